@@ -1,0 +1,62 @@
+"""A degree of freedom is a node and a signed direction: ``TCP:+X``."""
+
+import re
+from dataclasses import dataclass
+
+from foundation.errors import InputError
+
+_PATTERN = re.compile(r"^(?P<node>[^:]+):(?P<sign>[+-])(?P<axis>R?[XYZ]|S)$")
+
+
+@dataclass(frozen=True)
+class DegreeOfFreedom:
+    """Where and along which signed axis a force acts or a motion is measured.
+
+    Parameters
+    ----------
+    node
+        Name of the point, for example ``TCP`` or ``HOUSING``.
+    direction
+        ``+X -X +Y -Y +Z -Z`` (translation), ``+RX`` ... (rotation) or ``+S`` (scalar, no direction).
+
+    Raises
+    ------
+    InputError
+        The direction is none of these, or the node is empty or holds a colon.
+
+    Examples
+    --------
+    >>> DegreeOfFreedom.parse("TCP:-Y").direction
+    '-Y'
+    >>> str(DegreeOfFreedom("HOUSING", "+X"))
+    'HOUSING:+X'
+    """
+
+    node: str
+    direction: str
+
+    def __post_init__(self) -> None:
+        if _PATTERN.match(f"{self.node}:{self.direction}") is None:
+            raise InputError(
+                f"degree of freedom {self.node}:{self.direction!s} is not understood; "
+                "write node:direction with a direction such as +X, -Y or +RZ"
+            )
+
+    @classmethod
+    def parse(cls, text: str) -> "DegreeOfFreedom":
+        """Read ``node:direction``."""
+        node, _, direction = text.partition(":")
+        return cls(node, direction)
+
+    @property
+    def sign(self) -> float:
+        """+1 or -1."""
+        return -1.0 if self.direction.startswith("-") else 1.0
+
+    @property
+    def axis(self) -> str:
+        """The direction without its sign: ``X`` ... ``RZ`` or ``S``."""
+        return self.direction[1:]
+
+    def __str__(self) -> str:
+        return f"{self.node}:{self.direction}"

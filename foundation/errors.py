@@ -1,0 +1,13 @@
+"""The few named exceptions: a message shows the offending value and the remedy, in one line."""
+
+
+class MillfrfError(Exception):
+    """Base of every error this project raises on purpose; the command line ends with exit code 1."""
+
+
+class InputError(MillfrfError):
+    """What was given cannot be used: a wrong value, unit, length or option (exit code 2)."""
+
+
+class FileFormatError(InputError):
+    """A file is not what it should be: wrong kind, wrong version, damaged, or lacking a field."""

@@ -1,0 +1,1 @@
+"""Command line, reports and the demonstration: the face of the project."""

@@ -1,0 +1,122 @@
+"""`ModalModel`: poles, left and right vectors, and the terms that stand for modes out of band."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation import Frf
+from foundation import InputError
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Modes outside the band, as two real matrices: ``upper + lower / (i w)^2`` on receptance.
+
+    Parameters
+    ----------
+    upper : (n_responses, n_excitations)
+        Residual flexibility of the modes above the band, m/N.
+    lower : (n_responses, n_excitations)
+        Residual inertia of those below, m/N (rad/s)^2 (1/kg).
+    """
+
+    upper: NDArray[np.float64]
+    lower: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ModalModel:
+    """Modal model of a linear structure that need not be reciprocal.
+
+    ``H(w)[p, q] = sum_r right[r, p] left[r, q] / (i w - pole[r]) + conjugate term + residuals``
+    (Mohammadi & Ahmadi, Eq. 15; Ewins, Modal Testing, 2nd ed., section 2.7). No conjugate on ``left``.
+
+    Parameters
+    ----------
+    poles : (n_modes,), rad/s
+        Upper half of the conjugate pairs: imaginary part > 0.
+    right : (n_modes, n_responses), left : (n_modes, n_excitations)
+        Their product has the unit of the FRF times rad/s.
+    responses, excitations
+        Degrees of freedom along the axes, ``node:direction``.
+    quantity, unit
+        Of the FRF the model gives: ``receptance`` in ``m/N``, or ``transfer`` in any unit.
+    residuals
+        Out-of-band terms, or None.
+    covariance : (n_parameters, n_parameters) or None
+        Of the parameters in the order ``modal_fit`` documents.
+    physics
+        Terms ``{name, location, parameters}`` that a diagnosis added; empty for a linear model.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not agree, values that are not finite, or a pole in the lower half plane.
+    """
+
+    poles: NDArray[np.complex128]
+    right: NDArray[np.complex128]
+    left: NDArray[np.complex128]
+    responses: tuple[str, ...]
+    excitations: tuple[str, ...]
+    quantity: str = "receptance"
+    unit: str = "m/N"
+    residuals: Residuals | None = None
+    covariance: NDArray[np.float64] | None = None
+    physics: tuple[dict[str, Any], ...] = ()
+
+    def __post_init__(self) -> None:
+        n_modes = len(self.poles)
+        for name, array, labels in (("right", self.right, self.responses), ("left", self.left, self.excitations)):
+            if array.shape != (n_modes, len(labels)):
+                raise InputError(
+                    f"modal model: {name} vectors have shape {array.shape}, expected {(n_modes, len(labels))} "
+                    "(n_modes, n_dof)"
+                )
+        for name, array in (("poles", self.poles), ("right", self.right), ("left", self.left)):
+            if not np.isfinite(array).all():
+                raise InputError(f"modal model: {name} hold NaN or infinity; fit again or mend the file")
+        if n_modes and self.poles.imag.min() < 0:
+            raise InputError(
+                f"modal model: pole {self.poles[self.poles.imag.argmin()]:.4g} has a negative imaginary part; "
+                "give the upper half of each conjugate pair"
+            )
+
+    @property
+    def natural_frequencies(self) -> NDArray[np.float64]:
+        """Undamped natural frequencies |pole| / 2 pi, Hz, shape (n_modes,)."""
+        return np.abs(self.poles) / (2 * np.pi)
+
+    @property
+    def damping_ratios(self) -> NDArray[np.float64]:
+        """zeta = -Re(pole) / |pole|, shape (n_modes,)."""
+        return -self.poles.real / np.abs(self.poles)
+
+    def receptance(self, frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Evaluate H on ``frequencies`` (Hz); shape (n_frequencies, n_responses, n_excitations), in ``unit``.
+
+        Raises
+        ------
+        InputError
+            A frequency of zero where the model has a lower residual (it is infinite there).
+        """
+        s = 2j * np.pi * np.asarray(frequencies, dtype=float)
+        direct = np.einsum("kr,rp,rq->kpq", 1 / (s[:, None] - self.poles), self.right, self.left, optimize=True)
+        conjugate = np.einsum(
+            "kr,rp,rq->kpq", 1 / (s[:, None] - self.poles.conj()), self.right.conj(), self.left.conj(), optimize=True
+        )
+        values = np.asarray(direct + conjugate, dtype=complex)
+        if self.residuals is not None:
+            if self.residuals.lower.any() and (s == 0).any():
+                raise InputError("the model has a lower residual, infinite at 0 Hz; ask for frequencies above 0")
+            inverse_square = np.divide(1.0, s**2, out=np.zeros_like(s), where=s != 0)
+            values += self.residuals.upper + inverse_square[:, None, None] * self.residuals.lower
+        return values
+
+    def frf(self, frequencies: NDArray[np.float64]) -> Frf:
+        """The model's FRF as an :class:`estimation.Frf`, valid on every line."""
+        axis = np.asarray(frequencies, dtype=float)
+        valid = np.ones(len(axis), dtype=bool)
+        return Frf(axis, self.receptance(axis), self.responses, self.excitations, self.quantity, self.unit, valid)
