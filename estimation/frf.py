@@ -29,7 +29,7 @@ class FrfCovariance:
         """E|dH[p, q]|^2, shape (n_frequencies, n_responses, n_excitations)."""
         rows = np.real(np.einsum("kpp->kp", self.response))
         columns = np.real(np.einsum("kqq->kq", self.excitation))
-        return rows[:, :, None] * columns[:, None, :]
+        return np.asarray(rows[:, :, None] * columns[:, None, :])
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ def writing_whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     try:
         yield temporary
         _give_ordinary_permissions(temporary)
-        os.replace(temporary, target)
+        temporary.replace(target)
     finally:
         temporary.unlink(missing_ok=True)
 
