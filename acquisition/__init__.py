@@ -1,5 +1,23 @@
 """Channels, recordings and the sources they come from: knows nothing of spectra or models."""
 
-from acquisition.channel import Channel
+from .channel import Channel
+from .drivers import ReplaySource
+from .pacing import Paced
+from .record import record
+from .recording import EventSeries, Recording, Stream
+from .recording_writer import RecordingWriter
+from .source import Block, Source, StreamDescription
 
-__all__ = ["Channel"]
+__all__ = [
+    "Block",
+    "Channel",
+    "EventSeries",
+    "Paced",
+    "Recording",
+    "RecordingWriter",
+    "ReplaySource",
+    "Source",
+    "Stream",
+    "StreamDescription",
+    "record",
+]
