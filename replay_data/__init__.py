@@ -1,6 +1,8 @@
 """The simulated robot cell and its recordings: knows nothing of fitting or diagnosis."""
 
+from replay_data.hammer_cell import HammerCell
 from replay_data.material import Material
+from replay_data.milling_cell import MillingCell
 from replay_data.robot_structure import default_structure, table_one_model, tip_model
 from replay_data.sensors import (
     Sensor,
@@ -15,8 +17,10 @@ from replay_data.speed_profiles import ConstantSpeed, DriftingSpeed, LinearSweep
 __all__ = [
     "ConstantSpeed",
     "DriftingSpeed",
+    "HammerCell",
     "LinearSweep",
     "Material",
+    "MillingCell",
     "Sensor",
     "SpeedProfile",
     "default_structure",
