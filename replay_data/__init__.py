@@ -1,10 +1,10 @@
 """The simulated robot cell and its recordings: knows nothing of fitting or diagnosis."""
 
-from replay_data.hammer_cell import HammerCell
-from replay_data.material import Material
-from replay_data.milling_cell import MillingCell
-from replay_data.robot_structure import default_structure, table_one_model, tip_model
-from replay_data.sensors import (
+from .hammer_cell import HammerCell
+from .material import Material
+from .milling_cell import MillingCell
+from .robot_structure import default_structure, table_one_model, tip_model
+from .sensors import (
     Sensor,
     dynamometer,
     hammer_sensors,
@@ -12,7 +12,7 @@ from replay_data.sensors import (
     milling_sensors,
     tip_accelerometers,
 )
-from replay_data.speed_profiles import ConstantSpeed, DriftingSpeed, LinearSweep, SpeedProfile
+from .speed_profiles import ConstantSpeed, DriftingSpeed, LinearSweep, SpeedProfile
 
 __all__ = [
     "ConstantSpeed",
