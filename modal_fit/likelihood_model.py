@@ -16,8 +16,8 @@ class LikelihoodModel:
     """Unknowns of the fit, in the order in which they are packed into one real vector.
 
     Response of line k in test t, with D_k = s_k^derivative:
-    ``D_k [ sum_r right_r left_r^T / (s - p_r) + conjugate + out-of-band ] F + D_k sum_r right_r transient_tr / (s - p_r)
-    + smooth polynomial_t(s)``.
+    ``D_k [sum_r right_r left_r^T / (s - p_r) + conjugate + out-of-band] F
+    + D_k sum_r right_r transient_tr / (s - p_r) + smooth polynomial_t(s)``.
 
     Parameters
     ----------

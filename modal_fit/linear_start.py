@@ -11,8 +11,8 @@ Complex = NDArray[np.complex128]
 def linear_start(poles: Complex, setting: Setting) -> LikelihoodModel:
     """Least-squares unknowns for fixed ``poles`` (rad/s), with residues reduced to rank one.
 
-    Responses of one kind have the same regressors, so one factorisation serves them all. The residue matrices come out full
-    and are cut to rank one by their singular vectors, which are the right and left vectors.
+    Responses of one kind have the same regressors, so one factorisation serves them all. The residue
+    matrices come out full and are cut to rank one by their singular vectors, which are the right and left vectors.
     """
     spectra = setting.spectra
     n_modes, n_excitations, n_outside = len(poles), spectra.excitation.shape[1], len(setting.basis)

@@ -82,7 +82,6 @@ def _gauss_newton(
     model: LikelihoodModel, setting: Setting, noise: NoiseLevels
 ) -> tuple[LikelihoodModel, Complex, Complex, bool]:
     """Levenberg-Marquardt steps with noise variances held."""
-    spectra = setting.spectra
     damping = 1e-4
     frf, error, cost = _evaluate(model, setting, noise)
     for _ in range(_STEPS):
@@ -118,7 +117,7 @@ def _whitener(covariance: Complex) -> tuple[Complex, float]:
     """Inverse Cholesky factors, shape as given, and the log determinant summed over lines."""
     factor = np.linalg.cholesky(covariance)
     log_determinant = float(2 * np.sum(np.log(np.real(np.einsum("kpp->kp", factor)))))
-    return np.linalg.inv(factor), log_determinant
+    return np.asarray(np.linalg.inv(factor), dtype=np.complex128), log_determinant
 
 
 def _corrected_force(noise: NoiseLevels, spectra: RecordSpectra, frf: Complex, error: Complex) -> Complex:
@@ -136,10 +135,9 @@ def _normal_equations(
     force = _corrected_force(noise, setting.spectra, frf, error)
     derivative = jacobian(model, setting, force)
     whitener, _ = _whitener(noise.covariance(frf, setting.spectra.test))
-    columns = np.ascontiguousarray(whitener @ derivative).reshape(-1, derivative.shape[-1]).view(float)
-    columns = columns.reshape(len(columns), -1, 2)
+    columns = (whitener @ derivative).reshape(-1, derivative.shape[-1])
     target = (whitener @ error[..., None]).reshape(-1)
-    real, imaginary = np.ascontiguousarray(columns[..., 0]), np.ascontiguousarray(columns[..., 1])
+    real, imaginary = np.ascontiguousarray(columns.real), np.ascontiguousarray(columns.imag)
     matrix = real.T @ real + imaginary.T @ imaginary
     return np.asarray(matrix), np.asarray(real.T @ target.real + imaginary.T @ target.imag)
 

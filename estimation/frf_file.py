@@ -1,0 +1,97 @@
+"""FRF files: HDF5, format ``millfrf.frf`` version 1, readable with any HDF5 tool."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from foundation import FileFormatError, InputError, writing_whole_file
+
+from .frf import Frf, FrfCovariance
+
+FORMAT = "millfrf.frf"
+FORMAT_VERSION = 1
+
+
+def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", provenance: str = "") -> None:
+    """Write an FRF whole.
+
+    Root attributes ``format, format_version, title, provenance, quantity, unit, responses, excitations`` (JSON
+    lists); datasets ``frequencies`` (Hz), ``values`` (complex), ``valid``, and where known ``multiple_coherence``,
+    ``covariance/response``, ``covariance/excitation``.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+    """
+    with writing_whole_file(path) as temporary, h5py.File(temporary, "w") as file:
+        file.attrs.update({"format": FORMAT, "format_version": FORMAT_VERSION, "title": title})
+        file.attrs.update({"provenance": provenance, "quantity": frf.quantity, "unit": frf.unit})
+        file.attrs["responses"] = json.dumps(list(frf.responses))
+        file.attrs["excitations"] = json.dumps(list(frf.excitations))
+        for name in ("frequencies", "values", "valid"):
+            file[name] = getattr(frf, name)
+        if frf.multiple_coherence is not None:
+            file["multiple_coherence"] = frf.multiple_coherence
+        if frf.covariance is not None:
+            file["covariance/response"] = frf.covariance.response
+            file["covariance/excitation"] = frf.covariance.excitation
+
+
+def read_frf(path: str | os.PathLike[str]) -> Frf:
+    """Read what :func:`write_frf` wrote.
+
+    Raises
+    ------
+    InputError
+        No such file.
+    FileFormatError
+        Not HDF5, another format or version, a missing field, or shapes that disagree.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"no file {path}; check the name")
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        raise FileFormatError(f"{path} is not an HDF5 file or is damaged; give an FRF file made here") from error
+    with file:
+        _check(file.attrs, path)
+        try:
+            return _read(file)
+        except (KeyError, json.JSONDecodeError, TypeError, OSError) as error:
+            raise FileFormatError(f"{path}: a field is missing or damaged ({error}); estimate anew") from error
+        except InputError as error:
+            raise FileFormatError(f"{path}: {error}") from error
+
+
+def _check(attributes: Any, path: object) -> None:
+    found = attributes.get("format", "not given")
+    if found != FORMAT:
+        raise FileFormatError(f"{path} is no FRF: its format is {found!r}, expected {FORMAT!r}; run estimate first")
+    version = attributes.get("format_version")
+    if version is None or int(version) != FORMAT_VERSION:
+        raise FileFormatError(
+            f"{path} has format_version {version}, this program reads {FORMAT_VERSION}; use the program that wrote it"
+        )
+
+
+def _read(file: h5py.File) -> Frf:
+    covariance = None
+    if "covariance" in file:
+        covariance = FrfCovariance(file["covariance/response"][:], file["covariance/excitation"][:])
+    coherence = file["multiple_coherence"][:] if "multiple_coherence" in file else None
+    return Frf(
+        np.asarray(file["frequencies"][:], dtype=float),
+        np.asarray(file["values"][:], dtype=complex),
+        tuple(json.loads(file.attrs["responses"])),
+        tuple(json.loads(file.attrs["excitations"])),
+        str(file.attrs["quantity"]),
+        str(file.attrs["unit"]),
+        np.asarray(file["valid"][:], dtype=bool),
+        coherence,
+        covariance,
+    )

@@ -1,0 +1,82 @@
+"""Cross spectra of a recording: which channels, and one pass over the file."""
+
+from collections.abc import Callable, Sequence
+
+from acquisition import Channel, Recording, Stream
+from foundation import InputError
+
+from .cross_spectra import CrossSpectra, SpectralSettings
+from .spectral_accumulator import SpectralAccumulator
+
+EXCITING = ("force", "moment", "voltage")
+RESPONDING = ("acceleration", "velocity", "displacement")
+
+
+def choose_channels(
+    stream: Stream, excitations: Sequence[str] | None = None, responses: Sequence[str] | None = None
+) -> tuple[tuple[Channel, ...], tuple[Channel, ...]]:
+    """Excitation and response channels, by name or by quantity.
+
+    Without names, forces, moments and voltages excite; accelerations, velocities and displacements respond.
+
+    Raises
+    ------
+    InputError
+        A name that is not there, or none of the needed quantities.
+    """
+    chosen = []
+    for names, quantities, role in ((excitations, EXCITING, "excites"), (responses, RESPONDING, "responds")):
+        if names:
+            found = tuple(stream.channels[column] for column in stream.columns(names))
+        else:
+            found = tuple(channel for channel in stream.channels if channel.quantity in quantities)
+        if not found:
+            listed = ", ".join(f"{channel.name} ({channel.quantity})" for channel in stream.channels)
+            raise InputError(f"{stream.path.name}: no channel {role}; it has {listed}. Name the channels to use")
+        chosen.append(found)
+    return chosen[0], chosen[1]
+
+
+def cross_spectra(
+    recording: Recording,
+    settings: SpectralSettings,
+    *,
+    stream: str | None = None,
+    excitations: Sequence[str] | None = None,
+    responses: Sequence[str] | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> CrossSpectra:
+    """Welch spectra of one recording, read once, block by block.
+
+    Parameters
+    ----------
+    recording
+        Open recording.
+    settings
+        Segment length, overlap, window, detrending.
+    stream
+        Sample clock; None: the only one.
+    excitations, responses
+        Channel names; None: chosen by quantity, see :func:`choose_channels`.
+    progress
+        Called with the number of samples read so far.
+
+    Raises
+    ------
+    InputError
+        Channels that are not there, a record shorter than a segment, or samples that are not finite.
+    """
+    source = recording.stream(stream)
+    exciting, responding = choose_channels(source, excitations, responses)
+    accumulator = SpectralAccumulator(exciting, responding, source.sample_rate, settings)
+    names = [channel.name for channel in (*exciting, *responding)]
+    done = 0
+    try:
+        for block in source.blocks(max(1 << 16, settings.segment_length), names):
+            accumulator.add(block[:, : len(exciting)], block[:, len(exciting) :])
+            done += len(block)
+            if progress is not None:
+                progress(done)
+        return accumulator.result()
+    except InputError as error:
+        raise InputError(f"{recording.path.name}: {error}") from error

@@ -1,0 +1,247 @@
+"""Spectra and FRFs against scipy, analytic filters and invariants."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import signal
+
+from acquisition import Channel, Recording, RecordingWriter, StreamDescription
+from estimation import (
+    CrossSpectra,
+    Frf,
+    SpectralAccumulator,
+    SpectralSettings,
+    correct_high_pass,
+    cross_spectra,
+    h1,
+    h1_side_by_side,
+    input_coherence,
+    input_independence,
+    multiple_coherence,
+    read_frf,
+    settings_for,
+    sum_tests,
+    to_receptance,
+    write_frf,
+)
+from foundation import FileFormatError, InputError
+
+FORCES = tuple(Channel(f"f{a}", "force", "N", "TCP", f"+{a.upper()}") for a in "xy")
+MOTIONS = tuple(Channel(f"a{a}", "acceleration", "m/s^2", "TCP", f"+{a.upper()}") for a in "xy")
+RATE = 500.0
+
+
+def accumulate(
+    force: np.ndarray, motion: np.ndarray, settings: SpectralSettings, cuts: list[int] | None = None
+) -> CrossSpectra:
+    accumulator = SpectralAccumulator(FORCES, MOTIONS, RATE, settings)
+    for part in zip(np.split(force, cuts or []), np.split(motion, cuts or []), strict=True):
+        accumulator.add(*part)
+    return accumulator.result()
+
+
+@pytest.mark.parametrize("window", ["hann", "hamming", "boxcar"])
+@pytest.mark.parametrize("detrend", ["constant", "linear", "none"])
+@pytest.mark.parametrize("length", [128, 127])
+def test_spectra_equal_scipy(window: str, detrend: str, length: int) -> None:
+    rng = np.random.default_rng(3)
+    force, motion = rng.standard_normal((2, 1000, 2)) + 2.0
+    found = accumulate(force, motion, SpectralSettings(length, 0.5, window, detrend))
+    for p in range(2):
+        for q in range(2):
+            trend = False if detrend == "none" else detrend
+            # scipy's csd conjugates its first argument
+            _, expected = signal.csd(
+                force[:, q],
+                motion[:, p],
+                RATE,
+                window,
+                length,
+                round(0.5 * length),
+                detrend=trend,
+            )
+            np.testing.assert_allclose(found.cross_spectra[:, p, q], expected, rtol=1e-9, atol=1e-14)
+
+
+@given(cuts=st.lists(st.integers(0, 1500), max_size=6), overlap=st.sampled_from([0.0, 0.5, 0.75]))
+def test_any_division_into_blocks_gives_the_same_spectra(cuts: list[int], overlap: float) -> None:
+    force, motion = np.random.default_rng(1).standard_normal((2, 1500, 2))
+    settings = SpectralSettings(64, overlap, "hann")
+    whole = accumulate(force, motion, settings)
+    parts = accumulate(force, motion, settings, sorted(cuts))
+    assert parts.n_segments == whole.n_segments
+    np.testing.assert_allclose(parts.cross_spectra, whole.cross_spectra, rtol=1e-12, atol=1e-18)
+
+
+def test_two_half_records_summed_equal_the_whole() -> None:
+    force, motion = np.random.default_rng(1).standard_normal((2, 1024, 2))
+    settings = SpectralSettings(128, 0.0, "boxcar")
+    halves = [accumulate(force[part], motion[part], settings) for part in (slice(0, 512), slice(512, None))]
+    np.testing.assert_allclose(
+        sum_tests(halves).input_spectra, accumulate(force, motion, settings).input_spectra, rtol=1e-12
+    )
+
+
+def test_power_of_a_sine_and_of_white_noise() -> None:
+    time = np.arange(50_000) / RATE
+    sine = np.column_stack([3 * np.sin(2 * np.pi * 50 * time), np.zeros_like(time)])
+    noise = np.random.default_rng(0).standard_normal((50_000, 2)) * 2
+    found = accumulate(sine, noise, settings_for(RATE, 1.0, window="hann"))
+    resolution = found.frequencies[1]
+    assert np.real(found.input_spectra[:, 0, 0]).sum() * resolution == pytest.approx(4.5, rel=1e-6)
+    assert np.real(found.output_spectra[:, 0, 0]).sum() * resolution == pytest.approx(4.0, rel=0.03)
+
+
+def two_by_two(
+    n: int, noise: float, seed: int, force: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Force, motion and the true 2 x 2 impulse responses (short, so that leakage is nil at this segment length)."""
+    rng = np.random.default_rng(seed)
+    taps = np.array([[[1.0, -0.4, 0.1], [0.3, 0.2, 0.0]], [[-0.5, 0.1, 0.05], [0.8, 0.3, -0.2]]])
+    f = rng.standard_normal((n, 2)) if force is None else force
+    x = np.stack([sum(np.convolve(f[:, q], taps[p, q])[:n] for q in range(2)) for p in range(2)], axis=1)
+    return f, x + noise * x.std() * rng.standard_normal(x.shape), taps
+
+
+def test_h1_recovers_a_non_reciprocal_matrix_in_the_right_orientation() -> None:
+    force, motion, taps = two_by_two(200_000, 0.0, 5)
+    frf = h1(accumulate(force, motion, SpectralSettings(512, 0.5, "hann")))
+    truth = np.moveaxis(np.fft.rfft(taps, 512, axis=2), 2, 0)
+    assert frf.values.shape == truth.shape
+    np.testing.assert_allclose(frf.values, truth, atol=0.01)
+    assert abs(frf.values[20, 0, 1] - truth[20, 1, 0]) > 0.3  # a transposed matrix would pass neither
+    assert (frf.quantity, frf.unit) == ("accelerance", "m/s^2/N")
+
+
+def test_multiple_coherence_and_covariance_follow_the_noise() -> None:
+    """Gamma^2 = 1 - S_nn / S_pp; the covariance's mean square error ratio is 1."""
+    settings = SpectralSettings(128, 0.5, "hann")
+    ratios = []
+    for seed in range(40):
+        force, motion, taps = two_by_two(4000, 0.5, seed)
+        spectra = accumulate(force, motion, settings)
+        frf = h1(spectra)
+        truth = np.moveaxis(np.fft.rfft(taps, 128, axis=2), 2, 0)
+        assert frf.covariance is not None
+        ratios.append((np.abs(frf.values - truth) ** 2)[2:-2] / frf.covariance.variance()[2:-2])
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.06)
+    force, motion, taps = two_by_two(400_000, 0.5, 1)
+    coherence = multiple_coherence(accumulate(force, motion, settings))
+    truth = np.moveaxis(np.fft.rfft(taps, 128, axis=2), 2, 0)
+    power = np.sum(np.abs(truth) ** 2, axis=2)
+    noise = 0.25 * np.mean(np.sum(taps**2, axis=(1, 2)))
+    np.testing.assert_allclose(coherence[2:-2], (power / (power + noise))[2:-2], atol=0.03)
+
+
+def periodic_tests(seed: int) -> list[CrossSpectra]:
+    """Two tests whose forces are fully dependent, in different ways."""
+    tests = []
+    for mix in ([1.0, 0.7], [0.4, -1.0]):
+        drive = np.random.default_rng(seed).standard_normal(20_000)
+        force, motion, _ = two_by_two(20_000, 0.0, seed, np.outer(drive, mix))
+        tests.append(accumulate(force, motion, SpectralSettings(256, 0.5, "hann")))
+    return tests
+
+
+def test_dependent_inputs_are_told_and_stacking_mends_them() -> None:
+    tests = periodic_tests(2)
+    np.testing.assert_allclose(input_coherence(tests[0])[5:, 0, 1], 1.0, atol=1e-9)
+    single = input_independence(tests[0])
+    assert single.rank.max() == 1
+    assert "not independent" in single.warnings[0]
+    with pytest.raises(InputError, match="at least 2 tests with different immersions"):
+        h1(tests[0])
+    both = sum_tests(tests)
+    assert input_independence(both).independent.all()
+    truth = np.moveaxis(np.fft.rfft(two_by_two(10, 0.0, 2)[2], 256, axis=2), 2, 0)
+    for frf in (h1(both), h1_side_by_side(tests)):
+        np.testing.assert_allclose(frf.values[3:-3], truth[3:-3], atol=0.05)
+
+
+def test_a_line_without_independent_inputs_is_flagged_and_zero() -> None:
+    rng = np.random.default_rng(0)
+    common = signal.sosfilt(signal.butter(6, 50, fs=RATE, output="sos"), rng.standard_normal(40_000))
+    own = signal.sosfilt(
+        signal.butter(12, 120, "high", fs=RATE, output="sos"), rng.standard_normal((40_000, 2)), axis=0
+    )
+    force, motion, _ = two_by_two(40_000, 0.01, 0, common[:, None] * [1.0, 0.5] + own)
+    frf = h1(accumulate(force, motion, SpectralSettings(250, 0.5, "hann")))
+    # detrending takes the common part off the lowest lines
+    low, high = (frf.frequencies > 5) & (frf.frequencies < 40), frf.frequencies > 150
+    assert not frf.valid[low].any()
+    assert frf.valid[high].all()
+    assert not frf.values[~frf.valid].any()
+
+
+@given(rotation=st.floats(0, 2 * np.pi), gain=st.floats(1e-3, 1e3))
+def test_h1_turns_with_the_force_axes(rotation: float, gain: float) -> None:
+    """H for forces B f is H B^-1: no axis or unit is special."""
+    force, motion, _ = two_by_two(3000, 0.2, 8)
+    mix = gain * np.array([[np.cos(rotation), -np.sin(rotation)], [np.sin(rotation), np.cos(rotation)]])
+    settings = SpectralSettings(64, 0.5, "hann")
+    plain, turned = (h1(accumulate(f, motion, settings)).values for f in (force, force @ mix.T))
+    np.testing.assert_allclose(turned @ mix, plain, rtol=1e-8, atol=1e-10)
+
+
+def test_receptance_and_the_sensor_high_pass() -> None:
+    f = np.linspace(0, 50, 101)
+    s = 2j * np.pi * f
+    truth = 1 / (s**2 + 4 * s + (2 * np.pi * 17) ** 2)
+    corner = 0.5
+    passed = np.divide(s, s + 2 * np.pi * corner) * s**2 * truth
+    frf = Frf(f, passed[:, None, None], ("TCP:+X",), ("TCP:+X",), "accelerance", "m/s^2/N", np.ones(101, dtype=bool))
+    found = to_receptance(correct_high_pass(frf, [corner]))
+    assert (found.quantity, found.unit) == ("receptance", "m/N")
+    assert not found.valid[0]
+    np.testing.assert_allclose(found.values[1:, 0, 0], truth[1:], rtol=1e-12)
+
+
+def test_frf_files_round_trip_and_refuse_what_they_are_not(tmp_path: Path) -> None:
+    force, motion, _ = two_by_two(4000, 0.3, 1)
+    frf = h1(accumulate(force, motion, SpectralSettings(64, 0.5, "hann")))
+    write_frf(tmp_path / "a.h5", frf)
+    again = read_frf(tmp_path / "a.h5")
+    np.testing.assert_array_equal(again.values, frf.values)
+    assert again.covariance is not None
+    np.testing.assert_array_equal(again.covariance.variance(), frf.covariance.variance())  # type: ignore[union-attr]
+    (tmp_path / "b.h5").write_bytes(b"nothing")
+    with pytest.raises(FileFormatError, match="not an HDF5 file"):
+        read_frf(tmp_path / "b.h5")
+    stream = StreamDescription("main", RATE, 0.0, (*FORCES, *MOTIONS))
+    with RecordingWriter(tmp_path / "r.h5", [stream]) as writer:
+        writer.append("main", np.hstack([force, motion]))
+    with pytest.raises(FileFormatError, match=r"'millfrf.recording'"):
+        read_frf(tmp_path / "r.h5")
+    with Recording(tmp_path / "r.h5") as recording:
+        from_file = cross_spectra(recording, SpectralSettings(64, 0.5, "hann"))
+        np.testing.assert_allclose(h1(from_file).values, frf.values, rtol=1e-4, atol=1e-5)
+        with pytest.raises(InputError, match="no channel qx"):
+            cross_spectra(recording, SpectralSettings(64), excitations=["qx"])
+        with pytest.raises(InputError, match="shorter than one segment"):
+            cross_spectra(recording, SpectralSettings(10_000))
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (SpectralSettings(4), "too short"),
+        (SpectralSettings(64, 1.0), "overlap 1"),
+        (SpectralSettings(64, 0.5, "flat"), "unknown window 'flat'"),
+        (SpectralSettings(64, 0.5, "hann", "cubic"), "unknown detrend 'cubic'"),
+    ],
+)
+def test_unusable_settings_are_refused(settings: SpectralSettings, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        SpectralAccumulator(FORCES, MOTIONS, RATE, settings)
+
+
+def test_tests_that_differ_are_not_stacked() -> None:
+    force, motion, _ = two_by_two(1000, 0.0, 1)
+    one = accumulate(force, motion, SpectralSettings(64))
+    other = SpectralAccumulator(FORCES, MOTIONS, 2 * RATE, SpectralSettings(64))
+    other.add(force, motion)
+    with pytest.raises(InputError, match="1000 Hz, test 1 at 500 Hz"):
+        sum_tests([one, other.result()])
