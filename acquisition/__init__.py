@@ -1,6 +1,7 @@
 """Channels, recordings and the sources they come from: knows nothing of spectra or models."""
 
 from .channel import Channel
+from .conversion import convert
 from .drivers import ReplaySource
 from .pacing import Paced
 from .record import record
@@ -19,5 +20,6 @@ __all__ = [
     "Source",
     "Stream",
     "StreamDescription",
+    "convert",
     "record",
 ]

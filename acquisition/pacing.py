@@ -8,6 +8,40 @@ from foundation import InputError
 from .source import Block, Source, StreamDescription
 
 
+class Pace:
+    """A clock that runs ``speed`` times as fast as the host's.
+
+    Parameters
+    ----------
+    speed
+        1: real time; infinity: nothing ever waits.
+
+    Raises
+    ------
+    InputError
+        A speed that is not positive.
+    """
+
+    def __init__(self, speed: float) -> None:
+        if not speed > 0:
+            raise InputError(f"speed {speed!r} must be positive: 1 is real time")
+        self._speed = speed
+        self._started = math.nan
+
+    def start(self) -> None:
+        """The clock shows zero now."""
+        self._started = time.monotonic()
+
+    def wait_until(self, seconds: float) -> float:
+        """Sleep until the clock shows ``seconds``; returns the host's monotonic time, s (NaN where nothing waits)."""
+        if math.isinf(self._speed):
+            return math.nan
+        wait = self._started + seconds / self._speed - time.monotonic()
+        if wait > 0:
+            time.sleep(wait)
+        return time.monotonic()
+
+
 class Paced:
     """A source that delivers no block before its last sample's time.
 
@@ -25,12 +59,9 @@ class Paced:
     """
 
     def __init__(self, source: Source, speed: float = 1.0) -> None:
-        if not speed > 0:
-            raise InputError(f"speed {speed!r} must be positive: 1 is real time")
         self._source = source
-        self._speed = speed
+        self._pace = Pace(speed)
         self._rates = {stream.name: stream.sample_rate for stream in source.streams}
-        self._started = math.nan
 
     @property
     def title(self) -> str:
@@ -55,18 +86,16 @@ class Paced:
     def open(self) -> None:
         """Open the source and start the clock."""
         self._source.open()
-        self._started = time.monotonic()
+        self._pace.start()
 
     def read(self) -> Block | None:
         """The next block, not before its time."""
         block = self._source.read()
-        if block is None or math.isinf(self._speed):
-            return block
-        last = block.first_sample + len(block.samples)
-        wait = self._started + last / self._rates[block.stream] / self._speed - time.monotonic()
-        if wait > 0:
-            time.sleep(wait)
-        return Block(block.stream, block.first_sample, block.samples, time.monotonic())
+        if block is None:
+            return None
+        end = (block.first_sample + len(block.samples)) / self._rates[block.stream]
+        now = self._pace.wait_until(end)
+        return block if math.isnan(now) else Block(block.stream, block.first_sample, block.samples, now)
 
     def close(self) -> None:
         """Close the source."""

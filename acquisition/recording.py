@@ -60,6 +60,12 @@ class Stream:
         return int(self._samples.shape[0])
 
     @property
+    def dtype(self) -> "np.dtype[np.floating]":
+        """How samples are stored: float32 or float64."""
+        stored: np.dtype[np.floating] = self._samples.dtype
+        return stored
+
+    @property
     def duration(self) -> float:
         """n_samples / sample_rate, s."""
         return self.n_samples / self.sample_rate
@@ -121,8 +127,19 @@ class EventSeries:
         self._group = group
 
     def read(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times (s) and values, each (n_events,)."""
-        return np.asarray(self._group["time"][:], dtype=float), np.asarray(self._group["value"][:], dtype=float)
+        """Times (s) and values, each (n_events,).
+
+        Raises
+        ------
+        FileFormatError
+            The series is damaged.
+        """
+        try:
+            times, values = (np.asarray(self._group[column][:], dtype=float) for column in ("time", "value"))
+        except (OSError, KeyError, AttributeError, TypeError, ValueError) as error:
+            raise FileFormatError(f"events {self._group.name} lack readable 'time' and 'value'; record anew") from error
+        n_whole = min(len(times), len(values))  # a writer killed between the two leaves one time more
+        return times[:n_whole], values[:n_whole]
 
 
 class Recording:

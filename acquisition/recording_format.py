@@ -3,6 +3,8 @@
 import json
 from typing import Any
 
+import numpy as np
+
 from foundation import FileFormatError, InputError
 
 from .channel import Channel
@@ -32,7 +34,7 @@ def check_format(attributes: Any, path: object) -> None:
             f"{path} is not a recording: its format is {found or 'not given'!r}, expected {FORMAT!r}; convert it first"
         )
     version = attributes.get("format_version")
-    if version is None or int(version) != FORMAT_VERSION:
+    if not isinstance(version, (int, np.integer)) or version != FORMAT_VERSION:
         raise FileFormatError(
             f"{path} has format_version {version}, this program reads {FORMAT_VERSION}; use the program that wrote it"
         )
@@ -60,5 +62,5 @@ def stream_from_attributes(name: str, attributes: Any, n_columns: int, path: obj
         channels = tuple(Channel.from_json(entry) for entry in listed)
         rate, start = float(attributes["sample_rate"]), float(attributes.get("start_time", 0.0))
         return StreamDescription(name, rate, start, channels)
-    except (InputError, TypeError, ValueError) as error:
+    except (InputError, TypeError, ValueError, OverflowError) as error:
         raise FileFormatError(f"{path}: /signals/{name}: {error}") from error

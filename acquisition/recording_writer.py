@@ -27,7 +27,7 @@ class RecordingWriter:
     Parameters
     ----------
     path
-        New file; an existing one is refused.
+        New file; an existing one is refused unless ``overwrite``.
     streams
         The sample clocks to come.
     title, setup
@@ -40,6 +40,8 @@ class RecordingWriter:
         Names of the slow series that ``append_event`` may be given.
     recorded_at
         ISO 8601 UTC; None: now.
+    overwrite
+        Replace an existing file.
 
     Raises
     ------
@@ -58,12 +60,13 @@ class RecordingWriter:
         block_length: int = 4096,
         event_names: Sequence[str] = (),
         recorded_at: str | None = None,
+        overwrite: bool = False,
     ) -> None:
         self.path = Path(path)
         self.streams = {stream.name: stream for stream in streams}
         if not streams or len(self.streams) != len(streams):
             raise InputError(f"a recording needs streams of different names, got {[s.name for s in streams]}")
-        self._file = self._create()
+        self._file = self._create("w" if overwrite else "x")
         stamp = recorded_at or datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         self._file.attrs.update(
             {"format": FORMAT, "format_version": FORMAT_VERSION, "title": title, "recorded_at": stamp}
@@ -79,11 +82,11 @@ class RecordingWriter:
         self._file.swmr_mode = True
         self._file.flush()
 
-    def _create(self) -> h5py.File:
+    def _create(self, mode: str) -> h5py.File:
         if not self.path.parent.is_dir():
             raise InputError(f"cannot write {self.path}: folder {self.path.parent} does not exist; create it first")
         try:
-            return h5py.File(self.path, "x", libver="latest")
+            return h5py.File(self.path, mode, libver="latest")
         except FileExistsError as error:
             raise InputError(f"{self.path} exists; choose another name or remove it first") from error
         except OSError as error:
@@ -118,19 +121,22 @@ class RecordingWriter:
             )
         self._extend(self._file["signals"][stream]["samples"], samples)
 
-    def append_event(self, name: str, time: float, value: float) -> None:
-        """Append one slow value at ``time`` (s) to the series ``name``.
+    def append_event(self, name: str, time: float | NDArray[np.floating], value: float | NDArray[np.floating]) -> None:
+        """Append a slow value at ``time`` (s), or several of each (n,), to the series ``name``.
 
         Raises
         ------
         InputError
-            A series that was not named when the file was made.
+            A series that was not named when the file was made, or times and values of unequal length.
         """
         group = self._file.get(f"events/{name}")
         if group is None:
             raise InputError(f"event series {name!r} was not announced; name it in event_names")
-        self._extend(group["time"], np.array([time]))
-        self._extend(group["value"], np.array([value]))
+        times, values = np.atleast_1d(time), np.atleast_1d(value)
+        if times.shape != values.shape or times.ndim != 1:
+            raise InputError(f"event {name}: {times.size} times but {values.size} values; give one value a time")
+        self._extend(group["time"], times)
+        self._extend(group["value"], values)
 
     def append_clock_pair(self, stream: str, sample_index: int, host_time: float) -> None:
         """Append (sample index, host monotonic time in s) to a stream's clock."""
@@ -145,8 +151,12 @@ class RecordingWriter:
     @staticmethod
     def _extend(dataset: h5py.Dataset, rows: NDArray[np.floating]) -> None:
         start = dataset.shape[0]
-        dataset.resize(start + len(rows), axis=0)
-        dataset[start:] = rows
+        try:
+            dataset.resize(start + len(rows), axis=0)
+            dataset[start:] = rows
+        except BaseException:  # also Ctrl-C: rows that were announced but not written must not be read as zeros
+            dataset.resize(start, axis=0)
+            raise
         dataset.flush()
 
     def close(self, *, complete: bool = True) -> None:

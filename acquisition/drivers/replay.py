@@ -1,8 +1,10 @@
-"""Replay of a recording file, as fast as it can be read; wrap it in `Paced` for real time."""
+"""Replay of a recording file, in real time or as fast as it can be read."""
 
+import math
 import os
 from pathlib import Path
 
+from ..pacing import Pace
 from ..recording import Recording
 from ..source import Block, StreamDescription
 
@@ -14,6 +16,8 @@ class ReplaySource:
     ----------
     path
         A recording; checked at once.
+    speed
+        1: real time; infinity: as fast as it can be read.
     block_length
         Rows in a block.
 
@@ -23,7 +27,8 @@ class ReplaySource:
         The file cannot be used.
     """
 
-    def __init__(self, path: str | os.PathLike[str], *, block_length: int = 4096) -> None:
+    def __init__(self, path: str | os.PathLike[str], *, speed: float = math.inf, block_length: int = 4096) -> None:
+        self._pace = Pace(speed)
         self._path = Path(path)
         self._block_length = block_length
         with Recording(path) as recording:
@@ -31,6 +36,7 @@ class ReplaySource:
             self.setup = recording.setup
             self.streams: tuple[StreamDescription, ...] = tuple(s.description for s in recording.streams.values())
             self.n_samples: int | None = sum(s.n_samples for s in recording.streams.values())
+        self._earliest = min(stream.start_time for stream in self.streams)
         self._recording: Recording | None = None
         self._next: dict[str, int] = {}
 
@@ -39,6 +45,7 @@ class ReplaySource:
         self.close()
         self._recording = Recording(self._path)
         self._next = {stream.name: 0 for stream in self.streams}
+        self._pace.start()
 
     def read(self) -> Block | None:
         """The block whose end comes first in time, or None at the end."""
@@ -52,9 +59,10 @@ class ReplaySource:
                 due.append((stream.start_time + stop / stream.sample_rate, stream.name, start, stop))
         if not due:
             return None
-        _, name, start, stop = min(due)
+        end, name, start, stop = min(due)
         self._next[name] = stop
-        return Block(name, start, self._recording.streams[name].read(start, stop))
+        samples = self._recording.streams[name].read(start, stop)
+        return Block(name, start, samples, self._pace.wait_until(end - self._earliest))
 
     def close(self) -> None:
         """Close the file."""

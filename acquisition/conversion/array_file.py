@@ -1,0 +1,143 @@
+"""Named arrays in a file of another program: NPY, NPZ, MAT (any version), HDF5, CSV."""
+
+import zipfile
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import loadmat
+from scipy.io.matlab import MatReadError
+
+from foundation import FileFormatError, InputError
+
+from .csv_file import read_csv
+from .flat_fields import numbers
+
+SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5", ".csv", ".txt")
+
+
+class ArrayFile:
+    """Arrays by name, with the headings of a table's columns where it has some.
+
+    Parameters
+    ----------
+    path
+        The file.
+    fields
+        Whatever it holds, by name.
+    headings
+        Of the columns of its only table.
+    """
+
+    def __init__(self, path: Path, fields: Mapping[str, Any], headings: tuple[str, ...] = ()) -> None:
+        self.path = path
+        self.fields = fields
+        self.headings = headings
+
+    def array(self, name: str | None) -> NDArray[np.floating]:
+        """The array of that name; None asks for the only one.
+
+        Raises
+        ------
+        FileFormatError
+            No such array, several and none named, or one that does not hold real numbers.
+        """
+        names = list(self.fields)
+        if name is None and len(names) == 1:
+            name = names[0]
+        if name is None or name not in self.fields:
+            asked = "several arrays and none named" if name is None else f"no array {name!r}"
+            raise FileFormatError(f"{self.path}: {asked}; it has {', '.join(names) or 'none'}")
+        return numbers(self.fields[name], name, self.path)
+
+
+def open_arrays(path: Path, **csv_options: Any) -> ArrayFile:
+    """Read the arrays of a file; nothing in it is ever unpickled.
+
+    Raises
+    ------
+    InputError
+        No such file, or a suffix that cannot be read.
+    FileFormatError
+        The file is damaged or holds pickled objects.
+    """
+    if not path.is_file():
+        raise InputError(f"no file {path}; check the name, or 'file' in the mapping")
+    suffix = path.suffix.lower()
+    if suffix in (".csv", ".txt"):
+        table = read_csv(path, **csv_options)
+        return ArrayFile(path, {"table": table.values}, table.headings)
+    readers: dict[str, Callable[[Path], dict[str, Any]]] = {
+        ".npy": _npy,
+        ".npz": _npz,
+        ".mat": _mat,
+        ".h5": _hdf5,
+        ".hdf5": _hdf5,
+    }
+    if suffix not in readers:
+        raise InputError(f"cannot read {path.name}: suffix {path.suffix!r}; use one of {', '.join(SUFFIXES)}")
+    try:
+        return ArrayFile(path, readers[suffix](path))
+    except FileFormatError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, MatReadError) as error:
+        reason = " ".join(str(error).split())
+        if "pickle" in reason:
+            reason = "it holds pickled Python objects, which can run programs; save plain arrays of numbers"
+        raise FileFormatError(f"{path} cannot be read as {suffix}: {reason or type(error).__name__}") from error
+
+
+def _npy(path: Path) -> dict[str, Any]:
+    return {path.stem: np.load(path, mmap_mode="r", allow_pickle=False)}
+
+
+def _npz(path: Path) -> dict[str, Any]:
+    with np.load(path, allow_pickle=False) as archive:
+        if not isinstance(archive, np.lib.npyio.NpzFile):
+            raise FileFormatError(f"{path} is not an NPZ archive; rename it to .npy")
+        return {name: archive[name] for name in archive.files}
+
+
+def _mat(path: Path) -> dict[str, Any]:
+    """Version 5 by scipy; version 7.3 is HDF5 with the axes reversed."""
+    if h5py.is_hdf5(path):
+        return {name: _reversed_axes(value) for name, value in _hdf5(path).items()}
+    loaded = loadmat(path, squeeze_me=False, struct_as_record=True)
+    fields: dict[str, Any] = {}
+    for name, value in loaded.items():
+        if not name.startswith("__"):
+            _flatten(name, value, fields)
+    return fields
+
+
+def _flatten(name: str, value: Any, into: dict[str, Any]) -> None:
+    """MATLAB structures become ``structure.field``."""
+    if isinstance(value, np.ndarray) and value.dtype.names and value.size == 1:
+        for field in value.dtype.names:
+            _flatten(f"{name}.{field}", value.reshape(-1)[0][field], into)
+    else:
+        into[name] = value
+
+
+def _hdf5(path: Path) -> dict[str, Any]:
+    fields: dict[str, Any] = {}
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and not name.startswith("#"):
+            key = name.replace("/", ".")
+            fields[key] = _matlab_text(item) if item.attrs.get("MATLAB_class") == b"char" else np.asarray(item[()])
+
+    with h5py.File(path, "r") as file:
+        file.visititems(visit)
+    return fields
+
+
+def _matlab_text(item: Any) -> str:
+    return "".join(map(chr, np.asarray(item[()]).reshape(-1).astype(int)))
+
+
+def _reversed_axes(value: Any) -> Any:
+    return value.T if isinstance(value, np.ndarray) else value

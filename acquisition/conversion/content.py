@@ -1,0 +1,119 @@
+"""What a conversion carries from any file to any other: streams with their samples, events and texts."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import FileFormatError
+
+from ..recording import Recording
+from ..source import StreamDescription
+
+Pairs = tuple[NDArray[np.float64], NDArray[np.float64]]
+
+
+class Samples(Protocol):
+    """Rows of one stream, read when asked for; an open recording's `Stream` is one."""
+
+    @property
+    def description(self) -> StreamDescription:
+        """Name, rate and channels."""
+
+    @property
+    def n_samples(self) -> int:
+        """Rows."""
+
+    @property
+    def dtype(self) -> "np.dtype[np.floating]":
+        """float32 or float64."""
+
+    def read(self, start: int = 0, stop: int | None = None) -> NDArray[np.float64]:
+        """Rows (n_samples, n_channels), SI units."""
+
+
+@dataclass(frozen=True)
+class ArraySamples:
+    """Samples in memory, (n_samples, n_channels), SI units.
+
+    Raises
+    ------
+    FileFormatError
+        No samples, columns that do not match the channels, or values that are not finite.
+    """
+
+    description: StreamDescription
+    array: NDArray[np.floating]
+
+    def __post_init__(self) -> None:
+        stream, width = self.description, len(self.description.channels)
+        if self.array.ndim != 2 or self.array.shape[1] != width or not len(self.array):
+            raise FileFormatError(
+                f"stream {stream.name}: samples of shape {self.array.shape} do not fit {width} channels; expected "
+                f"(n_samples, {width})"
+            )
+        finite = np.isfinite(self.array)
+        if not finite.all():
+            row, column = np.argwhere(~finite)[0]
+            raise FileFormatError(
+                f"channel {stream.channels[column].name} holds {self.array[row, column]} at sample {row}; "
+                "cut or mend the data before converting"
+            )
+
+    @property
+    def n_samples(self) -> int:
+        """Rows."""
+        return len(self.array)
+
+    @property
+    def dtype(self) -> "np.dtype[np.floating]":
+        """float32 or float64."""
+        return self.array.dtype
+
+    def read(self, start: int = 0, stop: int | None = None) -> NDArray[np.float64]:
+        """Rows ``start`` to ``stop`` as float64."""
+        return np.asarray(self.array[start:stop], dtype=float)
+
+
+@dataclass(frozen=True)
+class Content:
+    """A recording's content, wherever it lies.
+
+    Parameters
+    ----------
+    streams
+        One a sample clock.
+    title, setup, recorded_at
+        As in a recording; ``recorded_at`` is empty where it is not known.
+    events
+        Times (s) and values by name.
+    clock_pairs
+        (sample index, host time) by stream, (n_pairs, 2).
+    """
+
+    streams: tuple[Samples, ...]
+    title: str = ""
+    setup: str = ""
+    recorded_at: str = ""
+    events: Mapping[str, Pairs] = field(default_factory=dict)
+    clock_pairs: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+
+
+def recording_content(recording: Recording) -> Content:
+    """Content of an open recording; its samples stay in the file."""
+    return Content(
+        tuple(recording.streams.values()),
+        recording.title,
+        recording.setup,
+        recording.recorded_at,
+        {name: series.read() for name, series in recording.events.items()},
+        {name: recording.clock_pairs(name) for name in recording.streams},
+    )
+
+
+def row_blocks(samples: Samples, block_length: int = 1 << 15) -> Iterator[NDArray[np.float64]]:
+    """All rows in order, at most ``block_length`` at a time."""
+    for start in range(0, samples.n_samples, block_length):
+        yield samples.read(start, min(start + block_length, samples.n_samples))

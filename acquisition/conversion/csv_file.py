@@ -1,0 +1,151 @@
+"""CSV files: ours, which describe themselves in comment lines, and those of other programs."""
+
+import csv
+import io
+import json
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import FileFormatError
+
+from ..recording_format import check_format, stream_from_attributes
+from .content import ArraySamples, Content
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """Columns of numbers with their headings (empty where the file has none); values (n_rows, n_columns)."""
+
+    headings: tuple[str, ...]
+    values: NDArray[np.float64]
+
+
+def read_csv(
+    path: Path, *, delimiter: str | None = None, decimal: str = ".", skip_lines: int = 0, encoding: str = "utf-8-sig"
+) -> CsvTable:
+    """Read a table of numbers; lines that begin with ``#`` are comments.
+
+    Parameters
+    ----------
+    delimiter
+        None: whichever of comma, semicolon and tabulator the first line holds most of.
+    decimal
+        Decimal sign.
+    skip_lines
+        Lines to skip at the top.
+
+    Raises
+    ------
+    FileFormatError
+        Rows of unequal length, or a field that is no number; with its line.
+    """
+    text = read_text(path, encoding)
+    lines = [(n, line) for n, line in enumerate(text.splitlines(), 1) if n > skip_lines]
+    rows = [(n, line) for n, line in lines if line.strip() and not line.startswith("#")]
+    if not rows:
+        raise FileFormatError(f"{path} holds no rows of numbers; check the file and skip_lines")
+    chosen = delimiter or max(",;\t", key=rows[0][1].count)
+    headings: tuple[str, ...] = ()
+    first = next(csv.reader([rows[0][1]], delimiter=chosen))
+    if not all(_is_number(field, decimal) for field in first):
+        headings = tuple(field.strip() for field in first)
+        rows = rows[1:]
+    return CsvTable(headings, _parse(rows, chosen, decimal, path))
+
+
+def read_text(path: Path, encoding: str = "utf-8-sig") -> str:
+    """The file's text.
+
+    Raises
+    ------
+    FileFormatError
+        It is not of that encoding.
+    """
+    try:
+        return path.read_text(encoding=encoding)
+    except (UnicodeDecodeError, LookupError) as error:
+        raise FileFormatError(
+            f"{path} is not text of encoding {encoding}; save it as UTF-8, or set encoding under [csv], such as cp1252"
+        ) from error
+
+
+def describes_itself(path: Path) -> bool:
+    """Whether the CSV file was written by this program."""
+    with path.open("rb") as handle:
+        return handle.readline(200).startswith(b"# format: ")
+
+
+def read_own_csv(path: Path) -> Content:
+    """Read what this program wrote, with its description.
+
+    Raises
+    ------
+    FileFormatError
+        The description or a row is damaged.
+    """
+    metadata: dict[str, Any] = {}
+    for line in read_text(path).splitlines():
+        if not line.startswith("# "):
+            break
+        key, _, value = line[2:].partition(": ")
+        try:
+            metadata[key] = json.loads(value)
+        except json.JSONDecodeError as error:
+            raise FileFormatError(f"{path}: comment line {key!r} is not JSON ({error}); convert anew") from error
+    check_format(metadata, path)
+    values = read_csv(path, delimiter=",").values[:, 1:]  # the first column is time
+    attributes = {**metadata, "channels": json.dumps(metadata.get("channels"))}
+    described = stream_from_attributes(str(metadata.get("stream", "main")), attributes, values.shape[1], path)
+    kept = values.astype(np.float32) if metadata.get("dtype") == "float32" else values
+    try:
+        events = {
+            name: (np.array(times, dtype=float), np.array(series, dtype=float))
+            for name, (times, series) in metadata.get("events", {}).items()
+        }
+        clock = np.array(metadata.get("clock", []), dtype=float).reshape(-1, 2)
+    except (TypeError, ValueError, AttributeError) as error:
+        raise FileFormatError(f"{path}: comment lines 'events' or 'clock' are damaged; convert anew") from error
+    title, setup, recorded_at = (str(metadata.get(name, "")) for name in ("title", "setup", "recorded_at"))
+    return Content((ArraySamples(described, kept),), title, setup, recorded_at, events, {described.name: clock})
+
+
+def _parse(rows: list[tuple[int, str]], delimiter: str, decimal: str, path: Path) -> NDArray[np.float64]:
+    def lines() -> Iterator[str]:
+        for _, line in rows:
+            yield line if decimal == "." else line.replace(decimal, ".")
+
+    if not rows:
+        raise FileFormatError(f"{path} holds headings but no rows of numbers")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            return np.loadtxt(io.StringIO("\n".join(lines())), delimiter=delimiter, ndmin=2, comments=None)
+    except (ValueError, Warning) as error:
+        raise FileFormatError(f"{path}: {_offence(rows, delimiter, decimal)}; mend the file or its mapping") from error
+
+
+def _offence(rows: list[tuple[int, str]], delimiter: str, decimal: str) -> str:
+    """The first row that is not like the others, or not of numbers."""
+    width = len(rows[0][1].split(delimiter))
+    for number, line in rows:
+        fields = line.split(delimiter)
+        if len(fields) != width:
+            return f"line {number} has {len(fields)} columns, the first row has {width}"
+        for column, field in enumerate(fields, 1):
+            if not _is_number(field, decimal):
+                return f"line {number}, column {column}: {field.strip()[:40]!r} is not a number"
+    return "it cannot be read as a table of numbers"
+
+
+def _is_number(field: str, decimal: str) -> bool:
+    try:
+        float(field.strip().replace(decimal, "."))
+    except ValueError:
+        return False
+    return True

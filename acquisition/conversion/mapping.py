@@ -1,0 +1,205 @@
+"""`Mapping`: which array or column of a file is which channel; a TOML file checked where it enters."""
+
+import os
+import tomllib
+from collections import Counter
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from foundation import SI_UNITS, InputError, si_factor
+
+from ..channel import Channel
+
+_STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class NameChange(BaseModel):
+    """A further file's name: the input's name with one part replaced."""
+
+    model_config = _STRICT
+    replace: Annotated[str, Field(min_length=1)]
+    by: str
+
+
+class ArrayMapping(BaseModel):
+    """Where an array lies and what its axes are.
+
+    Parameters
+    ----------
+    file
+        A file beside the input, or ``{replace, by}`` applied to the input's name; None: the input itself.
+    name
+        Of the array inside its file; None: the mapping's own key where the file has it, else the only array.
+    axes
+        One name an axis, ``sample`` among them, ``channel`` where there are several columns; None: the mapping's.
+    """
+
+    model_config = _STRICT
+    file: str | NameChange | None = None
+    name: str | None = None
+    axes: tuple[str, ...] | None = None
+
+
+class ChannelMapping(BaseModel):
+    """One channel: its place in the file, its place on the machine, and how its numbers become SI.
+
+    ``value = (stored - offset) / sensitivity * (unit in SI)``
+
+    Parameters
+    ----------
+    name, quantity, unit, node, direction, high_pass_hz, sensor
+        As in a recording's `Channel`, but ``unit`` is the file's own: ``kN``, ``g``, ``um``.
+    array
+        Key of ``[arrays.KEY]`` or name of an array in the input; None where there is only one.
+    column
+        Along the ``channel`` axis: a number counted from 1, or a heading of the table. None where there is one column.
+    full_scale
+        Largest magnitude the input holds, in ``unit``.
+    sensitivity
+        Stored numbers per ``unit``, for example 0.1 where 0.1 V are 1 g.
+    offset
+        Stored number that means zero.
+    """
+
+    model_config = _STRICT
+    name: Annotated[str, Field(min_length=1)]
+    quantity: str
+    unit: str
+    node: str = ""
+    direction: str = ""
+    array: str | None = None
+    column: Annotated[int, Field(ge=1)] | str | None = None
+    full_scale: Annotated[float, Field(gt=0)] | None = None
+    high_pass_hz: Annotated[float, Field(gt=0)] | None = None
+    sensor: str = ""
+    sensitivity: float = 1.0
+    offset: float = 0.0
+
+    @model_validator(mode="after")
+    def _understood(self) -> "ChannelMapping":
+        if self.sensitivity == 0:
+            raise ValueError("sensitivity 0 would divide by zero; give stored numbers per unit")
+        try:
+            self.channel()
+        except InputError as error:
+            raise ValueError(str(error)) from error
+        return self
+
+    def channel(self) -> Channel:
+        """The channel as a recording describes it, in SI units."""
+        factor = si_factor(self.quantity, self.unit)
+        full_scale = None if self.full_scale is None else self.full_scale * abs(factor)
+        place = (self.node, self.direction)
+        return Channel(
+            self.name, self.quantity, SI_UNITS[self.quantity], *place, full_scale, self.high_pass_hz, self.sensor
+        )
+
+    def to_si(self, stored: np.ndarray) -> np.ndarray:
+        """Stored numbers as SI values."""
+        values = stored if self.offset == 0 else stored - self.offset
+        factor = si_factor(self.quantity, self.unit) / self.sensitivity
+        return values if factor == 1 else values * factor
+
+
+class CsvOptions(BaseModel):
+    """How a CSV file of another program is written."""
+
+    model_config = _STRICT
+    delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = None
+    decimal: Literal[".", ","] = "."
+    skip_lines: Annotated[int, Field(ge=0)] = 0
+    encoding: str = "utf-8-sig"
+
+
+class Mapping(BaseModel):
+    """The whole mapping file.
+
+    Parameters
+    ----------
+    channels
+        One a column of the recording, in this order.
+    sample_rate
+        Hz; or instead ``time``, the evenly spaced array or column of times, in ``time_unit``.
+    arrays
+        Arrays by key, for those not simply found by name in the input.
+    axes
+        Axes of every array that does not name its own; None: ``sample, channel``.
+    join
+        Axes whose entries follow one another in time, slowest first.
+    split
+        Axis whose entries become one recording each: ``rec.h5`` becomes ``rec-1.h5``, ``rec-2.h5`` ...
+    """
+
+    model_config = _STRICT
+    channels: Annotated[tuple[ChannelMapping, ...], Field(min_length=1)]
+    title: str = ""
+    setup: str = ""
+    recorded_at: str = ""
+    stream: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")] = "main"
+    sample_rate: Annotated[float, Field(gt=0)] | None = None
+    time: str | None = None
+    time_unit: Literal["s", "ms", "us"] = "s"
+    start_time: float = 0.0
+    dtype: Literal["float32", "float64"] | None = None
+    arrays: dict[str, ArrayMapping] = Field(default_factory=dict)
+    axes: tuple[str, ...] | None = None
+    join: tuple[str, ...] = ()
+    split: str | None = None
+    csv: CsvOptions = CsvOptions()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Mapping":
+        twice = [name for name, count in Counter(channel.name for channel in self.channels).items() if count > 1]
+        if twice:
+            raise ValueError(f"channel {', '.join(twice)} appears twice; give unique names")
+        if (self.sample_rate is None) == (self.time is None):
+            raise ValueError("give either sample_rate (Hz) or time (name of the array or column of times), one of them")
+        for key, axes in [("axes", self.axes), *((f"arrays.{k}.axes", a.axes) for k, a in self.arrays.items())]:
+            self._check_axes(key, axes)
+        return self
+
+    def _check_axes(self, key: str, axes: tuple[str, ...] | None) -> None:
+        if axes is None:
+            return
+        if len(set(axes)) != len(axes) or "sample" not in axes:
+            raise ValueError(f"{key} = {list(axes)} must name each axis once, 'sample' among them")
+        loose = set(axes) - {"sample", "channel", self.split, *self.join}
+        if loose:
+            raise ValueError(f"{key}: axis {', '.join(sorted(loose))} is neither in join nor split; put it into one")
+
+
+def load_mapping(path: str | os.PathLike[str]) -> Mapping:
+    """Read a mapping file.
+
+    Raises
+    ------
+    InputError
+        No such file, no TOML, or a key that is unknown, missing or out of range; one line with file, key and value.
+    """
+    file = Path(path)
+    try:
+        return Mapping.model_validate(tomllib.loads(file.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise InputError(f"cannot read mapping {file}: {error.strerror}; check the name") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"mapping {file} is not TOML: {error}") from error
+    except ValidationError as error:
+        raise InputError(f"mapping {file}: {_first_complaint(error)}") from error
+
+
+def _first_complaint(error: ValidationError) -> str:
+    """The first complaint as one line: key, what is wrong, the value."""
+    first = error.errors(include_url=False)[0]
+    key = ""
+    for part in first["loc"]:
+        key += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if key else str(part)
+    if first["type"] == "extra_forbidden":
+        return f"unknown key {key}; check its spelling"
+    if first["type"] == "missing":
+        return f"key {key} is missing; add it"
+    reason = " ".join(first["msg"].removeprefix("Value error, ").split())
+    value = "" if isinstance(first["input"], (dict, BaseModel)) else f", got {first['input']!r}"
+    return f"{key}: {reason}{value}" if key else f"{reason}"

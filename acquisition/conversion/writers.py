@@ -1,0 +1,135 @@
+"""Write a recording's content as HDF5, NPZ, MAT or CSV."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import savemat
+
+from foundation import InputError
+
+from ..recording_format import FORMAT, FORMAT_VERSION
+from ..recording_writer import RecordingWriter
+from .content import Content, row_blocks
+from .flat_fields import to_fields
+
+Progress = Callable[[int], None]
+
+_LARGEST_MAT_ARRAY = 2**31 - 1
+
+
+def write_content(content: Content, path: Path, progress: Progress | None = None) -> None:
+    """Write ``content`` in the format that the suffix of ``path`` names.
+
+    Raises
+    ------
+    InputError
+        A suffix that cannot be written, or content that the format cannot hold.
+    """
+    require_writable(path)
+    report: Progress = progress or (lambda n_samples: None)
+    {".h5": _write_h5, ".npz": _write_npz, ".mat": _write_mat, ".csv": _write_csv}[path.suffix.lower()](
+        content, path, report
+    )
+
+
+def require_writable(path: Path) -> None:
+    """Refuse a suffix that :func:`write_content` does not know."""
+    if path.suffix.lower() not in (".h5", ".npz", ".mat", ".csv"):
+        raise InputError(f"cannot write {path.name}: suffix {path.suffix!r}; use .h5, .npz, .mat or .csv")
+
+
+def _write_h5(content: Content, path: Path, progress: Progress) -> None:
+    described = [samples.description for samples in content.streams]
+    dtype: Literal["float32", "float64"] = "float32"
+    if any(samples.dtype == np.float64 for samples in content.streams):
+        dtype = "float64"
+    with RecordingWriter(
+        path,
+        described,
+        title=content.title,
+        setup=content.setup,
+        dtype=dtype,
+        event_names=list(content.events),
+        recorded_at=content.recorded_at or None,
+        overwrite=True,
+    ) as writer:
+        written = 0
+        for samples in content.streams:
+            for block in row_blocks(samples):
+                writer.append(samples.description.name, block)
+                written += len(block)
+                progress(written)
+        for name, (times, values) in content.events.items():
+            writer.append_event(name, times, values)
+        for name, pairs in content.clock_pairs.items():
+            for index, host_time in pairs:
+                writer.append_clock_pair(name, int(index), float(host_time))
+
+
+def _write_npz(content: Content, path: Path, progress: Progress) -> None:
+    arrays: dict[str, Any] = {name: np.asarray(value) for name, value in to_fields(content).items()}
+    with path.open("wb") as handle:
+        np.savez(handle, **arrays)
+    progress(_total(content))
+
+
+def _write_mat(content: Content, path: Path, progress: Progress) -> None:
+    for samples in content.streams:
+        size = samples.n_samples * len(samples.description.channels) * samples.dtype.itemsize
+        if size > _LARGEST_MAT_ARRAY:
+            raise InputError(f"stream {samples.description.name} has {size} bytes, more than a MAT file holds; use .h5")
+    with path.open("wb") as handle:
+        savemat(handle, to_fields(content), oned_as="column")
+    progress(_total(content))
+
+
+def _total(content: Content) -> int:
+    return sum(samples.n_samples for samples in content.streams)
+
+
+def _write_csv(content: Content, path: Path, progress: Progress) -> None:
+    if len(content.streams) != 1:
+        names = ", ".join(samples.description.name for samples in content.streams)
+        raise InputError(f"a CSV file holds one sample clock, this recording has {names}; use .npz, .mat or .h5")
+    samples = content.streams[0]
+    described = samples.description
+    digits = "%.9g" if samples.dtype == np.float32 else "%.17g"
+    row_format = ",".join(["%.15g", *[digits] * len(described.channels)])
+    with path.open("w", encoding="utf-8", newline="\n") as handle:
+        for key, value in _csv_metadata(content).items():
+            handle.write(f"# {key}: {json.dumps(value)}\n")
+        names = ["time [s]", *(f"{channel.name} [{channel.unit}]" for channel in described.channels)]
+        handle.write(",".join(f'"{name}"' if "," in name else name for name in names) + "\n")
+        written = 0
+        for block in row_blocks(samples):
+            time = described.start_time + np.arange(written, written + len(block)) / described.sample_rate
+            np.savetxt(handle, np.column_stack([time, block]), fmt=row_format)
+            written += len(block)
+            progress(written)
+
+
+def _csv_metadata(content: Content) -> dict[str, object]:
+    samples = content.streams[0]
+    described = samples.description
+
+    def listed(pairs: tuple[NDArray[np.float64], NDArray[np.float64]]) -> list[list[float]]:
+        return [pairs[0].tolist(), pairs[1].tolist()]
+
+    return {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "title": content.title,
+        "recorded_at": content.recorded_at,
+        "setup": content.setup,
+        "stream": described.name,
+        "sample_rate": described.sample_rate,
+        "start_time": described.start_time,
+        "dtype": samples.dtype.name,
+        "channels": [channel.to_json() for channel in described.channels],
+        "events": {name: listed(pairs) for name, pairs in content.events.items()},
+        "clock": content.clock_pairs.get(described.name, np.empty((0, 2))).tolist(),
+    }
