@@ -1,5 +1,31 @@
 """Modal models, their fitting and the calibration to the tool tip: knows nothing of cutting."""
 
-from modal_fit.modal_model import ModalModel, Residuals
+from .modal_model import ModalModel, Residuals
+from .modal_model_file import read_modal_model, write_modal_model
+from .polyreference import ModalFit, fit_polyreference
+from .shape_measures import modal_assurance, phase_collinearity, phase_deviation, reciprocity_residual
+from .stabilisation import PoleGroup, StabilisationChart
+from .subspace import SubspaceFit, fit_subspace
+from .tip_calibration import TipCalibration, calibrate_to_tip
+from .uncertainty import derived_covariance, frequency_and_damping_errors
 
-__all__ = ["ModalModel", "Residuals"]
+__all__ = [
+    "ModalFit",
+    "ModalModel",
+    "PoleGroup",
+    "Residuals",
+    "StabilisationChart",
+    "SubspaceFit",
+    "TipCalibration",
+    "calibrate_to_tip",
+    "derived_covariance",
+    "fit_polyreference",
+    "fit_subspace",
+    "frequency_and_damping_errors",
+    "modal_assurance",
+    "phase_collinearity",
+    "phase_deviation",
+    "read_modal_model",
+    "reciprocity_residual",
+    "write_modal_model",
+]

@@ -25,9 +25,9 @@ class LikelihoodModel:
     right : (n_modes, n_responses), left : (n_modes, n_excitations)
     outside : (n_terms, n_responses, n_excitations), real
         Coefficients of ``basis``.
-    transient : (n_tests, n_modes)
+    transient : (n_tests, n_modes), or (0, n_modes) where there is no leakage
         Free decay left by each record's start and end, in units of ``left`` times force.
-    smooth : (n_tests, n_smooth, n_responses)
+    smooth : (n_tests, n_smooth, n_responses), or (0, n_smooth, n_responses)
         The same for all that lies outside the band: a polynomial over the scaled band.
     """
 
@@ -104,6 +104,8 @@ def prediction(model: LikelihoodModel, setting: Setting, frf: Complex) -> Comple
     """Response lines that the model gives for the measured excitation, shape (n_lines, n_responses)."""
     spectra = setting.spectra
     forced = np.einsum("kpq,kq->kp", frf, spectra.excitation)
+    if not len(model.transient):
+        return np.asarray(forced)
     decay = model.transient[spectra.test] / (spectra.s[:, None] - model.poles)
     polynomial = np.einsum("nk,knp->kp", setting.powers, model.smooth[spectra.test])
     return np.asarray(forced + setting.differentiation * (decay @ model.right) + polynomial)
@@ -117,10 +119,11 @@ def jacobian(model: LikelihoodModel, setting: Setting, excitation: Complex) -> C
     """
     spectra, s = setting.spectra, setting.spectra.s
     n_lines, n_responses = spectra.response.shape
-    n_modes = len(model.poles)
     differentiation = setting.differentiation
     plus, minus = 1 / (s[:, None] - model.poles), 1 / (s[:, None] - model.poles.conj())
-    drive = excitation @ model.left.T + model.transient[spectra.test]
+    drive = excitation @ model.left.T
+    if len(model.transient):
+        drive = drive + model.transient[spectra.test]
     mirror = excitation @ model.left.conj().T
     unit = np.eye(n_responses)
 
@@ -143,12 +146,11 @@ def jacobian(model: LikelihoodModel, setting: Setting, excitation: Complex) -> C
     )
     outside = np.einsum("nk,kq,pu->kpnuq", setting.basis, excitation, unit)
     columns.append(differentiation[:, :, None] * outside.reshape(n_lines, n_responses, -1))
-    member = (spectra.test[:, None] == np.arange(spectra.n_tests)).astype(float)
+    member = (spectra.test[:, None] == np.arange(len(model.transient))).astype(float)
     decay = np.einsum("kt,kr,rp->kptr", member, plus, model.right).reshape(n_lines, n_responses, -1)
     decay = differentiation[:, :, None] * decay
     smooth = np.einsum("kt,nk,pu->kptnu", member, setting.powers, unit).reshape(n_lines, n_responses, -1)
     columns += [decay, 1j * decay, smooth.astype(complex), 1j * smooth]
-    assert decay.shape[-1] == spectra.n_tests * n_modes
     return np.concatenate(columns, axis=-1)
 
 

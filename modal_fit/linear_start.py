@@ -8,7 +8,7 @@ from .likelihood_model import LikelihoodModel, Setting
 Complex = NDArray[np.complex128]
 
 
-def linear_start(poles: Complex, setting: Setting) -> LikelihoodModel:
+def linear_start(poles: Complex, setting: Setting, *, transients: bool = True) -> LikelihoodModel:
     """Least-squares unknowns for fixed ``poles`` (rad/s), with residues reduced to rank one.
 
     Responses of one kind have the same regressors, so one factorisation serves them all. The residue
@@ -16,24 +16,25 @@ def linear_start(poles: Complex, setting: Setting) -> LikelihoodModel:
     """
     spectra = setting.spectra
     n_modes, n_excitations, n_outside = len(poles), spectra.excitation.shape[1], len(setting.basis)
+    n_tests = spectra.n_tests if transients else 0
     parts = []
     for derivative in np.unique(spectra.derivative):
         mine = spectra.derivative == derivative
-        parts.append((mine, _solve(_regressors(poles, setting, int(derivative)), spectra.response[:, mine])))
+        parts.append((mine, _solve(_regressors(poles, setting, int(derivative), n_tests), spectra.response[:, mine])))
     solution = np.empty((len(parts[0][1]), spectra.response.shape[1]))
     for mine, part in parts:
         solution[:, mine] = part
     ends = np.cumsum([2 * n_modes * n_excitations, n_outside * n_excitations])
-    residues, outside, transients = np.split(solution, ends)
+    residues, outside, free = np.split(solution, ends)
     residues = residues.reshape(n_modes, n_excitations, 2, -1)
     outside = np.moveaxis(outside.reshape(n_outside, n_excitations, -1), 1, 2)
-    transients = transients.reshape(spectra.n_tests, n_modes + len(setting.powers), 2, -1)
-    decays = transients[:, :, 0] + 1j * transients[:, :, 1]
+    free = free.reshape(n_tests, n_modes + len(setting.powers), 2, spectra.response.shape[1])
+    decays = free[:, :, 0] + 1j * free[:, :, 1]
     matrices = np.moveaxis(residues[:, :, 0] + 1j * residues[:, :, 1], 1, 2)
     return _rank_one(poles, matrices, outside, decays[:, :n_modes], decays[:, n_modes:])
 
 
-def _regressors(poles: Complex, setting: Setting, derivative: int) -> Complex:
+def _regressors(poles: Complex, setting: Setting, derivative: int, n_tests: int) -> Complex:
     """Columns of the linear problem, shape (n_lines, n_unknowns), real unknowns."""
     spectra = setting.spectra
     s, force = spectra.s, spectra.excitation
@@ -42,11 +43,14 @@ def _regressors(poles: Complex, setting: Setting, derivative: int) -> Complex:
     minus = factor[:, None] / (s[:, None] - poles.conj())
     residues = np.einsum("krc,kq->krqc", np.stack([plus + minus, 1j * (plus - minus)], axis=2), force)
     outside = np.einsum("nk,kq->knq", factor * setting.basis, force)
-    member = (spectra.test[:, None] == np.arange(spectra.n_tests)).astype(float)
+    member = (spectra.test[:, None] == np.arange(n_tests)).astype(float)
     free = np.concatenate([plus, setting.powers.T], axis=1)
     transients = np.einsum("kt,kn,c->ktnc", member, free, np.array([1, 1j]))
     n_lines = len(s)
-    return np.concatenate([block.reshape(n_lines, -1) for block in (residues, outside, transients)], axis=1)
+    blocks = [block.reshape(n_lines, -1) for block in (residues, outside)]
+    if n_tests:
+        blocks.append(transients.reshape(n_lines, -1))
+    return np.concatenate(blocks, axis=1)
 
 
 def _solve(regressors: Complex, response: Complex) -> NDArray[np.float64]:

@@ -42,11 +42,11 @@ def matrix_fraction_poles(
 ) -> Iterator[OrderPoles]:
     """Poles of every order 1 ... ``max_order`` from one factorisation.
 
-    ``H(z) = B(z) A(z)^-1`` with complex polynomials in ``z = exp(i arc (f - f_low) / (f_high - f_low))``, so that a narrow
-    band far from 0 Hz is as well posed as any. The numerator is eliminated by the Cholesky factor of its normal
-    matrix; because leading blocks of a Cholesky factor are the factors of leading blocks, every lower order's reduced
-    normal matrix follows by leaving rows out (Peeters, Guillaume, Van der Auweraer et al., The PolyMAX frequency-domain
-    method, Shock and Vibration 11, 2004).
+    ``H(z) = B(z) A(z)^-1`` with complex polynomials in ``z = exp(i arc (f - f_low) / (f_high - f_low))``,
+    so that a narrow band far from 0 Hz is as well posed as any. The numerator is eliminated by the Cholesky factor
+    of its normal matrix; because leading blocks of a Cholesky factor are the factors of leading blocks, every lower
+    order's reduced normal matrix follows by leaving rows out (Peeters, Guillaume, Van der Auweraer et al., The PolyMAX
+    frequency-domain method, Shock and Vibration 11, 2004).
 
     Parameters
     ----------

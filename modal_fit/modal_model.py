@@ -85,7 +85,8 @@ class ModalModel:
     residuals
         Out-of-band terms, or None.
     covariance : (n_parameters, n_parameters) or None
-        Of the parameters in the order ``modal_fit`` documents.
+        Of the real numbers Re poles, Im poles, Re right, Im right, Re left, Im left, each laid out row by
+        row (mode by mode), in SI units.
     physics
         Terms ``{name, location, parameters}`` that a diagnosis added; empty for a linear model.
 

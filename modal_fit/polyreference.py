@@ -1,0 +1,226 @@
+"""`fit_polyreference`: FRF matrix to modal model, with stabilisation, vectors, residuals and error bars."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation import Frf, to_receptance
+from foundation import InputError, MillfrfError
+
+from .likelihood_result import best_fit, modal_model_from
+from .matrix_fraction import matrix_fraction_poles
+from .maximum_likelihood import LikelihoodFit
+from .modal_model import ModalModel
+from .noise_levels import LineNoise
+from .record_spectra import RecordSpectra
+from .stabilisation import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class ModalFit:
+    """A modal model with the evidence for it.
+
+    Parameters
+    ----------
+    model
+        Modes, residuals and covariance.
+    chart
+        Poles over order.
+    dropped
+        Groups of poles that were not taken for modes, each with its reason.
+    band
+        Hz.
+    reduced_chi_square
+        Misfit over what the noise explains; 1 is perfect, much above 1 means more than noise is left. NaN
+        where the FRF came without a covariance.
+    relative_error : (n_responses, n_excitations)
+        Root mean square misfit over root mean square FRF in the band.
+    warnings
+        One sentence each.
+    """
+
+    model: ModalModel
+    chart: StabilisationChart
+    dropped: tuple[PoleGroup, ...]
+    band: tuple[float, float]
+    reduced_chi_square: float
+    relative_error: NDArray[np.float64]
+    warnings: tuple[str, ...]
+
+
+def fit_polyreference(
+    frf: Frf, band: tuple[float, float], *, max_order: int = 40, n_modes: int | None = None
+) -> ModalFit:
+    """Fit a modal model to the valid lines of an FRF matrix inside ``band`` (Hz).
+
+    Poles come from the poly-reference least-squares complex frequency method over all orders, are chosen automatically,
+    and are refined together with vectors and out-of-band terms by maximum likelihood on the FRF's covariance.
+
+    Parameters
+    ----------
+    frf
+        Receptance, mobility, accelerance or a transfer; the first three give a receptance model.
+    band
+        Hz, 0 < low < high.
+    max_order
+        Highest order of the denominator.
+    n_modes
+        Keep the ``n_modes`` groups found in most orders; None: as many as there are.
+
+    Raises
+    ------
+    InputError
+        A band without enough valid lines, or an order below 2.
+    MillfrfError
+        No pole is stable over the orders.
+    """
+    receptance = to_receptance(frf)
+    inside = _usable_lines(receptance, band, max_order)
+    weights = None
+    if receptance.covariance is not None:
+        variance = receptance.covariance.variance()[inside].sum(axis=(1, 2))
+        weights = np.zeros(len(receptance.frequencies))
+        weights[inside] = 1 / np.maximum(variance, 1e-3 * np.median(variance))
+    by_order = list(matrix_fraction_poles(receptance, band, min(max_order, inside.sum() // 2), weights))
+    chart = stabilisation_chart(by_order, band)
+    kept, dropped = choose_poles(chart)
+    if n_modes is not None and len(kept) > n_modes:
+        ranked = sorted(kept, key=_minus_orders)
+        spare = [PoleGroup(g.pole, g.n_orders, f"not among the {n_modes} asked for") for g in ranked[n_modes:]]
+        kept, dropped = tuple(ranked[:n_modes]), (*dropped, *spare)
+    if not kept:
+        raise MillfrfError(
+            f"no pole is stable over orders 1 to {max_order} between {band[0]:g} and {band[1]:g} Hz; "
+            "widen the band, raise --max-order or average more"
+        )
+    spectra, noise = frf_lines(receptance, inside)
+    fit, superfluous = _without_superfluous(kept, spectra, band, noise)
+    dropped = (*dropped, *superfluous)
+    model = modal_model_from(fit, band, receptance.responses, receptance.excitations, receptance.unit)
+    error = relative_error(receptance, model, inside)
+    chi = fit.reduced_chi_square if noise is not None else float("nan")
+    return ModalFit(model, chart, dropped, band, chi, error, _warnings(receptance, inside, model, band, chi, error))
+
+
+def _without_superfluous(
+    kept: Sequence[PoleGroup], spectra: RecordSpectra, band: tuple[float, float], noise: LineNoise | None
+) -> tuple[LikelihoodFit, list[PoleGroup]]:
+    """Fit, then leave out, rarest first, each mode whose absence costs less than its unknowns are worth.
+
+    Schwarz's criterion with the misfit of the fullest model counted as noise: leakage and the like are no reason to
+    keep a mode.
+    """
+    remaining = sorted(kept, key=_minus_orders)
+    fit = best_fit(np.array([g.pole for g in remaining]), spectra, band, noise=noise, n_smooth=0)
+    superfluous: list[PoleGroup] = []
+    worth = 2 * sum(fit.model.right.shape[1:] + fit.model.left.shape[1:]) * float(np.log(2 * spectra.response.size))
+    for candidate in remaining[:0:-1]:
+        fewer = [g for g in remaining if g is not candidate]
+        trial = best_fit(np.array([g.pole for g in fewer]), spectra, band, noise=noise, n_smooth=0)
+        loss = 2 * (fit.log_likelihood - trial.log_likelihood) / max(1.0, fit.reduced_chi_square)
+        if loss < worth:
+            superfluous.append(PoleGroup(candidate.pole, candidate.n_orders, "the fit is as good without it"))
+            remaining, fit = fewer, trial
+    return fit, superfluous
+
+
+def _minus_orders(group: PoleGroup) -> int:
+    return -group.n_orders
+
+
+def _usable_lines(frf: Frf, band: tuple[float, float], max_order: int) -> NDArray[np.bool_]:
+    low, high = band
+    if not 0 < low < high:
+        raise InputError(f"band {low:g} to {high:g} Hz is empty or starts at 0; give 0 < low < high")
+    if max_order < 2:
+        raise InputError(f"highest order {max_order} leaves no room for a mode; give 2 or more")
+    inside = frf.valid & (frf.frequencies >= low) & (frf.frequencies <= high)
+    if inside.sum() < 8:
+        raise InputError(
+            f"{inside.sum()} valid lines between {low:g} and {high:g} Hz (file: {frf.frequencies[0]:g} to "
+            f"{frf.frequencies[-1]:g} Hz) are too few to fit; widen the band or use longer segments"
+        )
+    return np.asarray(inside)
+
+
+def frf_lines(frf: Frf, inside: NDArray[np.bool_]) -> tuple[RecordSpectra, LineNoise | None]:
+    """The FRF as excitation and response lines whose noise is independent between lines.
+
+    With covariance ``R (x) Q`` on a line, the columns of ``H C`` with ``C^T Q conj(C) = I`` have covariance R each and
+    none with one another.
+    """
+    s = 2j * np.pi * frf.frequencies[inside]
+    values = frf.values[inside]
+    n_lines, n_responses, n_excitations = values.shape
+    drive = np.broadcast_to(np.eye(n_excitations, dtype=complex), (n_lines, n_excitations, n_excitations))
+    noise = None
+    if frf.covariance is not None:
+        factor = np.linalg.cholesky(frf.covariance.excitation[inside].conj())
+        drive = np.linalg.inv(factor).conj().transpose(0, 2, 1)
+        noise = LineNoise(np.repeat(_regular(frf.covariance.response[inside]), n_excitations, axis=0))
+    response = (values @ drive).transpose(0, 2, 1).reshape(-1, n_responses)
+    excitation = drive.transpose(0, 2, 1).reshape(-1, n_excitations)
+    lines = RecordSpectra(
+        np.repeat(s, n_excitations),
+        np.zeros(n_lines * n_excitations, dtype=np.int64),
+        np.ascontiguousarray(excitation),
+        np.ascontiguousarray(response),
+        np.zeros(n_responses, dtype=np.int64),
+    )
+    return lines, noise
+
+
+def _regular(covariance: Complex) -> Complex:
+    """Keep a covariance of few averages invertible: smoothed over neighbouring lines, plus a small diagonal."""
+    kernel = np.ones(9) / 9
+    flat = covariance.reshape(len(covariance), -1)
+    padded = np.concatenate([flat[:4][::-1], flat, flat[-4:][::-1]]) if len(flat) > 8 else flat
+    smooth = flat
+    if len(flat) > 8:
+        smooth = np.stack([np.convolve(column, kernel, "valid") for column in padded.T], axis=1)
+    matrices = smooth.reshape(covariance.shape)
+    power = np.maximum(np.real(np.einsum("kpp->kp", matrices)), 1e-300)
+    floor = 1e-6 * np.median(power, axis=0) + 1e-3 * power
+    return np.asarray(matrices + np.einsum("kp,pu->kpu", floor, np.eye(power.shape[1])))
+
+
+def relative_error(frf: Frf, model: ModalModel, inside: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Root mean square misfit over root mean square FRF, (n_responses, n_excitations)."""
+    misfit = frf.values[inside] - model.receptance(frf.frequencies[inside])
+    size = np.sqrt(np.mean(np.abs(frf.values[inside]) ** 2, axis=0))
+    return np.asarray(np.sqrt(np.mean(np.abs(misfit) ** 2, axis=0)) / np.where(size > 0, size, 1.0))
+
+
+def _warnings(
+    frf: Frf,
+    inside: NDArray[np.bool_],
+    model: ModalModel,
+    band: tuple[float, float],
+    chi: float,
+    error: NDArray[np.float64],
+) -> tuple[str, ...]:
+    warnings = []
+    asked = (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
+    if inside.sum() < asked.sum():
+        warnings.append(
+            f"{asked.sum() - inside.sum()} of {asked.sum()} lines in the band have no FRF (dependent inputs) "
+            "and were left out"
+        )
+    if chi > 2:
+        warnings.append(
+            f"the misfit is {chi:.1f} times what the noise explains: a mode, leakage or a nonlinearity is left"
+        )
+    if error.max() > 0.3:
+        p, q = np.unravel_index(int(error.argmax()), error.shape)
+        warnings.append(
+            f"{frf.responses[p]} / {frf.excitations[q]} is fitted to {100 * error.max():.0f} % only: "
+            "the entry is weak or noisy"
+        )
+    outside = (model.natural_frequencies < band[0]) | (model.natural_frequencies > band[1])
+    if outside.any():
+        warnings.append(f"{outside.sum()} mode(s) moved out of the band during refinement; widen the band")
+    return tuple(warnings)

@@ -1,0 +1,146 @@
+"""`fit_subspace`: recordings to modal model without a spectrum in between: no window, no leakage, stacked tests."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimation import BandRecord
+from foundation import InputError, MillfrfError
+
+from .correlation_blocks import CorrelationBlocks, correlation_blocks
+from .likelihood_result import best_fit, modal_model_from
+from .matrix_fraction import OrderPoles
+from .modal_model import ModalModel
+from .noise_levels import NoiseLevels
+from .record_spectra import record_spectra
+from .stabilisation import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
+
+_SMOOTH = 2  # terms of the polynomial that stands for transients from outside the band
+
+
+@dataclass(frozen=True)
+class SubspaceFit:
+    """A modal model from recordings, with the evidence for it.
+
+    Parameters
+    ----------
+    model
+        Receptance model with residuals and covariance.
+    chart
+        Poles over order.
+    dropped
+        Groups of poles not taken for modes, each with its reason.
+    band
+        Hz.
+    reduced_chi_square
+        Misfit over the noise found; noise is estimated from the misfit itself, so 1 only says that the error
+        is spread over channels and lines as noise on forces and responses would be.
+    noise
+        Noise variances found on responses and forces, per test.
+    warnings
+        One sentence each.
+    """
+
+    model: ModalModel
+    chart: StabilisationChart
+    dropped: tuple[PoleGroup, ...]
+    band: tuple[float, float]
+    reduced_chi_square: float
+    noise: NoiseLevels
+    warnings: tuple[str, ...]
+
+
+def fit_subspace(
+    records: Sequence[BandRecord],
+    band: tuple[float, float],
+    *,
+    max_order: int = 30,
+    block_rows: int = 25,
+    n_modes: int | None = None,
+) -> SubspaceFit:
+    """Fit a modal model to stacked tests with measured forces.
+
+    Input-output subspace identification (past outputs and inputs as instruments; Van Overschee & De Moor, Subspace
+    Identification for Linear Systems, 1996, chapter 4; Verhaegen 1994) on correlation blocks summed over the tests
+    gives poles over model order; the chosen ones start a maximum-likelihood fit of the whole-record spectra in the
+    band, with left and right vectors, out-of-band terms, transients, and noise on forces as well as responses.
+
+    Parameters
+    ----------
+    records
+        One a test, from :func:`estimation.band_record`; all of one sample rate and channel layout.
+    band
+        Hz; the modes to be found lie inside.
+    max_order
+        Highest order of the state-space model (two states a mode).
+    block_rows
+        Samples of past and future in the correlations.
+    n_modes
+        Keep the ``n_modes`` groups found in most orders; None: as many as there are.
+
+    Raises
+    ------
+    InputError
+        Records that cannot be stacked, too short ones, or a band outside what they hold.
+    MillfrfError
+        No pole is stable over the orders, or the refinement does not converge.
+    """
+    spectra = record_spectra(records, band)
+    blocks = correlation_blocks(records, block_rows)
+    if not 2 <= max_order < block_rows * blocks.n_responses:
+        raise InputError(
+            f"highest order {max_order} does not fit {block_rows} block rows of {blocks.n_responses} responses; "
+            f"stay between 2 and {block_rows * blocks.n_responses - 1}"
+        )
+    chart = stabilisation_chart(list(subspace_poles(blocks, band, max_order)), band)
+    kept, dropped = choose_poles(chart)
+    if n_modes is not None:
+        kept = tuple(sorted(kept, key=_minus_orders)[:n_modes])
+    if not kept:
+        raise MillfrfError(
+            f"no pole is stable over orders 2 to {max_order} between {band[0]:g} and {band[1]:g} Hz; "
+            "widen the band or record longer"
+        )
+    fit = best_fit(np.array([group.pole for group in kept]), spectra, band, noise=None, n_smooth=_SMOOTH)
+    assert isinstance(fit.noise, NoiseLevels)
+    responses = [channel.degree_of_freedom for channel in records[0].responses]
+    excitations = [channel.degree_of_freedom for channel in records[0].excitations]
+    unit = "m/N" if records[0].excitations[0].unit == "N" else f"m/{records[0].excitations[0].unit}"
+    model = modal_model_from(fit, band, responses, excitations, unit)
+    warnings = (
+        () if fit.converged else ("the refinement stopped before it converged; treat the error bars as lower bounds",)
+    )
+    return SubspaceFit(model, chart, dropped, band, fit.reduced_chi_square, fit.noise, warnings)
+
+
+def _minus_orders(group: PoleGroup) -> int:
+    return -group.n_orders
+
+
+def subspace_poles(blocks: CorrelationBlocks, band: tuple[float, float], max_order: int) -> Iterator[OrderPoles]:
+    """Poles and shapes of even orders 2 ... ``max_order`` from one factorisation of the correlation blocks.
+
+    The Cholesky factor of the correlations is the transposed triangular factor of the data; its block of future
+    responses on past forces and responses spans the observability matrix, of which each order takes the leading
+    singular vectors.
+    """
+    n_in, n_out, rows = blocks.n_excitations, blocks.n_responses, blocks.block_rows
+    scale = np.sqrt(np.diag(blocks.matrix))
+    normal = blocks.matrix / np.outer(scale, scale)
+    factor = np.linalg.cholesky(normal + 1e-12 * np.eye(len(normal)))
+    past, future = n_in * rows, (2 * n_in + n_out) * rows
+    projected = factor[future:, past:future] * scale[future:, None]
+    vectors, _, _ = np.linalg.svd(projected, full_matrices=False)
+    low, high = 2 * np.pi * band[0], 2 * np.pi * band[1]
+    for order in range(2, max_order + 1, 2):
+        observability = vectors[:, :order]
+        transition = np.linalg.lstsq(observability[:-n_out], observability[n_out:], rcond=None)[0]
+        eigenvalues, modes = np.linalg.eig(transition)
+        usable = np.abs(eigenvalues) > 1e-9
+        poles = np.log(eigenvalues[usable].astype(complex)) * blocks.sample_rate
+        shapes = (observability[:n_out] @ modes[:, usable]).T * blocks.response_scale
+        magnitude = np.abs(poles)
+        kept = (poles.imag > 0) & (poles.real < 0) & (magnitude > low) & (magnitude < high)
+        length = np.linalg.norm(shapes[kept], axis=1, keepdims=True)
+        yield OrderPoles(order, poles[kept], np.asarray(shapes[kept] / length, dtype=complex))

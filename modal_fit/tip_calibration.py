@@ -1,0 +1,215 @@
+"""Calibration of an in-process model from the sensor to the tool tip, by the shapes of two hammer FRFs."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation import Frf, FrfCovariance, to_receptance
+from foundation import InputError
+
+from .modal_model import ModalModel, Residuals
+from .polyreference import ModalFit, fit_polyreference
+from .shape_measures import modal_assurance
+from .uncertainty import derived_covariance
+
+Complex = NDArray[np.complex128]
+_POOR = 0.3  # relative standard error above which a ratio is replaced
+
+
+@dataclass(frozen=True)
+class TipCalibration:
+    """An in-process model carried to the tool tip.
+
+    Parameters
+    ----------
+    model
+        With the tip's degrees of freedom as responses.
+    ratios : (n_modes, n_directions), complex
+        phi_tip / phi_sensor that each mode's right vector was multiplied by.
+    ratio_errors : (n_modes, n_directions)
+        Standard errors of the ratios (circular), NaN where the hammer FRFs came without covariance.
+    hammer_modes : (n_modes,)
+        Which hammer mode served each in-process mode.
+    hammer_fit
+        The fit of both hammer FRFs with common poles.
+    warnings
+        One sentence each.
+    """
+
+    model: ModalModel
+    ratios: Complex
+    ratio_errors: NDArray[np.float64]
+    hammer_modes: NDArray[np.int64]
+    hammer_fit: ModalFit
+    warnings: tuple[str, ...]
+
+
+def calibrate_to_tip(
+    model: ModalModel, tip: Frf, sensor: Frf, *, band: tuple[float, float] | None = None, max_order: int = 30
+) -> TipCalibration:
+    """Multiply each mode by ``phi_T / phi_S`` (Mohammadi & Ahmadi, Eq. 13-14), direction by direction.
+
+    The spindle assembly moves as a rigid body in the modes of the joints, so tip and sensor share poles and left
+    vectors; both hammer FRFs are fitted as one matrix. The ratio is complex, one for each mode and direction: a mode
+    that turns moves tip and sensor differently. An in-process mode takes the ratio of the hammer mode that is nearest
+    in frequency and shape.
+
+    Parameters
+    ----------
+    model
+        In-process model with responses at the sensor.
+    tip, sensor
+        Hammer FRFs, both excited at the tip: response at the tip and at the sensor, same directions in the
+        same order, on the same frequency axis.
+    band
+        Hz; None: the range of the model's modes, widened by a quarter on either side.
+    max_order
+        Of the hammer fit.
+
+    Raises
+    ------
+    InputError
+        Axes or directions that do not match, or a hammer fit without a mode near an in-process one.
+    """
+    tip, sensor = to_receptance(tip), to_receptance(sensor)
+    _check(model, tip, sensor)
+    natural = model.natural_frequencies
+    span = band or (0.75 * float(natural.min()), 1.25 * float(natural.max()))
+    fit = fit_polyreference(_joined(tip, sensor), span, max_order=max_order)
+    n = len(tip.responses)
+    chosen, warnings = _matched(model, fit.model, n)
+    ratios, errors, replaced = _ratios(fit.model, chosen, n)
+    for r, direction in replaced:
+        warnings.append(
+            f"mode {r + 1} ({natural[r]:.2f} Hz) hardly moves {sensor.responses[direction]}: "
+            "the ratio of the whole shape is used"
+        )
+    covariance = _covariance(model, fit.model, chosen, ratios)
+    residuals = None if model.residuals is None else _scaled(model.residuals, model, ratios)
+    calibrated = replace(
+        model, right=model.right * ratios, responses=tip.responses, residuals=residuals, covariance=covariance
+    )
+    return TipCalibration(calibrated, ratios, errors, chosen, fit, tuple(warnings))
+
+
+def _check(model: ModalModel, tip: Frf, sensor: Frf) -> None:
+    if sensor.responses != model.responses:
+        raise InputError(
+            f"the sensor FRF has responses {', '.join(sensor.responses)}, the model {', '.join(model.responses)}; "
+            "measure both at the same sensor, in the same order"
+        )
+    directions = [[dof.partition(":")[2] for dof in frf.responses] for frf in (tip, sensor)]
+    if directions[0] != directions[1]:
+        raise InputError(
+            f"tip directions {directions[0]} and sensor directions {directions[1]} differ; order them alike"
+        )
+    if tip.excitations != sensor.excitations:
+        raise InputError(
+            f"tip FRF excited at {', '.join(tip.excitations)}, sensor FRF at {', '.join(sensor.excitations)}; "
+            "tap one point"
+        )
+    if tip.frequencies.shape != sensor.frequencies.shape or not np.allclose(tip.frequencies, sensor.frequencies):
+        raise InputError("tip and sensor FRF have different frequency axes; estimate both with the same segments")
+
+
+def _joined(tip: Frf, sensor: Frf) -> Frf:
+    """Tip rows above sensor rows; covariance of the rows kept apart."""
+    covariance = None
+    if tip.covariance is not None and sensor.covariance is not None:
+        n, m = len(tip.responses), len(sensor.responses)
+        response = np.zeros((len(tip.frequencies), n + m, n + m), dtype=complex)
+        response[:, :n, :n] = tip.covariance.response
+        response[:, n:, n:] = sensor.covariance.response
+        covariance = FrfCovariance(response, tip.covariance.excitation)
+    return Frf(
+        tip.frequencies,
+        np.concatenate([tip.values, sensor.values], axis=1),
+        (*tip.responses, *sensor.responses),
+        tip.excitations,
+        tip.quantity,
+        tip.unit,
+        tip.valid & sensor.valid,
+        None,
+        covariance,
+    )
+
+
+def _matched(model: ModalModel, hammer: ModalModel, n: int) -> tuple[NDArray[np.int64], list[str]]:
+    """Hammer mode for each in-process mode, by distance in log frequency and 1 - MAC of the sensor shape."""
+    likeness = modal_assurance(model.right, hammer.right[:, n:])
+    distance = np.abs(np.log(model.natural_frequencies[:, None] / hammer.natural_frequencies[None, :]))
+    chosen = np.argmin(distance / 0.1 + (1 - likeness), axis=1).astype(np.int64)
+    warnings = []
+    for r, h in enumerate(chosen):
+        if distance[r, h] > 0.25:
+            raise InputError(
+                f"no hammer mode near the in-process mode at {model.natural_frequencies[r]:.2f} Hz (nearest "
+                f"{hammer.natural_frequencies[h]:.2f} Hz); widen the band or tap the same pose"
+            )
+        if likeness[r, h] < 0.8:
+            warnings.append(
+                f"mode {r + 1} ({model.natural_frequencies[r]:.2f} Hz) and its hammer mode "
+                f"({hammer.natural_frequencies[h]:.2f} Hz) differ in shape: MAC {likeness[r, h]:.2f}"
+            )
+    if len(set(chosen.tolist())) < len(chosen):
+        warnings.append("two in-process modes take the ratio of one hammer mode; check the hammer fit")
+    return chosen, warnings
+
+
+def _ratios(
+    hammer: ModalModel, chosen: NDArray[np.int64], n: int
+) -> tuple[Complex, NDArray[np.float64], list[tuple[int, int]]]:
+    """phi_T / phi_S, standard errors, and the entries that were replaced by the whole shape's ratio."""
+    tip, sensor = hammer.right[chosen, :n], hammer.right[chosen, n:]
+    safe = np.where(np.abs(sensor) > 0, sensor, 1e-300)
+    ratios = tip / safe
+    spread = derived_covariance(hammer, lambda m: _real(m.right[chosen, :n] / m.right[chosen, n:]))
+    errors = np.full(ratios.shape, np.nan)
+    if spread is not None:
+        variance = np.diag(spread).reshape(2, *ratios.shape)
+        errors = np.sqrt(variance.sum(axis=0) / 2)
+    replaced = []
+    whole = np.sum(sensor.conj() * tip, axis=1) / np.sum(np.abs(sensor) ** 2, axis=1)
+    for r, direction in np.argwhere(errors > _POOR * np.abs(ratios)):
+        ratios[r, direction] = whole[r]
+        replaced.append((int(r), int(direction)))
+    return ratios, errors, replaced
+
+
+def _real(values: Complex) -> NDArray[np.float64]:
+    return np.concatenate([values.real.ravel(), values.imag.ravel()])
+
+
+def _scaled(residuals: Residuals, model: ModalModel, ratios: Complex) -> Residuals:
+    """Residual rows scaled by the modes' mean real ratio, weighted by how much each moves: no better is known there."""
+    weight = np.abs(model.right) ** 2
+    mean = np.sum(weight * ratios.real, axis=0) / np.sum(weight, axis=0)
+    residues = None if residuals.residues is None else residuals.residues * mean[None, :, None]
+    return Residuals(residuals.upper * mean[:, None], residuals.lower * mean[:, None], residuals.poles, residues)
+
+
+def _covariance(
+    model: ModalModel, hammer: ModalModel, chosen: NDArray[np.int64], ratios: Complex
+) -> NDArray[np.float64] | None:
+    """In-process covariance carried through the ratios, plus the ratios' own: the two measurements are independent."""
+    if model.covariance is None:
+        return None
+    n_modes, n = model.right.shape
+    start = 2 * n_modes
+    size = model.right.size
+    through = np.eye(len(model.covariance))
+    block = slice(start, start + 2 * size)
+    through[block, block] = _multiplication(ratios.ravel())
+    covariance = through @ model.covariance @ through.T
+    spread = derived_covariance(hammer, lambda m: _real(m.right[chosen, :n] / m.right[chosen, n:]))
+    if spread is not None:
+        lever = _multiplication(model.right.ravel())
+        covariance[block, block] += lever @ spread @ lever.T
+    return np.asarray(covariance)
+
+
+def _multiplication(factors: Complex) -> NDArray[np.float64]:
+    """Real matrix that multiplies a packed (real parts, imaginary parts) vector by complex factors."""
+    real, imaginary = np.diag(factors.real), np.diag(factors.imag)
+    return np.block([[real, -imaginary], [imaginary, real]])
