@@ -17,7 +17,8 @@ FORMAT_VERSION = 1
 def text_attribute(attributes: Any, name: str, default: str = "") -> str:
     """A root attribute as text, whether stored as bytes or string."""
     value = attributes.get(name, default)
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+    raw = value if isinstance(value, bytes) else str(value).encode("utf-8", "surrogateescape")
+    return raw.decode("utf-8", "replace")
 
 
 def check_format(attributes: Any, path: object) -> None:

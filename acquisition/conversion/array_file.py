@@ -1,6 +1,5 @@
 """Named arrays in a file of another program: NPY, NPZ, MAT (any version), HDF5, CSV."""
 
-import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,6 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 from scipy.io import loadmat
-from scipy.io.matlab import MatReadError
 
 from foundation import FileFormatError, InputError
 
@@ -83,7 +81,7 @@ def open_arrays(path: Path, **csv_options: Any) -> ArrayFile:
         return ArrayFile(path, readers[suffix](path))
     except FileFormatError:
         raise
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, MatReadError) as error:
+    except Exception as error:  # damaged files make numpy, scipy and zipfile raise nearly anything
         reason = " ".join(str(error).split())
         if "pickle" in reason:
             reason = "it holds pickled Python objects, which can run programs; save plain arrays of numbers"

@@ -48,7 +48,9 @@ def contents(input_path: Path, mapping: Mapping) -> Iterator[Content]:
         An array, column or file is missing; unequal lengths; axes that do not fit; uneven times; samples not finite.
     """
     files: dict[Path, ArrayFile] = {}
-    arrays = {key: _ordered(key, input_path, mapping, files) for key in {c.array for c in mapping.channels}}
+    arrays = {
+        key: _ordered(key, input_path, mapping, files) for key in dict.fromkeys(c.array for c in mapping.channels)
+    }
     columns = [_column_number(channel, arrays[channel.array]) for channel in mapping.channels]
     _require_equal_lengths(arrays)
     rate, start = _clock(input_path, mapping, files)

@@ -1,5 +1,6 @@
 """Write a recording's content as HDF5, NPZ, MAT or CSV."""
 
+import csv
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -102,8 +103,8 @@ def _write_csv(content: Content, path: Path, progress: Progress) -> None:
     with path.open("w", encoding="utf-8", newline="\n") as handle:
         for key, value in _csv_metadata(content).items():
             handle.write(f"# {key}: {json.dumps(value)}\n")
-        names = ["time [s]", *(f"{channel.name} [{channel.unit}]" for channel in described.channels)]
-        handle.write(",".join(f'"{name}"' if "," in name else name for name in names) + "\n")
+        headings = ["time [s]", *(f"{channel.name} [{channel.unit}]" for channel in described.channels)]
+        csv.writer(handle, lineterminator="\n").writerow(headings)
         written = 0
         for block in row_blocks(samples):
             time = described.start_time + np.arange(written, written + len(block)) / described.sample_rate

@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition import Block, Channel, Paced, Recording, RecordingWriter, ReplaySource, StreamDescription, record
@@ -46,6 +46,7 @@ class ArraySource:
         self.closed = True
 
 
+@settings(max_examples=40)
 @given(n=st.integers(1, 700), block=st.integers(1, 300), read_block=st.integers(1, 300))
 def test_what_is_recorded_is_read_back_in_any_blocks(
     tmp_path_factory: pytest.TempPathFactory, n: int, block: int, read_block: int
@@ -166,6 +167,75 @@ def test_damaged_files_are_refused_in_one_line(tmp_path: Path, kind: str, messag
     with pytest.raises(FileFormatError, match=message) as caught:
         Recording(path)
     assert "\n" not in str(caught.value)
+
+
+def test_a_file_cut_short_is_refused_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    record(ArraySource(np.ones((10, 2)), 5), path)
+    whole = path.read_bytes()
+    for length in (0, 40, 500, len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:length])
+        with pytest.raises(FileFormatError, match="cut short or damaged"):
+            Recording(path)
+
+
+def test_a_table_larger_than_what_is_stored_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    record(ArraySource(np.ones((10, 2)), 5), path)
+    with h5py.File(path, "r+") as file:
+        file["signals/main/samples"].resize(10**12, axis=0)
+    with pytest.raises(FileFormatError, match="announces 1000000000000 samples but stores at most"):
+        Recording(path)
+
+
+def test_fields_that_older_files_lack_are_not_needed(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file.attrs["format"], file.attrs["format_version"] = "millfrf.recording", 1
+        group = file.create_group("signals/main")
+        group.attrs["sample_rate"], group.attrs["start_time"] = 512.0, 0.0
+        group.attrs["channels"] = '[{"name": "fx", "quantity": "force", "unit": "N"}]'
+        group["samples"] = np.ones((5, 1), "f4")
+    with Recording(path) as recording:
+        assert (recording.complete, recording.setup, recording.title, recording.events) == (None, "", "", {})
+        assert recording.stream().read(1, 3).shape == (2, 1)
+
+
+@pytest.mark.shared_data
+def test_recordings_of_the_practice_cases_open(shared_data: Path) -> None:
+    path = shared_data.parent / "practice" / "case_00" / "low.h5"
+    if not path.is_file():
+        pytest.skip(f"no practice recording at {path}")
+    with Recording(path) as recording:
+        assert recording.complete is None
+        assert (recording.stream().n_samples, recording.stream().duration) == (24576, 48.0)
+        assert [c.name for c in recording.stream().channels_of("force")] == ["fx", "fy", "fz"]
+
+
+def test_overwriting_must_be_asked_for(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    record(ArraySource(np.ones((10, 2)), 5), path)
+    with pytest.raises(InputError, match="exists"):
+        record(ArraySource(np.ones((4, 2)), 5), path)
+    with RecordingWriter(path, [STREAM], overwrite=True) as writer:
+        writer.append("main", np.zeros((3, 2)))
+    with Recording(path) as recording:
+        assert recording.stream().n_samples == 3
+
+
+def test_rows_that_could_not_be_written_are_not_announced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    writer = RecordingWriter(tmp_path / "a.h5", [STREAM])
+    writer.append("main", np.ones((6, 2)))
+    monkeypatch.setattr(h5py.Dataset, "__setitem__", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        writer.append("main", np.ones((6, 2)))
+    writer.close(complete=False)
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.stream().n_samples == 6
+        assert recording.complete is False
 
 
 def test_unknown_channels_and_streams_are_named(tmp_path: Path) -> None:
