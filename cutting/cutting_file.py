@@ -1,0 +1,83 @@
+"""Cutting files: the table ``[cutting]`` of a TOML file, checked."""
+
+import math
+import os
+import tomllib
+from pathlib import Path
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from foundation import FileFormatError, InputError
+
+from .milling_process import MillingProcess
+
+
+class _Cutting(BaseModel):
+    """Keys of the table with the units that their names say."""
+
+    model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
+
+    teeth: int
+    diameter_m: float
+    edge_angle_deg: float = 90.0
+    ktc_pa: float
+    krc: float
+    kac: float = 0.0
+    start_angle_deg: float
+    exit_angle_deg: float
+    feed_per_tooth_m: float = 0.0
+    kte_n_per_m: float = 0.0
+    kre_n_per_m: float = 0.0
+    kae_n_per_m: float = 0.0
+    runout_m: float = 0.0
+
+
+def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
+    """Read a cutter, its engagement and coefficients from ``CUT.toml``.
+
+    Raises
+    ------
+    InputError
+        No such file, or a value out of its range.
+    FileFormatError
+        Not TOML, no table ``[cutting]``, a key unknown, missing or of the wrong type.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"no file {path}; check the name")
+    try:
+        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FileFormatError(f"{path} is not TOML: {error}") from error
+    table = content.get("cutting")
+    if not isinstance(table, dict):
+        raise FileFormatError(f"{path} has no table [cutting]; add one with teeth, diameter_m, ktc_pa, krc, ...")
+    try:
+        cutting = _Cutting.model_validate(table)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        meaning = {"extra_forbidden": "is not a known key", "missing": "is missing"}.get(first["type"], first["msg"])
+        known = ", ".join(_Cutting.model_fields)
+        raise FileFormatError(f"{path}: cutting.{key} {meaning}; known keys: {known}") from error
+    return _process(cutting, path)
+
+
+def _process(cutting: _Cutting, path: object) -> MillingProcess:
+    try:
+        return MillingProcess(
+            teeth=cutting.teeth,
+            diameter=cutting.diameter_m,
+            edge_angle=math.radians(cutting.edge_angle_deg),
+            ktc=cutting.ktc_pa,
+            krc=cutting.krc,
+            kac=cutting.kac,
+            start_angle=math.radians(cutting.start_angle_deg),
+            exit_angle=math.radians(cutting.exit_angle_deg),
+            feed_per_tooth=cutting.feed_per_tooth_m,
+            kte=cutting.kte_n_per_m,
+            kre=cutting.kre_n_per_m,
+            kae=cutting.kae_n_per_m,
+            runout=cutting.runout_m,
+        )
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error

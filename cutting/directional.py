@@ -1,0 +1,101 @@
+"""Directional coefficients of milling: how a tool deflection becomes a cutting force."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .milling_process import MillingProcess
+
+
+def chip_direction(process: MillingProcess, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Chip thickness per unit tool displacement, ``(sin phi sin gamma, cos phi sin gamma, -cos gamma)``.
+
+    Parameters
+    ----------
+    process
+        Cutter; gamma is its edge angle.
+    angles : (n,)
+        Immersion angles phi of one tooth, rad.
+
+    Returns
+    -------
+    (n, 3)
+    """
+    sine, cosine = np.sin(process.edge_angle), np.cos(process.edge_angle)
+    return np.column_stack([np.sin(angles) * sine, np.cos(angles) * sine, np.full(len(angles), -cosine)])
+
+
+def force_direction(process: MillingProcess, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Force on the tool per unit chip area and K_tc: tangential, radial and axial parts turned into X, Y, Z.
+
+    The Z row's radial part is ``+ k_rc cos gamma``: Eq. 2 as printed has a minus there, which would push the edge
+    into the chip; at gamma = 90 deg, the paper's cutter, the term vanishes (Altintas, Manufacturing Automation,
+    2nd ed., section 2.8).
+
+    Returns
+    -------
+    (n, 3)
+    """
+    gamma = process.edge_angle
+    inward = process.krc * np.sin(gamma) + process.kac * np.cos(gamma)
+    along = process.krc * np.cos(gamma) - process.kac * np.sin(gamma)
+    x = -np.cos(angles) - inward * np.sin(angles)
+    y = np.sin(angles) - inward * np.cos(angles)
+    return np.column_stack([x, y, np.full(len(angles), along)])
+
+
+def directional_matrix(process: MillingProcess, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Matrix alpha at spindle angles, all teeth together (Mohammadi & Ahmadi, Eq. 2-3).
+
+    ``F = a K_tc alpha (X - X_tau)``; tooth j stands at ``angle + 2 pi j / N`` and cuts between start and exit angle.
+
+    Parameters
+    ----------
+    process
+        Cutter and engagement.
+    angles : (n,)
+        Spindle angle, rad: immersion of tooth 0.
+
+    Returns
+    -------
+    (n, 3, 3), dimensionless
+    """
+    total = np.zeros((len(angles), 3, 3))
+    for tooth in range(process.teeth):
+        phi = np.mod(np.asarray(angles) + 2 * np.pi * tooth / process.teeth, 2 * np.pi)
+        cutting = (phi >= process.start_angle) & (phi < process.exit_angle)
+        product = force_direction(process, phi)[:, :, None] * chip_direction(process, phi)[:, None, :]
+        total += cutting[:, None, None] * product
+    return total
+
+
+def average_directional_matrix(process: MillingProcess) -> NDArray[np.float64]:
+    """Mean of alpha over a tooth period, in closed form, shape (3, 3).
+
+    Examples
+    --------
+    >>> half = MillingProcess(2, 0.0127, np.pi / 2, 119e6, 0.17, 0.33, np.pi / 2, np.pi, 1e-4)
+    >>> (average_directional_matrix(half)[:, :2].round(3)).tolist()
+    [[0.117, -0.223], [0.277, -0.202], [-0.105, 0.105]]
+    """
+    gamma, start, stop = process.edge_angle, process.start_angle, process.exit_angle
+    sine, cosine = np.sin(gamma), np.cos(gamma)
+    inward = process.krc * sine + process.kac * cosine
+    along = process.krc * cosine - process.kac * sine
+
+    def between(value: float, at_start: float) -> float:
+        return value - at_start
+
+    one = stop - start
+    s = between(-np.cos(stop), -np.cos(start))  # integral of sin
+    c = between(np.sin(stop), np.sin(start))  # of cos
+    ss = between(stop / 2 - np.sin(2 * stop) / 4, start / 2 - np.sin(2 * start) / 4)
+    cc = one - ss
+    sc = between(np.sin(stop) ** 2 / 2, np.sin(start) ** 2 / 2)
+    matrix = np.array(
+        [
+            [sine * (-sc - inward * ss), sine * (-cc - inward * sc), -cosine * (-c - inward * s)],
+            [sine * (ss - inward * sc), sine * (sc - inward * cc), -cosine * (s - inward * c)],
+            [sine * along * s, sine * along * c, -cosine * along * one],
+        ]
+    )
+    return np.asarray(process.teeth / (2 * np.pi) * matrix)

@@ -1,0 +1,137 @@
+"""The 3 x 3 tip receptance that a stability solver works on, from a modal model or a measured FRF."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation import Frf, to_receptance
+from foundation import DegreeOfFreedom, InputError
+from modal_fit import ModalModel
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ToolReceptance:
+    """Receptance between force and motion of the tool in X, Y, Z; directions that were not given are rigid.
+
+    Parameters
+    ----------
+    evaluate
+        From frequencies (n,) Hz inside ``span`` to (n, 3, 3), m/N.
+    grid : (n_lines,), Hz
+        Fine enough that nothing between two lines is missed.
+    span
+        Lowest and highest frequency it is known at, Hz.
+    warnings
+        One sentence each.
+    """
+
+    evaluate: Callable[[Real], Complex]
+    grid: Real
+    span: tuple[float, float]
+    warnings: tuple[str, ...] = ()
+
+
+def tool_receptance(structure: Frf | ModalModel, *, node: str | None = None) -> ToolReceptance:
+    """Take X, Y, Z of one node from a measured FRF or a modal model, signs and order put right.
+
+    A measured FRF is interpolated linearly in real and imaginary part between its valid lines; a modal model is
+    evaluated where it is asked, from a twentieth of its lowest to three times its highest natural frequency.
+
+    Parameters
+    ----------
+    structure
+        With responses and excitations at the tool.
+    node
+        Name of the tool's node; None: the excitations' only node.
+
+    Raises
+    ------
+    InputError
+        No common direction at the node, no receptance, or too few valid lines.
+    """
+    if isinstance(structure, Frf):
+        structure = to_receptance(structure)
+    if structure.quantity != "receptance" or structure.unit != "m/N":
+        raise InputError(f"stability needs a receptance in m/N, this is {structure.quantity} in {structure.unit}")
+    node = node or _only_node(structure.excitations)
+    rows, row_axes, row_signs = _directions(structure.responses, node)
+    columns, column_axes, column_signs = _directions(structure.excitations, node)
+    if not rows or not columns:
+        raise InputError(
+            f"no response at the tool: excited at {node}, responses at {', '.join(structure.responses)}; "
+            "calibrate the model to the tip first"
+        )
+    signs = np.outer(row_signs, column_signs)
+
+    def placed(values: Complex) -> Complex:
+        full = np.zeros((len(values), 3, 3), dtype=complex)
+        full[:, np.array(row_axes)[:, None], np.array(column_axes)[None, :]] = values[:, rows][:, :, columns] * signs
+        return full
+
+    if isinstance(structure, ModalModel):
+        return _from_model(structure, placed)
+    return _from_frf(structure, placed)
+
+
+def _only_node(labels: tuple[str, ...]) -> str:
+    nodes = sorted({DegreeOfFreedom.parse(label).node for label in labels})
+    if len(nodes) > 1:
+        raise InputError(f"excitations at several nodes ({', '.join(nodes)}); name the tool's node")
+    return nodes[0]
+
+
+def _directions(labels: tuple[str, ...], node: str) -> tuple[list[int], list[int], list[float]]:
+    places, axes, signs = [], [], []
+    for place, label in enumerate(labels):
+        dof = DegreeOfFreedom.parse(label)
+        if dof.node == node and dof.axis in ("X", "Y", "Z"):
+            axis = "XYZ".index(dof.axis)
+            if axis in axes:
+                raise InputError(f"direction {dof.axis} of {node} appears twice; give each direction once")
+            places.append(place)
+            axes.append(axis)
+            signs.append(dof.sign)
+    return places, axes, signs
+
+
+def _from_model(model: ModalModel, placed: Callable[[Complex], Complex]) -> ToolReceptance:
+    if not len(model.poles):
+        raise InputError("the modal model has no mode; fit at least one")
+    if model.poles.real.max() >= 0:
+        worst = model.poles[model.poles.real.argmax()]
+        raise InputError(f"the structure itself is unstable: pole {worst:.4g} rad/s does not decay; fit again")
+    natural = model.natural_frequencies
+    low, high = 0.05 * float(natural.min()), 3.0 * float(natural.max())
+    steps = [np.geomspace(low, high, 400)]
+    for pole in model.poles:
+        width = -pole.real / (2 * np.pi)
+        steps.append(pole.imag / (2 * np.pi) + width * np.sinh(np.linspace(-4, 4, 161)))
+    grid = np.unique(np.concatenate(steps))
+    grid = grid[(grid >= low) & (grid <= high)]
+
+    def evaluate(frequencies: Real) -> Complex:
+        return placed(model.receptance(frequencies))
+
+    return ToolReceptance(evaluate, grid, (low, high))
+
+
+def _from_frf(frf: Frf, placed: Callable[[Complex], Complex]) -> ToolReceptance:
+    valid = frf.valid & (frf.frequencies > 0)
+    if valid.sum() < 8:
+        raise InputError(f"the FRF has {valid.sum()} valid lines above 0 Hz; too few to draw lobes from")
+    lines, values = frf.frequencies[valid], frf.values[valid]
+
+    def evaluate(frequencies: Real) -> Complex:
+        upper = np.clip(np.searchsorted(lines, frequencies), 1, len(lines) - 1)
+        share = (frequencies - lines[upper - 1]) / (lines[upper] - lines[upper - 1])
+        between = values[upper - 1] + share[:, None, None] * (values[upper] - values[upper - 1])
+        return placed(np.asarray(between))
+
+    gaps = np.diff(lines) > 1.5 * np.median(np.diff(lines))
+    warnings = (f"{gaps.sum()} gaps in the valid lines are bridged by straight lines",) if gaps.any() else ()
+    return ToolReceptance(evaluate, lines, (float(lines[0]), float(lines[-1])), warnings)
