@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from foundation import FileFormatError, InputError
 
 from .channel import Channel
+from .damage import open_for_reading, reporting_damage, require_stored
 from .recording_format import check_format, stream_from_attributes, text_attribute
 from .source import StreamDescription
 
@@ -161,9 +161,9 @@ class Recording:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
-        self._file = _open(self.path)
+        self._file = open_for_reading(self.path)
         try:
-            with _reporting_damage(self.path):
+            with reporting_damage(self.path):
                 check_format(self._file.attrs, self.path)
                 self.streams: Mapping[str, Stream] = self._find_streams()
         except BaseException:
@@ -179,7 +179,7 @@ class Recording:
             samples = clock.get("samples") if isinstance(clock, h5py.Group) else None
             if not isinstance(samples, h5py.Dataset) or samples.ndim != 2 or samples.dtype.kind != "f":
                 raise FileFormatError(f"{self.path}: /signals/{name} has no table 'samples' of floats; convert anew")
-            _require_stored(samples, name, self.path)
+            require_stored(samples, name, self.path)
             described = stream_from_attributes(name, clock.attrs, samples.shape[1], self.path)
             streams[name] = Stream(described, samples, self.path)
         return streams
@@ -200,7 +200,7 @@ class Recording:
         return self._text("setup")
 
     def _text(self, name: str) -> str:
-        with _reporting_damage(self.path):
+        with reporting_damage(self.path):
             return text_attribute(self._file.attrs, name)
 
     @property
@@ -212,13 +212,13 @@ class Recording:
     @property
     def events(self) -> dict[str, EventSeries]:
         """Slow values by name."""
-        with _reporting_damage(self.path):
+        with reporting_damage(self.path):
             group = self._file.get("events")
             return {} if group is None else {name: EventSeries(entry) for name, entry in group.items()}
 
     def clock_pairs(self, stream: str) -> NDArray[np.float64]:
         """Pairs (sample index, host monotonic time in s) of a stream, shape (n_pairs, 2)."""
-        with _reporting_damage(self.path):
+        with reporting_damage(self.path):
             pairs = self._file["signals"][stream].get("clock")
             return np.empty((0, 2)) if pairs is None else np.asarray(pairs[:], dtype=float).reshape(-1, 2)
 
@@ -248,55 +248,3 @@ class Recording:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
-
-
-def _require_stored(samples: h5py.Dataset, name: str, path: Path) -> None:
-    """Refuse a damaged size: a table that announces more than the file stores would read as endless zeros."""
-    announced = samples.shape[0] * samples.shape[1]
-    if samples.chunks is None:
-        stored = samples.id.get_storage_size() // samples.dtype.itemsize
-    else:
-        stored = samples.id.get_num_chunks() * samples.chunks[0] * samples.chunks[1]
-    if announced > stored:
-        raise FileFormatError(
-            f"{path}: /signals/{name} announces {samples.shape[0]} samples but stores at most "
-            f"{stored // max(samples.shape[1], 1)}; the file is damaged"
-        )
-
-
-def _open(path: Path) -> h5py.File:
-    """Open for reading; a file whose writer was killed opens only with ``swmr=True``."""
-    if not path.is_file():
-        raise InputError(f"no file {path}; check the name")
-    try:
-        return h5py.File(path, "r")
-    except OSError:
-        pass
-    try:
-        if _writer_was_killed(path):
-            return h5py.File(path, "r", libver="latest", swmr=True)
-    except (OSError, ValueError) as error:
-        raise FileFormatError(f"{path} is damaged beyond what a killed writer leaves; take a copy of it") from error
-    raise FileFormatError(f"{path} is not an HDF5 file, or it was cut short or damaged; give a whole recording")
-
-
-def _writer_was_killed(path: Path) -> bool:
-    """Whether the superblock (version 3) says that a single-writer, multiple-reader session was never closed.
-
-    Other files must not be opened so: the library would wait, practically forever, for damaged parts to be written.
-    """
-    with path.open("rb") as file:
-        superblock = file.read(48)
-    signature, still_written = b"\x89HDF\r\n\x1a\n", 0b101
-    if len(superblock) < 48 or superblock[:9] != signature + b"\x03" or superblock[11] != still_written:
-        return False
-    return path.stat().st_size >= int.from_bytes(superblock[28:36], "little")
-
-
-@contextmanager
-def _reporting_damage(path: Path) -> Iterator[None]:
-    """What the HDF5 library raises on damaged bytes, as one line."""
-    try:
-        yield
-    except (KeyError, OSError, RuntimeError, ValueError, TypeError, AttributeError) as error:
-        raise FileFormatError(f"{path} is damaged: {' '.join(str(error).split())}; take a copy of it") from error

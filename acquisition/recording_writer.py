@@ -163,10 +163,9 @@ class RecordingWriter:
         """Close the file; ``complete`` is set when the recording ended in order."""
         if not self._file:
             return
+        if complete:  # in place: reopening the file would leave a moment in which a kill makes it unreadable
+            self._file.attrs.modify("complete", np.bool_(True))
         self._file.close()
-        if complete:
-            with h5py.File(self.path, "r+", libver="latest") as file:
-                file.attrs["complete"] = np.bool_(True)
 
     def __enter__(self) -> "RecordingWriter":
         return self
