@@ -112,11 +112,14 @@ def test_lobes_survive_their_file(tmp_path: Path) -> None:
         read_lobes(tmp_path / "other.csv")
 
 
-def _frf(
-    values: np.ndarray, labels: tuple[str, ...] = ("TCP:+X",), unit: str = "m/N", quantity: str = "receptance"
-) -> Frf:
-    n = len(values)
+def _frf(values: np.ndarray, unit: str = "m/N", quantity: str = "receptance") -> Frf:
+    n, labels = len(values), ("TCP:+X",)
     return Frf(np.arange(1.0, n + 1), values, labels, labels, quantity, unit, np.ones(n, dtype=bool))
+
+
+def _one_mode(pole: complex, response: str) -> ModalModel:
+    one = np.ones((1, 1), dtype=complex)
+    return ModalModel(np.array([pole]), one, one, (response,), ("T:+X",))
 
 
 @pytest.mark.parametrize(
