@@ -1,0 +1,68 @@
+"""The command line `millfrf`: one verb a job; exit code 0 done, 1 the run failed, 2 bad input."""
+
+import os
+import sys
+from collections.abc import Sequence
+
+import typer
+
+from foundation import InputError, MillfrfError
+
+from .commands import COMMANDS
+
+DONE, FAILED, BAD_INPUT = 0, 1, 2
+
+app = typer.Typer(
+    name="millfrf",
+    help="FRFs of machining robots measured while they mill, their modal fit and stability lobes.",
+    add_completion=False,
+    no_args_is_help=False,
+    rich_markup_mode=None,
+)
+for _function in COMMANDS:
+    app.command()(_function)
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run one command line and return its exit code; a failure is one line on standard error.
+
+    Set ``MILLFRF_TRACEBACK=1`` to see where an unexpected failure came from.
+    """
+    command = typer.main.get_command(app)
+    try:
+        result = command.main(args=list(arguments), prog_name="millfrf", standalone_mode=False)
+    except (KeyboardInterrupt, typer.Abort):
+        return _fail("stopped; unfinished files were removed", FAILED)
+    except Exception as error:
+        return _explain(error)
+    return result if isinstance(result, int) else DONE
+
+
+def _explain(error: Exception) -> int:
+    """One line and the exit code for whatever ended a command."""
+    if isinstance(error, InputError):
+        return _fail(str(error), BAD_INPUT)
+    if isinstance(error, MillfrfError):
+        return _fail(str(error), FAILED)
+    usage = getattr(error, "format_message", None)  # a wrong option, whichever click typer brings along
+    if callable(usage):
+        return _fail(f"{usage()} Try 'millfrf --help'.", BAD_INPUT)
+    if os.environ.get("MILLFRF_TRACEBACK"):
+        raise error
+    if isinstance(error, OSError):
+        return _fail(f"{error.filename or 'a file'}: {error.strerror or error}", FAILED)
+    return _fail(f"unexpected {type(error).__name__}: {error}; MILLFRF_TRACEBACK=1 shows where", FAILED)
+
+
+def _fail(message: str, code: int) -> int:
+    print("millfrf: " + " ".join(message.split()), file=sys.stderr)
+    return code
+
+
+def main() -> None:
+    """Entry point of the program ``millfrf``."""
+    sys.exit(run(sys.argv[1:]))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,18 @@
+"""The steps of the main job, as the commands and the demonstration both call them."""
+
+from .calibrate import calibrate_model
+from .estimate import Estimate, EstimateOptions, estimate_recordings
+from .fit import FitOptions, fit_model
+from .lobes import LOBE_METHODS, compute_lobes, speed_axis
+
+__all__ = [
+    "LOBE_METHODS",
+    "Estimate",
+    "EstimateOptions",
+    "FitOptions",
+    "calibrate_model",
+    "compute_lobes",
+    "estimate_recordings",
+    "fit_model",
+    "speed_axis",
+]

@@ -1,0 +1,227 @@
+"""From recordings to an FRF file: spectra test by test, stacked, with the sensors' high-pass taken out."""
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Recording
+from estimation import (
+    CrossSpectra,
+    Frf,
+    InputIndependence,
+    correct_high_pass,
+    cross_spectra,
+    h1,
+    h1_side_by_side,
+    input_independence,
+    settings_for,
+    sum_tests,
+    write_frf,
+)
+from foundation import InputError
+
+from ..progress import Watch, silent
+from ..provenance import sources, versions
+
+DRIVEN = 1e-4
+"""A line is driven where the inputs' power is above this share of their largest."""
+
+STACKS = ("sum", "side-by-side")
+
+
+@dataclass(frozen=True)
+class EstimateOptions:
+    """How recordings are turned into an FRF.
+
+    Parameters
+    ----------
+    segment
+        Duration of a segment, s.
+    overlap, window
+        As in :class:`estimation.SpectralSettings`.
+    stack
+        ``sum`` or ``side-by-side``.
+    excitations, responses
+        Channel names; empty: chosen by quantity.
+    band
+        Lines to keep, Hz; None: all.
+    stream
+        Sample clock; None: the only one.
+    """
+
+    segment: float = 8.0
+    overlap: float = 0.5
+    window: str = "hann"
+    stack: str = "sum"
+    excitations: tuple[str, ...] = ()
+    responses: tuple[str, ...] = ()
+    band: tuple[float, float] | None = None
+    stream: str | None = None
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """An FRF with what it was made from.
+
+    Parameters
+    ----------
+    frf
+        In the recordings' own quantity (accelerance from accelerations).
+    tests
+        Spectra test by test.
+    independence
+        Of the stacked inputs.
+    warnings
+        One sentence each.
+    """
+
+    frf: Frf
+    tests: tuple[CrossSpectra, ...]
+    independence: InputIndependence
+    warnings: tuple[str, ...]
+
+
+def spectra_of_tests(
+    paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, watch: Watch = silent
+) -> tuple[CrossSpectra, ...]:
+    """Spectra of each recording on the lines that are wanted.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be used, or sample rates that differ.
+    """
+    if not paths:
+        raise InputError("no recording given; name at least one")
+    rates = [_sample_rate(path, options.stream) for path in paths]
+    for path, rate in zip(paths, rates, strict=True):
+        if rate != rates[0]:
+            raise InputError(
+                f"{Path(path).name} was sampled at {rate:g} Hz, {Path(paths[0]).name} at {rates[0]:g} Hz; "
+                "stack tests of one sample rate"
+            )
+    return tuple(_spectra(path, options, watch) for path in paths)
+
+
+def estimate_recordings(
+    paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, watch: Watch = silent
+) -> Estimate:
+    """H1 over one or many recordings.
+
+    Raises
+    ------
+    InputError
+        A file or option that cannot be used, or inputs that are dependent wherever they have power: fewer tests than
+        inputs, or tests that are too much alike.
+    """
+    if options.stack not in STACKS:
+        raise InputError(f"unknown stack {options.stack!r}; use one of {', '.join(STACKS)}")
+    tests = spectra_of_tests(paths, options, watch)
+    total = sum_tests(tests)
+    driven = _driven(total)
+    independence = input_independence(total, _range(total.frequencies[driven]))
+    _require_independence(total, independence, driven)
+    frf = h1(total) if options.stack == "sum" else h1_side_by_side(tests)
+    frf = correct_high_pass(frf, [channel.high_pass_hz for channel in total.responses])
+    return Estimate(frf, tests, independence, independence.warnings)
+
+
+def write_estimate(
+    path: str | os.PathLike[str],
+    estimate: Estimate,
+    recordings: Sequence[str | os.PathLike[str]],
+    options: EstimateOptions,
+) -> None:
+    """Write the FRF with its provenance: recordings, settings, averages, warnings, versions."""
+    first = estimate.tests[0]
+    provenance = {
+        "step": "estimate",
+        "sources": sources(recordings),
+        "options": asdict(options),
+        "settings": asdict(first.settings),
+        "sample_rate_hz": first.sample_rate,
+        "excitation_channels": [channel.name for channel in first.excitations],
+        "response_channels": [channel.name for channel in first.responses],
+        "n_tests": sum(test.n_tests for test in estimate.tests),
+        "n_segments": sum(test.n_segments for test in estimate.tests),
+        "effective_averages": sum(test.effective_averages for test in estimate.tests),
+        "warnings": list(estimate.warnings),
+        "versions": versions(),
+    }
+    title = f"H1 of {len(recordings)} recording{'s' if len(recordings) != 1 else ''}"
+    write_frf(path, estimate.frf, title=title, provenance=json.dumps(provenance))
+
+
+def _sample_rate(path: str | os.PathLike[str], stream: str | None) -> float:
+    with Recording(path) as recording:
+        return recording.stream(stream).sample_rate
+
+
+def _spectra(path: str | os.PathLike[str], options: EstimateOptions, watch: Watch) -> CrossSpectra:
+    with Recording(path) as recording:
+        source = recording.stream(options.stream)
+        settings = settings_for(source.sample_rate, options.segment, overlap=options.overlap, window=options.window)
+        with watch(f"spectra of {Path(path).name}", source.n_samples) as update:
+            spectra = cross_spectra(
+                recording,
+                settings,
+                stream=options.stream,
+                excitations=options.excitations or None,
+                responses=options.responses or None,
+                progress=update,
+            )
+    return spectra if options.band is None else lines_of(spectra, options.band)
+
+
+def lines_of(spectra: CrossSpectra, band: tuple[float, float]) -> CrossSpectra:
+    """The lines of spectra inside a band (Hz).
+
+    Raises
+    ------
+    InputError
+        None lies inside.
+    """
+    low, high = band
+    f = spectra.frequencies
+    inside = (f >= low) & (f <= high)
+    if not inside.any():
+        raise InputError(
+            f"no line lies between {low:g} and {high:g} Hz (the spectra have 0 to {f[-1]:g} Hz); widen --band"
+        )
+    return replace(
+        spectra,
+        frequencies=f[inside],
+        input_spectra=spectra.input_spectra[inside],
+        cross_spectra=spectra.cross_spectra[inside],
+        output_spectra=spectra.output_spectra[inside],
+    )
+
+
+def _driven(spectra: CrossSpectra) -> NDArray[np.bool_]:
+    """Lines above 0 Hz on which the inputs have power at all, each input weighed by its own largest."""
+    power = np.real(np.einsum("kii->ki", spectra.input_spectra))
+    largest = power.max(axis=0)
+    share = np.max(power / np.where(largest > 0, largest, 1.0), axis=1)
+    return np.asarray((share > DRIVEN) & (spectra.frequencies > 0))
+
+
+def _range(frequencies: NDArray[np.float64]) -> tuple[float, float] | None:
+    return (float(frequencies[0]), float(frequencies[-1])) if len(frequencies) else None
+
+
+def _require_independence(total: CrossSpectra, independence: InputIndependence, driven: NDArray[np.bool_]) -> None:
+    if not driven.any():
+        raise InputError("the inputs have no power on any line; check the excitation channels")
+    if not (independence.independent & driven).any():
+        n_inputs = len(total.excitations)
+        lines = total.frequencies[driven]
+        raise InputError(
+            f"the {n_inputs} inputs are dependent on every line they drive ({lines[0]:.4g} to {lines[-1]:.4g} Hz) in "
+            f"{total.n_tests} test{'s' if total.n_tests != 1 else ''} of {total.n_segments} segments: give at least "
+            f"{n_inputs} tests with different immersions, porous material, or shorter segments"
+        )

@@ -1,0 +1,56 @@
+"""From a model or an FRF at the tool tip to stability lobes."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cutting import MillingProcess
+from estimation import Frf, to_receptance
+from foundation import InputError
+from modal_fit import ModalModel
+from stability import StabilityLobes, nyquist_limits, zero_order
+
+from ..progress import Watch, silent
+
+LOBE_METHODS = {"zero-order": zero_order, "nyquist": nyquist_limits}
+"""Solvers by the name that ``--method`` takes."""
+
+
+def speed_axis(lowest: float, highest: float, count: int) -> NDArray[np.float64]:
+    """Spindle speeds from two in rpm, evenly spaced, rad/s.
+
+    Raises
+    ------
+    InputError
+        Speeds that are not positive and increasing, or a count below 1.
+    """
+    if not (0 < lowest <= highest and np.isfinite(highest)):
+        raise InputError(f"spindle speeds {lowest:g} to {highest:g} rpm are not positive and increasing; give LO HI N")
+    if count < 1 or (count == 1 and lowest != highest):
+        raise InputError(f"{count} spindle speeds between {lowest:g} and {highest:g} rpm; give 2 or more")
+    return np.asarray(np.linspace(lowest, highest, count) * np.pi / 30)
+
+
+def compute_lobes(
+    dynamics: Frf | ModalModel,
+    process: MillingProcess,
+    spindle_speeds: NDArray[np.float64],
+    max_depth: float,
+    method: str = "zero-order",
+    watch: Watch = silent,
+) -> StabilityLobes:
+    """Depth limit at each spindle speed (rad/s), up to ``max_depth`` (m).
+
+    Raises
+    ------
+    InputError
+        An unknown method, or dynamics that are not a receptance at the tool tip.
+    """
+    if method not in LOBE_METHODS:
+        raise InputError(f"unknown method {method!r}; use one of {', '.join(LOBE_METHODS)}")
+    if not (np.isfinite(max_depth) and max_depth > 0):
+        raise InputError(f"largest depth {max_depth!r} m must be positive, for example 0.005 (5 mm)")
+    known = to_receptance(dynamics) if isinstance(dynamics, Frf) else dynamics
+    if known.quantity != "receptance":
+        raise InputError(f"lobes need a receptance in m/N at the tool tip; this is a {known.quantity} in {known.unit}")
+    with watch(f"lobes, {method}"):
+        return LOBE_METHODS[method](known, process, spindle_speeds, max_depth)

@@ -1,0 +1,15 @@
+"""The commands, one a file. Their modules import nothing heavy, so that `--help` is quick."""
+
+from .calibrate import calibrate
+from .convert import convert
+from .demo import demo
+from .estimate import estimate
+from .fit import fit
+from .inspect import inspect
+from .lobes import lobes
+from .report import report
+
+COMMANDS = (demo, inspect, convert, estimate, fit, calibrate, lobes, report)
+"""In the order in which `--help` lists them."""
+
+__all__ = ["COMMANDS"]

@@ -1,0 +1,31 @@
+"""`millfrf calibrate`: a model at the sensor becomes one at the tool tip."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import Output, check_output
+
+
+def calibrate(
+    model: Annotated[Path, typer.Argument(metavar="MODEL.json", help="In-process model at the sensor.")],
+    tip: Annotated[Path, typer.Option("--tip", metavar="TT.h5", help="Hammer FRF: tapped at the tip, motion there.")],
+    sensor: Annotated[Path, typer.Option("--sensor", metavar="ST.h5", help="Hammer FRF: motion at the sensor.")],
+    out: Output,
+) -> None:
+    """Carry an in-process model from the sensor to the tool tip by two hammer FRFs."""
+    from estimation import read_frf
+    from modal_fit import read_modal_model
+
+    from ..chain.calibrate import calibrate_model, write_calibration
+    from ..progress import bar
+    from ..tables import mode_table, show
+
+    check_output(out, (".json",))
+    result = calibrate_model(read_modal_model(model), read_frf(tip), read_frf(sensor), bar)
+    write_calibration(out, result, [model, tip, sensor])
+    for warning in result.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    show(mode_table(result.model))
+    typer.echo(f"wrote {out}")

@@ -1,0 +1,48 @@
+"""`millfrf estimate`: FRF matrix from one or many recordings."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import Band, Output, Stream, check_band, check_output, names
+
+
+def estimate(
+    recordings: Annotated[list[Path], typer.Argument(metavar="REC...", help="Recordings of one set-up.")],
+    out: Output,
+    segment: Annotated[float, typer.Option("--segment", help="Duration of a segment, s.")] = 8.0,
+    overlap: Annotated[float, typer.Option("--overlap", help="Share of a segment shared with the next.")] = 0.5,
+    window: Annotated[str, typer.Option("--window", help="hann, hamming or boxcar.")] = "hann",
+    stack: Annotated[str, typer.Option("--stack", help="How tests are stacked: sum or side-by-side.")] = "sum",
+    excitation: Annotated[
+        list[str] | None, typer.Option("--excitation", help="Channel that excites; repeat, or separate by commas.")
+    ] = None,
+    response: Annotated[
+        list[str] | None, typer.Option("--response", help="Channel that responds; repeat, or separate by commas.")
+    ] = None,
+    band: Band = None,
+    stream: Stream = None,
+) -> None:
+    """H1 estimate of the FRF matrix over one or many tests, with coherence and covariance.
+
+    Without names, forces and voltages excite; accelerations, velocities and displacements respond. --band keeps only
+    those lines.
+    """
+    from ..chain.estimate import EstimateOptions, estimate_recordings, write_estimate
+    from ..progress import bar
+
+    check_output(out, (".h5", ".hdf5"))
+    options = EstimateOptions(
+        segment, overlap, window, stack, names(excitation), names(response), check_band(band), stream
+    )
+    result = estimate_recordings(recordings, options, bar)
+    write_estimate(out, result, recordings, options)
+    for warning in result.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    frf = result.frf
+    typer.echo(
+        f"wrote {out}: {frf.quantity}, {len(frf.responses)} responses x {len(frf.excitations)} excitations, "
+        f"{int(frf.valid.sum())} of {len(frf.frequencies)} lines valid, "
+        f"{frf.frequencies[0]:g} to {frf.frequencies[-1]:g} Hz"
+    )

@@ -1,0 +1,24 @@
+"""`millfrf inspect`: what is in a file, and what looks wrong."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def inspect(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Recording, FRF, model, lobes or cutting file.")],
+) -> None:
+    """Say what is in a file, and what looks wrong: levels, overload, dead channels, missing samples."""
+    from ..inspection import inspect_file
+    from ..progress import bar
+    from ..tables import show
+
+    findings = inspect_file(file, bar)
+    typer.echo(f"{file.name}: {findings.summary}")
+    for table in findings.tables:
+        show(table)
+    for concern in findings.concerns:
+        typer.echo(f"warning: {concern}")
+    if not findings.concerns:
+        typer.echo("nothing looks wrong")

@@ -1,0 +1,47 @@
+"""`millfrf lobes`: depth limit over spindle speed."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from foundation import InputError
+
+from .options import Output, check_output
+
+
+def lobes(
+    dynamics: Annotated[Path, typer.Argument(metavar="MODEL.json|FRF.h5", help="Dynamics at the tool tip.")],
+    cutting: Annotated[Path, typer.Option("--cutting", metavar="CUT.toml", help="Cutter, engagement, coefficients.")],
+    speeds: Annotated[
+        tuple[float, float, int], typer.Option("--speeds", metavar="LO HI N", help="Spindle speeds, rpm.")
+    ],
+    max_depth: Annotated[float, typer.Option("--max-depth", metavar="M", help="Largest depth looked at, m.")],
+    out: Output,
+    method: Annotated[str, typer.Option("--method", help="zero-order or nyquist.")] = "zero-order",
+) -> None:
+    """Stability lobes from a modal model or straight from a measured FRF."""
+    from cutting import read_cutting_process
+    from estimation import read_frf
+    from modal_fit import read_modal_model
+    from stability import write_lobes
+
+    from ..chain.lobes import compute_lobes, speed_axis
+    from ..file_kinds import FRF, MODEL, kind_of
+    from ..progress import bar
+
+    check_output(out, (".csv",))
+    readers = {FRF: read_frf, MODEL: read_modal_model}
+    kind = kind_of(dynamics)
+    if kind not in readers:
+        raise InputError(f"{dynamics} is a file of {kind}; lobes need a modal model or an FRF at the tool tip")
+    process = read_cutting_process(cutting)
+    result = compute_lobes(readers[kind](dynamics), process, speed_axis(*speeds), max_depth, method, bar)
+    write_lobes(out, result)
+    for warning in result.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    lowest = result.depth_limits.argmin()
+    typer.echo(
+        f"wrote {out}: lowest limit {1e3 * result.depth_limits[lowest]:.3g} mm "
+        f"at {result.spindle_speeds_rpm[lowest]:.0f} rpm"
+    )

@@ -1,0 +1,28 @@
+"""`millfrf report`: one self-contained HTML page of whatever files are given."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import Band, Output, check_band, check_output
+
+
+def report(
+    files: Annotated[
+        list[Path], typer.Argument(metavar="FILES...", help="Recordings, FRFs, models, lobes, cutting file.")
+    ],
+    out: Output,
+    title: Annotated[str, typer.Option("--title", help="Title of the report.")] = "In-process FRF and modal fit",
+    band: Band = None,
+    reference: Annotated[
+        Path | None, typer.Option("--reference", metavar="MODEL.json", help="Known dynamics to draw beside the fit.")
+    ] = None,
+) -> None:
+    """The modal-fitting report of a test: set-up, settings, modes, figures, lobes, versions."""
+    from ..progress import bar
+    from ..report import ReportOptions, write_report
+
+    check_output(out, (".html", ".htm"))
+    write_report(out, files, ReportOptions(title, check_band(band), reference), bar)
+    typer.echo(f"wrote {out}")

@@ -1,0 +1,198 @@
+"""FRF matrix: magnitude and phase of every entry, multiple coherence beneath, fit and reference over it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
+from matplotlib.ticker import MultipleLocator
+from numpy.typing import NDArray
+
+from estimation import Frf
+from foundation import InputError
+from modal_fit import ModalModel
+
+from .style import FITTED, MEASURED, TRUE, house_style, legend_above, new_figure
+
+PER_PAGE = 3
+"""Responses, and excitations, on one page."""
+
+_SYMBOLS = {"receptance": "H", "mobility": "Y", "accelerance": "A"}
+_REMOTE_FROM_FIT = 2.0
+
+
+@dataclass(frozen=True)
+class FrfCurves:
+    """What one figure shows.
+
+    Parameters
+    ----------
+    measured
+        Any quantity; the models must give the same unit.
+    band : (low, high), Hz
+        Frequency axis.
+    fitted, reference
+        Models drawn over it where they are given.
+    fit_band
+        Hz, where the fitted model holds; None: the whole axis.
+    """
+
+    measured: Frf
+    band: tuple[float, float]
+    fitted: ModalModel | None = None
+    reference: ModalModel | None = None
+    fit_band: tuple[float, float] | None = None
+
+
+def frf_figures(curves: FrfCurves) -> tuple[Figure, ...]:
+    """One page for every three responses by three excitations; columns are responses, rows are excitations.
+
+    Raises
+    ------
+    InputError
+        No line lies in the band.
+    """
+    frf = curves.measured
+    if not ((frf.frequencies >= curves.band[0]) & (frf.frequencies <= curves.band[1])).any():
+        raise InputError(
+            f"no line of the FRF lies between {curves.band[0]:g} and {curves.band[1]:g} Hz; "
+            f"it has {frf.frequencies[0]:g} to {frf.frequencies[-1]:g} Hz"
+        )
+    pages = []
+    with house_style():
+        for q in range(0, len(frf.excitations), PER_PAGE):
+            for p in range(0, len(frf.responses), PER_PAGE):
+                rows = range(q, min(q + PER_PAGE, len(frf.excitations)))
+                pages.append(_page(curves, range(p, min(p + PER_PAGE, len(frf.responses))), rows))
+    return tuple(pages)
+
+
+def _page(curves: FrfCurves, responses: range, excitations: range) -> Figure:
+    with_coherence = curves.measured.multiple_coherence is not None
+    figure = new_figure(62.0 * len(excitations) + (30.0 if with_coherence else 0.0) + 12.0)
+    heights = [2.0, 1.0] * len(excitations) + ([1.1] if with_coherence else [])
+    grid = GridSpec(len(heights), len(responses), figure=figure, height_ratios=heights)
+    limits = _magnitude_limits(curves)
+    first: Axes | None = None
+    for column, p in enumerate(responses):
+        for row, q in enumerate(excitations):
+            magnitude = figure.add_subplot(grid[2 * row, column], sharex=first)
+            first = first or magnitude
+            phase = figure.add_subplot(grid[2 * row + 1, column], sharex=first)
+            _draw_entry(magnitude, phase, curves, p, q)
+            magnitude.set_ylim(*limits)
+            _label(magnitude, phase, curves.measured, p, q, outer=column == 0)
+        bottom = phase
+        if with_coherence:
+            bottom = figure.add_subplot(grid[-1, column], sharex=first)
+            _draw_coherence(bottom, curves, p, outer=column == 0)
+        bottom.tick_params(labelbottom=True)
+        bottom.set_xlabel("Frequency (Hz)")
+        bottom.set_xlim(*curves.band)
+    if first is not None:
+        legend_above(figure, first)
+    return figure
+
+
+def _lines(curves: FrfCurves) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64] | None]:
+    """Frequencies, values and standard deviation inside the band; not a number where there is no FRF."""
+    frf = curves.measured
+    inside = (frf.frequencies >= curves.band[0]) & (frf.frequencies <= curves.band[1])
+    values = np.where(frf.valid[:, None, None], frf.values, np.nan)[inside]
+    deviation = None
+    if frf.covariance is not None:
+        variance = np.where(frf.valid[:, None, None], frf.covariance.variance(), np.nan)
+        deviation = np.sqrt(np.maximum(variance[inside], 0.0))
+    return frf.frequencies[inside], values, deviation
+
+
+def _axis_of(model_band: tuple[float, float]) -> NDArray[np.float64]:
+    return np.linspace(max(model_band[0], 1e-3), model_band[1], 600)
+
+
+def _models(curves: FrfCurves) -> list[tuple[str, ModalModel, tuple[float, float], dict[str, object]]]:
+    models: list[tuple[str, ModalModel, tuple[float, float], dict[str, object]]] = []
+    if curves.reference is not None:
+        dotted = {"color": TRUE, "linestyle": (0, (1, 1.2)), "linewidth": 1.6}
+        models.append(("True structure", curves.reference, curves.band, dotted))
+    if curves.fitted is not None:
+        low, high = curves.fit_band or curves.band
+        band = (max(low, curves.band[0]), min(high, curves.band[1]))
+        models.append(("Fitted model", curves.fitted, band, {"color": FITTED, "linestyle": (0, (5, 1.5))}))
+    return models
+
+
+def _draw_entry(magnitude: Axes, phase: Axes, curves: FrfCurves, p: int, q: int) -> None:
+    frequencies, values, deviation = _lines(curves)
+    size, angle = np.abs(values[:, p, q]), np.angle(values[:, p, q], deg=True)
+    if deviation is not None:
+        spread = 2 * deviation[:, p, q]
+        magnitude.fill_between(
+            frequencies,
+            np.maximum(size - spread, 1e-3 * size),
+            size + spread,
+            color="#bdbdbd",
+            linewidth=0,
+            label="± 2 standard deviations",
+        )
+    magnitude.plot(frequencies, size, color=MEASURED, linewidth=0.9, label="Measured")
+    phase.plot(frequencies, angle, ".", color=MEASURED, markersize=1.8)
+    for label, model, band, style in _models(curves):
+        axis = _axis_of(band)
+        entry = _entry(model.frf(axis), curves.measured, p, q)
+        if entry is None:
+            continue
+        magnitude.plot(axis, np.abs(entry), label=label, **style)
+        phase.plot(axis, _without_jumps(np.angle(entry, deg=True)), **style)
+    magnitude.set_yscale("log")
+
+
+def _entry(frf: Frf, like: Frf, p: int, q: int) -> NDArray[np.complex128] | None:
+    """The model's entry of the same degrees of freedom, None where it has none."""
+    if like.responses[p] not in frf.responses or like.excitations[q] not in frf.excitations:
+        return None
+    row, column = frf.responses.index(like.responses[p]), frf.excitations.index(like.excitations[q])
+    return np.asarray(frf.values[:, row, column])
+
+
+def _without_jumps(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Break the line where the phase passes from +180 to -180 degrees."""
+    broken = angle.copy()
+    broken[1:][np.abs(np.diff(angle)) > 180] = np.nan
+    return broken
+
+
+def _magnitude_limits(curves: FrfCurves) -> tuple[float, float]:
+    """One scale for all entries, four decades at most, so that strong and weak can be compared."""
+    size = np.abs(_lines(curves)[1])
+    size = size[np.isfinite(size) & (size > 0)]
+    if not len(size):
+        return 1e-9, 1e-3
+    top = float(size.max()) * 2.5
+    return max(float(np.percentile(size, 1)) / 2.5, top * 1e-4), top
+
+
+def _label(magnitude: Axes, phase: Axes, frf: Frf, p: int, q: int, *, outer: bool) -> None:
+    magnitude.set_title(f"{frf.responses[p]} / {frf.excitations[q]}", pad=3)
+    magnitude.tick_params(labelbottom=False, labelleft=outer)
+    phase.tick_params(labelbottom=False, labelleft=outer)
+    phase.set_ylim(-190, 190)
+    phase.yaxis.set_major_locator(MultipleLocator(90))
+    phase.set_yticks([-180, 0, 180])
+    if outer:
+        symbol = _SYMBOLS.get(frf.quantity, "H")
+        magnitude.set_ylabel(f"|{symbol}| ({frf.unit})")
+        phase.set_ylabel("Phase (°)")
+
+
+def _draw_coherence(axes: Axes, curves: FrfCurves, p: int, *, outer: bool) -> None:
+    frf = curves.measured
+    assert frf.multiple_coherence is not None
+    axes.plot(frf.frequencies, frf.multiple_coherence[:, p], color=MEASURED, linewidth=0.9)
+    axes.set_ylim(0, 1.05)
+    axes.set_yticks([0, 0.5, 1])
+    axes.set_title(f"Multiple coherence of {frf.responses[p]}", pad=3)
+    axes.tick_params(labelleft=outer)
+    if outer:
+        axes.set_ylabel("γ² (1)")

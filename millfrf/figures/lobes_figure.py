@@ -1,0 +1,90 @@
+"""Stability lobes: depth limit over spindle speed, the chatter frequency beneath, cuts that were tried."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from stability import StabilityLobes
+
+from .style import SHADE, house_style, legend_above, line_style, new_figure, panel_letter
+
+
+@dataclass(frozen=True)
+class TriedCut:
+    """A cut that was made, or simulated: does it chatter?
+
+    Parameters
+    ----------
+    spindle_speed_rpm, depth
+        rpm and m.
+    stable
+        What was seen.
+    """
+
+    spindle_speed_rpm: float
+    depth: float
+    stable: bool
+
+
+def lobes_figure(curves: Mapping[str, StabilityLobes], cuts: Sequence[TriedCut] = ()) -> Figure:
+    """Depth limits in mm over rpm, one line for each entry; the area above the first is shaded.
+
+    Where a cut is stable at all depths asked for, the line is interrupted.
+    """
+    with house_style():
+        figure = new_figure(115.0)
+        depth, chatter = figure.subplots(2, 1, sharex=True, height_ratios=[1.9, 1.0])
+        for number, (label, lobes) in enumerate(curves.items()):
+            _draw_curve(depth, chatter, label, lobes, number)
+        _draw_cuts(depth, cuts)
+        top = _depth_limit(list(curves.values()), cuts)
+        depth.set_ylim(0, top)
+        if curves:
+            _shade_unstable(depth, next(iter(curves.values())), top)
+        depth.set_ylabel("Axial depth limit (mm)")
+        chatter.set_ylabel("Chatter\nfrequency (Hz)")
+        chatter.set_xlabel("Spindle speed (rpm)")
+        panel_letter(depth, 0)
+        panel_letter(chatter, 1)
+        legend_above(figure, depth, columns=3)
+    return figure
+
+
+def _draw_curve(depth: Axes, chatter: Axes, label: str, lobes: StabilityLobes, number: int) -> None:
+    rpm = lobes.spindle_speeds_rpm
+    limit = np.where(np.isfinite(lobes.depth_limits), 1e3 * lobes.depth_limits, np.nan)
+    style = line_style(number)
+    depth.plot(rpm, limit, label=label, linewidth=1.6 if number == 0 else 1.2, **style)
+    chatter.plot(rpm, lobes.chatter_frequencies, linewidth=1.6 if number == 0 else 1.2, **style)
+    doubled = np.array([name == "period-doubling" for name in lobes.bifurcations], dtype=bool)
+    if doubled.any():
+        depth.plot(rpm[doubled], limit[doubled], "s", color=style["color"], markersize=3, label="period doubling")
+
+
+def _shade_unstable(axes: Axes, lobes: StabilityLobes, top: float) -> None:
+    limit = np.where(np.isfinite(lobes.depth_limits), 1e3 * lobes.depth_limits, top)
+    rpm = lobes.spindle_speeds_rpm
+    axes.fill_between(rpm, np.minimum(limit, top), top, color=SHADE, linewidth=0, zorder=0, label="unstable")
+    axes.set_xlim(float(rpm.min()), float(rpm.max()))
+
+
+def _draw_cuts(axes: Axes, cuts: Sequence[TriedCut]) -> None:
+    for stable, label, marker in ((True, "cut, stable", "o"), (False, "cut, chatter", "X")):
+        chosen = [cut for cut in cuts if cut.stable is stable]
+        if chosen:
+            rpm, depths = [cut.spindle_speed_rpm for cut in chosen], [1e3 * cut.depth for cut in chosen]
+            face = "white" if stable else "black"
+            axes.plot(rpm, depths, marker, color="black", markerfacecolor=face, markersize=5.5, label=label, zorder=5)
+
+
+def _depth_limit(curves: Sequence[StabilityLobes], cuts: Sequence[TriedCut]) -> float:
+    finite = np.concatenate(
+        [1e3 * lobes.depth_limits[np.isfinite(lobes.depth_limits)] for lobes in curves]
+        + [np.array([1e3 * cut.depth for cut in cuts])]
+    )
+    if not len(finite):
+        return 1.0
+    return 1.2 * float(max(np.percentile(finite, 97), max((1e3 * cut.depth for cut in cuts), default=0.0)))

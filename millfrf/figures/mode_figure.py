@@ -1,0 +1,48 @@
+"""Modal vectors in the complex plane: right (shape) beside left (participation), which differ in a robot."""
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.projections.polar import PolarAxes
+from numpy.typing import NDArray
+
+from modal_fit import ModalModel
+
+from .style import COLOURS, LINE_STYLES, house_style, legend_above, new_figure
+
+MOST_MODES = 4
+
+
+def mode_figure(model: ModalModel) -> Figure:
+    """Each vector turned and scaled so that its largest component is real and 1; the first four modes."""
+    n_modes = min(len(model.poles), MOST_MODES)
+    with house_style():
+        figure = new_figure(104.0 if n_modes > 1 else 70.0)
+        panels = figure.subplots(2, max(n_modes, 1), squeeze=False, subplot_kw={"projection": "polar"})
+        for mode in range(n_modes):
+            frequency = model.natural_frequencies[mode]
+            _draw(panels[0, mode], model.right[mode], model.responses)
+            _draw(panels[1, mode], model.left[mode], model.excitations)
+            panels[0, mode].set_title(f"Mode {mode + 1}, {frequency:.2f} Hz\nright vector (responses)", pad=6)
+            panels[1, mode].set_title("left vector (excitations)", pad=6)
+        legend_above(figure, panels[0, 0])
+    return figure
+
+
+def _draw(axes: PolarAxes, vector: NDArray[np.complex128], labels: tuple[str, ...]) -> None:
+    largest = vector[np.argmax(np.abs(vector))]
+    scaled = vector / largest if largest != 0 else vector
+    for number, (component, label) in enumerate(zip(scaled, labels, strict=True)):
+        style = {"color": COLOURS[number % len(COLOURS)], "linestyle": LINE_STYLES[number % len(LINE_STYLES)]}
+        axes.plot(
+            [0, np.angle(component)],
+            [0, np.abs(component)],
+            marker="o",
+            markevery=[1],
+            markersize=3.5,
+            label=label.split(":")[-1],
+            **style,
+        )
+    axes.set_ylim(0, 1.1)
+    axes.set_yticks([0.5, 1.0])
+    axes.set_yticklabels(["0.5", "1"])
+    axes.set_xticks(np.radians([0, 90, 180, 270]))

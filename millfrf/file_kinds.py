@@ -1,0 +1,69 @@
+"""What a file is, by what it holds and not by its name."""
+
+import csv
+import json
+import os
+import tomllib
+from pathlib import Path
+
+import h5py
+
+from foundation import FileFormatError, InputError
+
+RECORDING, FRF, MODEL, LOBES, CUTTING = "recording", "frf", "modal model", "lobes", "cutting data"
+_FORMATS = {"millfrf.recording": RECORDING, "millfrf.frf": FRF, "millfrf.modal_model": MODEL}
+_LOBES_COLUMNS = ["spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation"]
+
+
+def kind_of(path: str | os.PathLike[str]) -> str:
+    """``recording``, ``frf``, ``modal model``, ``lobes`` or ``cutting data``.
+
+    Raises
+    ------
+    InputError
+        No such file.
+    FileFormatError
+        It is none of these; the message says what it looked like.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise InputError(f"no file {file}; check the name")
+    kind = _hdf5_kind(file) if h5py.is_hdf5(file) else _text_kind(file)
+    if kind is None:
+        raise FileFormatError(
+            f"{file} is no recording, FRF, modal model, table of lobes or cutting file; "
+            "turn files of other programs into recordings with 'millfrf convert'"
+        )
+    return kind
+
+
+def _hdf5_kind(file: Path) -> str | None:
+    try:
+        with h5py.File(file, "r") as opened:
+            return _FORMATS.get(str(opened.attrs.get("format", "")))
+    except OSError:  # a recording whose writer was killed opens only for a reader beside a writer
+        return RECORDING
+
+
+def _text_kind(file: Path) -> str | None:
+    try:
+        text = file.read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        return None
+    if text.lstrip().startswith("{"):
+        return _json_kind(text)
+    rows = [line for line in text.splitlines() if line and not line.startswith("#")]
+    if rows and next(csv.reader(rows[:1])) == _LOBES_COLUMNS:
+        return LOBES
+    try:
+        return CUTTING if "cutting" in tomllib.loads(text) else None
+    except tomllib.TOMLDecodeError:
+        return None
+
+
+def _json_kind(text: str) -> str | None:
+    try:
+        content = json.loads(text)
+    except (json.JSONDecodeError, RecursionError):
+        return None
+    return _FORMATS.get(str(content.get("format"))) if isinstance(content, dict) else None

@@ -1,0 +1,60 @@
+"""Where a result came from: stored with it, so that a report can say so without being told."""
+
+import hashlib
+import json
+import os
+import platform
+from collections.abc import Iterable, Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from foundation import writing_whole_file
+
+LIBRARIES = ("numpy", "scipy", "h5py", "numba", "matplotlib")
+
+
+def sha256(path: str | os.PathLike[str]) -> str:
+    """SHA-256 of a file, as hexadecimal text."""
+    digest = hashlib.sha256()
+    with Path(path).open("rb") as file:
+        while chunk := file.read(1 << 20):
+            digest.update(chunk)
+    return digest.hexdigest()
+
+
+def sources(paths: Iterable[str | os.PathLike[str]]) -> list[dict[str, str]]:
+    """Name and SHA-256 of each file a result was made from."""
+    return [{"file": Path(path).name, "sha256": sha256(path)} for path in paths]
+
+
+def versions() -> dict[str, str]:
+    """Versions of this program, of Python and of the libraries that compute."""
+    return {
+        "millfrf": version("millfrf"),
+        "python": platform.python_version(),
+        **{name: version(name) for name in LIBRARIES},
+    }
+
+
+def add_to_json(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> None:
+    """Put a field ``provenance`` into a JSON file; readers that do not know it pass over it."""
+    content = json.loads(Path(path).read_text(encoding="utf-8"))
+    content["provenance"] = dict(provenance)
+    with writing_whole_file(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
+
+
+def read_provenance(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """What an FRF or model file says of its making; empty where it says nothing that can be read."""
+    try:
+        if Path(path).suffix.lower() == ".json":
+            stored = json.loads(Path(path).read_text(encoding="utf-8")).get("provenance", {})
+        else:
+            with h5py.File(path, "r") as file:
+                stored = json.loads(str(file.attrs.get("provenance", "")) or "{}")
+    except (OSError, ValueError, AttributeError):
+        return {}
+    return stored if isinstance(stored, dict) else {}

@@ -1,0 +1,114 @@
+"""Read the files of a report and find out which belongs to which."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from acquisition import Recording
+from cutting import MillingProcess, read_cutting_process
+from estimation import Frf, read_frf
+from foundation import InputError
+from modal_fit import ModalModel, read_modal_model
+from stability import StabilityLobes, read_lobes
+
+from ..file_kinds import CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
+from ..provenance import read_provenance, sha256
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """A file of the report.
+
+    Parameters
+    ----------
+    path, kind
+        Where and what it is.
+    sha256
+        Of its bytes.
+    provenance
+        What it says of its making; empty where it says nothing.
+    """
+
+    path: Path
+    kind: str
+    sha256: str
+    provenance: dict[str, Any]
+
+    @property
+    def label(self) -> str:
+        """File name without suffix, words apart."""
+        return self.path.stem.replace("_", " ")
+
+    def made_from(self, other: "SourceFile") -> bool:
+        """Whether ``other`` is among the files this one was made from, by its bytes."""
+        return any(source.get("sha256") == other.sha256 for source in self.provenance.get("sources", []))
+
+
+@dataclass(frozen=True)
+class Collected:
+    """All files of a report, read (recordings stay on disk).
+
+    Parameters
+    ----------
+    files
+        In the order given.
+    recordings, frfs, models, lobes, cutting
+        By kind, with the file each came from.
+    """
+
+    files: tuple[SourceFile, ...]
+    recordings: tuple[SourceFile, ...] = ()
+    frfs: tuple[tuple[SourceFile, Frf], ...] = ()
+    models: tuple[tuple[SourceFile, ModalModel], ...] = ()
+    lobes: tuple[tuple[SourceFile, StabilityLobes], ...] = ()
+    cutting: tuple[tuple[SourceFile, MillingProcess], ...] = field(default=())
+
+    def model_of(self, file: SourceFile, frf: Frf) -> tuple[SourceFile, ModalModel] | None:
+        """The model fitted to an FRF, or else one of the same degrees of freedom."""
+        fitted = [pair for pair in self.models if pair[0].made_from(file) and pair[1].responses == frf.responses]
+        alike = [
+            pair for pair in self.models if (pair[1].responses, pair[1].excitations) == (frf.responses, frf.excitations)
+        ]
+        return next(iter(fitted + alike), None)
+
+    def frf_of(self, model: SourceFile) -> Frf | None:
+        """The FRF a model was fitted to."""
+        return next((frf for file, frf in self.frfs if model.made_from(file)), None)
+
+    def recordings_of(self, frf: SourceFile) -> tuple[SourceFile, ...]:
+        """The recordings an FRF was estimated from, those that are among the files."""
+        return tuple(file for file in self.recordings if frf.made_from(file))
+
+
+def collect(paths: Sequence[str | os.PathLike[str]]) -> Collected:
+    """Read every file.
+
+    Raises
+    ------
+    InputError
+        No file, or one that cannot be used.
+    """
+    if not paths:
+        raise InputError("no file given; name recordings, FRFs, models, lobes or a cutting file")
+    files = tuple(_source(Path(path)) for path in paths)
+
+    def chosen(kind: str) -> tuple[SourceFile, ...]:
+        return tuple(file for file in files if file.kind == kind)
+
+    for file in chosen(RECORDING):
+        Recording(file.path).close()
+    return Collected(
+        files,
+        chosen(RECORDING),
+        tuple((file, read_frf(file.path)) for file in chosen(FRF)),
+        tuple((file, read_modal_model(file.path)) for file in chosen(MODEL)),
+        tuple((file, read_lobes(file.path)) for file in chosen(LOBES)),
+        tuple((file, read_cutting_process(file.path)) for file in chosen(CUTTING)),
+    )
+
+
+def _source(path: Path) -> SourceFile:
+    kind = kind_of(path)
+    return SourceFile(path, kind, sha256(path), read_provenance(path) if kind in (FRF, MODEL) else {})

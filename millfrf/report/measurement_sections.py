@@ -1,0 +1,117 @@
+"""The sections on the measurement: files, set-up, channels, settings."""
+
+import tomllib
+from typing import Any
+
+from acquisition import Recording
+
+from ..figures.embed import as_data_uri
+from ..figures.time_figure import time_figure
+from ..inspection import channel_levels, level_table
+from ..progress import Watch
+from ..tables import Table
+from .collect import Collected, SourceFile
+from .section import Picture, Section
+
+MOST_OVERVIEWS = 4
+
+
+def file_section(collected: Collected) -> Section:
+    """Every file with its size and the beginning of its SHA-256."""
+    rows = tuple(
+        (file.path.name, file.kind, _size(file.path.stat().st_size), file.sha256[:12]) for file in collected.files
+    )
+    return Section("Files", tables=(Table("", ("file", "kind", "size", "SHA-256 (first 12)"), rows),))
+
+
+def _size(n_bytes: int) -> str:
+    for unit in ("B", "kB", "MB"):
+        if n_bytes < 1000:
+            return f"{n_bytes:.3g} {unit}"
+        n_bytes = n_bytes // 1000 if n_bytes >= 1e6 else round(n_bytes / 1000)
+    return f"{n_bytes:.3g} GB"
+
+
+def setup_section(collected: Collected) -> Section:
+    """Tool, cut and pose as the recordings state them: one column a recording."""
+    stated: list[tuple[str, dict[str, str]]] = []
+    for file in collected.recordings:
+        with Recording(file.path) as recording:
+            entries = {"recorded at": recording.recorded_at or "not stated", "title": recording.title or "untitled"}
+            stated.append((file.path.stem, entries | _flat(recording.setup)))
+    if not stated:
+        return Section("Set-up")
+    keys = list(dict.fromkeys(key for _, entries in stated for key in entries))
+    rows = tuple((key, *(entries.get(key, "") for _, entries in stated)) for key in keys)
+    return Section("Set-up", tables=(Table("", ("", *(name for name, _ in stated)), rows),))
+
+
+def _flat(text: str) -> dict[str, str]:
+    """TOML tables as ``table.key``; text that is no TOML is shown as it is."""
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        return {"set-up": text}
+    found: dict[str, str] = {}
+    for name, content in tables.items():
+        if isinstance(content, dict):
+            found |= {f"{name}: {key.replace('_', ' ')}": _value(value) for key, value in content.items()}
+        else:
+            found[name] = _value(content)
+    return found
+
+
+def _value(value: Any) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def channel_section(collected: Collected, watch: Watch) -> tuple[Section, list[str]]:
+    """Levels of every channel, an overview in time, and what looks wrong."""
+    tables, pictures, concerns = [], [], []
+    for number, file in enumerate(collected.recordings):
+        with Recording(file.path) as recording:
+            if recording.complete is not True:
+                concerns.append(f"{file.path.name}: not closed in order; its end may be missing")
+            for stream in recording.streams.values():
+                if not stream.n_samples:
+                    continue
+                levels = channel_levels(stream, watch)
+                table = level_table(stream, levels)
+                tables.append(Table(f"{file.path.name}, {table.title}", table.columns, table.rows))
+                concerns += [f"{file.path.name}: {text}" for level in levels for text in level.concerns()]
+                if number < MOST_OVERVIEWS:
+                    pictures.append(_overview(file, stream))
+    return Section("Channels and levels", tables=tuple(tables), pictures=tuple(pictures)), concerns
+
+
+def _overview(file: SourceFile, stream: Any) -> Picture:
+    caption = (
+        f"{file.path.name}: every channel over the whole recording (left, largest and smallest sample in each of 600 "
+        "intervals) and a quarter of a second from its middle (right)."
+    )
+    return Picture(as_data_uri(time_figure(stream), kind="png"), caption, "Forces and motion over time")
+
+
+def settings_section(collected: Collected) -> Section:
+    """How each FRF was estimated."""
+    rows = []
+    for file, frf in collected.frfs:
+        made = file.provenance
+        if not made:
+            rows.append((file.path.name, *[""] * 6, f"{len(frf.frequencies)}"))
+            continue
+        settings, rate = made["settings"], made["sample_rate_hz"]
+        rows.append(
+            (
+                file.path.name,
+                f"{made['n_tests']}",
+                f"{settings['segment_length'] / rate:.4g} s",
+                f"{settings['window']}, {100 * settings['overlap']:.0f} % overlap",
+                f"{made['n_segments']} ({made['effective_averages']:.1f})",
+                f"{rate / settings['segment_length']:.4g} Hz",
+                made["options"]["stack"],
+                f"{int(frf.valid.sum())} of {len(frf.frequencies)}",
+            )
+        )
+    columns = ("FRF", "tests", "segment", "window", "segments (effective)", "resolution", "stacking", "valid lines")
+    return Section("Measurement settings", tables=(Table("", columns, tuple(rows)),) if rows else ())

@@ -1,0 +1,111 @@
+"""Put the sections together and write the page."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from foundation import writing_whole_file
+from modal_fit import read_modal_model
+
+from ..progress import Watch, silent
+from ..provenance import versions
+from .collect import Collected, collect
+from .measurement_sections import channel_section, file_section, settings_section, setup_section
+from .result_sections import frf_section, input_section, lobes_section, mode_section
+
+
+@dataclass(frozen=True)
+class ReportOptions:
+    """What a report shall show.
+
+    Parameters
+    ----------
+    title
+        Of the page.
+    band
+        Frequency axis of its figures, Hz; None: chosen by the fit.
+    reference
+        Model file with known dynamics to draw beside the measured ones.
+    """
+
+    title: str = "In-process FRF and modal fit"
+    band: tuple[float, float] | None = None
+    reference: str | os.PathLike[str] | None = None
+
+
+def write_report(
+    path: str | os.PathLike[str],
+    paths: Sequence[str | os.PathLike[str]],
+    options: ReportOptions | None = None,
+    watch: Watch = silent,
+) -> None:
+    """Write one HTML page, figures inside, that needs no other file and no network.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be used; nothing is written.
+    """
+    text = report_text(collect(paths), options or ReportOptions(), watch)
+    with writing_whole_file(path) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8")
+
+
+def report_text(collected: Collected, options: ReportOptions, watch: Watch = silent) -> str:
+    """The page as text."""
+    reference = None if options.reference is None else read_modal_model(options.reference)
+    channels, concerns = channel_section(collected, watch)
+    sections = (
+        mode_section(collected),
+        lobes_section(collected),
+        frf_section(collected, options.band, reference),
+        input_section(collected, options.band, watch),
+        settings_section(collected),
+        setup_section(collected),
+        channels,
+        file_section(collected),
+    )
+    environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
+    return environment.get_template("report.html.j2").render(
+        title=options.title,
+        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
+        brief=_in_brief(collected),
+        warnings=_warnings(collected, concerns),
+        sections=[section for section in sections if not section.empty],
+        versions=versions(),
+    )
+
+
+def _in_brief(collected: Collected) -> list[str]:
+    """The result in two or three sentences."""
+    sentences = []
+    for file, model in collected.models[-1:]:
+        modes = ", ".join(
+            f"{frequency:.2f} Hz ({100 * zeta:.2f} %)"
+            for frequency, zeta in zip(model.natural_frequencies, model.damping_ratios, strict=True)
+        )
+        sentences.append(f"{file.path.name} has {len(model.poles)} modes: {modes}.")
+    for file, lobes in collected.lobes[:1]:
+        if np.isfinite(lobes.depth_limits).any():
+            lowest = int(np.argmin(lobes.depth_limits))
+            sentences.append(
+                f"{file.path.name}: the lowest depth limit is {1e3 * lobes.depth_limits[lowest]:.2f} mm at "
+                f"{lobes.spindle_speeds_rpm[lowest]:.0f} rpm, chatter at {lobes.chatter_frequencies[lowest]:.2f} Hz."
+            )
+    return sentences
+
+
+def _warnings(collected: Collected, concerns: Sequence[str]) -> list[str]:
+    """Everything a reader should know before trusting the figures, each once."""
+    found = [
+        f"{file.path.name}: {warning}" for file in collected.files for warning in file.provenance.get("warnings", [])
+    ]
+    found += [f"{file.path.name}: {warning}" for file, lobes in collected.lobes for warning in lobes.warnings]
+    return list(dict.fromkeys([*found, *concerns]))

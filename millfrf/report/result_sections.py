@@ -1,0 +1,184 @@
+"""The sections on the results: FRFs, inputs, modes, lobes."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation import Frf, to_receptance
+from modal_fit import ModalModel
+
+from ..chain.estimate import EstimateOptions, spectra_of_tests
+from ..chain.fit import chart_from_json
+from ..figures.embed import as_data_uri
+from ..figures.frf_figure import FrfCurves, frf_figures
+from ..figures.input_figure import input_figure
+from ..figures.lobes_figure import lobes_figure
+from ..figures.mode_figure import mode_figure
+from ..figures.stabilisation_figure import stabilisation_figure
+from ..progress import Watch
+from ..tables import Table, mode_table
+from .collect import Collected, SourceFile
+from .section import Picture, Section
+
+Band = tuple[float, float]
+
+
+def frf_section(collected: Collected, band: Band | None, reference: ModalModel | None) -> Section:
+    """Each FRF with the model that belongs to it."""
+    pictures = []
+    for file, frf in collected.frfs:
+        found = collected.model_of(file, frf)
+        model, fit_band = (None, None) if found is None else (found[1], _band_of(found[0]))
+        shown = _shown(frf, model)
+        known = reference if reference is not None and _knows(reference, shown) else None
+        curves = FrfCurves(shown, band or _axis(shown, fit_band), model, known, fit_band)
+        for figure in frf_figures(curves):
+            caption = _frf_caption(file, found, known)
+            pictures.append(Picture(as_data_uri(figure), caption, "FRF magnitude, phase and multiple coherence"))
+    return Section("Frequency response functions", pictures=tuple(pictures))
+
+
+def _shown(frf: Frf, model: ModalModel | None) -> Frf:
+    """In the model's quantity where there is one."""
+    return to_receptance(frf) if model is None or model.quantity == "receptance" else frf
+
+
+def _knows(model: ModalModel, frf: Frf) -> bool:
+    return model.unit == frf.unit and bool(set(model.responses) & set(frf.responses))
+
+
+def _band_of(file: SourceFile) -> Band | None:
+    stored = file.provenance.get("band_hz")
+    return None if not stored else (float(stored[0]), float(stored[1]))
+
+
+def _axis(frf: Frf, fit_band: Band | None) -> Band:
+    """The fit's band widened by a fifth of its width on either side, or all valid lines."""
+    valid = frf.frequencies[frf.valid & (frf.frequencies > 0)]
+    first, last = (float(valid[0]), float(valid[-1])) if len(valid) else (0.0, float(frf.frequencies[-1]))
+    if fit_band is None:
+        return first, last
+    room = 0.2 * (fit_band[1] - fit_band[0])
+    return max(first, fit_band[0] - room), min(last, fit_band[1] + room)
+
+
+def _frf_caption(file: SourceFile, model: tuple[SourceFile, ModalModel] | None, reference: ModalModel | None) -> str:
+    text = f"{file.path.name}: magnitude and phase, and multiple coherence of each response with all excitations."
+    if model is not None:
+        fitted = model[0].made_from(file) and model[0].provenance.get("step") == "fit"
+        text += f" Dashed: model {model[0].path.name}" + (", fitted to these lines." if fitted else ".")
+    if reference is not None:
+        text += " Dotted: reference."
+    return text + (" Grey: twice the standard deviation of H1." if file.provenance else "")
+
+
+def input_section(collected: Collected, band: Band | None, watch: Watch) -> Section:
+    """Independence of the inputs of each FRF whose recordings are among the files."""
+    pictures = []
+    for file, frf in collected.frfs:
+        recordings = collected.recordings_of(file)
+        if not recordings or len(recordings) != len(file.provenance["sources"]) or len(frf.excitations) < 2:
+            continue
+        tests = spectra_of_tests([recording.path for recording in recordings], _options(file), watch)
+        found = collected.model_of(file, frf)
+        axis = band or _axis(frf, _band_of(found[0]) if found else None)
+        caption = (
+            f"{file.path.name}: (a) power spectra of the inputs; (b) singular values of their spectral matrix, all "
+            f"{len(tests)} tests stacked{', and the smallest of each test alone' if len(tests) > 1 else ''}; where the "
+            "smallest vanishes the inputs are dependent; (c) coherence between each two inputs."
+        )
+        pictures.append(Picture(as_data_uri(input_figure(tests, axis)), caption, "Independence of the inputs"))
+    return Section("Excitation", pictures=tuple(pictures))
+
+
+def _options(file: SourceFile) -> EstimateOptions:
+    """The options an FRF was estimated with, its channels by name."""
+    made = file.provenance
+    stored = dict(made["options"])
+    stored["band"] = tuple(stored["band"]) if stored["band"] else None
+    options = EstimateOptions(**stored)
+    channels = (tuple(made["excitation_channels"]), tuple(made["response_channels"]))
+    return replace(options, excitations=channels[0], responses=channels[1])
+
+
+def mode_section(collected: Collected) -> Section:
+    """Modes of each model, quality of the fit, stabilisation, vectors."""
+    tables, pictures, sentences = [], [], []
+    for file, model in collected.models:
+        tables.append(mode_table(model, f"{file.path.name}"))
+        sentences += _quality(file)
+        if file.provenance.get("step") == "fit":
+            pictures.append(_stabilisation(collected, file, model))
+        if len(model.responses) > 1 and len(model.poles):
+            caption = (
+                f"{file.path.name}: modal vectors in the complex plane, each scaled to its largest component. Right "
+                "and left vectors agree where the structure is reciprocal; components on one line are a real mode."
+            )
+            pictures.append(Picture(as_data_uri(mode_figure(model)), caption, "Modal vectors"))
+    return Section("Modal model", tuple(sentences), tuple(tables), tuple(pictures))
+
+
+def _quality(file: SourceFile) -> list[str]:
+    made = file.provenance
+    if made.get("step") != "fit":
+        return []
+    error = 100 * np.asarray(made["relative_error"])
+    text = (
+        f"{file.path.name}: {made['method']} up to order {made['max_order']}, {made['band_hz'][0]:g} to "
+        f"{made['band_hz'][1]:g} Hz; misfit between {error.min():.2g} and {error.max():.2g} % of each FRF's rms"
+    )
+    chi = made.get("reduced_chi_square")
+    return [text + ("." if chi is None else f", {chi:.2g} times what the noise explains (reduced chi-square).")]
+
+
+def _stabilisation(collected: Collected, file: SourceFile, model: ModalModel) -> Picture:
+    frf = collected.frf_of(file)
+    shown = None if frf is None else _shown(frf, model)
+    chart = chart_from_json(file.provenance["stabilisation"])
+    caption = (
+        f"{file.path.name}: stabilisation chart; (a) poles over model order above the summed FRF, (b) damping of the "
+        "poles that are stable in frequency and damping. Vertical lines and diamonds: modes of the fitted model."
+    )
+    return Picture(as_data_uri(stabilisation_figure(chart, shown, model)), caption, "Stabilisation chart")
+
+
+def lobes_section(collected: Collected) -> Section:
+    """All lobes in one figure and one table."""
+    if not collected.lobes:
+        return Section("Stability lobes")
+    curves = {file.label: lobes for file, lobes in collected.lobes}
+    sentences = tuple(
+        f"Cutter of {file.path.name}: {p.teeth} teeth, {1e3 * p.diameter:g} mm, "
+        f"edge angle {np.degrees(p.edge_angle):g}°, Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}, immersion {np.degrees(p.start_angle):g}° to "
+        f"{np.degrees(p.exit_angle):g}°, feed {1e3 * p.feed_per_tooth:g} mm a tooth."
+        for file, p in collected.cutting
+    )
+    caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
+    picture = Picture(as_data_uri(lobes_figure(curves)), caption, "Stability lobes")
+    return Section("Stability lobes", sentences, (_lobes_table(collected),), (picture,))
+
+
+def _lobes_table(collected: Collected, most: int = 12) -> Table:
+    """Depth limits at up to twelve speeds of the first curve, the others interpolated."""
+    first = collected.lobes[0][1]
+    rpm = first.spindle_speeds_rpm
+    chosen = np.unique(np.linspace(0, len(rpm) - 1, min(most, len(rpm))).round().astype(int))
+    columns = ["spindle speed (rpm)"]
+    for file, _ in collected.lobes:
+        columns += [f"{file.label} (mm)"]
+    columns += ["chatter frequency (Hz)", "type"]
+    rows = []
+    for k in chosen:
+        depths = [_depth_at(lobes.spindle_speeds_rpm, lobes.depth_limits, rpm[k]) for _, lobes in collected.lobes]
+        frequency = first.chatter_frequencies[k]
+        shown = f"{frequency:.2f}" if np.isfinite(frequency) else ""
+        rows.append((f"{rpm[k]:.0f}", *depths, shown, first.bifurcations[k]))
+    return Table("", tuple(columns), tuple(rows))
+
+
+def _depth_at(rpm: np.ndarray, depths: np.ndarray, wanted: float) -> str:
+    """Depth in mm at the nearest speed, empty where none is near."""
+    nearest = int(np.argmin(np.abs(rpm - wanted)))
+    if abs(rpm[nearest] - wanted) > 0.5:
+        return ""
+    return f"{1e3 * depths[nearest]:.3f}" if np.isfinite(depths[nearest]) else "no limit"
