@@ -104,7 +104,7 @@ class DemoResult:
     seconds: float
 
 
-def run_demo(options: DemoOptions, watch: Watch = silent, say: Callable[[str], None] = str) -> DemoResult:
+def run_demo(options: DemoOptions, watch: Watch = silent, say: Callable[[str], object] = str) -> DemoResult:
     """Run the whole chain; ``say`` is told what is going on.
 
     Raises
@@ -132,7 +132,7 @@ def run_demo(options: DemoOptions, watch: Watch = silent, say: Callable[[str], N
     say("drawing lobes and report ...")
     structures: dict[str, Frf | ModalModel] = {"identified": identified, "hammer": tip, "true": true}
     for name, structure in structures.items():
-        lobes = compute_lobes(structure, CUTTER, speed_axis(600, 2400, 181), MAX_DEPTH, watch=watch)
+        lobes = compute_lobes(structure, CUTTER, speed_axis(300, 2400, 211), MAX_DEPTH, watch=watch)
         write_lobes(folder / f"lobes_{name}.csv", lobes)
     compared = np.array(COMPARED_RPM) * RPM
     limits = {name: compute_lobes(structure, CUTTER, compared, MAX_DEPTH) for name, structure in structures.items()}
@@ -171,8 +171,8 @@ def comparison_tables(result: DemoResult) -> tuple[Table, Table]:
         )
         for k, rpm in enumerate(COMPARED_RPM)
     )
-    columns = ("speed (rpm)", "true (mm)", "milled (mm)", "error", "tapped FRF (mm)", "error ")
-    return modes, Table("Depth limits, half-immersion down-milling", columns, depths)
+    headings = ("speed (rpm)", "true (mm)", "milled (mm)", "error", "tapped FRF (mm)", "error ")
+    return modes, Table("Depth limits, half-immersion down-milling", headings, depths)
 
 
 def nearest_modes(result: DemoResult) -> tuple[tuple[int, int], ...]:

@@ -37,8 +37,7 @@ def bar(description: str, total: int | None = None) -> Iterator[Update]:
 
     console = Console(stderr=True)
     if not console.is_terminal:
-        with silent(description, total) as update:
-            yield update
+        yield _ignore
         return
     columns = (TextColumn("{task.description:<28}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     progress = Progress(*columns, console=console, transient=True)

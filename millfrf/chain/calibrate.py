@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,7 @@ def write_calibration(
 ) -> None:
     """Write the tip's model with the ratios and with the provenance of the model it came from (the first input)."""
     before = read_provenance(inputs[0])
-    provenance = {
+    provenance: dict[str, Any] = {
         **{key: before[key] for key in ("band_hz", "method") if key in before},
         "step": "calibrate",
         "sources": sources(inputs),

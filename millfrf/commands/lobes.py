@@ -31,12 +31,12 @@ def lobes(
     from ..progress import bar
 
     check_output(out, (".csv",))
-    readers = {FRF: read_frf, MODEL: read_modal_model}
     kind = kind_of(dynamics)
-    if kind not in readers:
+    if kind not in (FRF, MODEL):
         raise InputError(f"{dynamics} is a file of {kind}; lobes need a modal model or an FRF at the tool tip")
     process = read_cutting_process(cutting)
-    result = compute_lobes(readers[kind](dynamics), process, speed_axis(*speeds), max_depth, method, bar)
+    known = read_frf(dynamics) if kind == FRF else read_modal_model(dynamics)
+    result = compute_lobes(known, process, speed_axis(*speeds), max_depth, method, bar)
     write_lobes(out, result)
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)

@@ -1,11 +1,11 @@
 """FRF matrix: magnitude and phase of every entry, multiple coherence beneath, fit and reference over it."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.gridspec import GridSpec
 from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
@@ -13,13 +13,12 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .style import FITTED, MEASURED, TRUE, house_style, legend_above, new_figure
+from .style import FITTED, MEASURED, TRUE, WIDTH_MM, house_style, new_figure
 
 PER_PAGE = 3
 """Responses, and excitations, on one page."""
 
 _SYMBOLS = {"receptance": "H", "mobility": "Y", "accelerance": "A"}
-_REMOTE_FROM_FIT = 2.0
 
 
 @dataclass(frozen=True)
@@ -70,29 +69,56 @@ def frf_figures(curves: FrfCurves) -> tuple[Figure, ...]:
 
 def _page(curves: FrfCurves, responses: range, excitations: range) -> Figure:
     with_coherence = curves.measured.multiple_coherence is not None
-    figure = new_figure(62.0 * len(excitations) + (30.0 if with_coherence else 0.0) + 12.0)
-    heights = [2.0, 1.0] * len(excitations) + ([1.1] if with_coherence else [])
-    grid = GridSpec(len(heights), len(responses), figure=figure, height_ratios=heights)
+    page = _Page(len(responses), len(excitations), with_coherence)
     limits = _magnitude_limits(curves)
-    first: Axes | None = None
     for column, p in enumerate(responses):
         for row, q in enumerate(excitations):
-            magnitude = figure.add_subplot(grid[2 * row, column], sharex=first)
-            first = first or magnitude
-            phase = figure.add_subplot(grid[2 * row + 1, column], sharex=first)
+            magnitude, phase = page.panel(row, column, MAGNITUDE), page.panel(row, column, PHASE)
             _draw_entry(magnitude, phase, curves, p, q)
             magnitude.set_ylim(*limits)
             _label(magnitude, phase, curves.measured, p, q, outer=column == 0)
         bottom = phase
         if with_coherence:
-            bottom = figure.add_subplot(grid[-1, column], sharex=first)
+            bottom = page.panel(len(excitations), column, COHERENCE)
             _draw_coherence(bottom, curves, p, outer=column == 0)
         bottom.tick_params(labelbottom=True)
         bottom.set_xlabel("Frequency (Hz)")
-        bottom.set_xlim(*curves.band)
-    if first is not None:
-        legend_above(figure, first)
-    return figure
+    page.first.set_xlim(*curves.band)
+    handles, labels = page.first.get_legend_handles_labels()
+    page.figure.legend(handles, labels, loc="upper center", ncols=len(labels), borderaxespad=0.1)
+    return page.figure
+
+
+MAGNITUDE, PHASE, COHERENCE = (0.0, 34.0), (36.5, 17.0), (0.0, 20.0)
+"""Top edge and height of a panel within its entry, mm."""
+
+
+class _Page:
+    """Panels placed in millimetres: phase close under its magnitude, entries apart."""
+
+    left, right, gap, top, entry, foot = 16.0, 2.0, 3.5, 11.0, 60.0, 10.0
+
+    def __init__(self, n_columns: int, n_rows: int, with_coherence: bool) -> None:
+        coherence = COHERENCE[1] if with_coherence else -4.0
+        self.height = self.top + self.entry * n_rows + coherence + self.foot
+        self.figure = new_figure(self.height, None)
+        self.width = (WIDTH_MM - self.left - self.right - self.gap * (n_columns - 1)) / n_columns
+        self._first: Axes | None = None
+
+    @property
+    def first(self) -> Axes:
+        """The panel whose frequency axis all others share."""
+        assert self._first is not None
+        return self._first
+
+    def panel(self, row: int, column: int, place: tuple[float, float]) -> Axes:
+        """A new panel of an entry."""
+        x = self.left + column * (self.width + self.gap)
+        bottom = self.height - self.top - row * self.entry - place[0] - place[1]
+        corner = (x / WIDTH_MM, bottom / self.height, self.width / WIDTH_MM, place[1] / self.height)
+        axes = self.figure.add_axes(corner, sharex=self._first)
+        self._first = self._first or axes
+        return axes
 
 
 def _lines(curves: FrfCurves) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64] | None]:
@@ -111,11 +137,11 @@ def _axis_of(model_band: tuple[float, float]) -> NDArray[np.float64]:
     return np.linspace(max(model_band[0], 1e-3), model_band[1], 600)
 
 
-def _models(curves: FrfCurves) -> list[tuple[str, ModalModel, tuple[float, float], dict[str, object]]]:
-    models: list[tuple[str, ModalModel, tuple[float, float], dict[str, object]]] = []
+def _models(curves: FrfCurves) -> list[tuple[str, ModalModel, tuple[float, float], dict[str, Any]]]:
+    models: list[tuple[str, ModalModel, tuple[float, float], dict[str, Any]]] = []
     if curves.reference is not None:
         dotted = {"color": TRUE, "linestyle": (0, (1, 1.2)), "linewidth": 1.6}
-        models.append(("True structure", curves.reference, curves.band, dotted))
+        models.append(("Reference model", curves.reference, curves.band, dotted))
     if curves.fitted is not None:
         low, high = curves.fit_band or curves.band
         band = (max(low, curves.band[0]), min(high, curves.band[1]))
@@ -177,13 +203,15 @@ def _label(magnitude: Axes, phase: Axes, frf: Frf, p: int, q: int, *, outer: boo
     magnitude.set_title(f"{frf.responses[p]} / {frf.excitations[q]}", pad=3)
     magnitude.tick_params(labelbottom=False, labelleft=outer)
     phase.tick_params(labelbottom=False, labelleft=outer)
-    phase.set_ylim(-190, 190)
+    phase.set_ylim(-230, 230)  # room for the labels at 180
     phase.yaxis.set_major_locator(MultipleLocator(90))
     phase.set_yticks([-180, 0, 180])
     if outer:
         symbol = _SYMBOLS.get(frf.quantity, "H")
         magnitude.set_ylabel(f"|{symbol}| ({frf.unit})")
         phase.set_ylabel("Phase (°)")
+        for axes in (magnitude, phase):
+            axes.yaxis.set_label_coords(-11.5 / (axes.bbox.width / axes.figure.dpi * 25.4), 0.5)
 
 
 def _draw_coherence(axes: Axes, curves: FrfCurves, p: int, *, outer: bool) -> None:
@@ -196,3 +224,4 @@ def _draw_coherence(axes: Axes, curves: FrfCurves, p: int, *, outer: bool) -> No
     axes.tick_params(labelleft=outer)
     if outer:
         axes.set_ylabel("γ² (1)")
+        axes.yaxis.set_label_coords(-11.5 / (axes.bbox.width / axes.figure.dpi * 25.4), 0.5)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from estimation import CrossSpectra, input_coherence, input_independence, sum_tests
 
-from .style import COLOURS, LINE_STYLES, SHADE, house_style, line_style, new_figure, panel_letter
+from .style import SHADE, house_style, line_style, new_figure, panel_letter
 
 
 def input_figure(tests: Sequence[CrossSpectra], band: tuple[float, float]) -> Figure:
@@ -64,13 +64,15 @@ def _draw_singular_values(
             label=f"σ{_subscript(number + 1)} stacked",
             **line_style(number),
         )
-    for number, test in enumerate(tests):
-        smallest = input_independence(test).singular_values[inside, -1]
+    alone = [input_independence(test).singular_values[inside, -1] for test in tests]
+    for number, smallest in enumerate(alone):
         label = f"σ{_subscript(values.shape[1])} of one test" if number == 0 else None
         axes.plot(total.frequencies[inside], smallest, color="#7f7f7f", linewidth=0.6, label=label)
-    top = float(values.max()) if values.size else 1.0
-    axes.set_ylim(max(top * 1e-8, float(values[values > 0].min()) / 30 if (values > 0).any() else 1e-12), top * 5)
-    axes.set_ylabel(f"Singular values of\nS_ff ({_power_unit(total)})")
+    shown = np.concatenate([values.ravel(), *alone])
+    shown = shown[shown > 0]
+    if len(shown):
+        axes.set_ylim(max(float(np.percentile(shown, 1)) / 3, float(shown.max()) * 1e-12), float(shown.max()) * 5)
+    axes.set_ylabel(f"Singular values of\n$S_{{ff}}$ ({_power_unit(total)})")
 
 
 def _draw_coherence(axes: Axes, total: CrossSpectra) -> None:
@@ -114,6 +116,3 @@ def _power_unit(spectra: CrossSpectra) -> str:
 
 def _subscript(number: int) -> str:
     return str(number).translate(str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉"))
-
-
-__all__ = ["COLOURS", "LINE_STYLES", "input_figure"]

@@ -49,7 +49,7 @@ def lobes_figure(curves: Mapping[str, StabilityLobes], cuts: Sequence[TriedCut] 
         chatter.set_xlabel("Spindle speed (rpm)")
         panel_letter(depth, 0)
         panel_letter(chatter, 1)
-        legend_above(figure, depth, columns=3)
+    legend_above(figure, depth, columns=5)
     return figure
 
 

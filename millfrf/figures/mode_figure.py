@@ -16,14 +16,17 @@ def mode_figure(model: ModalModel) -> Figure:
     """Each vector turned and scaled so that its largest component is real and 1; the first four modes."""
     n_modes = min(len(model.poles), MOST_MODES)
     with house_style():
-        figure = new_figure(104.0 if n_modes > 1 else 70.0)
-        panels = figure.subplots(2, max(n_modes, 1), squeeze=False, subplot_kw={"projection": "polar"})
+        beside = n_modes <= 2
+        figure = new_figure(62.0 if beside else 104.0)
+        shape = (1, 2 * max(n_modes, 1)) if beside else (2, n_modes)
+        panels = figure.subplots(*shape, squeeze=False, subplot_kw={"projection": "polar"})
         for mode in range(n_modes):
-            frequency = model.natural_frequencies[mode]
-            _draw(panels[0, mode], model.right[mode], model.responses)
-            _draw(panels[1, mode], model.left[mode], model.excitations)
-            panels[0, mode].set_title(f"Mode {mode + 1}, {frequency:.2f} Hz\nright vector (responses)", pad=6)
-            panels[1, mode].set_title("left vector (excitations)", pad=6)
+            right, left = (panels[0, 2 * mode], panels[0, 2 * mode + 1]) if beside else panels[:, mode]
+            heading = f"Mode {mode + 1}, {model.natural_frequencies[mode]:.2f} Hz\n"
+            _draw(right, model.right[mode], model.responses)
+            _draw(left, model.left[mode], model.excitations)
+            right.set_title(f"{heading}right (responses)", pad=6)
+            left.set_title(f"{heading if beside else ''}left (excitations)", pad=6)
         legend_above(figure, panels[0, 0])
     return figure
 
@@ -44,5 +47,6 @@ def _draw(axes: PolarAxes, vector: NDArray[np.complex128], labels: tuple[str, ..
         )
     axes.set_ylim(0, 1.1)
     axes.set_yticks([0.5, 1.0])
-    axes.set_yticklabels(["0.5", "1"])
+    axes.set_yticklabels(["0.5", ""])
+    axes.set_rlabel_position(315)
     axes.set_xticks(np.radians([0, 90, 180, 270]))

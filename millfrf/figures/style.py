@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -65,9 +65,13 @@ def house_style() -> Iterator[None]:
         yield
 
 
-def new_figure(height_mm: float, width_mm: float = WIDTH_MM) -> Figure:
-    """An empty figure of a printed size, with constrained layout, apart from pyplot's global state."""
-    figure = Figure(figsize=(width_mm / 25.4, height_mm / 25.4), layout="constrained")
+def new_figure(height_mm: float, layout: Literal["constrained"] | None = "constrained") -> Figure:
+    """An empty figure of a printed size, apart from pyplot's global state.
+
+    Constrained layout measures every label; a page of many panels with no layout engine places them itself, ten times
+    faster.
+    """
+    figure = Figure(figsize=(WIDTH_MM / 25.4, height_mm / 25.4), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 

@@ -28,8 +28,11 @@ def time_figure(stream: Stream, *, zoom_seconds: float = 0.25, channels: Sequenc
     close = stream.read(middle, stop, names)
     time = stream.start_time + np.arange(middle, stop) / stream.sample_rate
     with house_style():
-        figure = new_figure(18.0 * len(shown) + 16.0)
-        panels = figure.subplots(len(shown), 2, squeeze=False, sharex="col", width_ratios=[1.7, 1.0])
+        height = 19.0 * len(shown) + 17.0
+        figure = new_figure(height, None)
+        room = {"left": 0.095, "right": 0.99, "wspace": 0.16, "hspace": 0.22, "top": 1 - 6 / height}
+        grid = figure.add_gridspec(len(shown), 2, width_ratios=[1.7, 1.0], bottom=11 / height, **room)
+        panels = grid.subplots(squeeze=False, sharex="col")
         for row, channel in enumerate(shown):
             _draw(panels[row, 0], panels[row, 1], channel)
             panels[row, 0].fill_between(edges, low[:, row], high[:, row], color=_colour(channel), linewidth=0.2)
@@ -56,7 +59,7 @@ def envelope(
             low.append(part.min(axis=0))
             high.append(part.max(axis=0))
     time = stream.start_time + (np.arange(len(low)) + 0.5) * length / stream.sample_rate
-    return time, np.array(low), np.array(high)
+    return np.asarray(time, dtype=np.float64), np.array(low), np.array(high)
 
 
 def _draw(whole: Axes, close: Axes, channel: Channel) -> None:

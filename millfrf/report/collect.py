@@ -38,8 +38,8 @@ class SourceFile:
 
     @property
     def label(self) -> str:
-        """File name without suffix, words apart."""
-        return self.path.stem.replace("_", " ")
+        """File name without suffix and kind, words apart."""
+        return self.path.stem.replace("_", " ").removeprefix("lobes ")
 
     def made_from(self, other: "SourceFile") -> bool:
         """Whether ``other`` is among the files this one was made from, by its bytes."""

@@ -137,7 +137,8 @@ def _stabilisation(collected: Collected, file: SourceFile, model: ModalModel) ->
     chart = chart_from_json(file.provenance["stabilisation"])
     caption = (
         f"{file.path.name}: stabilisation chart; (a) poles over model order above the summed FRF, (b) damping of the "
-        "poles that are stable in frequency and damping. Vertical lines and diamonds: modes of the fitted model."
+        "poles that are stable in frequency and damping. Vertical lines and diamonds: modes of the fitted model, "
+        "refined by maximum likelihood."
     )
     return Picture(as_data_uri(stabilisation_figure(chart, shown, model)), caption, "Stabilisation chart")
 
@@ -149,8 +150,9 @@ def lobes_section(collected: Collected) -> Section:
     curves = {file.label: lobes for file, lobes in collected.lobes}
     sentences = tuple(
         f"Cutter of {file.path.name}: {p.teeth} teeth, {1e3 * p.diameter:g} mm, "
-        f"edge angle {np.degrees(p.edge_angle):g}°, Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}, immersion {np.degrees(p.start_angle):g}° to "
-        f"{np.degrees(p.exit_angle):g}°, feed {1e3 * p.feed_per_tooth:g} mm a tooth."
+        f"edge angle {np.degrees(p.edge_angle):g}°, Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}, "
+        f"immersion {np.degrees(p.start_angle):g}° to {np.degrees(p.exit_angle):g}°, "
+        f"feed {1e3 * p.feed_per_tooth:g} mm a tooth."
         for file, p in collected.cutting
     )
     caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
