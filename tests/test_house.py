@@ -27,6 +27,12 @@ def test_every_package_folder_is_packaged_typed_and_linted() -> None:
     assert all((ROOT / name / "py.typed").exists() for name in folders)
 
 
+def test_every_folder_of_modules_is_a_package() -> None:
+    # a folder without __init__.py imports from a checkout and is missing from the wheel
+    sources = [path for name in _packages() for path in (ROOT / name).rglob("*.py")]
+    assert not {path.parent for path in sources if not (path.parent / "__init__.py").exists()}
+
+
 def test_exported_names_exist() -> None:
     for name in _packages():
         module = importlib.import_module(name)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from stability import StabilityLobes
 
@@ -49,7 +50,7 @@ def lobes_figure(curves: Mapping[str, StabilityLobes], cuts: Sequence[TriedCut] 
         chatter.set_xlabel("Spindle speed (rpm)")
         panel_letter(depth, 0)
         panel_letter(chatter, 1)
-    legend_above(figure, depth, columns=5)
+        legend_above(figure, depth, columns=5)
     return figure
 
 
@@ -58,10 +59,17 @@ def _draw_curve(depth: Axes, chatter: Axes, label: str, lobes: StabilityLobes, n
     limit = np.where(np.isfinite(lobes.depth_limits), 1e3 * lobes.depth_limits, np.nan)
     style = line_style(number)
     depth.plot(rpm, limit, label=label, linewidth=1.6 if number == 0 else 1.2, **style)
-    chatter.plot(rpm, lobes.chatter_frequencies, linewidth=1.6 if number == 0 else 1.2, **style)
+    chatter.plot(rpm, _without_jumps(lobes.chatter_frequencies), linewidth=1.6 if number == 0 else 1.2, **style)
     doubled = np.array([name == "period-doubling" for name in lobes.bifurcations], dtype=bool)
     if doubled.any():
         depth.plot(rpm[doubled], limit[doubled], "s", color=style["color"], markersize=3, label="period doubling")
+
+
+def _without_jumps(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Break the line where one lobe ends and the next begins at another frequency."""
+    broken = frequency.copy()
+    broken[1:][np.abs(np.diff(frequency)) > 0.02 * np.abs(frequency[1:])] = np.nan
+    return broken
 
 
 def _shade_unstable(axes: Axes, lobes: StabilityLobes, top: float) -> None:

@@ -1,0 +1,1 @@
+"""Pictures a researcher would publish: each returns a matplotlib figure and touches no file."""
