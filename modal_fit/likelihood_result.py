@@ -23,8 +23,9 @@ def best_fit(
     *,
     noise: Noise | None,
     n_smooth: int,
+    curvatures: tuple[bool, ...] = (False, True),
 ) -> LikelihoodFit:
-    """Fit with and without a fixed pole above the band, and keep the better by Schwarz's criterion.
+    """Fit without and with a fixed pole above the band, as ``curvatures`` says; keep the better by Schwarz's criterion.
 
     Raises
     ------
@@ -34,7 +35,7 @@ def best_fit(
     fits = []
     x = 2 * (spectra.s.imag / (2 * np.pi) - band[0]) / (band[1] - band[0]) - 1
     powers = np.array([x**k for k in range(n_smooth)]).reshape(n_smooth, len(x))
-    for curvature in (False, True):
+    for curvature in curvatures:
         setting = Setting(spectra, out_of_band_basis(spectra.s, band, curvature=curvature), powers)
         try:
             start = linear_start(poles, setting, transients=n_smooth > 0)

@@ -20,7 +20,7 @@ def linear_start(poles: Complex, setting: Setting, *, transients: bool = True) -
     parts = []
     for derivative in np.unique(spectra.derivative):
         mine = spectra.derivative == derivative
-        parts.append((mine, _solve(_regressors(poles, setting, int(derivative), n_tests), spectra.response[:, mine])))
+        parts.append((mine, _solve(regressors(poles, setting, int(derivative), n_tests), spectra.response[:, mine])))
     solution = np.empty((len(parts[0][1]), spectra.response.shape[1]))
     for mine, part in parts:
         solution[:, mine] = part
@@ -34,8 +34,12 @@ def linear_start(poles: Complex, setting: Setting, *, transients: bool = True) -
     return _rank_one(poles, matrices, outside, decays[:, :n_modes], decays[:, n_modes:])
 
 
-def _regressors(poles: Complex, setting: Setting, derivative: int, n_tests: int) -> Complex:
-    """Columns of the linear problem, shape (n_lines, n_unknowns), real unknowns."""
+def regressors(poles: Complex, setting: Setting, derivative: int, n_tests: int) -> Complex:
+    """Columns of the linear problem, shape (n_lines, n_unknowns), for real unknowns.
+
+    First the residues, mode by mode and excitation by excitation (real and imaginary part), then the out-of-band terms,
+    then the transients of ``n_tests`` tests.
+    """
     spectra = setting.spectra
     s, force = spectra.s, spectra.excitation
     factor = s**derivative

@@ -100,6 +100,13 @@ def _normal_matrices(
     return _NormalMatrices(np.ascontiguousarray(square), np.ascontiguousarray(reduced))
 
 
+def _logarithm_in_band(z: Complex) -> Complex:
+    """Logarithm whose imaginary part lies on the band's arc, half of the gap before and half after it."""
+    gap = np.pi - _ARC / 2
+    angle = np.mod(np.angle(z) + gap, 2 * np.pi) - gap
+    return np.asarray(np.log(np.abs(z)) + 1j * angle)
+
+
 def _poles_of_order(full: Complex, order: int, n_excitations: int, band: tuple[float, float]) -> OrderPoles:
     """Solve for the denominator with its lowest coefficient the identity, and take its companion's eigenvalues.
 
@@ -117,7 +124,7 @@ def _poles_of_order(full: Complex, order: int, n_excitations: int, band: tuple[f
     participation = vectors[-n_excitations:].T
     usable = np.abs(inverse) > 1e-12
     step = _ARC / (2 * np.pi * (band[1] - band[0]))
-    poles = 2j * np.pi * band[0] - np.log(inverse[usable]) / step
+    poles = 2j * np.pi * band[0] + _logarithm_in_band(1 / inverse[usable]) / step
     participation = participation[usable]
     low, high = 2 * np.pi * band[0], 2 * np.pi * band[1]
     kept = (poles.real < 0) & (poles.imag > low) & (poles.imag < high) & (poles.real > -0.7 * np.abs(poles))

@@ -89,6 +89,9 @@ class ModalModel:
         row (mode by mode), in SI units.
     physics
         Terms ``{name, location, parameters}`` that a diagnosis added; empty for a linear model.
+    delay
+        Pure delay of the measuring chain, s: the whole expression times ``exp(-i w delay)``. Of a ``transfer`` only,
+        whose input passes converters and amplifiers; a structure has none.
 
     Raises
     ------
@@ -106,9 +109,14 @@ class ModalModel:
     residuals: Residuals | None = None
     covariance: NDArray[np.float64] | None = None
     physics: tuple[dict[str, Any], ...] = ()
+    delay: float = 0.0
 
     def __post_init__(self) -> None:
         n_modes = len(self.poles)
+        if self.delay and self.quantity != "transfer":
+            raise InputError(
+                f"modal model: a {self.quantity} has no delay ({self.delay:g} s given); only a transfer has"
+            )
         for name, array, labels in (("right", self.right, self.responses), ("left", self.left, self.excitations)):
             if array.shape != (n_modes, len(labels)):
                 raise InputError(
@@ -150,7 +158,7 @@ class ModalModel:
         values = np.asarray(direct + conjugate, dtype=complex)
         if self.residuals is not None:
             values += self.residuals.receptance(s)
-        return values
+        return values * np.exp(-s * self.delay)[:, None, None] if self.delay else values
 
     def frf(self, frequencies: NDArray[np.float64]) -> Frf:
         """The model's FRF as an :class:`estimation.Frf`, valid on every line."""

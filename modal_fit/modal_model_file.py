@@ -42,6 +42,8 @@ def write_modal_model(path: str | os.PathLike[str], model: ModalModel) -> None:
             content["residuals"]["residues"] = _pairs(model.residuals.residues)
     if model.covariance is not None:
         content["covariance"] = model.covariance.tolist()
+    if model.delay:
+        content["delay_s"] = model.delay
     if model.physics:
         content["physics"] = list(model.physics)
     with writing_whole_file(path) as temporary:
@@ -107,6 +109,7 @@ def _model(content: dict[str, Any]) -> ModalModel:
         residuals=residuals,
         covariance=None if covariance is None else np.asarray(covariance, dtype=float),
         physics=tuple(content.get("physics", ())),
+        delay=float(content.get("delay_s", 0.0)),
     )
 
 

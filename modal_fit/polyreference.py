@@ -1,7 +1,7 @@
 """`fit_polyreference`: FRF matrix to modal model, with stabilisation, vectors, residuals and error bars."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,15 @@ from .likelihood_result import best_fit, modal_model_from
 from .matrix_fraction import matrix_fraction_poles
 from .maximum_likelihood import LikelihoodFit
 from .modal_model import ModalModel
+from .mode_selection import needed_modes
 from .noise_levels import LineNoise
 from .record_spectra import RecordSpectra
 from .stabilisation import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
+from .transfer_delay import transfer_delay
 
 Complex = NDArray[np.complex128]
+_DELAY_ROUNDS = 4  # the first poles are found with the delay still in
+_NO_VIBRATION = 0.5  # damping ratio above which a pole is taken for a trend
 
 
 @dataclass(frozen=True)
@@ -80,52 +84,90 @@ def fit_polyreference(
     """
     receptance = to_receptance(frf)
     inside = _usable_lines(receptance, band, max_order)
+    delay, advanced = 0.0, receptance
+    chart, kept, dropped = _poles_over_orders(receptance, band, max_order, inside, n_modes)
+    lines, _ = frf_lines(replace(receptance, covariance=None), inside)
+    for number in range(_DELAY_ROUNDS if receptance.quantity == "transfer" else 0):
+        found, before = transfer_delay(np.array([group.pole for group in kept]), lines, band), delay
+        delay = found if number < 2 else (found + before) / 2  # poles and delay can swing about their common value
+        advanced = _advanced(receptance, delay)
+        chart, kept, dropped = _poles_over_orders(advanced, band, max_order, inside, n_modes)
+        if abs(delay - before) < 1e-3 / band[1]:
+            break
+    spectra, noise = frf_lines(advanced, inside)
+    fit, superfluous = _fit_needed(kept, spectra, band, noise)
+    dropped = (*dropped, *superfluous)
+    model = modal_model_from(fit, band, receptance.responses, receptance.excitations, receptance.unit)
+    model = replace(model, delay=delay)
+    error = relative_error(receptance, model, inside)
+    chi = fit.reduced_chi_square if noise is not None else float("nan")
+    return ModalFit(model, chart, dropped, band, chi, error, _warnings(receptance, inside, model, band, chi, error))
+
+
+def _advanced(frf: Frf, delay: float) -> Frf:
+    """The FRF with a delay taken out."""
+    return replace(frf, values=frf.values * np.exp(2j * np.pi * frf.frequencies * delay)[:, None, None])
+
+
+def _poles_over_orders(
+    frf: Frf, band: tuple[float, float], max_order: int, inside: NDArray[np.bool_], n_modes: int | None
+) -> tuple[StabilisationChart, tuple[PoleGroup, ...], tuple[PoleGroup, ...]]:
+    """Chart, kept groups and dropped groups of one FRF."""
     weights = None
-    if receptance.covariance is not None:
-        variance = receptance.covariance.variance()[inside].sum(axis=(1, 2))
-        weights = np.zeros(len(receptance.frequencies))
+    if frf.covariance is not None:
+        variance = frf.covariance.variance()[inside].sum(axis=(1, 2))
+        weights = np.zeros(len(frf.frequencies))
         weights[inside] = 1 / np.maximum(variance, 1e-3 * np.median(variance))
-    by_order = list(matrix_fraction_poles(receptance, band, min(max_order, inside.sum() // 2), weights))
-    chart = stabilisation_chart(by_order, band)
+    chart = stabilisation_chart(
+        list(matrix_fraction_poles(frf, band, min(max_order, inside.sum() // 2), weights)), band
+    )
     kept, dropped = choose_poles(chart)
     if n_modes is not None and len(kept) > n_modes:
         ranked = sorted(kept, key=_minus_orders)
-        spare = [PoleGroup(g.pole, g.n_orders, f"not among the {n_modes} asked for") for g in ranked[n_modes:]]
+        spare = [replace(group, reason=f"not among the {n_modes} asked for") for group in ranked[n_modes:]]
         kept, dropped = tuple(ranked[:n_modes]), (*dropped, *spare)
     if not kept:
         raise MillfrfError(
             f"no pole is stable over orders 1 to {max_order} between {band[0]:g} and {band[1]:g} Hz; "
             "widen the band, raise --max-order or average more"
         )
-    spectra, noise = frf_lines(receptance, inside)
-    fit, superfluous = _without_superfluous(kept, spectra, band, noise)
-    dropped = (*dropped, *superfluous)
-    model = modal_model_from(fit, band, receptance.responses, receptance.excitations, receptance.unit)
-    error = relative_error(receptance, model, inside)
-    chi = fit.reduced_chi_square if noise is not None else float("nan")
-    return ModalFit(model, chart, dropped, band, chi, error, _warnings(receptance, inside, model, band, chi, error))
+    return chart, kept, dropped
 
 
-def _without_superfluous(
+def _fit_needed(
     kept: Sequence[PoleGroup], spectra: RecordSpectra, band: tuple[float, float], noise: LineNoise | None
 ) -> tuple[LikelihoodFit, list[PoleGroup]]:
-    """Fit, then leave out, rarest first, each mode whose absence costs less than its unknowns are worth.
-
-    Schwarz's criterion with the misfit of the fullest model counted as noise: leakage and the like are no reason to
-    keep a mode.
-    """
-    remaining = sorted(kept, key=_minus_orders)
-    fit = best_fit(np.array([g.pole for g in remaining]), spectra, band, noise=noise, n_smooth=0)
+    """Refine the modes that are needed, and leave out those that the refinement shows to be none."""
+    groups = sorted(kept, key=_minus_orders)
+    poles = np.array([group.pole for group in groups])
     superfluous: list[PoleGroup] = []
-    worth = 2 * sum(fit.model.right.shape[1:] + fit.model.left.shape[1:]) * float(np.log(2 * spectra.response.size))
-    for candidate in remaining[:0:-1]:
-        fewer = [g for g in remaining if g is not candidate]
-        trial = best_fit(np.array([g.pole for g in fewer]), spectra, band, noise=noise, n_smooth=0)
-        loss = 2 * (fit.log_likelihood - trial.log_likelihood) / max(1.0, fit.reduced_chi_square)
-        if loss < worth:
-            superfluous.append(PoleGroup(candidate.pole, candidate.n_orders, "the fit is as good without it"))
-            remaining, fit = fewer, trial
-    return fit, superfluous
+    while True:
+        needed = needed_modes(poles, spectra, band, noise)
+        spare = dict.fromkeys(needed.superfluous, "the fit is as good without it")
+        staying = [number for number in range(len(poles)) if number not in spare]
+        superfluous += [replace(groups[number], reason=reason) for number, reason in spare.items()]
+        groups, poles = [groups[number] for number in staying], poles[staying]
+        fit = best_fit(poles, spectra, band, noise=noise, n_smooth=0, curvatures=(needed.curvature,))
+        strayed = _strayed(fit.model.poles, poles, band)
+        if strayed and len(strayed) < len(poles):
+            superfluous += [replace(groups[n], reason="refinement drove it out of the band") for n in strayed]
+            staying = [number for number in range(len(poles)) if number not in strayed]
+            groups, poles = [groups[number] for number in staying], poles[staying]
+            continue
+        if not needed_modes(fit.model.poles, spectra, band, noise).superfluous:
+            return fit, superfluous
+        poles = fit.model.poles
+
+
+def _strayed(found: Complex, start: Complex, band: tuple[float, float]) -> list[int]:
+    """Modes that left the band or are no vibration any more, or that moved further than a neighbour is away."""
+    frequency, zeta = np.abs(found) / (2 * np.pi), -found.real / np.abs(found)
+    moved = np.abs(found - start) > 0.1 * np.abs(start)
+    return [
+        number
+        for number in range(len(found))
+        if not band[0] < frequency[number] < band[1] or zeta[number] > _NO_VIBRATION or moved[number]
+    ]
 
 
 def _minus_orders(group: PoleGroup) -> int:

@@ -5,13 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.optimize import linear_sum_assignment
 
 from .matrix_fraction import OrderPoles
 
 Complex = NDArray[np.complex128]
 _FREQUENCY, _DAMPING, _VECTOR = 0.01, 0.10, 0.95  # changes from order to order that count as stable
-_CLUSTER = 0.03  # relative distance in the complex plane within which poles are one mode
+_REACH = 0.03  # relative distance in the complex plane within which a pole continues a mode
+_MEMORY = 5  # latest orders that say where a mode is
 _SHARE = 0.4  # of all orders that a mode must be found in
 
 
@@ -114,14 +115,14 @@ def _stability(pole: complex, vector: Complex, previous: OrderPoles) -> int:
 def choose_poles(chart: StabilisationChart) -> tuple[tuple[PoleGroup, ...], tuple[PoleGroup, ...]]:
     """Group stable poles over the orders; return the kept groups and the dropped ones with their reasons.
 
-    Poles that are stable in frequency and damping are clustered by their distance in the complex plane relative
-    to their magnitude, so that two modes of like frequency and unlike damping stay two. A group is a mode when two
-    fifths of all orders have it: what only high orders find follows noise or leakage.
+    Poles that are stable in frequency and damping are followed from order to order by their distance in the complex
+    plane relative to their magnitude, so that two modes of like frequency and unlike damping stay two. A group
+    is a mode when two fifths of all orders have it: what only high orders find follows noise or leakage.
     """
     stable = np.flatnonzero(chart.stability >= 2)
     if len(stable) == 0:
         return (), ()
-    labels = _cluster(chart.poles[stable])
+    labels = _tracks(chart.poles[stable], chart.orders[stable])
     kept: list[PoleGroup] = []
     dropped: list[PoleGroup] = []
     top = int(chart.orders.max())
@@ -137,13 +138,29 @@ def _by_frequency(group: PoleGroup) -> float:
     return group.frequency
 
 
-def _cluster(poles: Complex) -> NDArray[np.int64]:
-    """Average-linkage clusters on the logarithm of the poles: distances relative to magnitude."""
-    if len(poles) == 1:
-        return np.array([1])
+def _tracks(poles: Complex, orders: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Follow modes from order to order: poles of one order are never one mode, however close they are.
+
+    Each order's poles are assigned to the modes found so far so that the summed distance is least; distance is that
+    of the logarithms of the poles, which is relative to their magnitude.
+    """
     logarithm = np.log(poles)
-    tree = linkage(np.column_stack([logarithm.real, logarithm.imag]), "average")
-    return np.asarray(fcluster(tree, _CLUSTER, "distance"))
+    labels = np.empty(len(poles), dtype=np.int64)
+    members: list[list[complex]] = []
+    for order in np.unique(orders):
+        mine = np.flatnonzero(orders == order)
+        centres = np.array([np.median(np.real(m[-_MEMORY:])) + 1j * np.median(np.imag(m[-_MEMORY:])) for m in members])
+        distance = np.abs(logarithm[mine][:, None] - centres.reshape(1, -1))
+        rows, columns = linear_sum_assignment(np.minimum(distance, 2 * _REACH))
+        found = {int(row): int(column) for row, column in zip(rows, columns, strict=True)}
+        for row, index in enumerate(mine):
+            column = found.get(row)
+            if column is None or distance[row, column] > _REACH:
+                column = len(members)
+                members.append([])
+            members[column].append(complex(logarithm[index]))
+            labels[index] = column
+    return labels
 
 
 def _group(chart: StabilisationChart, members: NDArray[np.int64]) -> PoleGroup:

@@ -136,3 +136,45 @@ def test_noise_alone_has_no_mode() -> None:
     noise = rng.standard_normal((2, *frf.values.shape))
     with pytest.raises(MillfrfError, match="no pole is stable"):
         fit_polyreference(replace(frf, values=noise[0] + 1j * noise[1]), (10.0, 30.0), max_order=12)
+
+
+def one_mode_each(frequencies: list[float], zeta: float) -> ModalModel:
+    """Modes with residues of unlike size and direction at three responses and two excitations."""
+    rng = np.random.default_rng(7)
+    omega = 2 * np.pi * np.array(frequencies)
+    n = len(frequencies)
+    return ModalModel(
+        poles=omega * (-zeta + 1j * np.sqrt(1 - zeta**2)),
+        right=rng.standard_normal((n, 3)) + 0.2j * rng.standard_normal((n, 3)),
+        left=rng.standard_normal((n, 2)) * omega[:, None] * 1e-8 * (1 + 0.1j),
+        responses=("TCP:+X", "TCP:+Y", "TCP:+Z"),
+        excitations=("TCP:+X", "TCP:+Y"),
+    )
+
+
+def test_modes_are_found_from_one_end_of_a_wide_band_to_the_other() -> None:
+    """Poles near the upper end once fell off the logarithm's branch."""
+    frequencies = [110.0, 260.0, 410.0, 560.0, 710.0, 860.0, 970.0]
+    truth = one_mode_each(frequencies, 0.01)
+    fit = fit_polyreference(truth.frf(np.arange(1.0, 1100.0, 0.5)), (60.0, 1000.0), max_order=24)
+    np.testing.assert_allclose(fit.model.poles, truth.poles, rtol=1e-6)
+
+
+def test_two_modes_closer_than_a_pole_scatters_stay_two() -> None:
+    truth = one_mode_each([300.0, 303.0, 380.0], 0.008)
+    fit = fit_polyreference(truth.frf(np.arange(200.0, 450.0, 0.25)), (250.0, 420.0), max_order=20)
+    np.testing.assert_allclose(fit.model.poles, truth.poles, rtol=1e-5)
+
+
+@pytest.mark.parametrize("delay", [0.0, 2e-4, 1.1e-3])
+def test_delay_of_a_measuring_chain_is_told_from_the_modes(delay: float) -> None:
+    structure = one_mode_each([210.0, 320.0, 405.0, 590.0], 0.012)
+    truth = replace(structure, quantity="transfer", unit="m/V", delay=delay)
+    fit = fit_polyreference(truth.frf(np.arange(100.0, 800.0, 0.5)), (150.0, 700.0), max_order=24)
+    assert fit.model.delay == pytest.approx(delay, abs=1e-6)
+    np.testing.assert_allclose(fit.model.poles, truth.poles, rtol=1e-4)
+
+
+def test_a_structure_has_no_delay() -> None:
+    with pytest.raises(InputError, match="only a transfer"):
+        replace(one_mode_each([10.0], 0.01), delay=1e-3)
