@@ -22,12 +22,13 @@ from replay_data import (
     milling_sensors,
     tip_model,
 )
-from stability import StabilityLobes, write_lobes
+from stability import StabilityLobes, read_lobes, write_lobes
 
 from .chain.calibrate import calibrate_model, write_calibration
 from .chain.estimate import EstimateOptions, estimate_recordings, write_estimate
 from .chain.fit import FitOptions, fit_model, write_fit
 from .chain.lobes import compute_lobes, speed_axis
+from .figures.lobes_figure import lobes_figure
 from .progress import Watch, silent
 from .report import ReportOptions, write_report
 from .tables import Table
@@ -136,6 +137,7 @@ def run_demo(options: DemoOptions, watch: Watch = silent, say: Callable[[str], o
         write_lobes(folder / f"lobes_{name}.csv", lobes)
     compared = np.array(COMPARED_RPM) * RPM
     limits = {name: compute_lobes(structure, CUTTER, compared, MAX_DEPTH) for name, structure in structures.items()}
+    _draw_lobes(folder)
     report = _report(folder, sweeps, watch)
     return DemoResult(identified, true, limits, report, time.perf_counter() - started)
 
@@ -230,6 +232,14 @@ def _identify(folder: Path, frf: Frf, tip: Frf, sensor: Frf, watch: Watch) -> Mo
     inputs = [folder / name for name in ("model_housing.json", "frf_hammer_tip.h5", "frf_hammer_housing.h5")]
     write_calibration(folder / "model_tip.json", calibration, inputs)
     return calibration.model
+
+
+def _draw_lobes(folder: Path) -> None:
+    """The picture of the README: limits from the dynamics measured in the cut, beside the truth."""
+    labels = {"identified": "measured in the cut", "true": "truth"}
+    figure = lobes_figure({label: read_lobes(folder / f"lobes_{name}.csv") for name, label in labels.items()})
+    with writing_whole_file(folder / "lobes.png") as temporary:
+        figure.savefig(temporary, dpi=130, format="png")
 
 
 def _report(folder: Path, sweeps: list[Path], watch: Watch) -> Path:

@@ -121,6 +121,14 @@ class _Page:
         return axes
 
 
+def coherent_lines(frf: Frf) -> NDArray[np.bool_]:
+    """Valid lines on which some response is mostly explained by the inputs; all valid ones where that is unknown."""
+    if frf.multiple_coherence is None:
+        return frf.valid
+    coherent = frf.valid & (np.nan_to_num(frf.multiple_coherence).max(axis=1) > 0.8)
+    return np.asarray(coherent) if coherent.any() else frf.valid
+
+
 def _lines(curves: FrfCurves) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64] | None]:
     """Frequencies, values and standard deviation inside the band; not a number where there is no FRF."""
     frf = curves.measured
@@ -191,7 +199,9 @@ def _without_jumps(angle: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _magnitude_limits(curves: FrfCurves) -> tuple[float, float]:
     """One scale for all entries, four decades at most, so that strong and weak can be compared."""
-    size = np.abs(_lines(curves)[1])
+    frf = curves.measured
+    inside = (frf.frequencies >= curves.band[0]) & (frf.frequencies <= curves.band[1])
+    size = np.abs(frf.values[inside & coherent_lines(frf)])
     size = size[np.isfinite(size) & (size > 0)]
     if not len(size):
         return 1e-9, 1e-3

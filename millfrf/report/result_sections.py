@@ -10,7 +10,7 @@ from modal_fit import ModalModel
 from ..chain.estimate import EstimateOptions, spectra_of_tests
 from ..chain.fit import chart_from_json
 from ..figures.embed import as_data_uri
-from ..figures.frf_figure import FrfCurves, frf_figures
+from ..figures.frf_figure import FrfCurves, coherent_lines, frf_figures
 from ..figures.input_figure import input_figure
 from ..figures.lobes_figure import lobes_figure
 from ..figures.mode_figure import mode_figure
@@ -53,8 +53,8 @@ def _band_of(file: SourceFile) -> Band | None:
 
 
 def _axis(frf: Frf, fit_band: Band | None) -> Band:
-    """The fit's band widened by a fifth of its width on either side, or all valid lines."""
-    valid = frf.frequencies[frf.valid & (frf.frequencies > 0)]
+    """The fit's band widened by a fifth of its width on either side, or all lines that show the structure."""
+    valid = frf.frequencies[coherent_lines(frf) & (frf.frequencies > 0)]
     first, last = (float(valid[0]), float(valid[-1])) if len(valid) else (0.0, float(frf.frequencies[-1]))
     if fit_band is None:
         return first, last

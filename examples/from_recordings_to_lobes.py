@@ -1,0 +1,72 @@
+"""From recordings to stability lobes in Python: mill a simulated robot, estimate, fit, draw the limit.
+
+Run it: `python examples/from_recordings_to_lobes.py`. With recordings of your own, leave out `mill` and
+give their names to `limits`.
+"""
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import numpy as np
+
+from acquisition import Recording, record
+from cutting import MillingProcess
+from estimation import cross_spectra, h1, settings_for, sum_tests
+from modal_fit import ModalModel, fit_polyreference
+from replay_data import LinearSweep, MillingCell, dynamometer, table_one_model, tip_accelerometers
+from stability import StabilityLobes, zero_order
+
+RPM = pi / 30
+CUTTER = MillingProcess(
+    teeth=2,
+    diameter=12.7e-3,
+    edge_angle=pi / 2,
+    ktc=119e6,
+    krc=0.17,
+    kac=0.33,
+    start_angle=pi / 2,
+    exit_angle=pi,
+    feed_per_tooth=0.15e-3,
+)
+
+
+def mill(folder: Path, seconds: float) -> list[Path]:
+    """Three speed sweeps, 450 to 690 rpm, each in another immersion so that the forces are independent."""
+    files = []
+    sweep = LinearSweep(450 * RPM, 690 * RPM, seconds)
+    for number, (start, exit_) in enumerate([(0.38, 0.61), (0.77, 1.0), (0.0, 0.23)]):
+        process = replace(CUTTER, start_angle=start * pi, exit_angle=exit_ * pi)
+        sensors = dynamometer() + tip_accelerometers()
+        cell = MillingCell(table_one_model(), process, 2e-3, sweep, seconds, sensors=sensors, seed=number)
+        files.append(folder / f"sweep_{number}.h5")
+        record(cell, files[-1])
+    return files
+
+
+def limits(files: Sequence[Path]) -> tuple[ModalModel, StabilityLobes]:
+    """Modal model and depth limits from recordings of one set-up."""
+    tests = []
+    for file in files:
+        with Recording(file) as recording:
+            settings = settings_for(recording.stream().sample_rate, 8.0)
+            tests.append(cross_spectra(recording, settings))
+    fit = fit_polyreference(h1(sum_tests(tests)), (15.2, 22.5))
+    for warning in fit.warnings:
+        print("warning:", warning)
+    return fit.model, zero_order(fit.model, CUTTER, np.linspace(600, 2400, 100) * RPM, 10e-3)
+
+
+def main() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        model, lobes = limits(mill(Path(folder), 60.0))
+    for frequency, zeta in zip(model.natural_frequencies, model.damping_ratios, strict=True):
+        print(f"mode at {frequency:.3f} Hz, damping {100 * zeta:.2f} %")
+    lowest = int(np.argmin(lobes.depth_limits))
+    print(f"lowest limit {1e3 * lobes.depth_limits[lowest]:.2f} mm at {lobes.spindle_speeds_rpm[lowest]:.0f} rpm")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,76 @@
+"""The demonstration and the example: the whole chain against the simulated robot's truth."""
+
+import importlib.util
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation import read_frf
+from millfrf.demonstration import FIT_BAND, DemoOptions, DemoResult, comparison_tables, nearest_modes, run_demo
+from modal_fit import read_modal_model
+from replay_data import default_structure, table_one_model, tip_model
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> DemoResult:
+    return run_demo(DemoOptions(tmp_path_factory.mktemp("demo")))
+
+
+def test_both_close_modes_are_found(demo: DemoResult) -> None:
+    pairs = nearest_modes(demo)
+    assert len(pairs) == 2
+    assert len({found for _, found in pairs}) == 2
+    for true, found in pairs:
+        assert demo.identified.natural_frequencies[found] == pytest.approx(
+            demo.true.natural_frequencies[true], rel=0.005
+        )
+        assert demo.identified.damping_ratios[found] == pytest.approx(demo.true.damping_ratios[true], rel=0.15)
+
+
+def test_depth_limits_of_the_measured_dynamics_are_within_a_tenth(demo: DemoResult) -> None:
+    true = demo.lobes["true"].depth_limits
+    np.testing.assert_allclose(demo.lobes["identified"].depth_limits, true, rtol=0.10)
+    np.testing.assert_allclose(demo.lobes["hammer"].depth_limits, true, rtol=0.10)
+
+
+def test_tap_calibrated_frf_matches_the_tip_around_the_modes(demo: DemoResult) -> None:
+    f = np.linspace(*FIT_BAND, 200)
+    true = demo.true.receptance(f)
+    error = np.abs(demo.identified.receptance(f) - true)
+    assert (error.max(axis=0) <= 0.05 * np.abs(true).max(axis=0)).all()
+
+
+def test_true_model_is_the_structure_that_was_milled(demo: DemoResult) -> None:
+    stored = read_modal_model(demo.report.parent / "true_model_tip.json")
+    np.testing.assert_array_equal(stored.poles, tip_model(default_structure()).poles)
+
+
+def test_tables_and_files_are_there(demo: DemoResult) -> None:
+    modes, depths = comparison_tables(demo)
+    assert (len(modes.rows), len(depths.rows)) == (2, 5)
+    folder = demo.report.parent
+    assert read_frf(folder / "frf_in_process.h5").quantity == "accelerance"
+    page = demo.report.read_text(encoding="utf-8")
+    for expected in ("Stability lobes", "Modal model", "Excitation", "16.99", "SHA-256", "data:image/"):
+        assert expected in page
+    assert not re.search(r"""(src|href)=["']?(https?:)?//""", page)  # nothing is loaded from elsewhere
+
+
+def test_the_example_finds_the_modes_of_table_1(tmp_path: Path) -> None:
+    path = ROOT / "examples" / "from_recordings_to_lobes.py"
+    specification = importlib.util.spec_from_file_location("from_recordings_to_lobes", path)
+    assert specification is not None
+    assert specification.loader is not None
+    example = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(example)
+    model, lobes = example.limits(example.mill(tmp_path, 60.0))
+    truth = table_one_model()
+    np.testing.assert_allclose(model.natural_frequencies, truth.natural_frequencies, rtol=0.005)
+    np.testing.assert_allclose(model.damping_ratios, truth.damping_ratios, rtol=0.05)
+    exact = example.zero_order(truth, replace(example.CUTTER), lobes.spindle_speeds, 10e-3)
+    np.testing.assert_allclose(lobes.depth_limits, exact.depth_limits, rtol=0.03)
