@@ -2,7 +2,7 @@
 
 from .calibrate import calibrate_model
 from .estimate import Estimate, EstimateOptions, estimate_recordings
-from .fit import FitOptions, fit_model
+from .fit import FitOptions, fit_model, fit_recordings
 from .lobes import LOBE_METHODS, compute_lobes, speed_axis
 
 __all__ = [
@@ -14,5 +14,6 @@ __all__ = [
     "compute_lobes",
     "estimate_recordings",
     "fit_model",
+    "fit_recordings",
     "speed_axis",
 ]

@@ -1,72 +1,127 @@
-"""From an FRF file to a modal model file."""
+"""From an FRF file, or straight from recordings, to a modal model file."""
 
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from estimation import Frf
+from acquisition import Recording
+from estimation import BandRecord, Frf, band_record, choose_channels
 from foundation import InputError, writing_whole_file
-from modal_fit import ModalFit, StabilisationChart, fit_polyreference, write_modal_model
+from modal_fit import (
+    ModalFit,
+    StabilisationChart,
+    SubspaceFit,
+    fit_polyreference,
+    fit_subspace,
+    write_modal_model,
+)
 
 from ..progress import Watch, silent
 from ..provenance import add_to_json, sources, versions
 
-FIT_METHODS = ("polyreference",)
+POLYREFERENCE, SUBSPACE = "polyreference", "subspace"
+MAX_ORDER = {POLYREFERENCE: 40, SUBSPACE: 30}
+"""Highest order where none is asked for."""
+
+KEPT_ABOVE = 1.6
+"""Records are kept up to this multiple of the band's upper end."""
 
 
 @dataclass(frozen=True)
 class FitOptions:
-    """How an FRF is fitted.
+    """How a model is fitted.
 
     Parameters
     ----------
     band
         Hz.
     method
-        ``polyreference``.
+        ``polyreference`` of an FRF, ``subspace`` of recordings.
     max_order
-        Highest order of the denominator.
+        Highest order of the denominator or of the state space; None: the method's own.
     n_modes
         Modes to keep; None: as many as are found.
+    excitations, responses
+        Channel names, for recordings; empty: chosen by quantity.
+    stream
+        Sample clock, for recordings; None: the only one.
     """
 
     band: tuple[float, float]
-    method: str = "polyreference"
-    max_order: int = 40
+    method: str = POLYREFERENCE
+    max_order: int | None = None
     n_modes: int | None = None
+    excitations: tuple[str, ...] = ()
+    responses: tuple[str, ...] = ()
+    stream: str | None = None
+
+    @property
+    def order(self) -> int:
+        """Highest order, by the method where none was asked for."""
+        return MAX_ORDER[self.method] if self.max_order is None else self.max_order
 
 
 def fit_model(frf: Frf, options: FitOptions, watch: Watch = silent) -> ModalFit:
-    """Fit a modal model.
+    """Fit a modal model to an FRF.
 
     Raises
     ------
     InputError
-        An unknown method, or a band without enough lines.
+        A method that needs recordings, or a band without enough lines.
     MillfrfError
         No stable pole was found.
     """
-    if options.method not in FIT_METHODS:
-        raise InputError(f"unknown method {options.method!r}; use one of {', '.join(FIT_METHODS)}")
+    if options.method != POLYREFERENCE:
+        raise InputError(f"method {options.method!r} does not fit an FRF; use {POLYREFERENCE}, or give recordings")
     with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
-        return fit_polyreference(frf, options.band, max_order=options.max_order, n_modes=options.n_modes)
+        return fit_polyreference(frf, options.band, max_order=options.order, n_modes=options.n_modes)
+
+
+def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions, watch: Watch = silent) -> SubspaceFit:
+    """Fit a modal model to recordings of one set-up, without spectra in between.
+
+    Raises
+    ------
+    InputError
+        A method that needs an FRF, or recordings that cannot be stacked.
+    MillfrfError
+        No stable pole was found.
+    """
+    if options.method != SUBSPACE:
+        raise InputError(f"method {options.method!r} does not fit recordings; use {SUBSPACE}, or estimate an FRF first")
+    records = [_band_record(path, options, watch) for path in paths]
+    with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
+        return fit_subspace(records, options.band, max_order=options.order, n_modes=options.n_modes)
+
+
+def _band_record(path: str | os.PathLike[str], options: FitOptions, watch: Watch) -> BandRecord:
+    with Recording(path) as recording:
+        stream = recording.stream(options.stream)
+        channels = choose_channels(stream, options.excitations or None, options.responses or None)
+        with watch(f"reading {Path(path).name}", stream.n_samples) as update:
+            highest = KEPT_ABOVE * options.band[1]
+            return band_record(recording, highest, *channels, stream=options.stream, progress=update)
 
 
 def write_fit(
-    path: str | os.PathLike[str], fit: ModalFit, inputs: Sequence[str | os.PathLike[str]], options: FitOptions
+    path: str | os.PathLike[str],
+    fit: ModalFit | SubspaceFit,
+    inputs: Sequence[str | os.PathLike[str]],
+    options: FitOptions,
 ) -> None:
-    """Write the model with its provenance: FRF file, band, quality, stabilisation chart, warnings, versions."""
+    """Write the model with its provenance: files, band, quality, stabilisation chart, warnings, versions."""
     provenance = {
         "step": "fit",
         "sources": sources(inputs),
         "method": options.method,
-        "max_order": options.max_order,
+        "max_order": options.order,
         "band_hz": list(fit.band),
         "reduced_chi_square": None if np.isnan(fit.reduced_chi_square) else fit.reduced_chi_square,
-        "relative_error": fit.relative_error.tolist(),
+        "relative_error": fit.relative_error.tolist() if isinstance(fit, ModalFit) else None,
         "warnings": list(fit.warnings),
         "dropped": [
             {"frequency_hz": g.frequency, "damping_ratio": g.damping_ratio, "reason": g.reason} for g in fit.dropped

@@ -1,32 +1,44 @@
-"""`millfrf fit`: modal model of an FRF."""
+"""`millfrf fit`: modal model of an FRF or of recordings."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from .options import Output, check_output
+from .options import Output, Stream, check_band, check_output, names
 
 
 def fit(
-    frf: Annotated[Path, typer.Argument(metavar="FRF.h5", help="FRF made by estimate.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="FRF.h5|REC...", help="An FRF made by estimate, or recordings of one set-up."),
+    ],
     out: Output,
     band: Annotated[tuple[float, float], typer.Option("--band", metavar="LO HI", help="Frequency band, Hz.")],
-    method: Annotated[str, typer.Option("--method", help="polyreference.")] = "polyreference",
-    max_order: Annotated[int, typer.Option("--max-order", help="Highest model order.")] = 40,
+    method: Annotated[
+        str | None, typer.Option("--method", help="polyreference (of an FRF) or subspace (of recordings).")
+    ] = None,
+    max_order: Annotated[int | None, typer.Option("--max-order", help="Highest model order.")] = None,
     modes: Annotated[int | None, typer.Option("--modes", help="Modes to keep; default: as many as are found.")] = None,
+    excitation: Annotated[list[str] | None, typer.Option("--excitation", help="Channel of recordings.")] = None,
+    response: Annotated[list[str] | None, typer.Option("--response", help="Channel of recordings.")] = None,
+    stream: Stream = None,
 ) -> None:
-    """Fit poles, vectors and residuals in a band, with a stabilisation chart that reports show."""
-    from estimation import read_frf
+    """Fit poles, vectors and residuals in a band, with error bars and a stabilisation chart that reports show.
 
-    from ..chain.fit import FitOptions, fit_model, write_fit
+    Recordings are fitted as they are, tests stacked, without windows or leakage; that is the more accurate way for
+    heavily damped modes.
+    """
+    from ..chain.fit import FitOptions, write_fit
+    from ..chain.fit_files import fit_files
     from ..progress import bar
     from ..tables import mode_table, show
 
     check_output(out, (".json",))
-    options = FitOptions(band, method, max_order, modes)
-    result = fit_model(read_frf(frf), options, bar)
-    write_fit(out, result, [frf], options)
+    check_band(band)
+    given = (max_order, modes, names(excitation), names(response), stream)
+    result, used = fit_files(files, method, lambda chosen: FitOptions(band, chosen, *given), bar)
+    write_fit(out, result, files, used)
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)
     show(mode_table(result.model))

@@ -122,13 +122,15 @@ def _quality(file: SourceFile) -> list[str]:
     made = file.provenance
     if made.get("step") != "fit":
         return []
-    error = 100 * np.asarray(made["relative_error"])
     text = (
         f"{file.path.name}: {made['method']} up to order {made['max_order']}, {made['band_hz'][0]:g} to "
-        f"{made['band_hz'][1]:g} Hz; misfit between {error.min():.2g} and {error.max():.2g} % of each FRF's rms"
+        f"{made['band_hz'][1]:g} Hz"
     )
+    if made.get("relative_error") is not None:
+        error = 100 * np.asarray(made["relative_error"])
+        text += f"; misfit between {error.min():.2g} and {error.max():.2g} % of each FRF's rms"
     chi = made.get("reduced_chi_square")
-    return [text + ("." if chi is None else f", {chi:.2g} times what the noise explains (reduced chi-square).")]
+    return [text + ("." if chi is None else f"; misfit over noise (reduced chi-square) {chi:.2f}.")]
 
 
 def _stabilisation(collected: Collected, file: SourceFile, model: ModalModel) -> Picture:

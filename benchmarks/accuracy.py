@@ -1,0 +1,152 @@
+"""How near do fits of stacked milling sweeps come to the truth? `python benchmarks/accuracy.py [--seeds 20]`.
+
+A simulated robot with the close, heavily damped pair of Mohammadi & Ahmadi's Table 1 and out-of-band modes is milled in
+three immersions while the spindle speed sweeps the band; forces and accelerations carry noise. Every method sees the
+same recordings and chooses its modes itself, except where a peer has no automatic choice: there the pole
+nearest to the truth over all its orders is taken, which favours the peer.
+"""
+
+import os
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
+import argparse
+import tempfile
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Recording, record
+from cutting import MillingProcess
+from estimation import Frf, band_record, choose_channels, cross_spectra, h1, settings_for, sum_tests, to_receptance
+from modal_fit import fit_polyreference, fit_subspace
+from replay_data import LinearSweep, MillingCell, default_structure, milling_sensors
+
+RPM = pi / 30
+CUTTER = MillingProcess(2, 12.7e-3, pi / 2, 119e6, 0.17, 0.33, 0.0, pi, 0.1e-3, runout=5e-6)
+IMMERSIONS = ((0.38, 0.61), (0.77, 1.0), (0.0, 0.23))
+SECONDS = 60.0
+TRUTH = default_structure().poles[:2]
+Poles = NDArray[np.complex128]
+
+
+def mill(folder: Path, noise: float, seed: int) -> list[Path]:
+    """Three sweeps, 450 to 690 rpm."""
+    sweep, paths = LinearSweep(450 * RPM, 690 * RPM, SECONDS), []
+    for number, (start, exit_) in enumerate(IMMERSIONS):
+        process = replace(CUTTER, start_angle=start * pi, exit_angle=exit_ * pi)
+        sensors = milling_sensors(noise, noise)
+        cell = MillingCell(
+            default_structure(), process, 2e-3, sweep, SECONDS, sensors=sensors, seed=1000 * seed + number
+        )
+        paths.append(folder / f"{number}.h5")
+        record(cell, paths[-1])
+    return paths
+
+
+def subspace(paths: list[Path], frf: Frf) -> Poles:
+    """Subspace poles, refined by maximum likelihood on the records."""
+    records = []
+    for path in paths:
+        with Recording(path) as recording:
+            records.append(band_record(recording, 40.0, *choose_channels(recording.stream())))
+    return fit_subspace(records, (13.0, 25.0)).model.poles
+
+
+def polyreference(paths: list[Path], frf: Frf) -> Poles:
+    """Poly-reference on H1, refined by maximum likelihood on its covariance."""
+    return fit_polyreference(frf, (15.2, 22.5)).model.poles
+
+
+def sdypy_lscf(paths: list[Path], frf: Frf) -> Poles:
+    """sdypy-EMA: LSCF on the band's lines of all nine FRFs."""
+    from sdypy import EMA
+
+    inside = (frf.frequencies >= 12.0) & (frf.frequencies <= 26.0)
+    values = to_receptance(frf).values[inside].reshape(inside.sum(), -1).T
+    model = EMA.Model(
+        values, frf.frequencies[inside], lower=12.0, upper=26.0, pol_order_high=40, pyfrf=False, frf_type="receptance"
+    )
+    model.get_poles(show_progress=False)
+    return np.concatenate([np.atleast_1d(p) for p in model.all_poles])
+
+
+METHODS: dict[str, Callable[[list[Path], Frf], Poles]] = {
+    "millfrf subspace + ML": subspace,
+    "millfrf poly-reference + ML": polyreference,
+    "sdypy-EMA LSCF": sdypy_lscf,
+}
+
+
+def errors(poles: Poles) -> NDArray[np.float64] | None:
+    """Relative errors (fn1, fn2, zeta1, zeta2) of the poles nearest to the truth; None where one is missed."""
+    poles = poles[(poles.imag > 0) & (poles.real < 0)]
+    if not len(poles):
+        return None
+    nearest = [int(np.argmin(np.abs(poles - true))) for true in TRUTH]
+    if len(set(nearest)) < 2 or np.any(np.abs(poles[nearest] - TRUTH) > 0.05 * np.abs(TRUTH)):
+        return None
+    found = poles[nearest]
+    zeta, true_zeta = -found.real / np.abs(found), -TRUTH.real / np.abs(TRUTH)
+    return np.concatenate([np.abs(found) / np.abs(TRUTH) - 1, zeta / true_zeta - 1])
+
+
+def trial(
+    noise: float, seed: int, found: dict[str, list[NDArray[np.float64] | None]], seconds: dict[str, float]
+) -> None:
+    """One seed, all methods."""
+    with tempfile.TemporaryDirectory() as folder:
+        paths = mill(Path(folder), noise, seed)
+        spectra = []
+        for path in paths:
+            with Recording(path) as recording:
+                spectra.append(cross_spectra(recording, settings_for(recording.stream().sample_rate, 8.0)))
+        frf = h1(sum_tests(spectra))
+        for name, method in METHODS.items():
+            started = time.perf_counter()
+            try:
+                found[name].append(errors(method(paths, frf)))
+            except ModuleNotFoundError:
+                continue
+            except Exception as problem:
+                print(f"  {name}, seed {seed}: {type(problem).__name__}: {problem}")
+                found[name].append(None)
+            seconds[name] += time.perf_counter() - started
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--noise", type=float, nargs="+", default=[0.01, 0.05])
+    options = parser.parse_args()
+    warnings.simplefilter("ignore")
+    for noise in options.noise:
+        found: dict[str, list[NDArray[np.float64] | None]] = {name: [] for name in METHODS}
+        seconds = dict.fromkeys(METHODS, 0.0)
+        for seed in range(options.seeds):
+            trial(noise, seed, found, seconds)
+        print(f"\nnoise {100 * noise:g} %, {options.seeds} seeds: median |error| (largest), %")
+        print(f"{'method':30s} {'missed':>6s} {'fn 1':>15s} {'fn 2':>15s} {'zeta 1':>15s} {'zeta 2':>15s} {'s':>6s}")
+        for name, rows in found.items():
+            good = np.array([row for row in rows if row is not None]).reshape(-1, 4)
+            if not rows:
+                print(f"{name:30s} not installed")
+                continue
+            size = 100 * np.abs(good)
+            text = [f"{np.median(column):.3f} ({column.max():.3f})" for column in size.T] if len(good) else ["-"] * 4
+            print(
+                f"{name:30s} {len(rows) - len(good):6d} "
+                + " ".join(f"{t:>15s}" for t in text)
+                + f" {seconds[name] / len(rows):6.2f}"
+            )
+
+
+if __name__ == "__main__":
+    main()
