@@ -26,7 +26,7 @@ from stability import StabilityLobes, read_lobes, write_lobes
 
 from .chain.calibrate import calibrate_model, write_calibration
 from .chain.estimate import EstimateOptions, estimate_recordings, write_estimate
-from .chain.fit import FitOptions, fit_model, write_fit
+from .chain.fit import SUBSPACE, FitOptions, fit_model, fit_recordings, write_fit
 from .chain.lobes import compute_lobes, speed_axis
 from .figures.lobes_figure import lobes_figure
 from .progress import Watch, silent
@@ -54,7 +54,10 @@ IMMERSIONS = {"central": (0.38, 0.61), "down": (0.77, 1.0), "up": (0.0, 0.23)}
 SWEEP_RPM, SWEEP_SECONDS, SWEEP_DEPTH = (450.0, 690.0), 60.0, 2e-3
 KEPT_BAND = (5.0, 60.0)
 FIT_BAND = (15.2, 22.5)
-"""Inside the 15 to 23 Hz of the teeth."""
+"""Inside the 15 to 23 Hz of the teeth, where the FRF is known."""
+
+SUBSPACE_BAND = (13.0, 25.0)
+"""Records need no force on every line."""
 
 COMPARED_RPM = (800, 900, 1200, 1600, 2000)
 MAX_DEPTH = 10e-3
@@ -127,7 +130,7 @@ def run_demo(options: DemoOptions, watch: Watch = silent, say: Callable[[str], o
     )
     sensor = _estimate(folder / "frf_hammer_housing.h5", hammer, replace(taps, responses=("ax", "ay", "az")), watch)
     say("fitting, and calibrating to the tool tip ...")
-    identified = _identify(folder, frf, tip, sensor, watch)
+    identified = _identify(folder, sweeps, frf, tip, sensor, watch)
     true = tip_model(default_structure())
     write_modal_model(folder / "true_model_tip.json", true)
     say("drawing lobes and report ...")
@@ -224,10 +227,17 @@ def _estimate(path: Path, recordings: list[Path], options: EstimateOptions, watc
     return estimate.frf
 
 
-def _identify(folder: Path, frf: Frf, tip: Frf, sensor: Frf, watch: Watch) -> ModalModel:
+def _identify(folder: Path, sweeps: list[Path], frf: Frf, tip: Frf, sensor: Frf, watch: Watch) -> ModalModel:
     options = FitOptions(FIT_BAND)
-    fit = fit_model(frf, options, watch)
-    write_fit(folder / "model_housing.json", fit, [folder / "frf_in_process.h5"], options)
+    write_fit(
+        folder / "model_housing_polyreference.json",
+        fit_model(frf, options, watch),
+        [folder / "frf_in_process.h5"],
+        options,
+    )
+    options = FitOptions(SUBSPACE_BAND, SUBSPACE)
+    fit = fit_recordings(sweeps, options, watch)
+    write_fit(folder / "model_housing.json", fit, sweeps, options)
     calibration = calibrate_model(fit.model, tip, sensor, watch)
     inputs = [folder / name for name in ("model_housing.json", "frf_hammer_tip.h5", "frf_hammer_housing.h5")]
     write_calibration(folder / "model_tip.json", calibration, inputs)
@@ -245,7 +255,13 @@ def _draw_lobes(folder: Path) -> None:
 def _report(folder: Path, sweeps: list[Path], watch: Watch) -> Path:
     with writing_whole_file(folder / "cut.toml") as temporary:
         temporary.write_text(cutting_text(CUTTER), encoding="utf-8")
-    names = ("frf_in_process.h5", "frf_hammer_tip.h5", "model_housing.json", "model_tip.json")
+    names = (
+        "frf_in_process.h5",
+        "frf_hammer_tip.h5",
+        "model_housing.json",
+        "model_housing_polyreference.json",
+        "model_tip.json",
+    )
     tables = ("lobes_identified.csv", "lobes_hammer.csv", "lobes_true.csv", "cut.toml")
     report = folder / "report.html"
     options = ReportOptions(

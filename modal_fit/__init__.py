@@ -1,5 +1,6 @@
 """Modal models, their fitting and the calibration to the tool tip: knows nothing of cutting."""
 
+from .comparison import ModePair, compare_modes
 from .modal_model import ModalModel, Residuals
 from .modal_model_file import read_modal_model, write_modal_model
 from .polyreference import ModalFit, fit_polyreference
@@ -12,12 +13,14 @@ from .uncertainty import derived_covariance, frequency_and_damping_errors
 __all__ = [
     "ModalFit",
     "ModalModel",
+    "ModePair",
     "PoleGroup",
     "Residuals",
     "StabilisationChart",
     "SubspaceFit",
     "TipCalibration",
     "calibrate_to_tip",
+    "compare_modes",
     "derived_covariance",
     "fit_polyreference",
     "fit_subspace",

@@ -74,12 +74,18 @@ class Collected:
         return next(iter(fitted + alike), None)
 
     def frf_of(self, model: SourceFile) -> Frf | None:
-        """The FRF a model was fitted to."""
-        return next((frf for file, frf in self.frfs if model.made_from(file)), None)
+        """The FRF a model was fitted to, or one made from the same recordings."""
+        fitted = [frf for file, frf in self.frfs if model.made_from(file)]
+        alike = [frf for file, frf in self.frfs if _sources(file) & _sources(model)]
+        return next(iter(fitted + alike), None)
 
     def recordings_of(self, frf: SourceFile) -> tuple[SourceFile, ...]:
         """The recordings an FRF was estimated from, those that are among the files."""
         return tuple(file for file in self.recordings if frf.made_from(file))
+
+
+def _sources(file: SourceFile) -> set[str]:
+    return {source.get("sha256", "") for source in file.provenance.get("sources", [])}
 
 
 def collect(paths: Sequence[str | os.PathLike[str]]) -> Collected:

@@ -16,6 +16,7 @@ from modal_fit import read_modal_model
 from ..progress import Watch, silent
 from ..provenance import versions
 from .collect import Collected, collect
+from .comparison_section import comparison_section
 from .measurement_sections import channel_section, file_section, settings_section, setup_section
 from .result_sections import frf_section, input_section, lobes_section, mode_section
 
@@ -63,6 +64,7 @@ def report_text(collected: Collected, options: ReportOptions, watch: Watch = sil
     channels, concerns = channel_section(collected, watch)
     sections = (
         mode_section(collected),
+        comparison_section(collected),
         lobes_section(collected),
         frf_section(collected, options.band, reference),
         input_section(collected, options.band, watch),
