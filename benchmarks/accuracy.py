@@ -72,7 +72,7 @@ def sdypy_lscf(paths: list[Path], frf: Frf) -> Poles:
     inside = (frf.frequencies >= 12.0) & (frf.frequencies <= 26.0)
     values = to_receptance(frf).values[inside].reshape(inside.sum(), -1).T
     model = EMA.Model(
-        values, frf.frequencies[inside], lower=12.0, upper=26.0, pol_order_high=40, pyfrf=False, frf_type="receptance"
+        values, frf.frequencies[inside], lower=12.0, upper=26.0, pol_order_high=40, pyfrf=False, frf_form="receptance"
     )
     model.get_poles(show_progress=False)
     return np.concatenate([np.atleast_1d(p) for p in model.all_poles])

@@ -11,6 +11,7 @@ from .quantities import correct_high_pass, to_receptance
 from .recording_spectra import choose_channels, cross_spectra
 from .spectral_accumulator import SpectralAccumulator
 from .stacking import sum_tests
+from .uff_file import read_frf_uff, write_frf_uff
 from .windows import effective_averages, settings_for
 
 __all__ = [
@@ -33,8 +34,10 @@ __all__ = [
     "input_independence",
     "multiple_coherence",
     "read_frf",
+    "read_frf_uff",
     "settings_for",
     "sum_tests",
     "to_receptance",
     "write_frf",
+    "write_frf_uff",
 ]

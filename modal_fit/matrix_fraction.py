@@ -5,12 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from estimation import Frf
 
 Complex = NDArray[np.complex128]
 _ARC = 1.7 * np.pi  # the band's share of the unit circle; the gap keeps its two ends apart
+
+
+_REGULAR = 1e-6  # smallest over largest diagonal entry of a Cholesky factor
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,8 @@ class OrderPoles:
     Parameters
     ----------
     order
-        Of the denominator polynomial.
+        Degree of the denominator. Its coefficients are complex and its band is one-sided, so that each degree holds a
+        mode an excitation; the real polynomials of the textbooks need two degrees for one.
     poles : (n_poles,), rad/s, stable and inside the band
     participation : (n_poles, n_excitations)
         Unit participation vectors: the left vectors up to a factor.
@@ -114,19 +118,37 @@ def _poles_of_order(full: Complex, order: int, n_excitations: int, band: tuple[f
     (Cauberghe, Guillaume, Verboven & Parloo, Identification of modal parameters ..., JSV 283, 2005).
     """
     free, fixed = full[n_excitations:, n_excitations:], full[n_excitations:, :n_excitations]
-    coefficients = np.linalg.lstsq(free, -fixed, rcond=1e-14)[0].reshape(order, n_excitations, n_excitations)
+    coefficients = _solve_hermitian(free, -fixed).reshape(order, n_excitations, n_excitations)
     # A(z) v = 0 with A_0 = I: in 1/z, the monic polynomial z^-n + A_1 z^-(n-1) + ... reversed
     size = order * n_excitations
     companion = np.zeros((size, size), dtype=complex)
     companion[n_excitations:, : size - n_excitations] = np.eye(size - n_excitations)
     companion[:n_excitations] = -coefficients.transpose(1, 0, 2).reshape(n_excitations, size)
-    inverse, vectors = np.linalg.eig(companion)
-    participation = vectors[-n_excitations:].T
-    usable = np.abs(inverse) > 1e-12
+    inverse: Complex = np.linalg.eigvals(companion).astype(complex)
     step = _ARC / (2 * np.pi * (band[1] - band[0]))
-    poles = 2j * np.pi * band[0] + _logarithm_in_band(1 / inverse[usable]) / step
-    participation = participation[usable]
+    z: Complex = 1 / inverse[np.abs(inverse) > 1.0]  # the others are unstable
+    poles = 2j * np.pi * band[0] + _logarithm_in_band(z) / step
     low, high = 2 * np.pi * band[0], 2 * np.pi * band[1]
     kept = (poles.real < 0) & (poles.imag > low) & (poles.imag < high) & (poles.real > -0.7 * np.abs(poles))
-    length = np.linalg.norm(participation[kept], axis=1, keepdims=True)
-    return OrderPoles(order, poles[kept], participation[kept] / length)
+    return OrderPoles(order, poles[kept], _null_vectors(coefficients, z[kept]))
+
+
+def _solve_hermitian(matrix: Complex, right_side: Complex) -> Complex:
+    """Cholesky where the matrix is regular in double precision, else the least-norm solution."""
+    try:
+        factor, lower = cho_factor(matrix, lower=True, check_finite=False)
+        diagonal = np.abs(np.diag(factor))
+        if diagonal.min() > _REGULAR * diagonal.max():
+            return np.asarray(cho_solve((factor, lower), right_side, check_finite=False))
+    except np.linalg.LinAlgError:
+        pass
+    return np.asarray(np.linalg.lstsq(matrix, right_side, rcond=1e-14)[0])
+
+
+def _null_vectors(coefficients: Complex, z: Complex) -> Complex:
+    """Unit vectors v with ``A(z) v = 0``, shape (n_poles, n_excitations)."""
+    if not len(z):
+        return np.empty((0, coefficients.shape[1]), dtype=complex)
+    powers = z[:, None] ** np.arange(1, len(coefficients) + 1)
+    matrices = np.eye(coefficients.shape[1]) + np.einsum("kr,rij->kij", powers, coefficients, optimize=True)
+    return np.asarray(np.linalg.svd(matrices)[2][:, -1].conj())

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from .options import check_output
+
 
 def convert(
     source: Annotated[Path, typer.Argument(metavar="IN", help="File to read.")],
@@ -13,10 +15,17 @@ def convert(
         Path | None, typer.Option("--map", metavar="MAP.toml", help="Which array or column is which channel.")
     ] = None,
 ) -> None:
-    """Convert by suffix: .h5 .npz .npy .mat .csv into .h5 .npz .mat .csv."""
+    """Convert by suffix: recordings .h5 .npz .npy .mat .csv into .h5 .npz .mat .csv, FRFs .h5 into .uff and back."""
     from acquisition import convert as convert_file
 
+    from ..chain.convert_frf import convert_frf, is_frf_conversion
     from ..progress import bar
+
+    if is_frf_conversion(source, target):
+        check_output(target, (".h5", ".hdf5", ".uff", ".unv"))
+        convert_frf(source, target)
+        typer.echo(f"wrote {target}")
+        return
 
     with bar(f"converting {source.name}") as update:
         written = convert_file(source, target, mapping, progress=update)
