@@ -2,6 +2,7 @@
 
 from .cutting_file import read_cutting_process
 from .directional import average_directional_matrix, chip_direction, directional_matrix, force_direction
+from .force_harmonics import force_harmonics
 from .milling_process import MillingProcess
 
 __all__ = [
@@ -10,5 +11,6 @@ __all__ = [
     "chip_direction",
     "directional_matrix",
     "force_direction",
+    "force_harmonics",
     "read_cutting_process",
 ]

@@ -11,6 +11,7 @@ from .quantities import correct_high_pass, to_receptance
 from .recording_spectra import choose_channels, cross_spectra
 from .spectral_accumulator import SpectralAccumulator
 from .stacking import sum_tests
+from .sweep_plan import SweepDemand, SweepPlan, plan_sweeps, predicted_spectra
 from .uff_file import read_frf_uff, write_frf_uff
 from .windows import effective_averages, settings_for
 
@@ -23,6 +24,8 @@ __all__ = [
     "InputIndependence",
     "SpectralAccumulator",
     "SpectralSettings",
+    "SweepDemand",
+    "SweepPlan",
     "band_record",
     "choose_channels",
     "correct_high_pass",
@@ -33,6 +36,8 @@ __all__ = [
     "input_coherence",
     "input_independence",
     "multiple_coherence",
+    "plan_sweeps",
+    "predicted_spectra",
     "read_frf",
     "read_frf_uff",
     "settings_for",

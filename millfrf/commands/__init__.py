@@ -7,9 +7,10 @@ from .estimate import estimate
 from .fit import fit
 from .inspect import inspect
 from .lobes import lobes
+from .plan import plan
 from .report import report
 
-COMMANDS = (demo, inspect, convert, estimate, fit, calibrate, lobes, report)
+COMMANDS = (demo, plan, inspect, convert, estimate, fit, calibrate, lobes, report)
 """In the order in which `--help` lists them."""
 
 __all__ = ["COMMANDS"]

@@ -128,6 +128,14 @@ def no_teeth(bench: Path) -> None:
     (bench / "cut.toml").write_text(CUT.replace("teeth = 2", "teeth = 0"), encoding="utf-8")
 
 
+def no_plan(bench: Path) -> None:
+    (bench / "plan.toml").write_text(CUT, encoding="utf-8")
+
+
+def odd_plan(bench: Path) -> None:
+    (bench / "plan.toml").write_text(CUT + "[plan]\nband = [1, 2]\n", encoding="utf-8")
+
+
 def truncated(bench: Path) -> None:
     whole = (bench / "a.h5").read_bytes()
     (bench / "a.h5").write_bytes(whole[: len(whole) // 2])
@@ -165,6 +173,9 @@ CASES: list[tuple[str, Callable[[Path], None], list[str], str]] = [
     ("wrong suffix", nothing, ["fit", "frf.h5", "--band", "10", "30", "--out", "out.xml"], ".json"),
     ("no such folder", nothing, ["fit", "frf.h5", "--band", "10", "30", "--out", "none/out.json"], "none"),
     ("unknown option", nothing, [*FIT, "--bend", "10", "30"], "--bend"),
+    ("plan without a plan", no_plan, ["plan", "plan.toml"], "[plan]"),
+    ("plan with an unknown key", odd_plan, ["plan", "plan.toml"], "band_hz"),
+    ("recordings and an FRF together", nothing, ["fit", "a.h5", *FIT[1:], "--band", "10", "30"], "one FRF"),
     ("unknown command", nothing, ["fity"], "fity"),
     ("report of nothing usable", nothing, ["report", "text.txt", "--out", "out.html"], "text.txt"),
     ("recording where an FRF is due", nothing, CALIBRATE, "a.h5"),
@@ -199,6 +210,7 @@ def test_the_same_commands_succeed_on_good_input(bench: Path, monkeypatch: pytes
     assert run([*FIT, "--band", "10", "30"]) == DONE
     assert run([*LOBES, "--max-depth", "0.01"]) == DONE
     assert run(["report", "out.csv", "cut.toml", "model.json", "--out", "out.html"]) == DONE
+    assert run(["plan", str(Path(__file__).resolve().parents[2] / "examples" / "plan.toml")]) == DONE
     for name in ("a.h5", "frf.h5", "model.json", "out.csv", "cut.toml"):
         assert run(["inspect", name]) == DONE
 

@@ -1,0 +1,17 @@
+"""`millfrf plan`: speeds, immersions and durations that excite a band in all directions."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def plan(
+    session: Annotated[Path, typer.Argument(metavar="SESSION.toml", help="File with tables [cutting] and [plan].")],
+) -> None:
+    """Propose three speed sweeps whose forces are independent, long enough for the FRF error that is wanted."""
+    from ..chain.plan import plan_from_file, plan_tables
+    from ..tables import show
+
+    for table in plan_tables(plan_from_file(session)):
+        show(table)

@@ -1,0 +1,73 @@
+"""Planned sweeps against the simulated cell: predicted spectra and FRF errors are those that come."""
+
+from dataclasses import replace
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition import Recording, record
+from cutting import MillingProcess
+from estimation import (
+    SweepDemand,
+    cross_spectra,
+    input_independence,
+    plan_sweeps,
+    predicted_spectra,
+    settings_for,
+    sum_tests,
+)
+from foundation import InputError
+from replay_data import LinearSweep, MillingCell, dynamometer, table_one_model, tip_accelerometers
+
+CUTTER = MillingProcess(2, 12.7e-3, pi / 2, 119e6, 0.17, 0.33, 0.0, pi, 0.15e-3)
+DEMAND = SweepDemand((14.0, 24.0), 1e-3, 0.25, 2e-8, 2e-8)
+
+
+def test_predicted_spectra_are_those_of_the_simulated_sweeps(tmp_path: Path) -> None:
+    plan = plan_sweeps(CUTTER, DEMAND)
+    stiff = table_one_model()
+    stiff = replace(stiff, left=1e-3 * stiff.left)  # hardly moves: the forces are those of the cutter alone
+    sweep, tests = LinearSweep(*plan.spindle_speeds, 40.0), []
+    for number, process in enumerate(plan.processes):
+        sensors = dynamometer(1e-4) + tip_accelerometers(1e-4)
+        cell = MillingCell(stiff, process, DEMAND.depth, sweep, 40.0, sensors=sensors, seed=number)
+        record(cell, tmp_path / f"{number}.h5")
+        with Recording(tmp_path / f"{number}.h5") as recording:
+            tests.append(cross_spectra(recording, settings_for(10240.0, 4.0)))
+    total = sum_tests(tests)
+    inside = (total.frequencies > 15.5) & (total.frequencies < 22.5)
+    measured = total.input_spectra[inside]
+    expected = predicted_spectra(plan.processes, DEMAND.depth, DEMAND.band, total.frequencies[inside])
+    ratio = np.real(np.einsum("kqq->q", measured)) / np.real(np.einsum("kqq->q", expected))
+    np.testing.assert_allclose(ratio, 1.0, atol=0.1)
+    found = np.median(np.linalg.svd(measured, compute_uv=False), axis=0)
+    np.testing.assert_allclose(found, np.median(np.linalg.svd(expected, compute_uv=False), axis=0), rtol=0.15)
+    assert input_independence(total, (15.5, 22.5)).independent[inside].all()
+
+
+def test_duration_meets_the_demand_and_scales_with_noise() -> None:
+    plan = plan_sweeps(CUTTER, DEMAND)
+    assert plan.frf_errors.max() <= DEMAND.frf_error * (1 + 1e-9)
+    noisy = plan_sweeps(CUTTER, replace(DEMAND, response_noise=100 * DEMAND.response_noise))
+    strict = plan_sweeps(CUTTER, replace(DEMAND, response_noise=1000 * DEMAND.response_noise))
+    assert strict.duration == pytest.approx(100 * noisy.duration, rel=1e-6)
+    assert strict.frf_errors.max() == pytest.approx(DEMAND.frf_error, rel=1e-6)
+
+
+def test_chosen_immersions_are_better_conditioned_than_neighbours() -> None:
+    plan = plan_sweeps(CUTTER, DEMAND)
+    alike = [replace(CUTTER, start_angle=a, exit_angle=a + pi / 6) for a in (0.2, 0.3, 0.4)]
+    spectra = predicted_spectra(alike, DEMAND.depth, DEMAND.band, np.array([19.0]))
+    values = np.linalg.svd(spectra, compute_uv=False)[0]
+    assert plan.condition < 0.2 * values[0] / values[-1]
+
+
+def test_demands_that_cannot_be_met_are_refused() -> None:
+    with pytest.raises(InputError, match="axial"):
+        plan_sweeps(replace(CUTTER, kac=0.0), DEMAND)
+    with pytest.raises(InputError, match="empty"):
+        replace(DEMAND, band=(20.0, 10.0))
+    with pytest.raises(InputError, match="depth"):
+        replace(DEMAND, depth=-1.0)
