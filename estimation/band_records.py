@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import firwin, kaiserord, upfirdn
 
 from acquisition import Channel, Recording
 from foundation import InputError
@@ -78,6 +77,8 @@ class BandDecimator:
         self._held: NDArray[np.float64] | None = None
 
     def _low_pass(self, sample_rate: float) -> NDArray[np.float64]:
+        from scipy.signal import firwin, kaiserord  # here, because scipy.signal alone takes 75 MB
+
         if self.factor == 1:
             return np.ones(1)
         # aliases may fall between usable_band and the new Nyquist frequency, never below usable_band
@@ -87,6 +88,8 @@ class BandDecimator:
 
     def add(self, samples: NDArray[np.float64]) -> NDArray[np.float64]:
         """Take the next samples (n, n_channels); return the decimated ones that are complete by now."""
+        from scipy.signal import upfirdn
+
         held = samples if self._held is None else np.concatenate([self._held, samples])
         n_out = max(0, (len(held) - len(self._taps)) // self.factor + 1) if len(held) >= len(self._taps) else 0
         if n_out == 0:

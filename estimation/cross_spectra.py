@@ -1,6 +1,6 @@
 """`CrossSpectra`: averaged one-sided spectra between excitations and responses, with how they were made."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,8 @@ class CrossSpectra:
         How they were made; sample_rate in Hz.
     n_tests
         Tests (recordings) that were summed.
+    n_excluded
+        Segments left out because of overload, clipping or dropped samples.
     """
 
     frequencies: NDArray[np.float64]
@@ -65,3 +67,15 @@ class CrossSpectra:
     settings: SpectralSettings
     sample_rate: float
     n_tests: int = 1
+    n_excluded: int = 0
+
+
+def lines_of(spectra: CrossSpectra, chosen: NDArray[np.bool_]) -> CrossSpectra:
+    """The spectra on some lines only; ``chosen`` (n_frequencies,)."""
+    return replace(
+        spectra,
+        frequencies=spectra.frequencies[chosen],
+        input_spectra=spectra.input_spectra[chosen],
+        cross_spectra=spectra.cross_spectra[chosen],
+        output_spectra=spectra.output_spectra[chosen],
+    )

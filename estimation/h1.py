@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from .coherence import multiple_coherence
-from .cross_spectra import CrossSpectra
+from .cross_spectra import CrossSpectra, lines_of
 from .frf import Frf, FrfCovariance
-from .independence import input_independence
+from .independence import independent_lines
 from .quantities import frf_quantity
 from .stacking import check_stackable, sum_tests
 
@@ -36,8 +36,7 @@ def h1(spectra: CrossSpectra) -> Frf:
     InputError
         No line has independent inputs: fewer tests or segments than inputs, or dependent ones.
     """
-    independence = input_independence(spectra)
-    valid = independence.independent
+    valid = independent_lines(spectra)
     if not valid.any():
         n_inputs = len(spectra.excitations)
         raise InputError(
@@ -76,6 +75,11 @@ def h1_side_by_side(tests: Sequence[CrossSpectra]) -> Frf:
 def _frf(
     spectra: CrossSpectra, values: NDArray[np.complex128], valid: NDArray[np.bool_], covariance: FrfCovariance | None
 ) -> Frf:
+    """With the multiple coherence: from H itself where there is one, else by pseudo-inverse."""
+    total = np.real(np.einsum("kpp->kp", spectra.output_spectra))
+    explained = np.real(np.einsum("kpq,kpq->kp", values, spectra.cross_spectra.conj()))
+    coherence = np.clip(np.divide(explained, total, out=np.zeros(total.shape), where=total > 0), 0.0, 1.0)
+    coherence[~valid] = multiple_coherence(lines_of(spectra, ~valid))
     quantity, unit = frf_quantity(spectra.responses, spectra.excitations)
     return Frf(
         spectra.frequencies,
@@ -85,7 +89,7 @@ def _frf(
         quantity,
         unit,
         valid,
-        multiple_coherence(spectra),
+        coherence,
         covariance,
     )
 

@@ -7,6 +7,7 @@ from foundation import InputError
 
 from .cross_spectra import CrossSpectra, SpectralSettings
 from .spectral_accumulator import SpectralAccumulator
+from .usable_samples import usable_samples
 
 EXCITING = ("force", "moment", "voltage")
 RESPONDING = ("acceleration", "velocity", "displacement")
@@ -44,6 +45,7 @@ def cross_spectra(
     stream: str | None = None,
     excitations: Sequence[str] | None = None,
     responses: Sequence[str] | None = None,
+    exclude_unusable: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> CrossSpectra:
     """Welch spectra of one recording, read once, block by block.
@@ -58,6 +60,8 @@ def cross_spectra(
         Sample clock; None: the only one.
     excitations, responses
         Channel names; None: chosen by quantity, see :func:`choose_channels`.
+    exclude_unusable
+        Leave out segments with overload, clipping, dropped or missing samples (:func:`usable_samples`).
     progress
         Called with the number of samples read so far.
 
@@ -72,11 +76,12 @@ def cross_spectra(
     names = [channel.name for channel in (*exciting, *responding)]
     done = 0
     try:
-        for block in source.blocks(max(1 << 16, settings.segment_length), names):
-            accumulator.add(block[:, : len(exciting)], block[:, len(exciting) :])
+        for block in source.blocks(1 << 14, names):
+            usable = usable_samples(block, (*exciting, *responding)) if exclude_unusable else None
+            accumulator.add(block[:, : len(exciting)], block[:, len(exciting) :], usable)
             done += len(block)
             if progress is not None:
                 progress(done)
-        return accumulator.result()
+        return accumulator.finish()
     except InputError as error:
         raise InputError(f"{recording.path.name}: {error}") from error

@@ -60,4 +60,5 @@ def sum_tests(tests: Sequence[CrossSpectra]) -> CrossSpectra:
         n_segments=n_segments,
         effective_averages=sum(test.effective_averages for test in tests),
         n_tests=sum(test.n_tests for test in tests),
+        n_excluded=sum(test.n_excluded for test in tests),
     )

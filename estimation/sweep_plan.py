@@ -4,12 +4,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess, force_harmonics
 from foundation import InputError
+
+if TYPE_CHECKING:  # the compiled kernels of cutting take 55 MB that spectra do without
+    from cutting import MillingProcess
 
 Real = NDArray[np.float64]
 _HARMONICS = 6
@@ -75,7 +78,7 @@ class SweepPlan:
         Largest over smallest singular value, at worst over the band.
     """
 
-    processes: tuple[MillingProcess, ...]
+    processes: "tuple[MillingProcess, ...]"
     spindle_speeds: tuple[float, float]
     duration: float
     frequencies: Real
@@ -84,7 +87,7 @@ class SweepPlan:
     condition: float
 
 
-def plan_sweeps(cutter: MillingProcess, demand: SweepDemand) -> SweepPlan:
+def plan_sweeps(cutter: "MillingProcess", demand: SweepDemand) -> SweepPlan:
     """Choose three immersions and the duration of their sweeps.
 
     The tooth-passing line sweeps the band. A line dwells on a frequency for a time that falls with its rate, so that
@@ -105,6 +108,8 @@ def plan_sweeps(cutter: MillingProcess, demand: SweepDemand) -> SweepPlan:
     InputError
         No three immersions give independent forces: the axial coefficient is zero, or the feed is.
     """
+    from cutting import force_harmonics
+
     candidates = _candidates(cutter, demand)
     vectors = np.array([force_harmonics(process, 1)[1] for process in candidates]) * demand.depth
     triples = np.array(list(combinations(range(len(candidates)), 3)))
@@ -138,7 +143,7 @@ def plan_sweeps(cutter: MillingProcess, demand: SweepDemand) -> SweepPlan:
 
 
 def predicted_spectra(
-    processes: Sequence[MillingProcess], depth: float, band: tuple[float, float], frequencies: Real
+    processes: "Sequence[MillingProcess]", depth: float, band: tuple[float, float], frequencies: Real
 ) -> NDArray[np.complex128]:
     """One-sided force spectra of sweeps of the tooth-passing line over ``band``, averaged over the tests.
 
@@ -146,6 +151,8 @@ def predicted_spectra(
     -------
     (n_frequencies, 3, 3), N^2/Hz
     """
+    from cutting import force_harmonics
+
     low, high = band
     total = np.zeros((len(frequencies), 3, 3), dtype=complex)
     for process in processes:
@@ -157,7 +164,7 @@ def predicted_spectra(
     return np.asarray(total / len(processes), dtype=np.complex128)
 
 
-def _candidates(cutter: MillingProcess, demand: SweepDemand) -> list[MillingProcess]:
+def _candidates(cutter: "MillingProcess", demand: SweepDemand) -> "list[MillingProcess]":
     """The cutter in every immersion of an allowed width on a grid of starts."""
     found = []
     for width in demand.widths:

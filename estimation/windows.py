@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import get_window
 
 from foundation import InputError
 
@@ -55,6 +54,8 @@ def check_settings(settings: SpectralSettings) -> None:
 
 def window_samples(settings: SpectralSettings) -> NDArray[np.float64]:
     """The window, periodic form, shape (segment_length,)."""
+    from scipy.signal import get_window  # here, because scipy.signal alone takes 75 MB
+
     return np.asarray(get_window(settings.window, settings.segment_length, fftbins=True), dtype=float)
 
 

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -18,6 +18,8 @@ from estimation import (
     cross_spectra,
     h1,
     h1_side_by_side,
+    h2,
+    hv,
     input_independence,
     settings_for,
     sum_tests,
@@ -32,6 +34,7 @@ DRIVEN = 1e-4
 """A line is driven where the inputs' power is above this share of their largest."""
 
 STACKS = ("sum", "side-by-side")
+ESTIMATORS: dict[str, Callable[[CrossSpectra], Frf]] = {"h1": h1, "h2": h2, "hv": hv}
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,10 @@ class EstimateOptions:
         Lines to keep, Hz; None: all.
     stream
         Sample clock; None: the only one.
+    estimator
+        ``h1``, ``h2`` or ``hv``; H2 and Hv sum the tests.
+    exclude
+        Leave out segments with overload, clipping or dropped samples.
     """
 
     segment: float = 8.0
@@ -62,6 +69,8 @@ class EstimateOptions:
     responses: tuple[str, ...] = ()
     band: tuple[float, float] | None = None
     stream: str | None = None
+    estimator: str = "h1"
+    exclude: bool = False
 
 
 @dataclass(frozen=True)
@@ -111,7 +120,7 @@ def spectra_of_tests(
 def estimate_recordings(
     paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, watch: Watch = silent
 ) -> Estimate:
-    """H1 over one or many recordings.
+    """FRF over one or many recordings.
 
     Raises
     ------
@@ -121,14 +130,24 @@ def estimate_recordings(
     """
     if options.stack not in STACKS:
         raise InputError(f"unknown stack {options.stack!r}; use one of {', '.join(STACKS)}")
+    if options.estimator not in ESTIMATORS:
+        raise InputError(f"unknown estimator {options.estimator!r}; use one of {', '.join(ESTIMATORS)}")
+    if options.stack != "sum" and options.estimator != "h1":
+        raise InputError(f"estimator {options.estimator} takes summed tests only; use --stack sum")
     tests = spectra_of_tests(paths, options, watch)
     total = sum_tests(tests)
     driven = _driven(total)
     independence = input_independence(total, _range(total.frequencies[driven]))
     _require_independence(total, independence, driven)
-    frf = h1(total) if options.stack == "sum" else h1_side_by_side(tests)
+    frf = ESTIMATORS[options.estimator](total) if options.stack == "sum" else h1_side_by_side(tests)
     frf = correct_high_pass(frf, [channel.high_pass_hz for channel in total.responses])
-    return Estimate(frf, tests, independence, independence.warnings)
+    warnings = list(independence.warnings)
+    if total.n_excluded:
+        warnings.append(
+            f"{total.n_excluded} of {total.n_excluded + total.n_segments} segments hold overload, clipping or dropped "
+            "samples and were left out"
+        )
+    return Estimate(frf, tests, independence, tuple(warnings))
 
 
 def write_estimate(
@@ -153,7 +172,7 @@ def write_estimate(
         "warnings": list(estimate.warnings),
         "versions": versions(),
     }
-    title = f"H1 of {len(recordings)} recording{'s' if len(recordings) != 1 else ''}"
+    title = f"{options.estimator.upper()} of {len(recordings)} recording{'s' if len(recordings) != 1 else ''}"
     write_frf(path, estimate.frf, title=title, provenance=json.dumps(provenance))
 
 
@@ -173,6 +192,7 @@ def _spectra(path: str | os.PathLike[str], options: EstimateOptions, watch: Watc
                 stream=options.stream,
                 excitations=options.excitations or None,
                 responses=options.responses or None,
+                exclude_unusable=options.exclude,
                 progress=update,
             )
     return spectra if options.band is None else lines_of(spectra, options.band)

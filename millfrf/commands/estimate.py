@@ -23,8 +23,14 @@ def estimate(
     ] = None,
     band: Band = None,
     stream: Stream = None,
+    estimator: Annotated[
+        str, typer.Option("--estimator", help="h1 (noise on responses), h2 (on excitations) or hv (on both).")
+    ] = "h1",
+    exclude: Annotated[
+        bool, typer.Option("--exclude", help="Leave out segments with overload, clipping or dropped samples.")
+    ] = False,
 ) -> None:
-    """H1 estimate of the FRF matrix over one or many tests, with coherence and covariance.
+    """FRF matrix over one or many tests, with coherence and covariance.
 
     Without names, forces and voltages excite; accelerations, velocities and displacements respond. --band keeps only
     those lines.
@@ -33,9 +39,8 @@ def estimate(
     from ..progress import bar
 
     check_output(out, (".h5", ".hdf5"))
-    options = EstimateOptions(
-        segment, overlap, window, stack, names(excitation), names(response), check_band(band), stream
-    )
+    channels = (names(excitation), names(response))
+    options = EstimateOptions(segment, overlap, window, stack, *channels, check_band(band), stream, estimator, exclude)
     result = estimate_recordings(recordings, options, bar)
     write_estimate(out, result, recordings, options)
     for warning in result.warnings:

@@ -164,6 +164,8 @@ CASES: list[tuple[str, Callable[[Path], None], list[str], str]] = [
     ("empty band", nothing, [*FIT, "--band", "30", "10"], "30"),
     ("band outside", nothing, [*FIT, "--band", "100", "200"], "too few"),
     ("unknown method", nothing, [*FIT, "--band", "10", "30", "--method", "magic"], "magic"),
+    ("unknown estimator", nothing, [*ESTIMATE, "--estimator", "h9"], "h9"),
+    ("too few responses for H2", nothing, [*ESTIMATE, "--estimator", "h2"], "H2"),
     ("unknown window", nothing, [*ESTIMATE, "--window", "square"], "square"),
     ("segment too long", nothing, [*ESTIMATE[:-1], "100"], "segment"),
     ("negative depth", nothing, [*LOBES, "--max-depth", "-0.01"], "-0.01"),
