@@ -5,11 +5,12 @@ from typing import Any
 
 from acquisition import Recording
 
+from ..channel_levels import channel_levels, level_table
 from ..figures.embed import as_data_uri
 from ..figures.time_figure import time_figure
-from ..inspection import channel_levels, level_table
 from ..progress import Watch
 from ..tables import Table
+from ..tap_concerns import tap_concerns
 from .collect import Collected, SourceFile
 from .section import Picture, Section
 
@@ -78,7 +79,8 @@ def channel_section(collected: Collected, watch: Watch) -> tuple[Section, list[s
                 levels = channel_levels(stream, watch)
                 table = level_table(stream, levels)
                 tables.append(Table(f"{file.path.name}, {table.title}", table.columns, table.rows))
-                concerns += [f"{file.path.name}: {text}" for level in levels for text in level.concerns()]
+                looks = [text for level in levels for text in level.concerns()] + tap_concerns(stream, levels)
+                concerns += [f"{file.path.name}: {text}" for text in looks]
                 if number < MOST_OVERVIEWS:
                     pictures.append(_overview(file, stream))
     return Section("Channels and levels", tables=tuple(tables), pictures=tuple(pictures)), concerns

@@ -1,0 +1,115 @@
+"""Levels of a recording's channels: mean, deviation, peak, overload, and what looks wrong with them."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from acquisition import Channel, Stream
+
+from .progress import Watch, silent
+from .tables import Table
+
+NEAR_FULL_SCALE = 0.999
+"""Samples above this share of full scale count as overloaded."""
+
+
+@dataclass
+class ChannelLevel:
+    """Running level of one channel.
+
+    Parameters
+    ----------
+    channel
+        Whose samples these are.
+    """
+
+    channel: Channel
+    n_samples: int = 0
+    total: float = 0.0
+    squares: float = 0.0
+    lowest: float = field(default=np.inf)
+    highest: float = field(default=-np.inf)
+    n_missing: int = 0
+    n_overloaded: int = 0
+    _origin: float | None = None
+
+    def add(self, samples: np.ndarray) -> None:
+        """Take in the next samples (n,); those that are not finite are counted and left out."""
+        finite = samples[np.isfinite(samples)]
+        self.n_missing += len(samples) - len(finite)
+        if not len(finite):
+            return
+        if self._origin is None:
+            self._origin = float(finite[0])  # squares about a near value: no cancellation for a large offset
+        centred = finite - self._origin
+        self.n_samples += len(finite)
+        self.total += float(centred.sum())
+        self.squares += float(centred @ centred)
+        self.lowest = min(self.lowest, float(finite.min()))
+        self.highest = max(self.highest, float(finite.max()))
+        if self.channel.full_scale:
+            self.n_overloaded += int(np.sum(np.abs(finite) >= NEAR_FULL_SCALE * self.channel.full_scale))
+
+    @property
+    def mean(self) -> float:
+        """Of all finite samples."""
+        return (self._origin or 0.0) + self.total / max(self.n_samples, 1)
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation: root mean square about the mean."""
+        n = max(self.n_samples, 1)
+        return float(np.sqrt(max(self.squares / n - (self.total / n) ** 2, 0.0)))
+
+    @property
+    def peak(self) -> float:
+        """Largest magnitude."""
+        return max(abs(self.lowest), abs(self.highest)) if self.n_samples else 0.0
+
+    def concerns(self) -> list[str]:
+        """What looks wrong with this channel."""
+        name, found = self.channel.name, []
+        if self.n_missing:
+            found.append(f"{name}: {self.n_missing} samples are NaN or infinite; record anew or cut them out")
+        if self.n_overloaded:
+            found.append(f"{name}: {self.n_overloaded} samples at full scale (overload); choose a larger range")
+        if self.n_samples and self.deviation == 0:
+            found.append(f"{name}: every sample is {self.mean:g} (dead channel); check cable and supply")
+        full_scale = self.channel.full_scale
+        if full_scale and self.n_samples and 0 < self.peak < 1e-3 * full_scale:
+            found.append(f"{name}: peak is {100 * self.peak / full_scale:.2g} % of full scale; choose a smaller range")
+        return found
+
+
+def channel_levels(stream: Stream, watch: Watch = silent) -> tuple[ChannelLevel, ...]:
+    """Levels of every channel, in one pass over the file."""
+    levels = tuple(ChannelLevel(channel) for channel in stream.channels)
+    done = 0
+    with watch(f"levels of {stream.name}", stream.n_samples) as update:
+        for block in stream.blocks():
+            for column, level in enumerate(levels):
+                level.add(block[:, column])
+            done += len(block)
+            update(done)
+    return levels
+
+
+def level_table(stream: Stream, levels: tuple[ChannelLevel, ...]) -> Table:
+    """One row a channel."""
+    rows = tuple(
+        (
+            level.channel.name,
+            level.channel.degree_of_freedom if level.channel.node else "",
+            level.channel.quantity,
+            level.channel.unit,
+            f"{level.mean:.4g}",
+            f"{level.deviation:.4g}",
+            f"{level.peak:.4g}",
+            "" if level.channel.full_scale is None else f"{level.channel.full_scale:g}",
+            str(level.n_overloaded) if level.channel.full_scale else "",
+        )
+        for level in levels
+    )
+    columns = ("channel", "place", "quantity", "unit", "mean", "rms about mean", "peak", "full scale", "overloaded")
+    title = f"stream {stream.name}: {stream.sample_rate:g} Hz, {stream.duration:.4g} s, {stream.n_samples} samples"
+    return Table(title, columns, rows)
