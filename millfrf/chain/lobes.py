@@ -1,5 +1,7 @@
 """From a model or an FRF at the tool tip to stability lobes."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,12 +9,33 @@ from cutting import MillingProcess
 from estimation import Frf, to_receptance
 from foundation import InputError
 from modal_fit import ModalModel
-from stability import StabilityLobes, nyquist_limits, zero_order
+from stability import (
+    StabilityLobes,
+    collocation,
+    multi_frequency,
+    nyquist_limits,
+    semi_discretisation,
+    zero_order,
+)
 
 from ..progress import Watch, silent
 
-LOBE_METHODS = {"zero-order": zero_order, "nyquist": nyquist_limits}
-"""Solvers by the name that ``--method`` takes."""
+Speeds = NDArray[np.float64]
+
+OF_ANY: dict[str, Callable[[Frf | ModalModel, MillingProcess, Speeds, float], StabilityLobes]] = {
+    "zero-order": zero_order,
+    "nyquist": nyquist_limits,
+    "multi-frequency": multi_frequency,
+}
+"""Solvers that take a modal model or a measured FRF, by the name that ``--method`` takes."""
+
+OF_MODELS: dict[str, Callable[[ModalModel, MillingProcess, Speeds, float], StabilityLobes]] = {
+    "collocation": collocation,
+    "semi-discretisation": semi_discretisation,
+}
+"""Solvers that need a modal model."""
+
+LOBE_METHODS = (*OF_ANY, *OF_MODELS)
 
 
 def speed_axis(lowest: float, highest: float, count: int) -> NDArray[np.float64]:
@@ -53,4 +76,8 @@ def compute_lobes(
     if known.quantity != "receptance":
         raise InputError(f"lobes need a receptance in m/N at the tool tip; this is a {known.quantity} in {known.unit}")
     with watch(f"lobes, {method}"):
-        return LOBE_METHODS[method](known, process, spindle_speeds, max_depth)
+        if method in OF_ANY:
+            return OF_ANY[method](known, process, spindle_speeds, max_depth)
+        if isinstance(known, Frf):
+            raise InputError(f"method {method} needs a modal model, not an FRF; fit one, or use multi-frequency")
+        return OF_MODELS[method](known, process, spindle_speeds, max_depth)

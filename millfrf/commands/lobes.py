@@ -18,7 +18,9 @@ def lobes(
     ],
     max_depth: Annotated[float, typer.Option("--max-depth", metavar="M", help="Largest depth looked at, m.")],
     out: Output,
-    method: Annotated[str, typer.Option("--method", help="zero-order or nyquist.")] = "zero-order",
+    method: Annotated[
+        str, typer.Option("--method", help="zero-order, nyquist, multi-frequency, collocation or semi-discretisation.")
+    ] = "zero-order",
 ) -> None:
     """Stability lobes from a modal model or straight from a measured FRF."""
     from cutting import read_cutting_process
