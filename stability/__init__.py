@@ -7,16 +7,21 @@ from .nyquist import is_stable, nyquist_limits, unstable_poles
 from .semi_discretisation import semi_discretisation
 from .stability_lobes import StabilityLobes
 from .tool_receptance import ToolReceptance, tool_receptance
+from .uncertainty import RecommendedCut, depth_errors, probability_of_stability, recommended_cut
 from .zero_order import zero_order
 
 __all__ = [
+    "RecommendedCut",
     "StabilityLobes",
     "ToolReceptance",
     "collocation",
+    "depth_errors",
     "is_stable",
     "multi_frequency",
     "nyquist_limits",
+    "probability_of_stability",
     "read_lobes",
+    "recommended_cut",
     "semi_discretisation",
     "tool_receptance",
     "unstable_poles",

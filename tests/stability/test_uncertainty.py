@@ -1,0 +1,132 @@
+"""Bands around the limit: coverage by Monte Carlo, probabilities, recommended cuts."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+
+from cutting import MillingProcess
+from estimation import FrfCovariance
+from foundation import InputError
+from modal_fit import fit_polyreference
+from replay_data import default_structure, table_one_model, tip_model
+from stability import (
+    StabilityLobes,
+    collocation,
+    depth_errors,
+    probability_of_stability,
+    recommended_cut,
+    zero_order,
+)
+
+HALF_DOWN = MillingProcess(2, 0.0127, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 0.15e-3)
+SPEEDS = np.array([650, 800, 950, 1100, 1300, 1600, 2000, 2300]) * pi / 30
+
+
+def run_of_bands(seeds: range) -> np.ndarray:
+    """Normalised errors (limit - truth) / standard error, (n_seeds, n_speeds), of fits of noisy FRFs."""
+    truth = tip_model(default_structure())
+    axis = np.arange(8.0, 35.0, 0.0625)
+    clean = truth.frf(axis)
+    level = 0.01 * np.sqrt(np.mean(np.abs(clean.values) ** 2, axis=(0, 2)))
+    covariance = FrfCovariance(
+        np.broadcast_to(np.diag(level**2).astype(complex), (len(axis), 3, 3)),
+        np.broadcast_to(np.eye(3, dtype=complex), (len(axis), 3, 3)),
+    )
+    exact = zero_order(truth, HALF_DOWN, SPEEDS, 20e-3).depth_limits
+    found = []
+    for seed in seeds:
+        noise = np.random.default_rng(seed).standard_normal((2, *clean.values.shape)) * level[:, None] / np.sqrt(2)
+        noisy = replace(clean, values=clean.values + noise[0] + 1j * noise[1], covariance=covariance)
+        model = fit_polyreference(noisy, (10.0, 30.0)).model
+        lobes = zero_order(model, HALF_DOWN, SPEEDS, 20e-3)
+        found.append((lobes.depth_limits - exact) / depth_errors(model, HALF_DOWN, lobes))
+    return np.array(found)
+
+
+def test_errors_are_of_the_right_size() -> None:
+    deviation = run_of_bands(range(12))
+    assert 0.6 < np.sqrt(np.mean(deviation**2)) < 1.5
+
+
+@pytest.mark.slow
+def test_bands_cover_the_true_limit() -> None:
+    deviation = run_of_bands(range(150))
+    covered = np.abs(deviation) < 1.96
+    assert 0.92 <= covered.mean() <= 0.98, covered.mean(axis=0)
+
+
+def test_error_of_a_model_follows_its_parameters() -> None:
+    """Only the first pole's frequency is uncertain: the error is the change that a shift makes."""
+    model = table_one_model()
+    size = 2 * (model.poles.size + model.right.size + model.left.size)
+    covariance = np.zeros((size, size))
+    shift = 1e-4 * abs(model.poles[0])
+    covariance[len(model.poles), len(model.poles)] = shift**2  # imaginary part of pole 1
+    known = replace(model, covariance=covariance)
+    lobes = zero_order(known, HALF_DOWN, SPEEDS, 20e-3)
+    moved = replace(model, poles=model.poles + np.array([1j * shift, 0]))
+    change = zero_order(moved, HALF_DOWN, SPEEDS, 20e-3).depth_limits - lobes.depth_limits
+    np.testing.assert_allclose(depth_errors(known, HALF_DOWN, lobes), np.abs(change), rtol=0.02, atol=1e-9)
+
+
+def test_measured_frf_gives_errors_of_the_same_kind() -> None:
+    """Noise on the lines themselves, no fit: spread of the limits over seeds against the error stated."""
+    truth = table_one_model()
+    axis = np.arange(10.0, 30.0, 0.02)
+    clean = truth.frf(axis)
+    level = 2e-3 * np.abs(clean.values).max()
+    covariance = FrfCovariance(
+        np.broadcast_to(level**2 * np.eye(3, dtype=complex), (len(axis), 3, 3)),
+        np.broadcast_to(np.eye(3, dtype=complex), (len(axis), 3, 3)),
+    )
+    # one smooth error over all lines, so that interpolation and the choice of line do not matter
+    limits, stated = [], []
+    for seed in range(40):
+        draw = np.random.default_rng(seed).standard_normal((2, 3, 3)) * level / np.sqrt(2)
+        noisy = replace(clean, values=clean.values + draw[0] + 1j * draw[1], covariance=covariance)
+        lobes = zero_order(noisy, HALF_DOWN, SPEEDS[1:6], 20e-3)
+        limits.append(lobes.depth_limits)
+        stated.append(depth_errors(noisy, HALF_DOWN, lobes))
+    ratio = np.std(limits, axis=0) / np.mean(stated, axis=0)
+    np.testing.assert_allclose(ratio, 1.0, atol=0.4)
+
+
+def flat_lobes() -> StabilityLobes:
+    """Limit 2 mm, with a pocket of 4 mm between 1400 and 1600 rpm."""
+    rpm = np.arange(1000.0, 2001.0, 10)
+    depth = np.where((rpm > 1400) & (rpm < 1600), 4e-3, 2e-3)
+    return StabilityLobes(rpm * pi / 30, depth, np.full(len(rpm), 18.0), ("hopf",) * len(rpm), "zero-order")
+
+
+def test_probability_and_recommendation() -> None:
+    lobes, errors = flat_lobes(), np.full(101, 0.1e-3)
+    speed = 1200 * pi / 30
+    assert probability_of_stability(lobes, errors, speed, 2e-3) == pytest.approx(0.5)
+    assert probability_of_stability(lobes, errors, speed, 1.8e-3) == pytest.approx(0.977, abs=1e-3)
+    pocket = 1500 * pi / 30
+    assert probability_of_stability(lobes, errors, pocket, 3e-3) > 0.999
+    assert probability_of_stability(lobes, errors, pocket, 3e-3, drift=0.1) < 0.001
+    cut = recommended_cut(lobes, errors, confidence=0.95, drift=0.01)
+    assert 1400 < cut.spindle_speed * 30 / pi < 1600
+    assert cut.depth == pytest.approx(4e-3 - 1.645 * 0.1e-3, rel=1e-3)
+    assert recommended_cut(lobes, errors, drift=0.1).spindle_speed * 30 / pi == pytest.approx(2000)
+
+
+def test_requests_that_cannot_be_met_are_refused() -> None:
+    lobes, errors = flat_lobes(), np.full(101, 0.1e-3)
+    with pytest.raises(InputError, match="outside the lobes"):
+        probability_of_stability(lobes, errors, 500 * pi / 30, 1e-3)
+    with pytest.raises(InputError, match="confidence"):
+        recommended_cut(lobes, errors, confidence=1.5)
+    with pytest.raises(InputError, match="no cut"):
+        recommended_cut(lobes, 100 * errors)
+    with pytest.raises(InputError, match="no covariance"):
+        depth_errors(table_one_model(), HALF_DOWN, lobes)
+    model = table_one_model()
+    size = 2 * (model.poles.size + model.right.size + model.left.size)
+    with pytest.raises(InputError, match="collocation"):
+        depth_errors(
+            replace(model, covariance=np.eye(size)), HALF_DOWN, collocation(model, HALF_DOWN, SPEEDS[:1], 5e-3)
+        )
