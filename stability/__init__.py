@@ -1,5 +1,6 @@
 """Stability lobes from modal models and measured FRFs: knows nothing of acquisition hardware."""
 
+from .chatter import ChatterVerdict, classify_cut
 from .collocation import collocation
 from .lobes_file import read_lobes, write_lobes
 from .multi_frequency import multi_frequency
@@ -11,9 +12,11 @@ from .uncertainty import RecommendedCut, depth_errors, probability_of_stability,
 from .zero_order import zero_order
 
 __all__ = [
+    "ChatterVerdict",
     "RecommendedCut",
     "StabilityLobes",
     "ToolReceptance",
+    "classify_cut",
     "collocation",
     "depth_errors",
     "is_stable",
