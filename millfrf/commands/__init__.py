@@ -1,6 +1,7 @@
 """The commands, one a file. Their modules import nothing heavy, so that `--help` is quick."""
 
 from .calibrate import calibrate
+from .chatter import chatter
 from .convert import convert
 from .demo import demo
 from .estimate import estimate
@@ -10,7 +11,7 @@ from .lobes import lobes
 from .plan import plan
 from .report import report
 
-COMMANDS = (demo, plan, inspect, convert, estimate, fit, calibrate, lobes, report)
+COMMANDS = (demo, plan, inspect, convert, estimate, fit, calibrate, lobes, chatter, report)
 """In the order in which `--help` lists them."""
 
 __all__ = ["COMMANDS"]

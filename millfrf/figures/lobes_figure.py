@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,24 +11,24 @@ from numpy.typing import NDArray
 
 from stability import StabilityLobes
 
-from .style import SHADE, house_style, legend_above, line_style, new_figure, panel_letter
+from .style import COLOURS, SHADE, house_style, legend_above, line_style, new_figure, panel_letter
 
 
 @dataclass(frozen=True)
 class TriedCut:
-    """A cut that was made, or simulated: does it chatter?
+    """A cut that was made, or simulated, and what was seen.
 
     Parameters
     ----------
     spindle_speed_rpm, depth
         rpm and m.
-    stable
-        What was seen.
+    kind
+        ``stable``, ``hopf`` or ``period-doubling``.
     """
 
     spindle_speed_rpm: float
     depth: float
-    stable: bool
+    kind: str
 
 
 def lobes_figure(curves: Mapping[str, StabilityLobes], cuts: Sequence[TriedCut] = ()) -> Figure:
@@ -50,7 +51,7 @@ def lobes_figure(curves: Mapping[str, StabilityLobes], cuts: Sequence[TriedCut] 
         chatter.set_xlabel("Spindle speed (rpm)")
         panel_letter(depth, 0)
         panel_letter(chatter, 1)
-        legend_above(figure, depth, columns=5)
+        legend_above(figure, depth, columns=4)
     return figure
 
 
@@ -62,7 +63,8 @@ def _draw_curve(depth: Axes, chatter: Axes, label: str, lobes: StabilityLobes, n
     chatter.plot(rpm, _without_jumps(lobes.chatter_frequencies), linewidth=1.6 if number == 0 else 1.2, **style)
     doubled = np.array([name == "period-doubling" for name in lobes.bifurcations], dtype=bool)
     if doubled.any():
-        depth.plot(rpm[doubled], limit[doubled], "s", color=style["color"], markersize=3, label="period doubling")
+        edge = np.where(doubled, limit, np.nan)
+        depth.plot(rpm, edge, color=COLOURS[2], linewidth=2.4, zorder=3, label=f"{label}, period doubling")
 
 
 def _without_jumps(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -79,13 +81,19 @@ def _shade_unstable(axes: Axes, lobes: StabilityLobes, top: float) -> None:
     axes.set_xlim(float(rpm.min()), float(rpm.max()))
 
 
+_MARKS: tuple[tuple[str, str, dict[str, Any]], ...] = (
+    ("stable", "cut, stable", {"marker": "o", "markerfacecolor": "white"}),
+    ("hopf", "cut, Hopf chatter", {"marker": "X", "markeredgecolor": "white"}),
+    ("period-doubling", "cut, period doubling", {"marker": "s", "markeredgecolor": "white"}),
+)
+
+
 def _draw_cuts(axes: Axes, cuts: Sequence[TriedCut]) -> None:
-    for stable, label, marker in ((True, "cut, stable", "o"), (False, "cut, chatter", "X")):
-        chosen = [cut for cut in cuts if cut.stable is stable]
+    for kind, label, marks in _MARKS:
+        chosen = [cut for cut in cuts if cut.kind == kind]
         if chosen:
             rpm, depths = [cut.spindle_speed_rpm for cut in chosen], [1e3 * cut.depth for cut in chosen]
-            face = "white" if stable else "black"
-            axes.plot(rpm, depths, marker, color="black", markerfacecolor=face, markersize=5.5, label=label, zorder=5)
+            axes.plot(rpm, depths, linestyle="none", color="black", markersize=6, label=label, zorder=5, **marks)
 
 
 def _depth_limit(curves: Sequence[StabilityLobes], cuts: Sequence[TriedCut]) -> float:

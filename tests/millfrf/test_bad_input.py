@@ -178,6 +178,8 @@ CASES: list[tuple[str, Callable[[Path], None], list[str], str]] = [
     ("plan without a plan", no_plan, ["plan", "plan.toml"], "[plan]"),
     ("plan with an unknown key", odd_plan, ["plan", "plan.toml"], "band_hz"),
     ("recordings and an FRF together", nothing, ["fit", "a.h5", *FIT[1:], "--band", "10", "30"], "one FRF"),
+    ("cut too short to judge", nothing, ["chatter", "a.h5", "--speed", "60", "--teeth", "2"], "needed"),
+    ("speed that is none", nothing, ["chatter", "a.h5", "--speed", "-5", "--teeth", "2"], "-5"),
     ("unknown command", nothing, ["fity"], "fity"),
     ("report of nothing usable", nothing, ["report", "text.txt", "--out", "out.html"], "text.txt"),
     ("recording where an FRF is due", nothing, CALIBRATE, "a.h5"),

@@ -4,6 +4,7 @@ import importlib.util
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -61,13 +62,23 @@ def test_tables_and_files_are_there(demo: DemoResult) -> None:
     assert not re.search(r"""(src|href)=["']?(https?:)?//""", page)  # nothing is loaded from elsewhere
 
 
-def test_the_example_finds_the_modes_of_table_1(tmp_path: Path) -> None:
-    path = ROOT / "examples" / "from_recordings_to_lobes.py"
-    specification = importlib.util.spec_from_file_location("from_recordings_to_lobes", path)
+def example_script(name: str) -> Any:
+    specification = importlib.util.spec_from_file_location(name, ROOT / "examples" / f"{name}.py")
     assert specification is not None
     assert specification.loader is not None
     example = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(example)
+    return example
+
+
+def test_the_example_draws_lobes_with_cuts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    example_script("lobes_and_cuts").main(tmp_path / "picture.png")
+    assert "13 of 13 cuts are on the side that collocation says" in capsys.readouterr().out
+    assert (tmp_path / "picture.png").stat().st_size > 20_000
+
+
+def test_the_example_finds_the_modes_of_table_1(tmp_path: Path) -> None:
+    example = example_script("from_recordings_to_lobes")
     model, lobes = example.limits(example.mill(tmp_path, 60.0))
     truth = table_one_model()
     np.testing.assert_allclose(model.natural_frequencies, truth.natural_frequencies, rtol=0.005)
