@@ -27,6 +27,23 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
+def with_error(value: float, error: float, *, sign: bool = False) -> str:
+    """A value and its error with as many decimals as two digits of the error need.
+
+    Examples
+    --------
+    >>> with_error(16.98997, 0.000069)
+    '16.989970 ± 0.000069'
+    >>> with_error(638.374, 0.27), with_error(2.85, float("nan"))
+    ('638.37 ± 0.27', '2.850')
+    """
+    plus = "+" if sign else ""
+    if not np.isfinite(error):
+        return f"{value:{plus}.3f}"
+    decimals = int(np.clip(1 - np.floor(np.log10(error)), 0, 7)) if error > 0 else 3
+    return f"{value:{plus}.{decimals}f} ± {error:.{decimals}f}"
+
+
 def mode_table(model: ModalModel, title: str = "Modes", band: tuple[float, float] | None = None) -> Table:
     """Natural frequency and damping ratio of each mode with twice their standard errors, and the residue's size."""
     errors = frequency_and_damping_errors(model)
@@ -34,11 +51,16 @@ def mode_table(model: ModalModel, title: str = "Modes", band: tuple[float, float
     for r, (frequency, zeta) in enumerate(zip(model.natural_frequencies, model.damping_ratios, strict=True)):
         if band is not None and not band[0] <= frequency <= band[1]:
             continue
-        spread = ("", "") if errors is None else (f" ± {2 * errors[0][r]:.2g}", f" ± {200 * errors[1][r]:.2g}")
+        spread = (np.nan, np.nan) if errors is None else (2 * errors[0][r], 200 * errors[1][r])
         size = np.abs(model.right[r]).max() * np.abs(model.left[r]).max()
         peak = size / abs(model.poles[r].real)
         rows.append(
-            (str(r + 1), f"{frequency:.3f}{spread[0]}", f"{100 * zeta:.3f}{spread[1]}", f"{peak:.3g} {model.unit}")
+            (
+                str(r + 1),
+                with_error(float(frequency), spread[0]),
+                with_error(float(100 * zeta), spread[1]),
+                f"{peak:.3g} {model.unit}",
+            )
         )
     columns = ("mode", "frequency (Hz)", "damping ratio (%)", "largest resonant term")
     note = " (± 2 standard errors)" if errors is not None else ""

@@ -31,7 +31,24 @@ class TriedCut:
     kind: str
 
 
-def lobes_figure(curves: Mapping[str, StabilityLobes], cuts: Sequence[TriedCut] = ()) -> Figure:
+@dataclass(frozen=True)
+class Band:
+    """Interval of a depth limit.
+
+    Parameters
+    ----------
+    spindle_speeds_rpm : (n_speeds,), rpm
+    low, high : (n_speeds,), m
+    """
+
+    spindle_speeds_rpm: NDArray[np.float64]
+    low: NDArray[np.float64]
+    high: NDArray[np.float64]
+
+
+def lobes_figure(
+    curves: Mapping[str, StabilityLobes], cuts: Sequence[TriedCut] = (), band: Band | None = None
+) -> Figure:
     """Depth limits in mm over rpm, one line for each entry; the area above the first is shaded.
 
     Where a cut is stable at all depths asked for, the line is interrupted.
@@ -42,6 +59,11 @@ def lobes_figure(curves: Mapping[str, StabilityLobes], cuts: Sequence[TriedCut] 
         for number, (label, lobes) in enumerate(curves.items()):
             _draw_curve(depth, chatter, label, lobes, number)
         _draw_cuts(depth, cuts)
+        if band is not None:
+            low, high = 1e3 * band.low, 1e3 * band.high
+            depth.fill_between(
+                band.spindle_speeds_rpm, low, high, color=COLOURS[1], alpha=0.3, linewidth=0, label="95 % interval"
+            )
         top = _depth_limit(list(curves.values()), cuts)
         depth.set_ylim(0, top)
         if curves:

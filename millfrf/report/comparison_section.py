@@ -4,7 +4,7 @@ import numpy as np
 
 from modal_fit import ModalModel, ModePair, compare_modes
 
-from ..tables import Table
+from ..tables import Table, with_error
 from .collect import Collected, SourceFile
 from .section import Section
 
@@ -38,9 +38,9 @@ def _table(
             (
                 str(pair.first + 1),
                 f"{base.natural_frequencies[pair.first]:.3f}",
-                f"{pair.frequency_change:+.3f} ± {2 * pair.frequency_error:.2g}",
+                with_error(pair.frequency_change, 2 * pair.frequency_error, sign=True),
                 f"{100 * zeta:.3f}",
-                f"{100 * pair.damping_change:+.3f} ± {200 * pair.damping_error:.2g}",
+                with_error(100 * pair.damping_change, 200 * pair.damping_error, sign=True),
                 f"{pair.right_likeness:.3f} / {pair.left_likeness:.3f}",
                 "moved" if pair.moved else "",
             )

@@ -18,7 +18,8 @@ from ..provenance import versions
 from .collect import Collected, collect
 from .comparison_section import comparison_section
 from .measurement_sections import channel_section, file_section, settings_section, setup_section
-from .result_sections import frf_section, input_section, lobes_section, mode_section
+from .result_sections import frf_section, input_section, mode_section
+from .stability_section import lobes_section
 
 
 @dataclass(frozen=True)

@@ -12,11 +12,10 @@ from ..chain.fit import chart_from_json
 from ..figures.embed import as_data_uri
 from ..figures.frf_figure import FrfCurves, coherent_lines, frf_figures
 from ..figures.input_figure import input_figure
-from ..figures.lobes_figure import lobes_figure
 from ..figures.mode_figure import mode_figure
 from ..figures.stabilisation_figure import stabilisation_figure
 from ..progress import Watch
-from ..tables import Table, mode_table
+from ..tables import mode_table
 from .collect import Collected, SourceFile
 from .section import Picture, Section
 
@@ -143,46 +142,3 @@ def _stabilisation(collected: Collected, file: SourceFile, model: ModalModel) ->
         "refined by maximum likelihood."
     )
     return Picture(as_data_uri(stabilisation_figure(chart, shown, model)), caption, "Stabilisation chart")
-
-
-def lobes_section(collected: Collected) -> Section:
-    """All lobes in one figure and one table."""
-    if not collected.lobes:
-        return Section("Stability lobes")
-    curves = {file.label: lobes for file, lobes in collected.lobes}
-    sentences = tuple(
-        f"Cutter of {file.path.name}: {p.teeth} teeth, {1e3 * p.diameter:g} mm, "
-        f"edge angle {np.degrees(p.edge_angle):g}°, Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}, "
-        f"immersion {np.degrees(p.start_angle):g}° to {np.degrees(p.exit_angle):g}°, "
-        f"feed {1e3 * p.feed_per_tooth:g} mm a tooth."
-        for file, p in collected.cutting
-    )
-    caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
-    picture = Picture(as_data_uri(lobes_figure(curves)), caption, "Stability lobes")
-    return Section("Stability lobes", sentences, (_lobes_table(collected),), (picture,))
-
-
-def _lobes_table(collected: Collected, most: int = 12) -> Table:
-    """Depth limits at up to twelve speeds of the first curve, the others interpolated."""
-    first = collected.lobes[0][1]
-    rpm = first.spindle_speeds_rpm
-    chosen = np.unique(np.linspace(0, len(rpm) - 1, min(most, len(rpm))).round().astype(int))
-    columns = ["spindle speed (rpm)"]
-    for file, _ in collected.lobes:
-        columns += [f"{file.label} (mm)"]
-    columns += ["chatter frequency (Hz)", "type"]
-    rows = []
-    for k in chosen:
-        depths = [_depth_at(lobes.spindle_speeds_rpm, lobes.depth_limits, rpm[k]) for _, lobes in collected.lobes]
-        frequency = first.chatter_frequencies[k]
-        shown = f"{frequency:.2f}" if np.isfinite(frequency) else ""
-        rows.append((f"{rpm[k]:.0f}", *depths, shown, first.bifurcations[k]))
-    return Table("", tuple(columns), tuple(rows))
-
-
-def _depth_at(rpm: np.ndarray, depths: np.ndarray, wanted: float) -> str:
-    """Depth in mm at the nearest speed, empty where none is near."""
-    nearest = int(np.argmin(np.abs(rpm - wanted)))
-    if abs(rpm[nearest] - wanted) > 0.5:
-        return ""
-    return f"{1e3 * depths[nearest]:.3f}" if np.isfinite(depths[nearest]) else "no limit"

@@ -1,0 +1,37 @@
+"""Where two measurements advise differently: the table of speeds."""
+
+from math import pi
+
+import numpy as np
+
+from millfrf.report.stability_section import advice_table
+from stability import StabilityLobes
+
+
+def lobes(depth: np.ndarray, rpm: np.ndarray) -> StabilityLobes:
+    finite = np.isfinite(depth)
+    kinds = tuple("hopf" if value else "none" for value in finite)
+    return StabilityLobes(rpm * pi / 30, depth, np.where(finite, 18.0, np.nan), kinds, "zero-order")
+
+
+def test_ranges_and_worst_speed() -> None:
+    rpm = np.arange(600.0, 2001.0, 10)
+    base = np.full(len(rpm), 2e-3)
+    other = base.copy()
+    other[(rpm >= 900) & (rpm <= 1000)] *= 1.3
+    other[rpm == 950] *= 1.1
+    other[rpm >= 1800] *= 0.8
+    other[rpm == 1500] *= 1.05  # too little to count
+    table = advice_table(lobes(base, rpm), lobes(other, rpm), "milled", "tapped")
+    assert [row[0] for row in table.rows] == ["900 to 1000", "1800 to 2000"]
+    assert table.rows[0][1:] == ("950", "2.00", "2.86", "+43 %")
+    assert table.rows[1][4] == "-20 %"
+
+
+def test_same_advice_gives_no_row_and_no_limit_is_said() -> None:
+    rpm = np.arange(600.0, 2001.0, 10)
+    base = np.full(len(rpm), 2e-3)
+    assert advice_table(lobes(base, rpm), lobes(1.05 * base, rpm), "a", "b").rows == ()
+    free = np.where(rpm > 1900, np.inf, base)
+    [row] = advice_table(lobes(base, rpm), lobes(free, rpm), "a", "b").rows
+    assert row[3:] == ("no limit", "no limit")
