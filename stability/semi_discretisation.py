@@ -88,7 +88,7 @@ def semi_discretisation(
         limits[k] = 0.5 * (low + high)
         kinds[k] = _kind(critical)
         chatter[k] = _frequency(states, critical, period)
-    return StabilityLobes(speeds, limits, chatter, tuple(kinds), "semi-discretisation", states.warnings)
+    return StabilityLobes(speeds, limits, chatter, tuple(kinds), "semi-discretization", states.warnings)
 
 
 def mean_directional_matrices(process: MillingProcess, steps: int) -> Real:

@@ -2,9 +2,12 @@
 
 import math
 import os
+import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from acquisition import Recording
 from estimation import choose_channels
@@ -14,6 +17,9 @@ from stability import classify_cut
 from ..progress import Watch, silent
 from ..tables import Table
 
+SPEED_EVENTS = "spindle_speed_rpm"
+"""Event series, and key of any table of the set-up, that states the spindle's speed."""
+
 
 @dataclass(frozen=True)
 class CutOptions:
@@ -21,10 +27,10 @@ class CutOptions:
 
     Parameters
     ----------
-    speed_rpm
-        Spindle speed.
     teeth
         Number of teeth.
+    speed_rpm
+        Spindle speed; None: what each recording states.
     runout
         Whether teeth may cut unequal chips.
     responses
@@ -33,8 +39,8 @@ class CutOptions:
         Sample clock; None: the only one.
     """
 
-    speed_rpm: float
     teeth: int
+    speed_rpm: float | None = None
     runout: bool = True
     responses: tuple[str, ...] = ()
     stream: str | None = None
@@ -46,21 +52,47 @@ def classify_recordings(paths: Sequence[str | os.PathLike[str]], options: CutOpt
     Raises
     ------
     InputError
-        A file that cannot be used, or too short a cut.
+        A file that cannot be used, no speed, or too short a cut.
     """
-    if not (math.isfinite(options.speed_rpm) and options.speed_rpm > 0):
-        raise InputError(f"spindle speed {options.speed_rpm!r} rpm must be positive")
     rows = []
     for path in paths:
         with Recording(path) as recording:
             stream = recording.stream(options.stream)
             _, responses = choose_channels(stream, None, options.responses or None)
+            rpm = _speed(recording, options)
             with watch(f"judging {Path(path).name}"):
                 samples = stream.read(channels=[channel.name for channel in responses])
                 found = classify_cut(
-                    samples, stream.sample_rate, options.speed_rpm * math.pi / 30, options.teeth, runout=options.runout
+                    samples, stream.sample_rate, rpm * math.pi / 30, options.teeth, runout=options.runout
                 )
         line = "" if math.isnan(found.frequency) else f"{found.frequency:.2f}"
-        rows.append((Path(path).name, found.kind, f"{100 * found.deviation:.1f} %", f"{found.growth:.2f}", line))
-    columns = ("cut", "verdict", "does not repeat", "last / first quarter", "line (Hz, folded to the tooth passing)")
-    return Table("Cuts", columns, tuple(rows))
+        rows.append(
+            (Path(path).name, f"{rpm:.1f}", found.kind, f"{100 * found.deviation:.1f} %", f"{found.growth:.2f}", line)
+        )
+    columns = ("cut", "speed (rpm)", "verdict", "does not repeat", "last / first quarter", "line (Hz, folded)")
+    return Table("Cuts; lines are folded into half the tooth passing", columns, tuple(rows))
+
+
+def _speed(recording: Recording, options: CutOptions) -> float:
+    """In rpm: as asked for, or as the recording's events or set-up say."""
+    rpm = options.speed_rpm
+    if rpm is None and SPEED_EVENTS in recording.events:
+        rpm = float(np.median(recording.events[SPEED_EVENTS].read()[1]))
+    if rpm is None:
+        rpm = _stated(recording.setup)
+    if rpm is None:
+        raise InputError(f"{recording.path.name} states no {SPEED_EVENTS} in events or set-up; give --speed RPM")
+    if not (math.isfinite(rpm) and rpm > 0):
+        raise InputError(f"spindle speed {rpm!r} rpm must be positive")
+    return rpm
+
+
+def _stated(setup: str) -> float | None:
+    try:
+        tables = tomllib.loads(setup)
+    except tomllib.TOMLDecodeError:
+        return None
+    for table in tables.values():
+        if isinstance(table, dict) and isinstance(table.get(SPEED_EVENTS), int | float):
+            return float(table[SPEED_EVENTS])
+    return None

@@ -31,7 +31,7 @@ OF_ANY: dict[str, Callable[[Frf | ModalModel, MillingProcess, Speeds, float], St
 
 OF_MODELS: dict[str, Callable[[ModalModel, MillingProcess, Speeds, float], StabilityLobes]] = {
     "collocation": collocation,
-    "semi-discretisation": semi_discretisation,
+    "semi-discretization": semi_discretisation,
 }
 """Solvers that need a modal model."""
 

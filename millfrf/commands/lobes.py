@@ -19,7 +19,7 @@ def lobes(
     max_depth: Annotated[float, typer.Option("--max-depth", metavar="M", help="Largest depth looked at, m.")],
     out: Output,
     method: Annotated[
-        str, typer.Option("--method", help="zero-order, nyquist, multi-frequency, collocation or semi-discretisation.")
+        str, typer.Option("--method", help="zero-order, nyquist, multi-frequency, collocation or semi-discretization.")
     ] = "zero-order",
 ) -> None:
     """Stability lobes from a modal model or straight from a measured FRF."""
