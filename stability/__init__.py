@@ -1,15 +1,26 @@
 """Stability lobes from modal models and measured FRFs: knows nothing of acquisition hardware."""
 
+from .collocation import collocation, collocation_limits
+from .delay_system import DelaySystem, delay_system
 from .lobes_file import read_lobes, write_lobes
+from .multipliers import Multipliers, multipliers
 from .nyquist import is_stable, nyquist_limits, unstable_poles
+from .stability_limits import StabilityLimits
 from .stability_lobes import StabilityLobes
 from .tool_receptance import ToolReceptance, tool_receptance
 from .zero_order import zero_order
 
 __all__ = [
+    "DelaySystem",
+    "Multipliers",
+    "StabilityLimits",
     "StabilityLobes",
     "ToolReceptance",
+    "collocation",
+    "collocation_limits",
+    "delay_system",
     "is_stable",
+    "multipliers",
     "nyquist_limits",
     "read_lobes",
     "tool_receptance",
