@@ -33,6 +33,19 @@ class Characteristic:
     radius: float
     accuracy: Real
 
+    @property
+    def usable(self) -> bool:
+        """Whether the series are complete and precise enough to search and refine roots on."""
+        return bool((self.accuracy < 1e-10).all())
+
+    def needed_powers(self, *, tolerance: float = 1e-8) -> NDArray[np.int64]:
+        """Powers that matter in each sixteenth of the radius, (n_speeds, 16): enough to find roots, not to refine."""
+        share = np.arange(1, 17) / 16
+        count = self.coefficients.shape[2]
+        size = np.abs(self.coefficients).max(axis=1)[:, None, :] * share[:, None] ** np.arange(count)
+        matters = size > tolerance
+        return np.where(matters.any(axis=2), count - np.argmax(matters[:, :, ::-1], axis=2), 1).astype(np.int64)
+
 
 def characteristic(operator: PeriodOperator, max_depth: float, *, most_powers: int = 120) -> Characteristic:
     """Series of the characteristic polynomial for depths up to ``max_depth`` (m).
@@ -44,9 +57,12 @@ def characteristic(operator: PeriodOperator, max_depth: float, *, most_powers: i
     terms = [operator.free]
     vector = operator.motion
     largest = np.abs(terms[0]).max(axis=(1, 2))
+    rounding = np.zeros(n_speeds)
+    reach = np.abs(operator.impulse).sum(axis=2).max(axis=1)
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(most_powers):
             vector = radius * vector
+            rounding = np.maximum(rounding, reach * np.abs(vector).max(axis=(1, 2)))
             term = operator.impulse @ vector
             terms.append(term)
             here = np.abs(term).max(axis=(1, 2))
@@ -62,9 +78,8 @@ def characteristic(operator: PeriodOperator, max_depth: float, *, most_powers: i
     on_circle = np.fft.fft(np.stack(terms, axis=1), n=points, axis=1)
     polynomial = _characteristic_polynomial(on_circle)
     series = np.real(np.fft.ifft(polynomial, axis=1)).swapaxes(1, 2)
-    scale = np.abs(series).max(axis=(1, 2))
-    used = np.flatnonzero((np.abs(series) > 1e-16 * scale[:, None, None]).any(axis=(0, 1)))
-    accuracy = 2e-16 * np.abs(polynomial).max(axis=(1, 2))
+    accuracy = 2e-16 * np.maximum(np.abs(polynomial).max(axis=(1, 2)), rounding)
+    used = np.flatnonzero((np.abs(series) > accuracy[:, None, None]).any(axis=(0, 1)))
     return Characteristic(np.ascontiguousarray(series[:, :, : int(used[-1]) + 1]), radius, accuracy)
 
 

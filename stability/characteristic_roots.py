@@ -9,6 +9,7 @@ from cutting.compiled import compiled
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 
 @compiled
@@ -44,6 +45,39 @@ def value(coefficients: Real, radius: float, theta: float, depth: float) -> tupl
         turned *= multiplier.conjugate()
     by_theta += by_b * depth / radius * 1j * multiplier.conjugate()
     return total, by_theta, by_b * factor / radius
+
+
+@compiled
+def quick_value(coefficients: Real, needed: Index, radius: float, theta: float, depth: float) -> complex:
+    """F alone, with only the powers that matter at this depth.
+
+    Parameters
+    ----------
+    coefficients, radius, theta, depth
+        As for :func:`value`.
+    needed : (16,)
+        Powers that matter in each sixteenth of the radius.
+    """
+    degree = coefficients.shape[0] - 1
+    multiplier = complex(math.cos(theta), math.sin(theta))
+    b = depth / radius * (1.0 - multiplier.conjugate())
+    powers = needed[min(15, int(16 * abs(b)))]
+    # real recurrence for a polynomial with real coefficients at a complex point (Knuth, TAOCP 2, section 4.6.4)
+    twice, square = 2.0 * b.real, b.real * b.real + b.imag * b.imag
+    turned = 1.0 + 0j
+    for _ in range(degree // 2):
+        turned *= multiplier
+    total = 0j
+    for k in range(degree + 1):
+        one, two = coefficients[k, powers - 1], 0.0
+        for j in range(powers - 2, 0, -1):
+            one, two = coefficients[k, j] + twice * one + two, -square * one
+        if powers > 1:
+            total += turned * (b * one + (coefficients[k, 0] + two))
+        else:
+            total += turned * one
+        turned *= multiplier.conjugate()
+    return total
 
 
 @compiled
@@ -85,12 +119,14 @@ def turn(one: complex, other: complex) -> float:
 
 
 @compiled
-def period_doublings(coefficients: Real, radius: float, max_depth: float, count: int, found: Real, filled: int) -> int:
+def period_doublings(
+    coefficients: Real, needed: Index, radius: float, max_depth: float, count: int, found: Real, filled: int
+) -> int:
     """Write roots at theta = pi, where F is real, into rows (theta, depth, growth) of ``found``."""
     step = max_depth / count
-    before = value(coefficients, radius, math.pi, 0.0)[0].real
+    before = quick_value(coefficients, needed, radius, math.pi, 0.0).real
     for k in range(1, count + 1):
-        here = value(coefficients, radius, math.pi, k * step)[0].real
+        here = quick_value(coefficients, needed, radius, math.pi, k * step).real
         if before * here < 0.0 and filled < found.shape[0]:
             low, high, low_value, high_value = (k - 1) * step, k * step, before, here
             for _ in range(60):
@@ -132,7 +168,9 @@ def _put(
 
 
 @compiled
-def roots(coefficients: Real, radius: float, max_depth: float, angles: Real, rows: int, found: Real) -> int:
+def roots(
+    coefficients: Real, needed: Index, radius: float, max_depth: float, angles: Real, rows: int, found: Real
+) -> int:
     """Write all roots below ``max_depth`` into rows (theta, depth, growth) of ``found``; return how many.
 
     On each cell the turns of F along the four edges are added: a sum of one whole turn is one root inside. Cells with
@@ -140,7 +178,7 @@ def roots(coefficients: Real, radius: float, max_depth: float, angles: Real, row
 
     Parameters
     ----------
-    coefficients, radius
+    coefficients, needed, radius
         Of one speed.
     angles : (n_angles,), rad
         First edges of cells in theta, increasing, the last pi.
@@ -150,29 +188,31 @@ def roots(coefficients: Real, radius: float, max_depth: float, angles: Real, row
         Receives the roots.
     """
     count = len(angles)
-    filled = period_doublings(coefficients, radius, max_depth, 8 * rows, found, 0)
+    filled = period_doublings(coefficients, needed, radius, max_depth, 8 * rows, found, 0)
     stack = np.empty((4096, 5))
     corners = np.empty((4096, 4), dtype=np.complex128)
     left = np.empty(rows + 1, dtype=np.complex128)
     right = np.empty(rows + 1, dtype=np.complex128)
     for j in range(rows + 1):
-        left[j] = value(coefficients, radius, angles[0], max_depth * (j / rows) ** 1.5)[0]
+        left[j] = quick_value(coefficients, needed, radius, angles[0], max_depth * (j / rows) ** 1.5)
     for i in range(count - 1):
         low, high = angles[i], angles[i + 1]
         if i == count - 2:  # period doublings shall lie inside cells, not on their edges
             high += 0.37 * (high - low)
         for j in range(rows + 1):
-            right[j] = value(coefficients, radius, high, max_depth * (j / rows) ** 1.5)[0]
+            right[j] = quick_value(coefficients, needed, radius, high, max_depth * (j / rows) ** 1.5)
         for j in range(rows):
             bottom, top = max_depth * (j / rows) ** 1.5, max_depth * ((j + 1) / rows) ** 1.5
             _put(stack, corners, 0, low, high, bottom, top, 0.0, left[j], right[j], right[j + 1], left[j + 1])
-            filled = _search(coefficients, radius, stack, corners, found, filled)
+            filled = _search(coefficients, needed, radius, stack, corners, found, filled)
         left, right = right, left
     return filled
 
 
 @compiled
-def _search(coefficients: Real, radius: float, stack: Real, corners: Complex, found: Real, filled: int) -> int:
+def _search(
+    coefficients: Real, needed: Index, radius: float, stack: Real, corners: Complex, found: Real, filled: int
+) -> int:
     """Work off a stack of cells that holds one to begin with."""
     depth_of_stack = 1
     while depth_of_stack:
@@ -195,12 +235,15 @@ def _search(coefficients: Real, radius: float, stack: Real, corners: Complex, fo
                 continue
         if level >= 12 or (winding == 0 and level >= 6) or depth_of_stack + 4 > len(stack):
             continue
-        centre = value(coefficients, radius, middle, height)[0]
+        centre = quick_value(coefficients, needed, radius, middle, height)
         south, north = (
-            value(coefficients, radius, middle, bottom)[0],
-            value(coefficients, radius, middle, top)[0],
+            quick_value(coefficients, needed, radius, middle, bottom),
+            quick_value(coefficients, needed, radius, middle, top),
         )
-        west, east = value(coefficients, radius, low, height)[0], value(coefficients, radius, high, height)[0]
+        west, east = (
+            quick_value(coefficients, needed, radius, low, height),
+            quick_value(coefficients, needed, radius, high, height),
+        )
         deeper = level + 1.0
         _put(stack, corners, at, low, middle, bottom, height, deeper, f00, south, centre, west)
         _put(stack, corners, at + 1, middle, high, bottom, height, deeper, south, f10, east, centre)

@@ -26,10 +26,6 @@ class Crossings:
     depth : (n,), m
     theta : (n,), rad
         Argument of the multiplier, 0 < theta <= pi; pi is period doubling.
-    eigenvalue : (n,)
-        Of the loop gain, 1 / depth up to the root's tolerance.
-    slope : (n,), 1/(m rad)
-        Its derivative along the circle.
     outward : (n,), bool
         Whether the multiplier leaves the circle as depth grows.
     """
@@ -37,8 +33,6 @@ class Crossings:
     speed: Index
     depth: Real
     theta: Real
-    eigenvalue: Complex
-    slope: Complex
     outward: NDArray[np.bool_]
 
 
@@ -69,14 +63,14 @@ def find_crossings(spectrum: Spectrum, grid: Real, max_depth: float) -> Crossing
     )
     inside = value.real >= 1 / max_depth
     speed, theta, value = speed[inside], theta[inside], value[inside]
-    slope = (value - _nearest(spectrum(speed, theta - SLOPE_STEP), value)) / SLOPE_STEP
+    slope = (value - nearest(spectrum(speed, theta - SLOPE_STEP), value)) / SLOPE_STEP
     depth = 1 / value.real
     order = np.lexsort([depth, speed])
     outward = slope.imag < 0
-    return Crossings(speed[order], depth[order], theta[order], value[order], slope[order], outward[order])
+    return Crossings(speed[order], depth[order], theta[order], outward[order])
 
 
-def _nearest(values: Complex, wanted: Complex) -> Complex:
+def nearest(values: Complex, wanted: Complex) -> Complex:
     """From each row the value nearest to what is wanted."""
     if not len(values):
         return np.zeros(0, dtype=complex)
@@ -178,7 +172,7 @@ def _roots(
         slope = weight_high[live] - weight_low[live]
         theta[live] = (low[live] * weight_high[live] - high[live] * weight_low[live]) / slope
         guess = value_low[live] + (theta[live] - first[live]) / width[live] * rise[live]
-        value[live] = _nearest(spectrum(speed[live], theta[live]), guess)
+        value[live] = nearest(spectrum(speed[live], theta[live]), guess)
         other_side = value.imag[live] * weight_high[live] < 0
         low[live] = np.where(other_side, high[live], low[live])
         weight_low[live] = np.where(other_side, weight_high[live], weight_low[live] / 2)

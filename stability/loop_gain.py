@@ -25,62 +25,23 @@ class LoopGain:
 
     Parameters
     ----------
-    within, motion, impulse, free
-        As in :class:`PeriodOperator`, or projected on a smaller basis.
-    basis : (n_speeds, n_nodes, n) or None
-        From the projection back to the nodes; None: not projected.
+    operator
+        One tooth period at several speeds.
     """
 
-    within: Real
-    motion: Real
-    impulse: Real
-    free: Real
-    basis: Real | None
+    operator: PeriodOperator
 
     def matrices(self, speeds: NDArray[np.int64], theta: Real) -> Complex:
         """The operator for each pair of speed index and theta, shape (n_pairs, n, n), 1/m."""
         multiplier = np.exp(1j * theta)[:, None, None]
-        size = self.free.shape[-1]
-        carried = np.linalg.solve(multiplier * np.eye(size) - self.free[speeds], self.impulse[speeds])
-        return np.asarray((1 - 1 / multiplier) * (self.within[speeds] + self.motion[speeds] @ carried))
+        size = self.operator.free.shape[-1]
+        carried = np.linalg.solve(multiplier * np.eye(size) - self.operator.free[speeds], self.operator.impulse[speeds])
+        return np.asarray(
+            (1 - 1 / multiplier) * (self.operator.within[speeds] + self.operator.motion[speeds] @ carried)
+        )
 
     def eigenvalues(self, speeds: NDArray[np.int64], theta: Real) -> Complex:
         """Eigenvalues, largest first, shape (n_pairs, n), 1/m."""
         values = np.linalg.eigvals(self.matrices(speeds, theta))
         order = np.argsort(-np.abs(values), axis=1)
         return np.asarray(np.take_along_axis(values, order, axis=1))
-
-
-def loop_gain(operator: PeriodOperator, max_depth: float, *, tolerance: float = 1e-11) -> LoopGain:
-    """Project a period on the few chip patterns that can build up below ``max_depth``.
-
-    The patterns are ``(I - b G)^-1 E`` with |b| <= 2 max_depth; G is smoothing and causal, so its powers die out like
-    1/k! and a Krylov basis of E, G E, G^2 E ... is complete after a few steps.
-
-    Parameters
-    ----------
-    operator
-        One tooth period at several speeds.
-    max_depth
-        m.
-    tolerance
-        Share of the first block below which a further one is left out.
-    """
-    n = operator.within.shape[1]
-    blocks = [np.linalg.qr(operator.motion)[0]]
-    width, left = blocks[0].shape[2], 1.0
-    while left > tolerance:
-        if (len(blocks) + 1) * width >= 0.8 * n:
-            return LoopGain(operator.within, operator.motion, operator.impulse, operator.free, None)
-        known = np.concatenate(blocks, axis=2)
-        following = operator.within @ blocks[-1]
-        for _ in range(2):
-            following = following - known @ (known.swapaxes(1, 2) @ following)
-        block, size = np.linalg.qr(following)
-        left *= 2 * max_depth * float(np.linalg.norm(size, axis=(1, 2)).max())
-        blocks.append(block)
-    basis = np.concatenate(blocks, axis=2)
-    turned = basis.swapaxes(1, 2)
-    return LoopGain(
-        turned @ operator.within @ basis, turned @ operator.motion, operator.impulse @ basis, operator.free, basis
-    )
