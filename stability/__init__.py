@@ -1,11 +1,14 @@
 """Stability lobes from modal models and measured FRFs: knows nothing of acquisition hardware."""
 
 from .chatter import ChatterVerdict, classify_cut
-from .collocation import collocation
+from .collocation import collocation, collocation_limits
+from .delay_system import DelaySystem, delay_system
 from .lobes_file import read_lobes, write_lobes
 from .multi_frequency import multi_frequency
+from .multipliers import Multipliers, multipliers
 from .nyquist import is_stable, nyquist_limits, unstable_poles
 from .semi_discretisation import semi_discretisation
+from .stability_limits import StabilityLimits
 from .stability_lobes import StabilityLobes
 from .tool_receptance import ToolReceptance, tool_receptance
 from .uncertainty import RecommendedCut, depth_errors, probability_of_stability, recommended_cut
@@ -13,14 +16,20 @@ from .zero_order import zero_order
 
 __all__ = [
     "ChatterVerdict",
+    "DelaySystem",
+    "Multipliers",
     "RecommendedCut",
+    "StabilityLimits",
     "StabilityLobes",
     "ToolReceptance",
     "classify_cut",
     "collocation",
+    "collocation_limits",
+    "delay_system",
     "depth_errors",
     "is_stable",
     "multi_frequency",
+    "multipliers",
     "nyquist_limits",
     "probability_of_stability",
     "read_lobes",

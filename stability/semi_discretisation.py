@@ -11,8 +11,8 @@ from cutting import MillingProcess, directional_matrix
 from foundation import InputError
 from modal_fit import ModalModel
 
+from .delay_system import DelaySystem, delay_system
 from .stability_lobes import StabilityLobes
-from .structure_states import StructureStates, structure_states
 from .zero_order import checked_speeds
 
 Complex = NDArray[np.complex128]
@@ -63,14 +63,17 @@ def semi_discretisation(
     speeds = checked_speeds(spindle_speeds, max_depth)
     if steps < 4 or order not in (0, 1):
         raise InputError(f"{steps} steps of order {order}: give 4 steps or more, and order 0 or 1")
-    states = structure_states(structure)
+    system = delay_system(structure, process)
+    warnings = system.warnings
+    if system.upper.any():
+        warnings = (*warnings, "the residual flexibility is left out of the semi-discretisation")
     limits, chatter, kinds = np.full(len(speeds), np.inf), np.full(len(speeds), np.nan), ["none"] * len(speeds)
     for k, speed in enumerate(speeds):
         means = mean_directional_matrices(process, steps)
         period = 2 * math.pi / (process.teeth * float(speed))
 
         def multipliers(depth: float, period: float = period, means: Real = means) -> Complex:
-            return one_period_multipliers(states, process.ktc * depth * means, period, order)
+            return one_period_multipliers(system, process.ktc * depth * means, period, order)
 
         low, high = 0.0, math.nan
         for depth in max_depth * np.linspace(0, 1, _DEPTHS + 1)[1:] ** 2:
@@ -87,8 +90,8 @@ def semi_discretisation(
         critical = complex(values[np.argmax(np.abs(values))])
         limits[k] = 0.5 * (low + high)
         kinds[k] = _kind(critical)
-        chatter[k] = _frequency(states, critical, period)
-    return StabilityLobes(speeds, limits, chatter, tuple(kinds), "semi-discretization", states.warnings)
+        chatter[k] = _frequency(system, critical, period)
+    return StabilityLobes(speeds, limits, chatter, tuple(kinds), "semi-discretization", warnings)
 
 
 def mean_directional_matrices(process: MillingProcess, steps: int) -> Real:
@@ -108,41 +111,41 @@ def mean_directional_matrices(process: MillingProcess, steps: int) -> Real:
     return means
 
 
-def one_period_multipliers(states: StructureStates, stiffness: Real, period: float, order: int) -> Complex:
+def one_period_multipliers(system: DelaySystem, stiffness: Real, period: float, order: int) -> Complex:
     """Floquet multipliers for the force matrices ``a K_tc alpha`` (steps, 3, 3) over a tooth period (s).
 
     State and tool position at the steps' ends map on those one period later.
     """
-    steps, n_states = len(stiffness), len(states.poles)
+    matrix, output = system.state_matrix, system.output_matrix
+    steps, n_states = len(stiffness), len(matrix)
     step = period / steps
     width = n_states + 3 * (steps + 1)
-    state = np.zeros((n_states, width), dtype=complex)
+    state = np.zeros((n_states, width))
     state[:, :n_states] = np.eye(n_states)
-    positions = np.zeros((steps + 1, 3, width), dtype=complex)
-    positions[0] = states.outputs @ state
-    free = np.exp(states.poles * step)
+    positions = np.zeros((steps + 1, 3, width))
+    positions[0] = output @ state
+    free = expm(matrix * step)
     for i in range(steps):
         column = n_states + 3 * i
         if not stiffness[i].any():
-            state = free[:, None] * state
+            state = free @ state
         else:
-            fade, first, second = _step(states, stiffness[i], step, order)
+            fade, first, second = _step(system, stiffness[i], step, order)
             state = fade @ state
             state[:, column : column + 3] += first
             state[:, column + 3 : column + 6] += second
-        positions[i + 1] = states.outputs @ state
-    matrix = np.concatenate([state, positions.reshape(-1, width)])
-    return np.asarray(np.linalg.eigvals(matrix), dtype=np.complex128)
+        positions[i + 1] = output @ state
+    monodromy = np.concatenate([state, positions.reshape(-1, width)])
+    return np.asarray(np.linalg.eigvals(monodromy), dtype=np.complex128)
 
 
-def _step(states: StructureStates, stiffness: Real, step: float, order: int) -> tuple[Complex, Complex, Complex]:
+def _step(system: DelaySystem, stiffness: Real, step: float, order: int) -> tuple[Real, Real, Real]:
     """One interval: decay of the state, and what the delayed position at its start and end adds."""
-    n = len(states.poles)
-    drive = states.inputs @ stiffness
-    matrix = np.diag(states.poles) + drive @ states.outputs
+    drive = system.input_matrix @ stiffness
+    n = len(drive)
     # state, constant input, its slope: one exponential gives all three integrals
-    augmented = np.zeros((n + 6, n + 6), dtype=complex)
-    augmented[:n, :n] = matrix * step
+    augmented = np.zeros((n + 6, n + 6))
+    augmented[:n, :n] = (system.state_matrix + drive @ system.output_matrix) * step
     augmented[:n, n : n + 3] = -drive * step
     augmented[n : n + 3, n + 3 :] = np.eye(3)
     exponential = expm(augmented)
@@ -159,9 +162,13 @@ def _kind(multiplier: complex) -> str:
     return "fold" if angle < 1e-6 else "hopf"
 
 
-def _frequency(states: StructureStates, multiplier: complex, period: float) -> float:
+def _frequency(system: DelaySystem, multiplier: complex, period: float) -> float:
     """Of the lines that the multiplier allows, the one where the tool's receptance is largest, Hz."""
-    highest = 1.5 * np.abs(states.poles).max() * period / (2 * math.pi)
+    highest = 1.5 * np.abs(system.poles).max() * period / (2 * math.pi)
     lines = (np.angle(multiplier) + 2 * math.pi * np.arange(-int(highest) - 2, int(highest) + 3)) / period
-    receptance = np.einsum("ps,ks,sq->kpq", states.outputs, 1 / (1j * lines[:, None] - states.poles), states.inputs)
-    return float(np.abs(lines[np.argmax(np.linalg.norm(receptance, axis=(1, 2)))]) / (2 * math.pi))
+    direct = np.einsum("rp,kr,rq->kpq", system.right, 1 / (1j * lines[:, None] - system.poles), system.left)
+    mirror = np.einsum(
+        "rp,kr,rq->kpq", system.right.conj(), 1 / (1j * lines[:, None] - system.poles.conj()), system.left.conj()
+    )
+    strength = np.linalg.norm(direct + mirror, axis=(1, 2))
+    return float(np.abs(lines[np.argmax(strength)]) / (2 * math.pi))

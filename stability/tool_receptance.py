@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +57,51 @@ def tool_receptance(structure: Frf | ModalModel, *, node: str | None = None) -> 
     """
     if isinstance(structure, Frf):
         structure = to_receptance(structure)
+    placed = tool_directions(structure, node).place
+    if isinstance(structure, ModalModel):
+        return _from_model(structure, placed)
+    return _from_frf(structure, placed)
+
+
+@dataclass(frozen=True)
+class ToolDirections:
+    """Which rows and columns of a receptance are X, Y, Z of the tool, and with which sign."""
+
+    rows: list[int]
+    row_axes: list[int]
+    row_signs: list[float]
+    columns: list[int]
+    column_axes: list[int]
+    column_signs: list[float]
+
+    def place(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Values (..., n_responses, n_excitations) as (..., 3, 3), zero in directions that were not given."""
+        full = np.zeros((*values.shape[:-2], 3, 3), dtype=values.dtype)
+        chosen = values[..., self.rows, :][..., self.columns] * np.outer(self.row_signs, self.column_signs)
+        full[..., np.array(self.row_axes)[:, None], np.array(self.column_axes)[None, :]] = chosen
+        return full
+
+    def place_rows(self, vectors: Complex) -> Complex:
+        """Right vectors (n_modes, n_responses) as (n_modes, 3)."""
+        full = np.zeros((len(vectors), 3), dtype=complex)
+        full[:, self.row_axes] = vectors[:, self.rows] * np.array(self.row_signs)
+        return full
+
+    def place_columns(self, vectors: Complex) -> Complex:
+        """Left vectors (n_modes, n_excitations) as (n_modes, 3)."""
+        full = np.zeros((len(vectors), 3), dtype=complex)
+        full[:, self.column_axes] = vectors[:, self.columns] * np.array(self.column_signs)
+        return full
+
+
+def tool_directions(structure: Frf | ModalModel, node: str | None = None) -> ToolDirections:
+    """Find X, Y, Z of the tool among the degrees of freedom of a receptance.
+
+    Raises
+    ------
+    InputError
+        No receptance, excitations at several nodes, or no response or excitation at the tool.
+    """
     if structure.quantity != "receptance" or structure.unit != "m/N":
         raise InputError(f"stability needs a receptance in m/N, this is {structure.quantity} in {structure.unit}")
     node = node or _only_node(structure.excitations)
@@ -66,22 +112,14 @@ def tool_receptance(structure: Frf | ModalModel, *, node: str | None = None) -> 
             f"no response at the tool: excited at {node}, responses at {', '.join(structure.responses)}; "
             "calibrate the model to the tip first"
         )
-    signs = np.outer(row_signs, column_signs)
-
-    def placed(values: Complex) -> Complex:
-        full = np.zeros((len(values), 3, 3), dtype=complex)
-        full[:, np.array(row_axes)[:, None], np.array(column_axes)[None, :]] = values[:, rows][:, :, columns] * signs
-        return full
-
-    if isinstance(structure, ModalModel):
-        return _from_model(structure, placed)
-    return _from_frf(structure, placed)
+    return ToolDirections(rows, row_axes, row_signs, columns, column_axes, column_signs)
 
 
 def _only_node(labels: tuple[str, ...]) -> str:
     nodes = sorted({DegreeOfFreedom.parse(label).node for label in labels})
-    if len(nodes) > 1:
-        raise InputError(f"excitations at several nodes ({', '.join(nodes)}); name the tool's node")
+    if len(nodes) != 1:
+        found = ", ".join(nodes) or "none"
+        raise InputError(f"excitations at one node are needed, got {found}; name the tool's node or give an FRF of it")
     return nodes[0]
 
 

