@@ -1,5 +1,6 @@
 """Stability lobes from modal models and measured FRFs: knows nothing of acquisition hardware."""
 
+from .boundary import StabilityBoundary, StabilityGrid, stability_grid, trace_boundary
 from .collocation import collocation, collocation_limits
 from .delay_system import DelaySystem, delay_system
 from .lobes_file import read_lobes, write_lobes
@@ -13,6 +14,8 @@ from .zero_order import zero_order
 __all__ = [
     "DelaySystem",
     "Multipliers",
+    "StabilityBoundary",
+    "StabilityGrid",
     "StabilityLimits",
     "StabilityLobes",
     "ToolReceptance",
@@ -23,7 +26,9 @@ __all__ = [
     "multipliers",
     "nyquist_limits",
     "read_lobes",
+    "stability_grid",
     "tool_receptance",
+    "trace_boundary",
     "unstable_poles",
     "write_lobes",
     "zero_order",
