@@ -1,5 +1,6 @@
 """Stability lobes from modal models and measured FRFs: knows nothing of acquisition hardware."""
 
+from .boundary import StabilityBoundary, StabilityGrid, stability_grid, trace_boundary
 from .chatter import ChatterVerdict, classify_cut
 from .collocation import collocation, collocation_limits
 from .delay_system import DelaySystem, delay_system
@@ -19,6 +20,8 @@ __all__ = [
     "DelaySystem",
     "Multipliers",
     "RecommendedCut",
+    "StabilityBoundary",
+    "StabilityGrid",
     "StabilityLimits",
     "StabilityLobes",
     "ToolReceptance",
@@ -35,7 +38,9 @@ __all__ = [
     "read_lobes",
     "recommended_cut",
     "semi_discretisation",
+    "stability_grid",
     "tool_receptance",
+    "trace_boundary",
     "unstable_poles",
     "write_lobes",
     "zero_order",

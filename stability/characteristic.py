@@ -35,8 +35,8 @@ class Characteristic:
 
     @property
     def usable(self) -> bool:
-        """Whether the series are complete and precise enough to search and refine roots on."""
-        return bool((self.accuracy < 1e-10).all())
+        """Whether the series are complete and precise enough to find roots on; they are refined elsewhere."""
+        return bool((self.accuracy < 1e-6).all())
 
     def needed_powers(self, *, tolerance: float = 1e-8) -> NDArray[np.int64]:
         """Powers that matter in each sixteenth of the radius, (n_speeds, 16): enough to find roots, not to refine."""

@@ -263,3 +263,14 @@ def _keep(found: Real, filled: int, theta: float, depth: float, growth: float, r
             return filled
     found[filled, 0], found[filled, 1], found[filled, 2] = theta, depth, growth
     return filled + 1
+
+
+@compiled
+def all_roots(
+    coefficients: Real, needed: Index, radius: float, max_depth: float, angles: Real, rows: int, found: Real
+) -> Index:
+    """Roots at every speed: :func:`roots` for each row of ``coefficients``, ``needed``, ``angles`` and ``found``."""
+    counts = np.zeros(len(coefficients), dtype=np.int64)
+    for k in range(len(coefficients)):
+        counts[k] = roots(coefficients[k], needed[k], radius, max_depth, angles[k], rows, found[k])
+    return counts

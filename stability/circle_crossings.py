@@ -4,32 +4,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .characteristic import Characteristic, characteristic
-from .characteristic_roots import newton, roots
-from .crossings import SLOPE_STEP, Crossings, find_crossings, nearest
+from .characteristic_roots import all_roots
+from .crossings import Crossings, find_crossings
 from .loop_gain import LoopGain
 from .period_operator import PeriodOperator
+from .polish import polished
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 
-def circle_crossings(operator: PeriodOperator, poles: Complex, max_depth: float) -> Crossings:
-    """All crossings up to ``max_depth`` (m) at the operator's speeds.
+def circle_crossings(
+    operator: PeriodOperator, finer: PeriodOperator, poles: Complex, max_depth: float
+) -> tuple[Crossings, Real]:
+    """All crossings up to ``max_depth`` (m) at the operator's speeds, and the error of their depths.
 
     Parameters
     ----------
     operator
         One tooth period at several speeds.
+    finer
+        The same with more nodes; the crossings are refined on it, and what that changes is their error.
     poles : (n_modes,), rad/s
         Of the structure: where along the circle to look closely.
     max_depth
         m.
+
+    Returns
+    -------
+    crossings
+    error : (n_crossings,), m
     """
     angles = first_angles(poles, operator.periods)
     series = characteristic(operator, max_depth)
     if series.usable:
-        return _by_series(series, angles, max_depth)
-    return find_crossings(LoopGain(operator).eigenvalues, angles, max_depth)
+        found, settled = polished(operator, _by_series(series, angles, max_depth))
+        final, settled_again = polished(finer, found)
+        if settled.all() and settled_again.all():
+            return final, np.abs(final.depth - found.depth) + 1e-9 * final.depth
+    found = find_crossings(LoopGain(operator).eigenvalues, angles, max_depth)
+    final, settled = polished(finer, found)
+    depth = np.where(settled, final.depth, found.depth)
+    theta = np.where(settled, final.theta, found.theta)
+    error = np.where(settled, np.abs(final.depth - found.depth) + 1e-9 * final.depth, found.depth)
+    return Crossings(found.speed, depth, theta, found.outward), error
 
 
 def first_angles(poles: Complex, periods: Real, *, count: int = 24) -> Real:
@@ -49,54 +67,10 @@ def first_angles(poles: Complex, periods: Real, *, count: int = 24) -> Real:
 
 
 def _by_series(series: Characteristic, angles: Real, max_depth: float) -> Crossings:
-    found = np.empty((256, 3))
-    needed = series.needed_powers()
-    speeds, rows = [], []
-    for k, coefficients in enumerate(series.coefficients):
-        count = roots(coefficients, needed[k], series.radius, max_depth, angles[k], 24, found)
-        here = found[:count]
-        rows.append(here[np.argsort(here[:, 1])])
-        speeds.append(np.full(count, k))
-    together = np.concatenate(rows)
-    return Crossings(np.concatenate(speeds), together[:, 1].copy(), together[:, 0].copy(), together[:, 2] > 0)
-
-
-def depth_errors(finer: PeriodOperator, found: Crossings, max_depth: float) -> Real:
-    """How far an operator with more nodes moves each depth, and the root's own tolerance, m.
-
-    Parameters
-    ----------
-    finer
-        The same periods with more nodes.
-    found
-        Crossings with the nodes that are to be judged.
-    max_depth
-        m.
-    """
-    if not len(found.depth):
-        return np.zeros(0)
-    series = characteristic(finer, max_depth)
-    moved = _moved_series(series, found) if series.usable else np.full(len(found.depth), np.nan)
-    lost = np.isnan(moved)
-    if lost.any():
-        moved[lost] = _moved_eigenvalues(LoopGain(finer), found)[lost]
-    return np.asarray(np.abs(moved) + 1e-9 * found.depth)
-
-
-def _moved_series(series: Characteristic, found: Crossings) -> Real:
-    moved = np.full(len(found.depth), np.nan)
-    for k, (speed, theta, depth) in enumerate(zip(found.speed, found.theta, found.depth, strict=True)):
-        good, _, there, _ = newton(series.coefficients[speed], series.radius, theta, depth, 0.1, 0.05 * depth)
-        if good:
-            moved[k] = there - depth
-    return moved
-
-
-def _moved_eigenvalues(gain: LoopGain, found: Crossings) -> Real:
-    """First-order: the root moves along the circle until the imaginary part vanishes again."""
-    before = (1 / found.depth).astype(np.complex128)
-    there = nearest(gain.eigenvalues(found.speed, found.theta), before)
-    slope = (there - nearest(gain.eigenvalues(found.speed, found.theta - SLOPE_STEP), there)) / SLOPE_STEP
-    steep = np.where(found.theta == np.pi, 0.0, slope.real / slope.imag)
-    change = there - before
-    return np.asarray(found.depth**2 * (np.abs(change.real) + np.abs(change.imag * steep)))
+    found = np.empty((len(angles), 128, 3))
+    counts = all_roots(series.coefficients, series.needed_powers(), series.radius, max_depth, angles, 24, found)
+    together = np.concatenate(
+        [rows[:count][np.argsort(rows[:count, 1])] for rows, count in zip(found, counts, strict=True)]
+    )
+    speed = np.repeat(np.arange(len(angles)), counts)
+    return Crossings(speed, together[:, 1].copy(), together[:, 0].copy(), together[:, 2] > 0)

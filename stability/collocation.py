@@ -1,5 +1,7 @@
 """Stability limits of a modal model with coefficients as they vary, by spectral collocation."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +11,7 @@ from foundation import InputError
 from modal_fit import ModalModel
 
 from .chatter_frequency import strongest_lines
-from .circle_crossings import circle_crossings, depth_errors
+from .circle_crossings import circle_crossings
 from .delay_system import DelaySystem, delay_system
 from .period_operator import period_operator
 from .stability_limits import StabilityLimits
@@ -45,7 +47,12 @@ def collocation(
 
 
 def collocation_limits(
-    structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
+    structure: Frf | ModalModel,
+    process: MillingProcess,
+    spindle_speeds: Real,
+    max_depth: float,
+    *,
+    threads: int = 1,
 ) -> StabilityLimits:
     """All depths at which a Floquet multiplier crosses the unit circle, with frequency, kind and error.
 
@@ -57,6 +64,8 @@ def collocation_limits(
     ----------
     structure, process, spindle_speeds, max_depth
         As :func:`collocation`.
+    threads
+        Over which the speeds are spread.
 
     Raises
     ------
@@ -67,7 +76,9 @@ def collocation_limits(
         raise InputError("collocation needs a modal model, this is an FRF; fit it first, or use multi-frequency")
     speeds = checked_speeds(spindle_speeds, max_depth)
     system = delay_system(structure, process)
-    parts = [_limits_of(system, speeds, chunk, max_depth) for chunk in _chunks(speeds)]
+    chunks = _chunks(speeds)
+    with ThreadPoolExecutor(max(1, threads)) as pool:
+        parts = list(pool.map(lambda chunk: _limits_of(system, speeds, chunk, max_depth), chunks))
     speed, depth, frequency, at_pi, change, error = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.lexsort([depth, speed])
     kinds = tuple("period-doubling" if doubling else "hopf" for doubling in at_pi[order])
@@ -86,11 +97,11 @@ def collocation_limits(
 
 
 def _chunks(speeds: Real) -> list[Index]:
-    """Indices of speeds whose tooth periods differ by less than a fifth: they share their nodes."""
+    """Indices of speeds whose tooth periods differ by less than two fifths: they share their nodes."""
     order = np.argsort(speeds)
-    octave = np.floor(np.log(speeds[order] / speeds[order][0]) / np.log(1.2)).astype(int)
+    octave = np.floor(np.log(speeds[order] / speeds[order][0]) / np.log(1.4)).astype(int)
     groups = np.split(order, np.flatnonzero(np.diff(octave)) + 1)
-    return [part for group in groups for part in np.array_split(group, max(1, len(group) // 16))]
+    return [part for group in groups for part in np.array_split(group, max(1, len(group) // 32))]
 
 
 def _limits_of(
@@ -98,9 +109,8 @@ def _limits_of(
 ) -> tuple[Index, Real, Real, NDArray[np.bool_], Index, Real]:
     periods = 2 * np.pi / (system.process.teeth * speeds[chunk])
     operator = period_operator(system, periods)
-    found = circle_crossings(operator, system.poles, max_depth)
-    finer = period_operator(system, periods, extra=4)
-    error = depth_errors(finer, found, max_depth)
+    finer = period_operator(system, periods, extra=5)
+    found, error = circle_crossings(operator, finer, system.poles, max_depth)
     at_pi = found.theta == np.pi
     change = np.where(found.outward, 1, -1) * np.where(at_pi, 1, 2)
     return chunk[found.speed], found.depth, strongest_lines(system, operator, found), at_pi, change, error
