@@ -8,6 +8,7 @@ from .shape_measures import modal_assurance, phase_collinearity, phase_deviation
 from .stabilisation import PoleGroup, StabilisationChart
 from .subspace import SubspaceFit, fit_subspace
 from .tip_calibration import TipCalibration, calibrate_to_tip
+from .uff_modes import read_modes_uff, write_modes_uff
 from .uncertainty import derived_covariance, frequency_and_damping_errors
 
 __all__ = [
@@ -29,6 +30,8 @@ __all__ = [
     "phase_collinearity",
     "phase_deviation",
     "read_modal_model",
+    "read_modes_uff",
     "reciprocity_residual",
     "write_modal_model",
+    "write_modes_uff",
 ]

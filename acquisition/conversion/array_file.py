@@ -1,4 +1,4 @@
-"""Named arrays in a file of another program: NPY, NPZ, MAT (any version), HDF5, CSV."""
+"""Named arrays in a file of another program: NPY, NPZ, MAT (any version), HDF5, TDMS, CSV."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -14,7 +14,7 @@ from foundation import FileFormatError, InputError
 from .csv_file import read_csv
 from .flat_fields import numbers
 
-SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5", ".csv", ".txt")
+SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5", ".tdms", ".csv", ".txt")
 
 
 class ArrayFile:
@@ -74,12 +74,13 @@ def open_arrays(path: Path, **csv_options: Any) -> ArrayFile:
         ".mat": _mat,
         ".h5": _hdf5,
         ".hdf5": _hdf5,
+        ".tdms": _tdms,
     }
     if suffix not in readers:
         raise InputError(f"cannot read {path.name}: suffix {path.suffix!r}; use one of {', '.join(SUFFIXES)}")
     try:
         return ArrayFile(path, readers[suffix](path))
-    except FileFormatError:
+    except InputError:
         raise
     except Exception as error:  # damaged files make numpy, scipy and zipfile raise nearly anything
         reason = " ".join(str(error).split())
@@ -97,6 +98,16 @@ def _npz(path: Path) -> dict[str, Any]:
         if not isinstance(archive, np.lib.npyio.NpzFile):
             raise FileFormatError(f"{path} is not an NPZ archive; rename it to .npy")
         return {name: archive[name] for name in archive.files}
+
+
+def _tdms(path: Path) -> dict[str, Any]:
+    """National Instruments' format: channels by ``group/channel``."""
+    try:
+        from nptdms import TdmsFile
+    except ModuleNotFoundError as error:
+        raise InputError("TDMS files need the package npTDMS; run 'pip install millfrf[formats]'") from error
+    with TdmsFile.open(path) as opened:
+        return {f"{group.name}/{channel.name}": channel[:] for group in opened.groups() for channel in group.channels()}
 
 
 def _mat(path: Path) -> dict[str, Any]:

@@ -15,15 +15,17 @@ def convert(
         Path | None, typer.Option("--map", metavar="MAP.toml", help="Which array or column is which channel.")
     ] = None,
 ) -> None:
-    """Convert by suffix: recordings .h5 .npz .npy .mat .csv into .h5 .npz .mat .csv, FRFs .h5 into .uff and back."""
+    """Convert by suffix: recordings .h5 .npz .npy .mat .tdms .csv into .h5 .npz .mat .csv; FRFs .h5 into .uff and back;
+    modal models .json into .uff and back.
+    """
     from acquisition import convert as convert_file
 
-    from ..chain.convert_frf import convert_frf, is_frf_conversion
+    from ..chain.convert_uff import convert_uff, is_uff_conversion
     from ..progress import bar
 
-    if is_frf_conversion(source, target):
-        check_output(target, (".h5", ".hdf5", ".uff", ".unv"))
-        convert_frf(source, target)
+    if is_uff_conversion(source, target):
+        check_output(target, (".h5", ".hdf5", ".json", ".uff", ".unv"))
+        convert_uff(source, target)
         typer.echo(f"wrote {target}")
         return
 

@@ -181,6 +181,7 @@ CASES: list[tuple[str, Callable[[Path], None], list[str], str]] = [
     ("cut too short to judge", nothing, ["chatter", "a.h5", "--cutting", "cut.toml", "--speed", "60"], "needed"),
     ("speed not stated", nothing, ["chatter", "a.h5", "--cutting", "cut.toml"], "--speed"),
     ("speed that is none", nothing, ["chatter", "a.h5", "--cutting", "cut.toml", "--speed", "-5"], "-5"),
+    ("UFF that is none", nothing, ["convert", "text.txt", "out.uff"], "text.txt"),
     ("unknown command", nothing, ["fity"], "fity"),
     ("report of nothing usable", nothing, ["report", "text.txt", "--out", "out.html"], "text.txt"),
     ("recording where an FRF is due", nothing, CALIBRATE, "a.h5"),
@@ -215,6 +216,9 @@ def test_the_same_commands_succeed_on_good_input(bench: Path, monkeypatch: pytes
     assert run([*FIT, "--band", "10", "30"]) == DONE
     assert run([*LOBES, "--max-depth", "0.01"]) == DONE
     assert run(["report", "out.csv", "cut.toml", "model.json", "--out", "out.html"]) == DONE
+    for source, target in (("frf.h5", "a.uff"), ("a.uff", "b.h5.h5"), ("model.json", "m.uff"), ("m.uff", "m.json")):
+        assert run(["convert", source, target]) == DONE
+    assert run(["fit", "b.h5.h5", "--out", "again.json", "--band", "10", "30"]) == DONE
     assert run(["plan", str(Path(__file__).resolve().parents[2] / "examples" / "plan.toml")]) == DONE
     for name in ("a.h5", "frf.h5", "model.json", "out.csv", "cut.toml"):
         assert run(["inspect", name]) == DONE
