@@ -4,6 +4,7 @@ from .boundary import StabilityBoundary, StabilityGrid, stability_grid, trace_bo
 from .collocation import collocation, collocation_limits
 from .delay_system import DelaySystem, delay_system
 from .lobes_file import read_lobes, write_lobes
+from .multi_frequency import multi_frequency, multi_frequency_limits
 from .multipliers import Multipliers, multipliers
 from .nyquist import is_stable, nyquist_limits, unstable_poles
 from .stability_limits import StabilityLimits
@@ -23,6 +24,8 @@ __all__ = [
     "collocation_limits",
     "delay_system",
     "is_stable",
+    "multi_frequency",
+    "multi_frequency_limits",
     "multipliers",
     "nyquist_limits",
     "read_lobes",
