@@ -7,6 +7,7 @@ from .lobes_file import read_lobes, write_lobes
 from .multi_frequency import multi_frequency, multi_frequency_limits
 from .multipliers import Multipliers, multipliers
 from .nyquist import is_stable, nyquist_limits, unstable_poles
+from .semi_discretisation import semi_discretisation, semi_discretised_multipliers
 from .stability_limits import StabilityLimits
 from .stability_lobes import StabilityLobes
 from .tool_receptance import ToolReceptance, tool_receptance
@@ -29,6 +30,8 @@ __all__ = [
     "multipliers",
     "nyquist_limits",
     "read_lobes",
+    "semi_discretisation",
+    "semi_discretised_multipliers",
     "stability_grid",
     "tool_receptance",
     "trace_boundary",
