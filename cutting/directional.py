@@ -99,3 +99,36 @@ def average_directional_matrix(process: MillingProcess) -> NDArray[np.float64]:
         ]
     )
     return np.asarray(process.teeth / (2 * np.pi) * matrix)
+
+
+def directional_harmonics(process: MillingProcess, orders: NDArray[np.int64]) -> NDArray[np.complex128]:
+    """Fourier coefficients of alpha over the tooth passing, ``alpha(t) = sum_k alpha_k exp(i k N Omega t)``.
+
+    ``alpha_k = N / (2 pi) integral over the immersion of alpha_tooth(phi) exp(-i k N phi)``, tooth 0 at +Y at t = 0;
+    order 0 is :func:`average_directional_matrix` (Budak & Altintas 1998, Eq. 9).
+
+    Parameters
+    ----------
+    process
+        Cutter and engagement.
+    orders : (n_orders,)
+        Whole numbers k, negative ones too.
+
+    Returns
+    -------
+    (n_orders, 3, 3), complex
+
+    Examples
+    --------
+    >>> half = MillingProcess(2, 0.0127, np.pi / 2, 119e6, 0.17, 0.33, np.pi / 2, np.pi, 1e-4)
+    >>> bool(np.allclose(directional_harmonics(half, np.array([0]))[0], average_directional_matrix(half)))
+    True
+    """
+    orders = np.asarray(orders)
+    width = process.exit_angle - process.start_angle
+    turns = (process.teeth * int(np.abs(orders).max(initial=0)) + 2) * width
+    nodes, weights = np.polynomial.legendre.leggauss(20 + int(0.6 * turns))
+    phi = process.start_angle + width / 2 * (nodes + 1)
+    product = force_direction(process, phi)[:, :, None] * chip_direction(process, phi)[:, None, :]
+    wave = np.exp(-1j * process.teeth * orders[:, None] * phi) * (weights * width / 2)
+    return np.asarray(process.teeth / (2 * np.pi) * np.einsum("kn,nij->kij", wave, product))

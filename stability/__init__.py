@@ -5,10 +5,10 @@ from .chatter import ChatterVerdict, classify_cut
 from .collocation import collocation, collocation_limits
 from .delay_system import DelaySystem, delay_system
 from .lobes_file import read_lobes, write_lobes
-from .multi_frequency import multi_frequency
+from .multi_frequency import multi_frequency, multi_frequency_limits
 from .multipliers import Multipliers, multipliers
 from .nyquist import is_stable, nyquist_limits, unstable_poles
-from .semi_discretisation import semi_discretisation
+from .semi_discretisation import semi_discretisation, semi_discretised_multipliers
 from .stability_limits import StabilityLimits
 from .stability_lobes import StabilityLobes
 from .tool_receptance import ToolReceptance, tool_receptance
@@ -32,12 +32,14 @@ __all__ = [
     "depth_errors",
     "is_stable",
     "multi_frequency",
+    "multi_frequency_limits",
     "multipliers",
     "nyquist_limits",
     "probability_of_stability",
     "read_lobes",
     "recommended_cut",
     "semi_discretisation",
+    "semi_discretised_multipliers",
     "stability_grid",
     "tool_receptance",
     "trace_boundary",

@@ -183,3 +183,25 @@ def _roots(
         live = live[~done]
     good = (np.abs(value.imag) < 1e-6 * np.abs(value)) & (value.real > 0)
     return theta, value, good
+
+
+def moved_depths(spectrum: Spectrum, found: Crossings) -> Real:
+    """How far another loop gain would move each depth, to first order, m.
+
+    The root moves along the circle until the imaginary part vanishes again; at pi it stays where it is.
+
+    Parameters
+    ----------
+    spectrum
+        Of the other loop gain: more nodes, fewer FRF lines ...
+    found
+        Crossings of the first.
+    """
+    if not len(found.depth):
+        return np.zeros(0)
+    before = (1 / found.depth).astype(np.complex128)
+    there = nearest(spectrum(found.speed, found.theta), before)
+    slope = (there - nearest(spectrum(found.speed, found.theta - SLOPE_STEP), there)) / SLOPE_STEP
+    steep = np.where(found.theta == np.pi, 0.0, slope.real / np.where(slope.imag == 0, np.inf, slope.imag))
+    change = there - before
+    return np.asarray(found.depth**2 * (np.abs(change.real) + np.abs(change.imag * steep)))

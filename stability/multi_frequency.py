@@ -1,142 +1,196 @@
-"""Multi-frequency solution: period doubling and Hopf limits from the FRF alone, without a modal fit."""
+"""Multi-frequency solution: harmonics of tooth passing on FRF samples, period doubling without a modal fit."""
 
-import math
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess, chip_direction, force_direction
+from cutting import MillingProcess, directional_harmonics
 from estimation import Frf
+from foundation import InputError
 from modal_fit import ModalModel
 
-from .boundary_search import Matrices, lowest_crossing
+from .crossings import Crossings, find_crossings, moved_depths
+from .stability_limits import StabilityLimits
 from .stability_lobes import StabilityLobes
 from .tool_receptance import ToolReceptance, tool_receptance
 from .zero_order import checked_speeds
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
-_QUADRATURE = 60
-_FEWEST_HARMONICS, _MOST_HARMONICS = 6, 60
-_PHASES = 160
+Index = NDArray[np.int64]
+
+MOST_HARMONICS = 60
+"""On each side; a structure that needs more turns too often between two teeth."""
 
 
 def multi_frequency(
-    structure: Frf | ModalModel,
-    process: MillingProcess,
-    spindle_speeds: Real,
-    max_depth: float,
-    *,
-    harmonics: int | None = None,
+    structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
 ) -> StabilityLobes:
-    """Depth limit at each speed from the truncated infinite determinant of the periodic loop.
-
-    Motion at a chatter frequency w comes with lines at ``w + k W`` (W the tooth passing): with Fourier coefficients
-    alpha_k of the directional matrix, ``F_h = a K_tc (1 - exp(-i w T)) sum_k alpha_(h-k) H(w + k W) F_k`` (Budak &
-    Altintas 1998; Merdol & Altintas, J. Manuf. Sci. Eng. 126, 2004). For each phase ``w T`` the possible depths are
-    reciprocal eigenvalues; the boundary is where one is real and positive. w T = pi is period doubling.
+    """Lowest unstable depth at each speed from FRF samples; Hopf and period doubling.
 
     Parameters
     ----------
     structure
-        Tip receptance, measured or modal. Outside a measured FRF's span it counts as rigid.
+        Tip receptance, measured or modal.
     process
-        Cutter with teeth of equal pitch.
+        Cutter and engagement.
     spindle_speeds : (n_speeds,), rad/s
     max_depth
         Depths above it are not looked for, m.
-    harmonics
-        Lines kept on either side of the chatter frequency; None: all within the FRF's span, at least six.
 
     Raises
     ------
     InputError
-        Speeds or depth that are not positive, or a structure that cannot be used.
+        As :func:`multi_frequency_limits`.
+    """
+    return multi_frequency_limits(structure, process, spindle_speeds, max_depth).lowest()
+
+
+def multi_frequency_limits(
+    structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
+) -> StabilityLimits:
+    """All limits from ``det[I - a (1 - exp(-i w tau)) K_tc alpha_(p-q) H(w + q w_T)] = 0``.
+
+    Forces at ``w + p w_T`` come from motions at ``w + q w_T`` through the harmonics of the directional matrix;
+    harmonics at which the structure does not move drop out, which truncates the infinite determinant by itself. The
+    depth is one over an eigenvalue, as in the zero-order solution, which keeps p = q = 0 alone; period doubling is
+    ``w = w_T / 2`` (Budak & Altintas 1998; Merdol & Altintas 2004).
+
+    A measured FRF counts only inside its valid lines: below them its first line's real part is kept, above them the
+    structure is taken to stand still.
+
+    Parameters
+    ----------
+    structure, process, spindle_speeds, max_depth
+        As :func:`multi_frequency`.
+
+    Raises
+    ------
+    InputError
+        Speeds or depth not positive, a structure that cannot be used, or speeds so low that more than 60 harmonics of
+        tooth passing lie below its highest frequency.
     """
     speeds = checked_speeds(spindle_speeds, max_depth)
     source = tool_receptance(structure)
-    highest = source.span[1]
-    if isinstance(structure, ModalModel):  # known at every frequency, but for a residual that is infinite at 0
-        source = replace(source, span=(source.span[0] if structure.residuals else 0.0, math.inf))
-    limits, chatter, kinds = np.full(len(speeds), np.inf), np.full(len(speeds), np.nan), ["none"] * len(speeds)
-    for k, speed in enumerate(speeds):
-        period = 2 * math.pi / (process.teeth * float(speed))
-        kept = harmonics or int(np.clip(math.ceil(highest * period) + 2, _FEWEST_HARMONICS, _MOST_HARMONICS))
-        coefficients = directional_harmonics(process, 2 * kept + 1)
-
-        matrices = partial(_determinant_blocks, source, coefficients, period, kept)
-        phases = _phases(source, period)
-        found = lowest_crossing(matrices, phases, process.ktc * max_depth)
-        if found is not None:
-            limits[k], kinds[k] = found[0] / process.ktc, found[2]
-            chatter[k] = _chatter(source, matrices, found, period, kept)
-    return StabilityLobes(speeds, limits, chatter, tuple(kinds), "multi-frequency", source.warnings)
-
-
-def directional_harmonics(process: MillingProcess, n_harmonics: int) -> Complex:
-    """Fourier coefficients of alpha over a tooth period, ``alpha(phi) = sum_k alpha_k exp(i k N phi)``.
-
-    Returns
-    -------
-    (2 n_harmonics + 1, 3, 3), k from -n to n
-    """
-    half = 0.5 * (process.exit_angle - process.start_angle)
-    waves_in_cut = process.teeth * n_harmonics * half / math.pi
-    nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE + math.ceil(4 * waves_in_cut))
-    angles = process.start_angle + half * (nodes + 1)
-    product = force_direction(process, angles)[:, :, None] * chip_direction(process, angles)[:, None, :]
-    orders = np.arange(-n_harmonics, n_harmonics + 1)
-    waves = np.exp(-1j * process.teeth * np.outer(orders, angles)) * (weights * half)
-    return np.asarray(process.teeth / (2 * math.pi) * np.einsum("ka,apq->kpq", waves, product))
+    truncated = _Truncated(source, process, 2 * np.pi / (process.teeth * speeds), _flexible(source))
+    coarser = replace(truncated, source=_coarser(structure, source))
+    found = find_crossings(truncated.eigenvalues, truncated.first_angles(_peaks(source)), max_depth)
+    at_pi = found.theta == np.pi
+    return StabilityLimits(
+        speeds,
+        float(max_depth),
+        found.speed,
+        found.depth,
+        truncated.strongest_lines(found),
+        tuple("period-doubling" if doubling else "hopf" for doubling in at_pi),
+        np.where(found.outward, 1, -1) * np.where(at_pi, 1, 2),
+        moved_depths(coarser.eigenvalues, found) / 3 + 1e-9 * found.depth,
+        "multi-frequency",
+        source.warnings,
+    )
 
 
-def _determinant_blocks(
-    source: ToolReceptance, coefficients: Complex, period: float, kept: int, multipliers: Complex
-) -> Complex:
-    """``(1 - 1/mu) alpha_(h-k) H(w + k W)`` for every multiplier, (n, 3 (2 kept + 2), the same)."""
-    orders = _orders(kept)
-    angular = (np.angle(multipliers)[:, None] + 2 * math.pi * orders) / period
-    receptance = _two_sided(source, angular / (2 * math.pi))
-    middle = (len(coefficients) - 1) // 2
-    blocks = coefficients[middle + orders[:, None] - orders[None, :]]
-    product = np.einsum("hkpq,nkqr->nhpkr", blocks, receptance, optimize=True)
-    size = 3 * len(orders)
-    return np.asarray((1 - 1 / multipliers)[:, None, None] * product.reshape(len(multipliers), size, size))
+@dataclass(frozen=True)
+class _Truncated:
+    """The truncated determinant: a receptance, a process and one truncation for all speeds."""
+
+    source: ToolReceptance
+    process: MillingProcess
+    periods: Real
+    flexible: tuple[list[int], list[int]]
+
+    @property
+    def harmonics(self) -> Index:
+        """Orders q that can lie below the highest frequency at the longest period."""
+        top = int(np.ceil(self.source.span[1] * float(self.periods.max())))
+        if top > MOST_HARMONICS:
+            raise InputError(
+                f"{top} harmonics of tooth passing lie below {self.source.span[1]:.4g} Hz at "
+                f"{60 / (self.process.teeth * self.periods.max()):.4g} rpm, the most is {MOST_HARMONICS}; "
+                "raise the lowest speed or cut the FRF's upper end"
+            )
+        return np.arange(-top - 1, top + 1)
+
+    def lines(self, speeds: Index, theta: Real) -> Real:
+        """Frequencies (n_pairs, n_harmonics), Hz, negative ones too."""
+        return np.asarray((theta[:, None] / (2 * np.pi) + self.harmonics) / self.periods[speeds][:, None])
+
+    def receptance(self, lines: Real) -> Complex:
+        """H at lines of either sign, zero above the span and quasi-static below, (..., 3, 3)."""
+        low, high = self.source.span
+        size = np.abs(lines).ravel()
+        values = self.source.evaluate(np.clip(size, low, high))
+        values[size < low] = values[size < low].real
+        values[size > high] = 0
+        values[lines.ravel() < 0] = values[lines.ravel() < 0].conj()
+        return values.reshape(*lines.shape, 3, 3)
+
+    def matrices(self, speeds: Index, theta: Real) -> Complex:
+        """The loop gain between forces at all harmonics, (n_pairs, n, n), 1/m."""
+        orders = self.harmonics
+        count = len(orders)
+        rows, columns = self.flexible
+        every = directional_harmonics(self.process, np.arange(1 - count, count)) * self.process.ktc
+        difference = np.arange(count)[:, None] - np.arange(count) + count - 1
+        cutting = every[difference][:, :, columns][:, :, :, rows]
+        moving = self.receptance(self.lines(speeds, theta))[:, :, rows][:, :, :, columns]
+        blocks = np.einsum("pqij,nqjk->npiqk", cutting, moving, optimize=True)
+        size = count * len(columns)
+        return np.asarray((1 - np.exp(-1j * theta))[:, None, None] * blocks.reshape(len(theta), size, size))
+
+    def eigenvalues(self, speeds: Index, theta: Real) -> Complex:
+        """Eigenvalues, largest first, (n_pairs, n)."""
+        values = np.linalg.eigvals(self.matrices(speeds, theta))
+        order = np.argsort(-np.abs(values), axis=1)
+        return np.asarray(np.take_along_axis(values, order, axis=1))
+
+    def first_angles(self, peaks: Real) -> Real:
+        """Angles in (0, pi] to begin with: clustered at both ends and about every peak, (n_speeds, n_angles)."""
+        even = (1 - np.cos(np.linspace(0, np.pi, 33)[1:])) * np.pi / 2
+        near = peaks[:, None] * (1 + np.array([-0.1, -0.04, -0.015, 0.0, 0.015, 0.04, 0.1]))
+        turns = 2 * np.pi * np.outer(self.periods, near.ravel())
+        folded = np.clip(np.abs(np.mod(turns + np.pi, 2 * np.pi) - np.pi), 1e-3, np.pi - 1e-3)
+        return np.asarray(np.sort(np.hstack([np.tile(even, (len(self.periods), 1)), folded]), axis=1))
+
+    def strongest_lines(self, found: Crossings) -> Real:
+        """Frequency (Hz) of the strongest line of the tool's motion at each crossing."""
+        if not len(found.depth):
+            return np.zeros(0)
+        values, vectors = np.linalg.eig(self.matrices(found.speed, found.theta))
+        chosen = np.argmin(np.abs(values - 1 / found.depth[:, None]), axis=1)
+        rows, columns = self.flexible
+        force = vectors[np.arange(len(chosen)), :, chosen].reshape(len(chosen), -1, len(columns))
+        lines = self.lines(found.speed, found.theta)
+        moving = self.receptance(lines)[:, :, rows][:, :, :, columns]
+        motion = np.linalg.norm(np.einsum("nqjk,nqk->nqj", moving, force), axis=2)
+        return np.asarray(np.abs(lines[np.arange(len(lines)), np.argmax(motion, axis=1)]))
 
 
-def _orders(kept: int) -> NDArray[np.int64]:
-    """Lines ``-kept - 1 ... kept``: at w T = pi each has its mirror image, so that period doubling stays real."""
-    return np.arange(-kept - 1, kept + 1)
+def _flexible(source: ToolReceptance) -> tuple[list[int], list[int]]:
+    """Directions that move, and directions in which a force moves anything."""
+    size = np.abs(source.evaluate(source.grid)).max(axis=0)
+    return np.flatnonzero(size.any(axis=1)).tolist(), np.flatnonzero(size.any(axis=0)).tolist()
 
 
-def _two_sided(source: ToolReceptance, frequencies: Real) -> Complex:
-    """H at positive and negative frequencies; zero outside the span."""
-    size = np.abs(frequencies)
-    inside = (size >= source.span[0]) & (size <= source.span[1])
-    values = np.zeros((*frequencies.shape, 3, 3), dtype=complex)
-    values[inside] = source.evaluate(size[inside])
-    return np.where((frequencies < 0)[..., None, None], values.conj(), values)
+def _peaks(source: ToolReceptance) -> Real:
+    """Up to eight highest peaks of the receptance, Hz."""
+    size = np.linalg.norm(source.evaluate(source.grid), axis=(1, 2))
+    tops = np.flatnonzero((size[1:-1] > size[:-2]) & (size[1:-1] >= size[2:])) + 1
+    return source.grid[tops[np.argsort(-size[tops])][:8]]
 
 
-def _phases(source: ToolReceptance, period: float) -> Real:
-    """Phases that the FRF's own lines fold onto, and even ones; pi is looked at apart."""
-    folded = np.abs(np.angle(np.exp(2j * math.pi * source.grid * period)))
-    phases = np.unique(np.concatenate([folded, np.linspace(0, math.pi, _PHASES)]))
-    phases = phases[(phases > 1e-6) & (phases < math.pi)]
-    if len(phases) > 4 * _PHASES:  # no finer than the grid's own resolution needs
-        phases = phases[np.linspace(0, len(phases) - 1, 4 * _PHASES).astype(int)]
-    return np.asarray(phases)
-
-
-def _chatter(
-    source: ToolReceptance, matrices: Matrices, found: tuple[float, float, str], period: float, kept: int
-) -> float:
-    """The line with the largest motion, Hz."""
-    matrix = matrices(np.array([np.exp(1j * found[1])]))[0]
-    values, vectors = np.linalg.eig(matrix)
-    force: Complex = np.asarray(vectors[:, np.argmin(np.abs(values - 1 / found[0]))].reshape(-1, 3), dtype=complex)
-    lines: Real = np.asarray((found[1] + 2 * math.pi * _orders(kept)) / (2 * math.pi * period))
-    motion = np.einsum("kpq,kq->kp", _two_sided(source, lines), force)
-    return float(np.abs(lines[np.argmax(np.linalg.norm(motion, axis=1))]))
+def _coarser(structure: Frf | ModalModel, source: ToolReceptance) -> ToolReceptance:
+    """What the limits are compared with: every second FRF line, or a model truncated a quarter lower."""
+    if isinstance(structure, ModalModel):
+        return replace(source, span=(source.span[0], 0.75 * source.span[1]))
+    half = replace(
+        structure,
+        frequencies=structure.frequencies[::2],
+        values=structure.values[::2],
+        valid=structure.valid[::2],
+        multiple_coherence=None,
+        covariance=None,
+    )
+    usable = (half.valid & (half.frequencies > 0)).sum() >= 8
+    return tool_receptance(half) if usable else source

@@ -1,174 +1,215 @@
-"""Semi-discretisation: the delayed motion is a polynomial over each small step, everything else is exact."""
+"""Semi-discretisation: the delayed motion a polynomial on small steps, the rest exact; first and higher order."""
 
 import math
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from cutting import MillingProcess, directional_matrix
+from cutting import MillingProcess, chip_direction, force_direction
+from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
 from .delay_system import DelaySystem, delay_system
+from .engagement import Piece, engagement_pieces
+from .multipliers import Multipliers
 from .stability_lobes import StabilityLobes
 from .zero_order import checked_speeds
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
-_DEPTHS = 40
-_AVERAGE = 8  # Gauss points for the mean of alpha over a part of a step
+
+ORDERS = (1, 3)
+
+
+def semi_discretised_multipliers(
+    model: ModalModel, process: MillingProcess, spindle_speed: float, depth: float, *, steps: int = 40, order: int = 1
+) -> Multipliers:
+    """Floquet multipliers of a cut by semi-discretisation.
+
+    Order 1 is the classic: on each step the coefficients are their average and the delayed motion is a straight line;
+    the multipliers converge with the square of the step (Insperger & Stepan, Semi-Discretization for Time-Delay
+    Systems, section 3.3.2). Order 3 takes the delayed motion as a cubic and the varying coefficients by a Magnus
+    expansion with two Gauss points; it converges with the fourth power. Steps never straddle a tooth's entry or exit,
+    which would spoil both; the free flight between is one exact step.
+
+    Parameters
+    ----------
+    model, process
+        Structure at the tool tip, without residual flexibility, and cut.
+    spindle_speed
+        rad/s.
+    depth
+        m.
+    steps
+        In the cutting part of a tooth period, at least 4.
+    order
+        Of the polynomial for the delayed motion, 1 or 3.
+
+    Raises
+    ------
+    InputError
+        A value outside these bounds, or a structure that cannot be used.
+    """
+    if not (math.isfinite(spindle_speed) and spindle_speed > 0):
+        raise InputError(f"spindle speed {spindle_speed!r} rad/s must be positive")
+    if not (math.isfinite(depth) and depth >= 0):
+        raise InputError(f"depth = {depth!r} m must be zero or more, and finite")
+    if order not in ORDERS:
+        raise InputError(f"order {order!r} of semi-discretisation is not offered; use 1 or 3")
+    if steps < 4:
+        raise InputError(f"{steps} steps are too few; give 4 or more")
+    system = delay_system(model, process)
+    if system.upper.any():
+        raise InputError("semi-discretisation cannot take a residual flexibility; use collocation or multi-frequency")
+    return _multipliers(system, spindle_speed, depth, steps, order)
+
+
+def _multipliers(system: DelaySystem, speed: float, depth: float, steps: int, order: int) -> Multipliers:
+    moving = np.flatnonzero(np.abs(system.right).any(axis=0))
+    output = system.output_matrix[moving]
+    pieces = engagement_pieces(system.process)
+    total = sum(piece.end - piece.begin for piece in pieces)
+    counts = [max(4, round(steps * (piece.end - piece.begin) / total)) for piece in pieces]
+    size, width = len(system.state_matrix), len(moving)
+    length = size + width * sum(count + 1 for count in counts)
+    state = np.eye(size, length)
+    history, angle, row = [], 0.0, size
+    for piece, count in zip(pieces, counts, strict=True):
+        state = expm(system.state_matrix * (piece.begin - angle) / speed) @ state
+        advance, delayed = _steps(system, piece, count, (speed, depth, order), moving)
+        history.append(output @ state)
+        for k in range(count):
+            first = row + width * _first_node(k, count, order)
+            state = advance[k] @ state
+            state[:, first : first + delayed.shape[2]] += delayed[k]
+            history.append(output @ state)
+        row += width * (count + 1)
+        angle = piece.end
+    pitch = 2 * np.pi / system.process.teeth
+    state = expm(system.state_matrix * (pitch - angle) / speed) @ state
+    values = np.linalg.eigvals(np.concatenate([state, *history]))
+    return Multipliers(np.asarray(values[np.argsort(-np.abs(values))], dtype=complex), pitch / speed)
+
+
+def _first_node(step: int, count: int, order: int) -> int:
+    """First of the order + 1 nodes between which the delayed motion is interpolated on a step."""
+    return step if order == 1 else min(max(step - 1, 0), count - 3)
+
+
+def _cutting_matrices(system: DelaySystem, piece: Piece, angles: Real) -> Real:
+    """K_tc alpha of the teeth engaged in a piece at angles (n,) from its beginning, (n, 3, 3), also at its ends."""
+    total = np.zeros((len(angles), 3, 3))
+    for phi in piece.immersions:
+        force = force_direction(system.process, phi + angles)
+        total += force[:, :, None] * chip_direction(system.process, phi + angles)[:, None, :]
+    return system.process.ktc * total
+
+
+def _steps(
+    system: DelaySystem, piece: Piece, count: int, cut: tuple[float, float, int], moving: NDArray[np.int64]
+) -> tuple[Real, Real]:
+    """For each step of a piece: what it does to the state, and to the delayed motions at its nodes."""
+    speed, depth, order = cut
+    turn = (piece.end - piece.begin) / count
+    h = turn / speed
+    # Gauss points of all steps: two for the Magnus expansion, four for an average that is exact to rounding
+    points, weights = np.polynomial.legendre.leggauss(2 if order == 3 else 4)
+    angles = turn * (np.arange(count)[:, None] + (points + 1) / 2)
+    cutting = depth * _cutting_matrices(system, piece, angles.ravel()).reshape(count, len(points), 3, 3)[..., moving]
+    pushed = system.input_matrix @ cutting  # (count, points, size, width)
+    output = system.output_matrix[moving]
+    if order == 1:
+        mean = np.einsum("g,kgij->kij", weights / 2, pushed)
+        return _linear(system.state_matrix + mean @ output, -mean, h)
+    return _cubic(system.state_matrix + pushed @ output, -pushed, h, points)
+
+
+def _linear(matrices: Real, inputs: Real, h: float) -> tuple[Real, Real]:
+    """``x' = P x + R (w_0 + (w_1 - w_0) s / h)`` exactly, P and R constant on the step."""
+    count, size, width = inputs.shape
+    whole = np.zeros((count, size + 2 * width, size + 2 * width))
+    whole[:, :size, :size], whole[:, :size, size : size + width] = h * matrices, h * inputs
+    whole[:, size : size + width, size + width :] = np.eye(width)
+    step = expm(whole)[:, :size]
+    start, rise = step[:, :, size : size + width], step[:, :, size + width :]
+    return step[:, :, :size], np.concatenate([start - rise, rise], axis=2)
+
+
+def _cubic(matrices: Real, inputs: Real, h: float, points: Real) -> tuple[Real, Real]:
+    """Fourth-order Magnus step of ``x' = P(s) x + R(s) sum_j l_j(s) w_j``, the w_j four delayed motions."""
+    count, _, size, width = inputs.shape
+    whole = np.zeros((count, 2, size + 4 * width, size + 4 * width))
+    whole[:, :, :size, :size] = h * matrices
+    for k in range(count):
+        nodes = _first_node(k, count, 3) - k + np.arange(4.0)
+        for g, at in enumerate((points + 1) / 2):
+            for j in range(4):
+                others = np.delete(nodes, j)
+                share = np.prod((at - others) / (nodes[j] - others))
+                whole[k, g, :size, size + j * width : size + (j + 1) * width] = h * share * inputs[k, g]
+    one, two = whole[:, 0], whole[:, 1]
+    step = expm((one + two) / 2 + math.sqrt(3) / 12 * (two @ one - one @ two))[:, :size]
+    return step[:, :, :size], step[:, :, size:]
 
 
 def semi_discretisation(
-    structure: ModalModel,
+    structure: Frf | ModalModel,
     process: MillingProcess,
     spindle_speeds: Real,
     max_depth: float,
     *,
-    steps: int = 80,
+    steps: int = 40,
     order: int = 1,
-    tolerance: float = 1e-4,
+    n_depths: int = 40,
 ) -> StabilityLobes:
-    """Lowest unstable depth at each speed: a scan over depth, then bisection of the spectral radius.
+    """Lowest unstable depth at each speed, by a scan over depth and halving.
 
-    Over each of ``steps`` intervals of the tooth period the directional matrix is its mean and the delayed tool
-    position a polynomial of degree ``order`` through known points (0: mean of both ends, 1: linear); the state is
-    integrated exactly (Insperger & Stepan, Semi-Discretization for Time-Delay Systems, 2011, chapter 3). The error
-    falls with the square of the step; :func:`collocation` converges faster and is the solver to use, this one
-    is its independent check.
+    A reference to compare with: collocation is faster, finds every island and states its error. Here an island thinner
+    than a step of the scan may be missed.
 
     Parameters
     ----------
     structure
         Modal model at the tool tip.
-    process
-        Cutter with teeth of equal pitch.
-    spindle_speeds : (n_speeds,), rad/s
-    max_depth
-        m.
-    steps
-        Intervals a tooth period.
-    order
-        0 or 1.
-    tolerance
-        Relative, of the depth.
+    process, spindle_speeds, max_depth
+        As for :func:`collocation`.
+    steps, order
+        As for :func:`semi_discretised_multipliers`.
+    n_depths
+        Steps of the scan.
 
     Raises
     ------
     InputError
-        Speeds, depth, steps or order that cannot be, or a structure that cannot be used.
+        As :func:`semi_discretised_multipliers`, or an FRF.
     """
+    if isinstance(structure, Frf):
+        raise InputError("semi-discretisation needs a modal model, this is an FRF; fit it, or use multi-frequency")
     speeds = checked_speeds(spindle_speeds, max_depth)
-    if steps < 4 or order not in (0, 1):
-        raise InputError(f"{steps} steps of order {order}: give 4 steps or more, and order 0 or 1")
-    system = delay_system(structure, process)
-    warnings = system.warnings
-    if system.upper.any():
-        warnings = (*warnings, "the residual flexibility is left out of the semi-discretisation")
     limits, chatter, kinds = np.full(len(speeds), np.inf), np.full(len(speeds), np.nan), ["none"] * len(speeds)
+
+    def found(speed: float, depth: float) -> Multipliers:
+        return semi_discretised_multipliers(structure, process, speed, depth, steps=steps, order=order)
+
+    scan = np.linspace(max_depth / n_depths, max_depth, n_depths)
     for k, speed in enumerate(speeds):
-        means = mean_directional_matrices(process, steps)
-        period = 2 * math.pi / (process.teeth * float(speed))
-
-        def multipliers(depth: float, period: float = period, means: Real = means) -> Complex:
-            return one_period_multipliers(system, process.ktc * depth * means, period, order)
-
-        low, high = 0.0, math.nan
-        for depth in max_depth * np.linspace(0, 1, _DEPTHS + 1)[1:] ** 2:
-            if np.abs(multipliers(float(depth))).max() > 1:
-                high = float(depth)
-                break
-            low = float(depth)
-        if math.isnan(high):
+        unstable = next((i for i, depth in enumerate(scan) if not found(speed, depth).stable), None)
+        if unstable is None:
             continue
-        while high - low > tolerance * high:
-            middle = 0.5 * (low + high)
-            low, high = (low, middle) if np.abs(multipliers(middle)).max() > 1 else (middle, high)
-        values = multipliers(high)
-        critical = complex(values[np.argmax(np.abs(values))])
-        limits[k] = 0.5 * (low + high)
-        kinds[k] = _kind(critical)
-        chatter[k] = _frequency(system, critical, period)
-    return StabilityLobes(speeds, limits, chatter, tuple(kinds), "semi-discretization", warnings)
+        low, high = (scan[unstable - 1] if unstable else 0.0), scan[unstable]
+        while high - low > 1e-6 * max_depth:
+            middle = (low + high) / 2
+            low, high = (middle, high) if found(speed, middle).stable else (low, middle)
+        critical = found(speed, high)
+        limits[k], kinds[k] = high, critical.bifurcation
+        chatter[k] = _nearest_line(structure, complex(critical.values[0]), critical.tooth_period)
+    return StabilityLobes(speeds, limits, chatter, tuple(kinds), "semi-discretization")
 
 
-def mean_directional_matrices(process: MillingProcess, steps: int) -> Real:
-    """Mean of alpha over each interval of a tooth period, split exactly at entry and exit, (steps, 3, 3)."""
-    pitch = 2 * math.pi / process.teeth
-    edges = np.linspace(0, pitch, steps + 1)
-    events = [math.fmod(angle, pitch) for angle in (process.start_angle, process.exit_angle)]
-    nodes, weights = np.polynomial.legendre.leggauss(_AVERAGE)
-    means = np.zeros((steps, 3, 3))
-    for i in range(steps):
-        inner = sorted(event for event in events if edges[i] < event < edges[i + 1])
-        parts = [edges[i], *inner, edges[i + 1]]
-        for low, high in pairwise(parts):
-            angles = 0.5 * (low + high) + 0.5 * (high - low) * nodes
-            share = 0.5 * (high - low) / (edges[1] - edges[0])
-            means[i] += share * np.einsum("a,apq->pq", weights, directional_matrix(process, angles))
-    return means
-
-
-def one_period_multipliers(system: DelaySystem, stiffness: Real, period: float, order: int) -> Complex:
-    """Floquet multipliers for the force matrices ``a K_tc alpha`` (steps, 3, 3) over a tooth period (s).
-
-    State and tool position at the steps' ends map on those one period later.
-    """
-    matrix, output = system.state_matrix, system.output_matrix
-    steps, n_states = len(stiffness), len(matrix)
-    step = period / steps
-    width = n_states + 3 * (steps + 1)
-    state = np.zeros((n_states, width))
-    state[:, :n_states] = np.eye(n_states)
-    positions = np.zeros((steps + 1, 3, width))
-    positions[0] = output @ state
-    free = expm(matrix * step)
-    for i in range(steps):
-        column = n_states + 3 * i
-        if not stiffness[i].any():
-            state = free @ state
-        else:
-            fade, first, second = _step(system, stiffness[i], step, order)
-            state = fade @ state
-            state[:, column : column + 3] += first
-            state[:, column + 3 : column + 6] += second
-        positions[i + 1] = output @ state
-    monodromy = np.concatenate([state, positions.reshape(-1, width)])
-    return np.asarray(np.linalg.eigvals(monodromy), dtype=np.complex128)
-
-
-def _step(system: DelaySystem, stiffness: Real, step: float, order: int) -> tuple[Real, Real, Real]:
-    """One interval: decay of the state, and what the delayed position at its start and end adds."""
-    drive = system.input_matrix @ stiffness
-    n = len(drive)
-    # state, constant input, its slope: one exponential gives all three integrals
-    augmented = np.zeros((n + 6, n + 6))
-    augmented[:n, :n] = (system.state_matrix + drive @ system.output_matrix) * step
-    augmented[:n, n : n + 3] = -drive * step
-    augmented[n : n + 3, n + 3 :] = np.eye(3)
-    exponential = expm(augmented)
-    constant, ramp = exponential[:n, n : n + 3], exponential[:n, n + 3 :]
-    if order == 0:
-        return exponential[:n, :n], constant / 2, constant / 2
-    return exponential[:n, :n], constant - ramp, ramp
-
-
-def _kind(multiplier: complex) -> str:
-    angle = abs(np.angle(multiplier))
-    if angle > math.pi - 1e-6:
-        return "period-doubling"
-    return "fold" if angle < 1e-6 else "hopf"
-
-
-def _frequency(system: DelaySystem, multiplier: complex, period: float) -> float:
-    """Of the lines that the multiplier allows, the one where the tool's receptance is largest, Hz."""
-    highest = 1.5 * np.abs(system.poles).max() * period / (2 * math.pi)
-    lines = (np.angle(multiplier) + 2 * math.pi * np.arange(-int(highest) - 2, int(highest) + 3)) / period
-    direct = np.einsum("rp,kr,rq->kpq", system.right, 1 / (1j * lines[:, None] - system.poles), system.left)
-    mirror = np.einsum(
-        "rp,kr,rq->kpq", system.right.conj(), 1 / (1j * lines[:, None] - system.poles.conj()), system.left.conj()
-    )
-    strength = np.linalg.norm(direct + mirror, axis=(1, 2))
-    return float(np.abs(lines[np.argmax(strength)]) / (2 * math.pi))
+def _nearest_line(model: ModalModel, multiplier: complex, period: float) -> float:
+    """Of the lines ``(theta + 2 pi k) / tau``, the one where the structure moves most, Hz."""
+    top = int(np.ceil(1.5 * model.natural_frequencies.max() * period)) + 1
+    lines = np.abs((np.angle(multiplier) / (2 * np.pi) + np.arange(-top, top + 1)) / period)
+    return float(lines[np.argmax(np.linalg.norm(model.receptance(lines), axis=(1, 2)))])

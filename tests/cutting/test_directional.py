@@ -11,6 +11,7 @@ from cutting import (
     MillingProcess,
     average_directional_matrix,
     chip_direction,
+    directional_harmonics,
     directional_matrix,
     force_direction,
     read_cutting_process,
@@ -104,3 +105,16 @@ def test_absurd_cutting_files_are_refused_in_one_line(
     with pytest.raises(error, match=message) as caught:
         read_cutting_process(path)
     assert "\n" not in str(caught.value)
+
+
+@given(start=st.floats(0, 2.5), width=st.floats(0.2, 3.1), teeth=st.integers(1, 5), gamma=st.floats(0.3, np.pi / 2))
+def test_harmonics_are_the_fourier_coefficients_of_the_matrix(
+    start: float, width: float, teeth: int, gamma: float
+) -> None:
+    """Against sums over a tooth period, whose error falls with the step because of the jumps."""
+    process = MillingProcess(teeth, 0.01, gamma, 1e8, 0.3, 0.2, start, min(start + width, np.pi), 1e-4)
+    count, orders = 20_000, np.array([-3, 0, 1, 7])
+    angles = (np.arange(count) + 0.5) * 2 * np.pi / teeth / count
+    wave = np.exp(-1j * teeth * orders[:, None] * angles) / count
+    expected = np.einsum("kn,nij->kij", wave, directional_matrix(process, angles))
+    np.testing.assert_allclose(directional_harmonics(process, orders), expected, atol=4 * teeth / count)

@@ -1,0 +1,64 @@
+"""Semi-discretisation: stated orders of convergence to collocation's values, published figures, refusals."""
+
+import numpy as np
+import pytest
+from benchmarks_of_literature import HALF_DOWN, RPM, benchmark_cut, one_degree_of_freedom
+
+from foundation import InputError
+from replay_data import table_one_model
+from stability import multipliers, semi_discretisation, semi_discretised_multipliers
+
+
+def radius(steps: int, order: int, cut: tuple[float, str], rpm: float, depth: float) -> float:
+    """Spectral radius of the 1-degree-of-freedom benchmark."""
+    found = semi_discretised_multipliers(
+        one_degree_of_freedom(), benchmark_cut(*cut), rpm * RPM, depth, steps=steps, order=order
+    )
+    return found.spectral_radius
+
+
+CUTS = [((0.1, "down"), 6000, 1.7e-3), ((0.5, "up"), 6000, 0.3e-3)]
+
+
+@pytest.mark.parametrize(("cut", "rpm", "depth"), [*CUTS, ((1.0, "slot"), 20000, 2e-3)])
+def test_first_order_converges_with_the_square_of_the_step(cut: tuple[float, str], rpm: float, depth: float) -> None:
+    exact = multipliers(one_degree_of_freedom(), benchmark_cut(*cut), rpm * RPM, depth).spectral_radius
+    errors = np.abs([radius(steps, 1, cut, rpm, depth) - exact for steps in (20, 40, 80)])
+    np.testing.assert_allclose(np.log2(errors[:-1] / errors[1:]), 2, atol=0.1)
+
+
+@pytest.mark.parametrize(("cut", "rpm", "depth"), CUTS)
+def test_third_order_converges_with_the_fourth_power(cut: tuple[float, str], rpm: float, depth: float) -> None:
+    exact = multipliers(one_degree_of_freedom(), benchmark_cut(*cut), rpm * RPM, depth).spectral_radius
+    errors = np.abs([radius(steps, 3, cut, rpm, depth) - exact for steps in (20, 40, 80)])
+    np.testing.assert_allclose(np.log2(errors[:-1] / errors[1:]), 4, atol=0.2)
+
+
+@pytest.mark.parametrize(("steps", "published"), [(40, 1.17618), (80, 1.17761), (160, 1.17796)])
+def test_published_spectral_radii_of_the_slot(steps: int, published: float) -> None:
+    """First order, slot, 20000 rpm, 2 mm; the coefficients' average is taken a little differently there."""
+    assert radius(steps, 1, (1.0, "slot"), 20000, 2e-3) == pytest.approx(published, abs=2e-5)
+
+
+def test_table_1_by_a_second_road() -> None:
+    """Limits and the notch from the other method, as published to two digits after the point."""
+    speeds = np.array([800, 1050, 1600.0]) * RPM
+    lobes = semi_discretisation(table_one_model(), HALF_DOWN, speeds, 0.004, steps=16, order=3, n_depths=20)
+    np.testing.assert_allclose(lobes.depth_limits * 1e3, [1.67, 1.36, 2.95], rtol=0.01)
+    assert lobes.bifurcations == ("hopf", "period-doubling", "hopf")
+    assert lobes.chatter_frequencies[1] == pytest.approx(17.5)
+
+
+def test_absurd_input_is_refused_in_one_line() -> None:
+    model, cut = one_degree_of_freedom(), benchmark_cut(1.0, "slot")
+    for change, message in (
+        ({"depth": -1e-3}, r"depth = -0.001 m"),
+        ({"spindle_speed": 0.0}, r"spindle speed 0.0"),
+        ({"order": 2}, r"order 2 of semi-discretisation"),
+        ({"steps": 1}, r"1 steps are too few"),
+    ):
+        given = {"spindle_speed": 600.0, "depth": 1e-3, "steps": 20, "order": 1} | change
+        with pytest.raises(InputError, match=message):
+            semi_discretised_multipliers(model, cut, **given)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="needs a modal model"):
+        semi_discretisation(table_one_model().frf(np.arange(1.0, 50.0)), HALF_DOWN, np.array([80.0]), 0.01)
