@@ -4,20 +4,32 @@ from .cutting_file import read_cutting_process
 from .directional import (
     average_directional_matrix,
     chip_direction,
+    damping_harmonics,
     directional_harmonics,
     directional_matrix,
     force_direction,
+    turn_harmonics,
 )
+from .engaged_edge import damping_matrices, edge_matrices
 from .force_harmonics import force_harmonics
+from .immersion import IMMERSIONS, immersion_angles
 from .milling_process import MillingProcess
+from .refusal import refuse_varied
 
 __all__ = [
+    "IMMERSIONS",
     "MillingProcess",
     "average_directional_matrix",
     "chip_direction",
+    "damping_harmonics",
+    "damping_matrices",
     "directional_harmonics",
     "directional_matrix",
+    "edge_matrices",
     "force_direction",
     "force_harmonics",
+    "immersion_angles",
     "read_cutting_process",
+    "refuse_varied",
+    "turn_harmonics",
 ]

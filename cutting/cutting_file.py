@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from foundation import FileFormatError, InputError
 
+from .immersion import immersion_angles
 from .milling_process import MillingProcess
 
 
@@ -23,17 +24,25 @@ class _Cutting(BaseModel):
     ktc_pa: float
     krc: float
     kac: float = 0.0
-    start_angle_deg: float
-    exit_angle_deg: float
+    start_angle_deg: float | None = None
+    exit_angle_deg: float | None = None
+    immersion: str | None = None
+    radial_depth_m: float | None = None
     feed_per_tooth_m: float = 0.0
     kte_n_per_m: float = 0.0
     kre_n_per_m: float = 0.0
     kae_n_per_m: float = 0.0
     runout_m: float = 0.0
+    helix_angle_deg: float = 0.0
+    pitch_angles_deg: tuple[float, ...] = ()
+    process_damping_n_per_m: float = 0.0
 
 
 def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
     """Read a cutter, its engagement and coefficients from ``CUT.toml``.
+
+    The engagement is ``start_angle_deg`` and ``exit_angle_deg``, or ``immersion`` (up, down, central: with
+    ``radial_depth_m``; slot).
 
     Raises
     ------
@@ -64,6 +73,7 @@ def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
 
 def _process(cutting: _Cutting, path: object) -> MillingProcess:
     try:
+        start, leave = _engagement(cutting)
         return MillingProcess(
             teeth=cutting.teeth,
             diameter=cutting.diameter_m,
@@ -71,13 +81,34 @@ def _process(cutting: _Cutting, path: object) -> MillingProcess:
             ktc=cutting.ktc_pa,
             krc=cutting.krc,
             kac=cutting.kac,
-            start_angle=math.radians(cutting.start_angle_deg),
-            exit_angle=math.radians(cutting.exit_angle_deg),
+            start_angle=start,
+            exit_angle=leave,
             feed_per_tooth=cutting.feed_per_tooth_m,
             kte=cutting.kte_n_per_m,
             kre=cutting.kre_n_per_m,
             kae=cutting.kae_n_per_m,
             runout=cutting.runout_m,
+            helix_angle=math.radians(cutting.helix_angle_deg),
+            pitch_angles=tuple(math.radians(angle) for angle in cutting.pitch_angles_deg),
+            process_damping=cutting.process_damping_n_per_m,
         )
     except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+        raise type(error)(f"{path}: {error}") from error
+
+
+def _engagement(cutting: _Cutting) -> tuple[float, float]:
+    """Start and exit angle, rad, from the two angles or from immersion and radial depth."""
+    angles = (cutting.start_angle_deg, cutting.exit_angle_deg)
+    if cutting.immersion is not None:
+        if angles != (None, None):
+            raise InputError("give either immersion or start_angle_deg and exit_angle_deg, not both")
+        if cutting.radial_depth_m is None and cutting.immersion != "slot":
+            raise InputError(f"immersion {cutting.immersion!r} needs radial_depth_m")
+        return immersion_angles(cutting.immersion, cutting.radial_depth_m or 0.0, cutting.diameter_m)
+    for name, angle in zip(("start_angle_deg", "exit_angle_deg"), angles, strict=True):
+        if angle is None:
+            raise FileFormatError(f"cutting.{name} is missing; give both angles, or immersion and radial_depth_m")
+    start, leave = angles
+    assert start is not None
+    assert leave is not None
+    return math.radians(start), math.radians(leave)

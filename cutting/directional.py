@@ -1,5 +1,7 @@
 """Directional coefficients of milling: how a tool deflection becomes a cutting force."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -46,7 +48,8 @@ def force_direction(process: MillingProcess, angles: NDArray[np.float64]) -> NDA
 def directional_matrix(process: MillingProcess, angles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Matrix alpha at spindle angles, all teeth together (Mohammadi & Ahmadi, Eq. 2-3).
 
-    ``F = a K_tc alpha (X - X_tau)``; tooth j stands at ``angle + 2 pi j / N`` and cuts between start and exit angle.
+    ``F = a K_tc alpha (X - X_tau)``; tooth j stands its ``tooth_angles`` ahead of ``angle`` and cuts between start and
+    exit angle. Edges are straight; :func:`edge_matrices` has the helix.
 
     Parameters
     ----------
@@ -60,8 +63,8 @@ def directional_matrix(process: MillingProcess, angles: NDArray[np.float64]) -> 
     (n, 3, 3), dimensionless
     """
     total = np.zeros((len(angles), 3, 3))
-    for tooth in range(process.teeth):
-        phi = np.mod(np.asarray(angles) + 2 * np.pi * tooth / process.teeth, 2 * np.pi)
+    for ahead in process.tooth_angles:
+        phi = np.mod(np.asarray(angles) + ahead, 2 * np.pi)
         cutting = (phi >= process.start_angle) & (phi < process.exit_angle)
         product = force_direction(process, phi)[:, :, None] * chip_direction(process, phi)[:, None, :]
         total += cutting[:, None, None] * product
@@ -124,11 +127,39 @@ def directional_harmonics(process: MillingProcess, orders: NDArray[np.int64]) ->
     >>> bool(np.allclose(directional_harmonics(half, np.array([0]))[0], average_directional_matrix(half)))
     True
     """
-    orders = np.asarray(orders)
+    orders = process.teeth * np.asarray(orders)
+    return process.teeth * _tooth_harmonics(process, orders, force_direction)
+
+
+def turn_harmonics(process: MillingProcess, orders: NDArray[np.int64]) -> NDArray[np.complex128]:
+    """Fourier coefficients over a turn of each tooth's alpha, ``alpha_j(t) = sum_k alpha_jk exp(i k Omega t)``.
+
+    For unequal pitch: tooth j stands ``tooth_angles[j]`` ahead, which turns its coefficients.
+
+    Returns
+    -------
+    (teeth, n_orders, 3, 3), complex
+    """
+    ahead = np.exp(1j * np.outer(process.tooth_angles, orders))
+    return np.asarray(ahead[:, :, None, None] * _tooth_harmonics(process, np.asarray(orders), force_direction))
+
+
+def damping_harmonics(process: MillingProcess, orders: NDArray[np.int64]) -> NDArray[np.complex128]:
+    """Fourier coefficients over a turn of the normals ``sum_j n n^T`` of process damping, (n_orders, 3, 3)."""
+    ahead = np.exp(1j * np.outer(process.tooth_angles, orders)).sum(axis=0)
+    return np.asarray(ahead[:, None, None] * _tooth_harmonics(process, np.asarray(orders), chip_direction))
+
+
+def _tooth_harmonics(
+    process: MillingProcess,
+    orders: NDArray[np.int64],
+    acts: Callable[[MillingProcess, NDArray[np.float64]], NDArray[np.float64]],
+) -> NDArray[np.complex128]:
+    """``1 / (2 pi) int acts(phi) chip(phi)^T exp(-i k phi) dphi`` over the immersion, (n_orders, 3, 3)."""
     width = process.exit_angle - process.start_angle
-    turns = (process.teeth * int(np.abs(orders).max(initial=0)) + 2) * width
+    turns = (int(np.abs(orders).max(initial=0)) + 2) * width
     nodes, weights = np.polynomial.legendre.leggauss(20 + int(0.6 * turns))
     phi = process.start_angle + width / 2 * (nodes + 1)
-    product = force_direction(process, phi)[:, :, None] * chip_direction(process, phi)[:, None, :]
-    wave = np.exp(-1j * process.teeth * orders[:, None] * phi) * (weights * width / 2)
-    return np.asarray(process.teeth / (2 * np.pi) * np.einsum("kn,nij->kij", wave, product))
+    product = acts(process, phi)[:, :, None] * chip_direction(process, phi)[:, None, :]
+    wave = np.exp(-1j * orders[:, None] * phi) * (weights * width / 2)
+    return np.asarray(np.einsum("kn,nij->kij", wave, product) / (2 * np.pi))

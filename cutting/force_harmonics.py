@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from .milling_process import MillingProcess
+from .refusal import refuse_varied
 from .tooth_force import tooth_force
 
 _NODES = 200  # of the quadrature over the immersion; the integrand is a few waves of smooth function
@@ -34,7 +35,7 @@ def force_harmonics(process: MillingProcess, n_harmonics: int) -> NDArray[np.com
     Raises
     ------
     InputError
-        A negative number of harmonics.
+        A negative number of harmonics, helical edges or unequal pitch.
 
     Examples
     --------
@@ -44,6 +45,7 @@ def force_harmonics(process: MillingProcess, n_harmonics: int) -> NDArray[np.com
     """
     if n_harmonics < 0:
         raise InputError(f"{n_harmonics} harmonics: give 0 or more")
+    refuse_varied(process, "the plan of excitation", "give straight edges at equal pitch", takes=("damping",))
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
     half = 0.5 * (process.exit_angle - process.start_angle)
     angles = process.start_angle + half * (nodes + 1)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from itertools import accumulate
 
 from foundation import InputError
 
@@ -34,6 +35,13 @@ class MillingProcess:
         Edge coefficients, N/m of edge engaged.
     runout
         Radial offset of the spindle axis, m; tooth j runs ``runout * cos(2 pi j / teeth)`` large.
+    helix_angle
+        Of the edges, rad, 0 <= beta < pi/2; at the height z an edge stands ``2 z tan(beta) / diameter`` behind its tip.
+    pitch_angles : (teeth,)
+        From each tooth j to the one before it in the cut, j + 1, rad; together 2 pi. Empty: equal.
+    process_damping
+        Coefficient C, N/m: the flank takes ``C v_n / V`` per metre of edge, v_n the speed into the surface, V the
+        cutting speed (Tyler & Schmitz, Precision Engineering 37, 2013, Eq. 1).
 
     Raises
     ------
@@ -54,6 +62,9 @@ class MillingProcess:
     kre: float = 0.0
     kae: float = 0.0
     runout: float = 0.0
+    helix_angle: float = 0.0
+    pitch_angles: tuple[float, ...] = ()
+    process_damping: float = 0.0
 
     def __post_init__(self) -> None:
         if not (isinstance(self.teeth, int) and self.teeth >= 1):
@@ -65,6 +76,7 @@ class MillingProcess:
             "kre": self.kre,
             "kae": self.kae,
             "runout": self.runout,
+            "process_damping": self.process_damping,
         }
         for name, value in positive.items():
             if not (math.isfinite(value) and value > 0):
@@ -81,3 +93,39 @@ class MillingProcess:
                 f"immersion {math.degrees(self.start_angle):g} to {math.degrees(self.exit_angle):g} deg is not within "
                 "0 <= start < exit <= 180 deg; swap or correct start_angle_deg and exit_angle_deg"
             )
+        if not 0 <= self.helix_angle < math.pi / 2:
+            raise InputError(f"helix angle {math.degrees(self.helix_angle):g} deg is outside 0 <= beta < 90 deg")
+        self._check_pitch()
+
+    def _check_pitch(self) -> None:
+        if not self.pitch_angles:
+            return
+        if len(self.pitch_angles) != self.teeth:
+            raise InputError(f"{len(self.pitch_angles)} pitch angles for {self.teeth} teeth; give one a tooth")
+        degrees = ", ".join(f"{math.degrees(angle):g}" for angle in self.pitch_angles)
+        if not min(self.pitch_angles) > 0 or abs(sum(self.pitch_angles) - 2 * math.pi) > 1e-6:
+            raise InputError(f"pitch angles {degrees} deg must be positive and add up to 360 deg")
+
+    @property
+    def pitches(self) -> tuple[float, ...]:
+        """Angle from each tooth j to the one before it in the cut, j + 1, rad."""
+        return self.pitch_angles or (2 * math.pi / self.teeth,) * self.teeth
+
+    @property
+    def tooth_angles(self) -> tuple[float, ...]:
+        """Angle of each tooth ahead of tooth 0, rad."""
+        return tuple(accumulate(self.pitches[:-1], initial=0.0))
+
+    @property
+    def equal_pitch(self) -> bool:
+        """Whether all teeth follow each other at the same angle."""
+        return max(self.pitches) - min(self.pitches) < 1e-9
+
+    @property
+    def is_plain(self) -> bool:
+        """Straight edges at equal pitch without process damping: force linear in depth, one delay."""
+        return self.helix_angle == 0 and self.equal_pitch and self.process_damping == 0
+
+    def lag(self, depth: float) -> float:
+        """Angle by which an edge at the height ``depth`` (m) stands behind its tip, rad."""
+        return 2 * depth * math.tan(self.helix_angle) / self.diameter

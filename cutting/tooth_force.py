@@ -9,6 +9,7 @@ from foundation import InputError
 
 from .compiled import compiled
 from .milling_process import MillingProcess
+from .refusal import refuse_varied
 
 
 @compiled
@@ -161,10 +162,11 @@ def rigid_force(process: MillingProcess, depth: float, spindle_angles: NDArray[n
     Raises
     ------
     InputError
-        The depth is negative or not finite.
+        The depth is negative or not finite, or the edges are helical or of unequal pitch.
     """
     if not (math.isfinite(depth) and depth >= 0):
         raise InputError(f"depth = {depth!r} m must be zero or more, and finite")
+    refuse_varied(process, "the rigid force", "give straight edges at equal pitch", takes=("damping",))
     cutting, edge = specific_forces(process)
     sine_edge, cosine_edge = math.sin(process.edge_angle), math.cos(process.edge_angle)
     force = np.zeros((len(spindle_angles), 3))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
+from cutting import MillingProcess, refuse_varied
 from cutting.tooth_force import tooth_offsets
 from foundation import InputError
 from modal_fit import ModalModel
@@ -92,6 +92,7 @@ class MillingCell(SampledCell):
         super().__init__(structure, duration, sample_rate, chosen, seed, oversampling, block_length)
         if not (math.isfinite(depth) and depth >= 0):
             raise InputError(f"depth = {depth!r} m must be zero or more, and finite")
+        refuse_varied(process, "the simulated cell", "give straight edges at equal pitch without process damping")
         self.process = process
         self.depth = float(depth)
         self.profile: SpeedProfile = ConstantSpeed(float(speed)) if isinstance(speed, (int, float)) else speed

@@ -5,6 +5,7 @@ from .chatter import ChatterVerdict, classify_cut
 from .collocation import collocation, collocation_limits
 from .delay_system import DelaySystem, delay_system
 from .lobes_file import read_lobes, write_lobes
+from .mode_coupling import ModeCouplingLimit, mode_coupling_limit
 from .multi_frequency import multi_frequency, multi_frequency_limits
 from .multipliers import Multipliers, multipliers
 from .nyquist import is_stable, nyquist_limits, unstable_poles
@@ -18,6 +19,7 @@ from .zero_order import zero_order
 __all__ = [
     "ChatterVerdict",
     "DelaySystem",
+    "ModeCouplingLimit",
     "Multipliers",
     "RecommendedCut",
     "StabilityBoundary",
@@ -31,6 +33,7 @@ __all__ = [
     "delay_system",
     "depth_errors",
     "is_stable",
+    "mode_coupling_limit",
     "multi_frequency",
     "multi_frequency_limits",
     "multipliers",

@@ -40,7 +40,7 @@ def circle_crossings(
     if series.usable:
         found, settled = polished(operator, _by_series(series, angles, max_depth))
         final, settled_again = polished(finer, found)
-        if settled.all() and settled_again.all():
+        if settled.all() and settled_again.all() and _complete(operator, final, max_depth):
             return final, np.abs(final.depth - found.depth) + 1e-9 * final.depth
     found = find_crossings(LoopGain(operator).eigenvalues, angles, max_depth)
     final, settled = polished(finer, found)
@@ -64,6 +64,32 @@ def first_angles(poles: Complex, periods: Real, *, count: int = 24) -> Real:
     folded = np.abs(np.mod(near + np.pi, 2 * np.pi) - np.pi).reshape(len(periods), -1)
     together = [np.broadcast_to(even, (len(periods), count)), np.clip(folded, 1e-3, np.pi - 1e-3)]
     return np.asarray(np.sort(np.concatenate(together, axis=1), axis=1))
+
+
+def _complete(operator: PeriodOperator, found: Crossings, max_depth: float) -> bool:
+    """Whether the crossings account for the unstable multipliers that two depths really have at every speed.
+
+    Cells too coarse for a function that turns fast miss crossings, and cannot know it themselves.
+    """
+    change = np.where(found.outward, 1, -1) * np.where(found.theta == np.pi, 1, 2)
+    n_speeds, n_nodes, size = operator.motion.shape
+    for depth in (0.4 * max_depth, max_depth):
+        near = np.abs(found.depth - depth) < 1e-6 * depth
+        expected = np.zeros(n_speeds, dtype=np.int64)
+        np.add.at(expected, found.speed, np.where(found.depth < depth, change, 0))
+        within = depth * operator.within
+        drive = np.concatenate([operator.motion, -within], axis=2)
+        chip = np.linalg.solve(np.eye(n_nodes) - within, drive)
+        regained = chip.copy()
+        regained[:, :, size:] -= np.eye(n_nodes)
+        state = depth * operator.impulse @ regained
+        state[:, :, :size] += operator.free
+        unstable = np.abs(np.linalg.eigvals(np.concatenate([state, chip], axis=1))) > 1
+        wrong = unstable.sum(axis=1) != expected
+        wrong[found.speed[near]] = False
+        if wrong.any():
+            return False
+    return True
 
 
 def _by_series(series: Characteristic, angles: Real, max_depth: float) -> Crossings:

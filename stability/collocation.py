@@ -16,6 +16,7 @@ from .delay_system import DelaySystem, delay_system
 from .period_operator import period_operator
 from .stability_limits import StabilityLimits
 from .stability_lobes import StabilityLobes
+from .varied_limits import varied_limits
 from .zero_order import checked_speeds
 
 Complex = NDArray[np.complex128]
@@ -60,6 +61,9 @@ def collocation_limits(
     and 1 / depth is found as an eigenvalue of the loop gain on the unit circle, so no grid of depths is needed. With a
     purely regenerative force there is no fold: at a multiplier of 1 the chip would be ``y - y_tau = 0``.
 
+    Helical edges make the force a curved function of depth, unequal pitch gives several delays, process damping acts on
+    velocity: such cuts are collocated over a tooth period or a turn, and depths are scanned (``varied_limits``).
+
     Parameters
     ----------
     structure, process, spindle_speeds, max_depth
@@ -76,6 +80,8 @@ def collocation_limits(
         raise InputError("collocation needs a modal model, this is an FRF; fit it first, or use multi-frequency")
     speeds = checked_speeds(spindle_speeds, max_depth)
     system = delay_system(structure, process)
+    if not process.is_plain:
+        return varied_limits(system, speeds, float(max_depth))
     chunks = _chunks(speeds)
     with ThreadPoolExecutor(max(1, threads)) as pool:
         parts = list(pool.map(lambda chunk: _limits_of(system, speeds, chunk, max_depth), chunks))

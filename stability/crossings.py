@@ -25,7 +25,7 @@ class Crossings:
         Index of the spindle speed.
     depth : (n,), m
     theta : (n,), rad
-        Argument of the multiplier, 0 < theta <= pi; pi is period doubling.
+        Argument of the multiplier, 0 <= theta <= pi; pi is period doubling, 0 a fold.
     outward : (n,), bool
         Whether the multiplier leaves the circle as depth grows.
     """
@@ -36,7 +36,7 @@ class Crossings:
     outward: NDArray[np.bool_]
 
 
-def find_crossings(spectrum: Spectrum, grid: Real, max_depth: float) -> Crossings:
+def find_crossings(spectrum: Spectrum, grid: Real, max_depth: float, *, folds: bool = False) -> Crossings:
     """Follow the eigenvalues of the loop gain over theta and refine where one is real and positive.
 
     Intervals of the grid are halved until every eigenvalue that matters (above 0.7 / max_depth) has a clear partner
@@ -51,16 +51,16 @@ def find_crossings(spectrum: Spectrum, grid: Real, max_depth: float) -> Crossing
         First angles in (0, pi], increasing, ending in pi.
     max_depth
         Depths above it are not looked for, m.
+    folds
+        Look at theta = 0 too, where a purely regenerative force of equal teeth has none.
     """
     speed, low, high, value_low, value_high = _brackets(spectrum, grid, 0.7 / max_depth)
     theta, value, good = _roots(spectrum, speed, low, high, value_low, value_high)
     speed, theta, value = speed[good], theta[good], value[good]
-    doubling, at_pi = _period_doublings(spectrum, len(grid), 1 / max_depth)
-    speed, theta, value = (
-        np.concatenate([speed, doubling]),
-        np.append(theta, np.full(len(doubling), np.pi)),
-        np.append(value, at_pi),
-    )
+    for end in (np.pi, 0.0) if folds else (np.pi,):
+        there, at_end = _real_ones(spectrum, len(grid), end, 1 / max_depth)
+        speed = np.concatenate([speed, there])
+        theta, value = np.append(theta, np.full(len(there), end)), np.append(value, at_end)
     inside = value.real >= 1 / max_depth
     speed, theta, value = speed[inside], theta[inside], value[inside]
     slope = (value - nearest(spectrum(speed, theta - SLOPE_STEP), value)) / SLOPE_STEP
@@ -78,9 +78,9 @@ def nearest(values: Complex, wanted: Complex) -> Complex:
     return np.asarray(values[np.arange(len(values)), chosen])
 
 
-def _period_doublings(spectrum: Spectrum, n_speeds: int, smallest: float) -> tuple[Index, Complex]:
-    """Real positive eigenvalues at theta = pi, where the loop gain is a real matrix."""
-    values = spectrum(np.arange(n_speeds), np.full(n_speeds, np.pi))
+def _real_ones(spectrum: Spectrum, n_speeds: int, theta: float, smallest: float) -> tuple[Index, Complex]:
+    """Real positive eigenvalues at theta = pi or 0, where the loop gain is a real matrix."""
+    values = spectrum(np.arange(n_speeds), np.full(n_speeds, theta))
     speeds, columns = np.nonzero((np.abs(values.imag) < 1e-9 * np.abs(values)) & (values.real >= smallest))
     return speeds, np.asarray(values[speeds, columns].real + 0j)
 
@@ -202,6 +202,8 @@ def moved_depths(spectrum: Spectrum, found: Crossings) -> Real:
     before = (1 / found.depth).astype(np.complex128)
     there = nearest(spectrum(found.speed, found.theta), before)
     slope = (there - nearest(spectrum(found.speed, found.theta - SLOPE_STEP), there)) / SLOPE_STEP
-    steep = np.where(found.theta == np.pi, 0.0, slope.real / np.where(slope.imag == 0, np.inf, slope.imag))
+    steep = np.where(
+        (found.theta == np.pi) | (found.theta == 0), 0.0, slope.real / np.where(slope.imag == 0, np.inf, slope.imag)
+    )
     change = there - before
     return np.asarray(found.depth**2 * (np.abs(change.real) + np.abs(change.imag * steep)))

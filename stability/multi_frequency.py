@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess, directional_harmonics
+from cutting import MillingProcess, damping_harmonics, directional_harmonics, refuse_varied, turn_harmonics
 from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
@@ -14,6 +14,7 @@ from .crossings import Crossings, find_crossings, moved_depths
 from .stability_limits import StabilityLimits
 from .stability_lobes import StabilityLobes
 from .tool_receptance import ToolReceptance, tool_receptance
+from .varied_edges import period_angle
 from .zero_order import checked_speeds
 
 Complex = NDArray[np.complex128]
@@ -57,6 +58,9 @@ def multi_frequency_limits(
     depth is one over an eigenvalue, as in the zero-order solution, which keeps p = q = 0 alone; period doubling is
     ``w = w_T / 2`` (Budak & Altintas 1998; Merdol & Altintas 2004).
 
+    Unequal pitch has its harmonics at the spindle's frequency and one delay a tooth; process damping adds
+    ``-i w (C / V) P`` to the force, linear in depth too.
+
     A measured FRF counts only inside its valid lines: below them its first line's real part is kept, above them the
     structure is taken to stand still.
 
@@ -71,20 +75,23 @@ def multi_frequency_limits(
         Speeds or depth not positive, a structure that cannot be used, or speeds so low that more than 60 harmonics of
         tooth passing lie below its highest frequency.
     """
+    refuse_varied(process, "the multi-frequency solution", "use collocation", takes=("pitch", "damping"))
     speeds = checked_speeds(spindle_speeds, max_depth)
     source = tool_receptance(structure)
-    truncated = _Truncated(source, process, 2 * np.pi / (process.teeth * speeds), _flexible(source))
+    truncated = _Truncated(source, process, period_angle(process) / speeds, _flexible(source))
     coarser = replace(truncated, source=_coarser(structure, source))
-    found = find_crossings(truncated.eigenvalues, truncated.first_angles(_peaks(source)), max_depth)
-    at_pi = found.theta == np.pi
+    found = find_crossings(
+        truncated.eigenvalues, truncated.first_angles(_peaks(source)), max_depth, folds=not process.is_plain
+    )
+    real = (found.theta == np.pi) | (found.theta == 0)
     return StabilityLimits(
         speeds,
         float(max_depth),
         found.speed,
         found.depth,
         truncated.strongest_lines(found),
-        tuple("period-doubling" if doubling else "hopf" for doubling in at_pi),
-        np.where(found.outward, 1, -1) * np.where(at_pi, 1, 2),
+        tuple({np.pi: "period-doubling", 0.0: "fold"}.get(float(theta), "hopf") for theta in found.theta),
+        np.where(found.outward, 1, -1) * np.where(real, 1, 2),
         moved_depths(coarser.eigenvalues, found) / 3 + 1e-9 * found.depth,
         "multi-frequency",
         source.warnings,
@@ -131,13 +138,34 @@ class _Truncated:
         orders = self.harmonics
         count = len(orders)
         rows, columns = self.flexible
-        every = directional_harmonics(self.process, np.arange(1 - count, count)) * self.process.ktc
         difference = np.arange(count)[:, None] - np.arange(count) + count - 1
-        cutting = every[difference][:, :, columns][:, :, :, rows]
+        orders = np.arange(1 - count, count)
         moving = self.receptance(self.lines(speeds, theta))[:, :, rows][:, :, :, columns]
-        blocks = np.einsum("pqij,nqjk->npiqk", cutting, moving, optimize=True)
         size = count * len(columns)
-        return np.asarray((1 - np.exp(-1j * theta))[:, None, None] * blocks.reshape(len(theta), size, size))
+        blocks = np.zeros((len(theta), count, len(columns), count, len(columns)), dtype=complex)
+        for harmonics, factor in self._terms(orders, speeds, theta):
+            cutting = harmonics[difference][:, :, columns][:, :, :, rows]
+            blocks += np.einsum("pqij,nqjk->npiqk", cutting, factor[:, :, None, None] * moving, optimize=True)
+        return blocks.reshape(len(theta), size, size)
+
+    def _terms(self, orders: Index, speeds: Index, theta: Real) -> list[tuple[Complex, Complex]]:
+        """Harmonics (n_orders, 3, 3) of each force, Pa, and its factor (n_pairs, n_harmonics) from motion at a line."""
+        process, count = self.process, len(self.harmonics)
+        turns = theta[:, None] + 2 * np.pi * self.harmonics  # of the motion over a period
+        if process.equal_pitch:
+            delayed = np.tile(1 - np.exp(-1j * theta)[:, None], (1, count))
+            terms = [(process.ktc * directional_harmonics(process, orders), delayed)]
+        else:
+            teeth = process.ktc * turn_harmonics(process, orders)
+            factors = [1 - np.exp(-1j * turns * pitch / (2 * np.pi)) for pitch in process.pitches]
+            terms = list(zip(teeth, factors, strict=True))
+        if process.process_damping:
+            spindle = period_angle(process) / self.periods[speeds]
+            flank = process.process_damping / (spindle * process.diameter / 2)
+            step = process.teeth if process.equal_pitch else 1
+            velocity = -1j * turns * (flank / self.periods[speeds])[:, None]
+            terms.append((damping_harmonics(process, step * orders), velocity))
+        return terms
 
     def eigenvalues(self, speeds: Index, theta: Real) -> Complex:
         """Eigenvalues, largest first, (n_pairs, n)."""

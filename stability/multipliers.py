@@ -12,6 +12,7 @@ from modal_fit import ModalModel
 
 from .delay_system import delay_system
 from .period_operator import period_operator
+from .varied_edges import varied_cut
 
 Complex = NDArray[np.complex128]
 
@@ -24,7 +25,7 @@ class Multipliers:
     ----------
     values : (n,)
     tooth_period
-        s.
+        s; of a turn where the pitch is not equal.
     """
 
     values: Complex
@@ -82,6 +83,10 @@ def multipliers(
         raise InputError(f"spindle speed {spindle_speed!r} rad/s must be positive")
     if not (math.isfinite(depth) and depth >= 0):
         raise InputError(f"depth = {depth!r} m must be zero or more, and finite")
+    if not process.is_plain:
+        cut = varied_cut(delay_system(model, process), spindle_speed, depth, extra=extra_nodes)
+        values = np.linalg.eigvals(cut.monodromy)
+        return Multipliers(np.asarray(values[np.argsort(-np.abs(values))], dtype=complex), cut.period)
     period = 2 * np.pi / (process.teeth * spindle_speed)
     operator = period_operator(delay_system(model, process), np.array([period]), extra=extra_nodes)
     within, motion, impulse = depth * operator.within[0], operator.motion[0], depth * operator.impulse[0]

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess, average_directional_matrix
+from cutting import MillingProcess, average_directional_matrix, damping_harmonics
 from estimation import Frf
 from modal_fit import ModalModel
 
@@ -20,10 +20,10 @@ def unstable_poles(
 ) -> NDArray[np.int64]:
     """Number of unstable closed-loop pole pairs at each depth, by encirclements of the origin.
 
-    ``det[I - a K_tc alpha_0 (1 - exp(-s tau)) H(s)]`` is followed along the positive imaginary axis; the structure
-    itself is stable, so each turn of its argument by -2 pi is one unstable pair (Nyquist 1932; Mohammadi & Ahmadi,
-    Eq. 5). Below and above the known span the receptance is taken to be so small that the determinant stays near
-    its end value.
+    ``det[I - a K_tc alpha_0 mean_j(1 - exp(-s tau_j)) H(s)]`` is followed along the positive imaginary axis, process
+    damping added as ``a s (C / V) P_0 H``; the structure itself is stable, so each turn of its argument by -2 pi is one
+    unstable pair (Nyquist 1932; Mohammadi & Ahmadi, Eq. 5). Below and above the known span the receptance is taken to
+    be so small that the determinant stays near its end value.
 
     Parameters
     ----------
@@ -46,15 +46,13 @@ def is_stable(structure: Frf | ModalModel, process: MillingProcess, spindle_spee
 
 
 def _turns(source: ToolReceptance, process: MillingProcess, speed: float, depths: Real) -> NDArray[np.int64]:
-    delay = 2 * np.pi / (process.teeth * speed)
-    step = 1 / (24 * delay)
+    step = speed / (24 * max(process.pitches))
     counts = np.maximum(1, np.ceil(np.diff(source.grid) / step)).astype(int)
     pieces = [
         np.linspace(a, b, n, endpoint=False) for a, b, n in zip(source.grid, source.grid[1:], counts, strict=False)
     ]
     frequencies = np.append(np.concatenate(pieces), source.grid[-1])
-    loop = process.ktc * average_directional_matrix(process) @ source.evaluate(frequencies)
-    loop = loop * (1 - np.exp(-2j * np.pi * frequencies * delay))[:, None, None]
+    loop = _averaged_loop(process, speed, source.evaluate(frequencies), frequencies)
     # det(I - a L) = 1 - a c1 + a^2 c2 - a^3 c3 with the principal minors of L
     first = np.trace(loop, axis1=1, axis2=2)
     second = (first**2 - np.trace(loop @ loop, axis1=1, axis2=2)) / 2
@@ -109,10 +107,20 @@ def nyquist_limits(
     return StabilityLobes(speeds, limits, chatter, bifurcations, "nyquist", source.warnings)
 
 
+def _averaged_loop(process: MillingProcess, speed: float, receptance: Complex, frequencies: Real) -> Complex:
+    """Loop gain per unit depth, (n_lines, 3, 3), 1/m, with every tooth's delay and process damping."""
+    omega = 2j * np.pi * frequencies
+    regained = 1 - np.exp(-omega[:, None] * np.array(process.pitches) / speed).mean(axis=1)
+    loop = process.ktc * regained[:, None, None] * (average_directional_matrix(process) @ receptance)
+    if process.process_damping:
+        flank = process.process_damping / (speed * process.diameter / 2)
+        normals = damping_harmonics(process, np.array([0]))[0].real
+        loop = loop - (flank * omega)[:, None, None] * (normals @ receptance)
+    return np.asarray(loop)
+
+
 def _crossing_frequency(source: ToolReceptance, process: MillingProcess, speed: float, depth: float) -> float:
     """Frequency at which the determinant comes closest to zero, Hz."""
-    delay = 2 * np.pi / (process.teeth * speed)
     fine = np.unique(np.concatenate([np.linspace(a, b, 9) for a, b in zip(source.grid, source.grid[1:], strict=False)]))
-    loop = process.ktc * depth * average_directional_matrix(process) @ source.evaluate(fine)
-    loop = loop * (1 - np.exp(-2j * np.pi * fine * delay))[:, None, None]
+    loop = depth * _averaged_loop(process, speed, source.evaluate(fine), fine)
     return float(fine[np.argmin(np.abs(np.linalg.det(np.eye(3) - loop)))])

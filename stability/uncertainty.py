@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
-from cutting import MillingProcess, average_directional_matrix
+from cutting import MillingProcess, average_directional_matrix, refuse_varied
 from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
@@ -77,6 +77,7 @@ def depth_errors(structure: Frf | ModalModel, process: MillingProcess, lobes: St
     if not len(found):
         return errors
     frequencies, depths = lobes.chatter_frequencies[found], lobes.depth_limits[found]
+    refuse_varied(process, "the band of a limit", "draw it for equal pitch without process damping", takes=("helix",))
     delays = 2 * math.pi / (process.teeth * lobes.spindle_speeds[found])
     weights, slope, level = _sensitivity(structure, process, frequencies, depths, delays)
     # d a / d Re g and d a / d Im g, with the frequency free to follow

@@ -5,7 +5,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess, average_directional_matrix
+from cutting import MillingProcess, average_directional_matrix, refuse_varied
 from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
@@ -42,6 +42,7 @@ def zero_order(
     InputError
         Speeds or depth that are not positive, or a structure that cannot be used.
     """
+    refuse_varied(process, "the zero-order solution", "use nyquist or collocation", takes=("helix",))
     speeds = checked_speeds(spindle_speeds, max_depth)
     source = tool_receptance(structure)
     limits = np.full(len(speeds), np.inf)

@@ -12,6 +12,7 @@ from modal_fit import ModalModel
 from stability import (
     StabilityLobes,
     collocation,
+    mode_coupling_limit,
     multi_frequency,
     nyquist_limits,
     semi_discretisation,
@@ -81,3 +82,15 @@ def compute_lobes(
         if isinstance(known, Frf):
             raise InputError(f"method {method} needs a modal model, not an FRF; fit one, or use multi-frequency")
         return OF_MODELS[method](known, process, spindle_speeds, max_depth)
+
+
+def mode_coupling_line(model: ModalModel, process: MillingProcess, max_depth: float) -> str:
+    """One sentence on whether two modes couple at any depth up to ``max_depth`` (m), at every spindle speed alike."""
+    if model.residuals is not None and model.residuals.upper.any():
+        return "mode coupling: not computed, the model has a residual flexibility"
+    found = mode_coupling_limit(model, process, max_depth)
+    if found.kind == "none":
+        return f"mode coupling: none up to {1e3 * max_depth:.3g} mm"
+    if found.kind == "fold":
+        return f"mode coupling: from {1e3 * found.depth:.3g} mm the cutting force exceeds the structure's stiffness"
+    return f"mode coupling: from {1e3 * found.depth:.3g} mm on at {found.frequency:.4g} Hz, at every spindle speed"

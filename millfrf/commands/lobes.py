@@ -28,7 +28,7 @@ def lobes(
     from modal_fit import read_modal_model
     from stability import write_lobes
 
-    from ..chain.lobes import compute_lobes, speed_axis
+    from ..chain.lobes import compute_lobes, mode_coupling_line, speed_axis
     from ..file_kinds import FRF, MODEL, kind_of
     from ..progress import bar
 
@@ -47,3 +47,5 @@ def lobes(
         f"wrote {out}: lowest limit {1e3 * result.depth_limits[lowest]:.3g} mm "
         f"at {result.spindle_speeds_rpm[lowest]:.0f} rpm"
     )
+    if kind == MODEL:
+        typer.echo(mode_coupling_line(read_modal_model(dynamics), process, max_depth))

@@ -1,0 +1,43 @@
+"""Crossings found along the circle against multipliers counted at depths, on random structures."""
+
+import numpy as np
+import pytest
+
+from cutting import MillingProcess
+from modal_fit import ModalModel
+from stability import collocation_limits, multipliers
+
+LABELS = ("T:+X", "T:+Y", "T:+Z")
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_counts_of_unstable_multipliers_follow_from_the_crossings(seed: int) -> None:
+    """Non-reciprocal modes, low speeds, depths many times the first limit: where a coarse search would miss some."""
+    rng = np.random.default_rng(seed)
+    n_modes = int(rng.integers(1, 4))
+    omega = 2 * np.pi * np.sort(rng.uniform(30, 120, n_modes))
+    damping = rng.uniform(0.01, 0.06, n_modes)
+    poles = omega * (-damping + 1j * np.sqrt(1 - damping**2))
+    shapes = rng.normal(size=(n_modes, 3))
+    model = ModalModel(
+        poles,
+        shapes / (2j * poles.imag[:, None] * rng.uniform(1, 3, (n_modes, 1))),
+        shapes + 0.15 * rng.normal(size=(n_modes, 3)) + 0j,
+        LABELS,
+        LABELS,
+    )
+    start = rng.uniform(0, 1.8)
+    process = MillingProcess(
+        int(rng.integers(1, 5)), 0.01, np.pi / 2, 2e8, 0.3, 0.1, start, min(start + rng.uniform(0.5, 3.1), np.pi), 1e-4
+    )
+    speeds = np.sort(rng.uniform(700, 4000, 4)) * np.pi / 30
+    limits = collocation_limits(model, process, speeds, 4e-3)
+    depths = np.linspace(2e-4, 4e-3, 20)
+    counted = limits.unstable_multipliers(depths)
+    for k, speed in enumerate(speeds):
+        for depth, count in zip(depths, counted[k], strict=True):
+            edges = limits.depth[limits.speed == k]
+            if len(edges) and np.abs(edges - depth).min() < 1e-6:
+                continue
+            here = multipliers(model, process, float(speed), float(depth)).values
+            assert (np.abs(here) > 1).sum() == count, (speed, depth)
