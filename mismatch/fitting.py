@@ -1,0 +1,226 @@
+"""Gauss-Newton on whole recordings: modal parameters within a lab's error, the numbers of causes, and the noise."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .explanation import Cause, Explanation, Predicted, columns_of, predict_lines, surround
+from .noise_model import NoiseModel, fit_noise, whitening
+from .windowed_lines import WindowedLines
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+THREADS = 2
+
+
+@dataclass(frozen=True)
+class Fit:
+    """An explanation fitted to recordings.
+
+    Parameters
+    ----------
+    explanation
+        At its best.
+    noises
+        One a recording.
+    misfit
+        ``2 sum ln det V + r^H V^-1 r`` over lines and recordings.
+    deviation
+        |u|^2, in lab errors.
+    score
+        ``misfit + deviation + n_cause_numbers ln N``: Bayes' information criterion with the lab's belief as prior.
+    covariance : (size, size)
+        Of u and the causes' coordinates.
+    """
+
+    explanation: Explanation
+    noises: tuple[NoiseModel, ...]
+    misfit: float
+    deviation: float
+    score: float
+    covariance: Real
+
+
+@dataclass(frozen=True)
+class _Assessed:
+    """One recording under an explanation."""
+
+    predicted: Predicted
+    white: Complex
+    rest: Complex
+    misfit: float
+    noise: NoiseModel
+
+
+def fit(
+    lines: list[WindowedLines],
+    start: Explanation,
+    noises: tuple[NoiseModel, ...] | None = None,
+    *,
+    iterations: int = 8,
+    tolerance: float = 1.0,
+) -> Fit:
+    """Fit an explanation to recordings.
+
+    Minimises ``misfit + |u|^2`` by Gauss-Newton with step halving (Levenberg's damping where halving fails); noise is
+    estimated anew at each step, so causes compete on what they leave, not on a noise that one of them assumed.
+
+    Parameters
+    ----------
+    lines
+        Recordings.
+    start
+        To begin with.
+    noises
+        To begin with; None: from the residual of ``start``.
+    iterations
+        At most.
+    tolerance
+        Of the misfit: a smaller gain ends the fit.
+    """
+    explanation = start
+    with ThreadPoolExecutor(THREADS) as pool:
+        current = list(noises) if noises is not None else [None] * len(lines)
+        seen = list(pool.map(_assess, lines, [explanation] * len(lines), current))
+        cost = _cost(seen, explanation)
+        matrix, gradient = _normal_equations(pool, lines, explanation, seen)
+        damping = 0.0
+        for _ in range(iterations):
+            step = np.asarray(np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), gradient), dtype=float)
+            for _ in range(4):
+                trial = _moved(explanation, step)
+                again = list(pool.map(_assess, lines, [trial] * len(lines), [one.noise for one in seen]))
+                trial_cost = _cost(again, trial)
+                if trial_cost < cost:
+                    break
+                step = step / 4
+            if not trial_cost < cost:
+                if damping > 1:
+                    break
+                damping = max(10 * damping, 0.1)
+                continue
+            damping /= 10
+            gain = cost - trial_cost
+            explanation, seen, cost = trial, again, trial_cost
+            if gain < tolerance:
+                break
+            matrix, gradient = _normal_equations(pool, lines, explanation, seen)
+    misfit = sum(one.misfit for one in seen)
+    deviation = _deviation(explanation)
+    count = 2 * sum(one.measured.size for one in lines)
+    numbers = sum(cause.size for cause in explanation.causes)
+    # a mode's length may be shared between its vectors at will: two numbers of each are no freedom
+    numbers += explanation.shape.added * (explanation.shape.per_mode - 2)
+    return Fit(
+        explanation,
+        tuple(one.noise for one in seen),
+        misfit,
+        deviation,
+        misfit + deviation + numbers * float(np.log(count)),
+        np.asarray(np.linalg.inv(matrix), dtype=float),
+    )
+
+
+def residual(fitted: Fit, lines: list[WindowedLines]) -> list[Complex]:
+    """What a fit leaves of each recording, (n_lines, n_responses)."""
+    return [one.measured - predict_lines(fitted.explanation, one).response for one in lines]
+
+
+def through_structure(explanation: Explanation, lines: WindowedLines) -> Complex:
+    """From forces to measured responses at the lines, (n_lines, n_responses, n_excitations)."""
+    around = surround(explanation, lines.frequencies)
+    closed = around.closed(explanation.model.receptance(lines.frequencies))
+    if around.force is not None:
+        closed = closed @ around.force
+    return np.asarray(around.shown(closed * lines.kinematic(lines.frequencies)[:, :, None]))
+
+
+def levels(lines: WindowedLines) -> tuple[Real, Real]:
+    """Root mean square a line of responses and of forces."""
+    return (
+        np.sqrt(np.mean(np.abs(lines.measured) ** 2, axis=0)),
+        np.sqrt(np.mean(np.abs(lines.force_here) ** 2, axis=0)),
+    )
+
+
+def jacobian(explanation: Explanation, lines: WindowedLines, predicted: Predicted) -> Complex:
+    """Derivative of the response lines by u and the causes' coordinates, (n_lines, n_responses, size)."""
+    around = surround(explanation, lines.frequencies)
+    force = around.pushed(lines.force_here)
+    if predicted.joint.any():
+        force = force - lines.cut(lines.signal(predicted.joint))
+    closed = None
+    if around.feedback is not None:
+        receptance = explanation.model.receptance(lines.frequencies)
+        displacement = np.einsum("kpq,kq->kp", around.closed(receptance), force)
+        force = force - np.einsum("kqp,kp->kq", around.feedback, displacement)
+        closed = np.linalg.inv(np.eye(receptance.shape[1]) + receptance @ around.feedback)
+    linear = explanation.shape.jacobian(explanation.u, lines.frequencies, force)
+    if closed is not None:
+        linear = closed @ linear
+    linear = around.shown(linear * lines.kinematic(lines.frequencies)[:, :, None])
+    columns = [linear]
+    here = explanation.coordinates()
+    for k in range(len(here)):
+        aside = here.copy()
+        aside[k] += 0.02
+        changed = predict_lines(explanation.with_causes(aside), lines).response
+        columns.append(((changed - predicted.response) / 0.02)[:, :, None])
+    return np.concatenate(columns, axis=2)
+
+
+def _assess(lines: WindowedLines, explanation: Explanation, noise: NoiseModel | None) -> _Assessed:
+    predicted = predict_lines(explanation, lines)
+    rest = lines.measured - predicted.response
+    if not np.isfinite(rest).all():
+        return _Assessed(predicted, np.zeros(0, dtype=complex), rest, np.inf, noise or NoiseModel(*(np.zeros(0),) * 3))
+    through = through_structure(explanation, lines)
+    noise = fit_noise(lines.frequencies, rest, through, levels(lines), noise)
+    covariance = noise.covariance(lines.frequencies, through)
+    white = whitening(covariance)
+    small = np.einsum("kij,kj->ki", white, rest)
+    misfit = 2 * float(np.sum(np.linalg.slogdet(covariance)[1]) + np.sum(np.abs(small) ** 2))
+    return _Assessed(predicted, white, rest, misfit, noise)
+
+
+def _normal_of(lines: WindowedLines, explanation: Explanation, seen: _Assessed) -> tuple[Real, Real]:
+    slope = (seen.white @ jacobian(explanation, lines, seen.predicted)).reshape(seen.rest.size, -1)
+    small = np.einsum("kij,kj->ki", seen.white, seen.rest).ravel()
+    matrix = slope.real.T @ slope.real + slope.imag.T @ slope.imag
+    return 2 * matrix, 2 * (slope.real.T @ small.real + slope.imag.T @ small.imag)
+
+
+def _normal_equations(
+    pool: ThreadPoolExecutor, lines: list[WindowedLines], explanation: Explanation, seen: list[_Assessed]
+) -> tuple[Real, Real]:
+    """Normal equations with the lab's belief about u, and a belief so weak that it only keeps them solvable."""
+    size, count = explanation.shape.size, explanation.size
+    parts = list(pool.map(_normal_of, lines, [explanation] * len(lines), seen))
+    belief = np.full(count, 1e-6)
+    belief[:size] = explanation.shape.belief
+    matrix = sum((part[0] for part in parts), np.diag(belief))
+    gradient = sum((part[1] for part in parts), np.zeros(count))
+    gradient[:size] -= explanation.shape.belief * explanation.u
+    return matrix, gradient
+
+
+def _moved(explanation: Explanation, step: Real) -> Explanation:
+    size = explanation.shape.size
+    moved = replace(explanation, u=explanation.u + step[:size])
+    if not explanation.causes:
+        return moved
+    return moved.with_causes(explanation.coordinates() + np.clip(step[size:], -15, 15))
+
+
+def _cost(seen: list[_Assessed], explanation: Explanation) -> float:
+    return sum(one.misfit for one in seen) + _deviation(explanation)
+
+
+def _deviation(explanation: Explanation) -> float:
+    return float(explanation.shape.belief @ explanation.u**2)
+
+
+__all__ = ["Cause", "Fit", "columns_of", "fit", "jacobian", "levels", "residual", "through_structure"]

@@ -1,0 +1,88 @@
+"""The restoring force of one joint as a function of its deflection, velocity, time and memory."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+
+POINTS = 8193
+"""Of a table over deflection or velocity."""
+
+
+def _none() -> Real:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True)
+class JointLaw:
+    """Force g that a joint takes beyond its linear stiffness and damping, ``g = S(x) + D(v) + r tau x + sum_i w_i``.
+
+    Any law of deflection x and velocity v goes into the two tables; memory is a sum of elastic-plastic elements in
+    parallel, ``w_i' = k_i v`` held within ``|w_i| <= k_i y_i`` (Iwan, J. Applied Mechanics 33, 1966): one is an
+    elastic-plastic spring, several a smooth hysteresis, a stiff one dry friction with presliding.
+
+    Parameters
+    ----------
+    reach
+        Deflection x at the ends of its table, m; beyond, the table goes on straight.
+    stiffness : (POINTS,), N
+        S at evenly spaced x from -reach to reach; empty: none.
+    speed
+        Velocity at the ends of its table, m/s.
+    damping : (POINTS,), N
+        D at evenly spaced v; empty: none.
+    ramp
+        r, N/m: change of stiffness from the beginning to the end of a recording, tau runs from -1/2 to 1/2.
+    springs : (n,), N/m
+        k of the elastic-plastic elements.
+    yields : (n,), m
+        y.
+    """
+
+    reach: float = 1.0
+    stiffness: Real = field(default_factory=_none)
+    speed: float = 1.0
+    damping: Real = field(default_factory=_none)
+    ramp: float = 0.0
+    springs: Real = field(default_factory=_none)
+    yields: Real = field(default_factory=_none)
+
+    def tables(self) -> tuple[Real, Real]:
+        """Both tables, zeros where there is none."""
+        zero = np.zeros(3)
+        return (self.stiffness if len(self.stiffness) else zero, self.damping if len(self.damping) else zero)
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """How far and how fast a joint moved in the trials: what a law's shape is chosen from.
+
+    Parameters
+    ----------
+    deflection
+        Root mean square, m, of the strongest trial.
+    velocity
+        Root mean square, m/s.
+    reach, speed
+        Twice the largest deflection (m) and velocity (m/s).
+    stiffness
+        Of the structure along the joint's direction, N/m.
+    """
+
+    deflection: float
+    velocity: float
+    reach: float
+    speed: float
+    stiffness: float
+
+    @property
+    def deflections(self) -> Real:
+        """Points of the table over deflection, m."""
+        return np.linspace(-self.reach, self.reach, POINTS)
+
+    @property
+    def velocities(self) -> Real:
+        """Points of the table over velocity, m/s."""
+        return np.linspace(-self.speed, self.speed, POINTS)

@@ -1,0 +1,106 @@
+"""Free simulation of a joint's law on a modal model, recording by recording."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, rfft
+
+from foundation import DegreeOfFreedom, InputError
+from modal_fit import ModalModel
+
+from .joint_law import JointLaw
+from .joint_loop import driven_run, free_run
+from .windowed_lines import WindowedLines, receptance_at
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+INSTANTS_PER_PERIOD = 20.0
+"""Of the highest mode."""
+
+
+def common_axes(model: ModalModel) -> tuple[list[int], list[int]]:
+    """Responses and excitations that share an axis: where a joint's deflection and its force are both seen.
+
+    Raises
+    ------
+    InputError
+        There are none.
+    """
+    axes = {DegreeOfFreedom.parse(label).axis: place for place, label in reversed(list(enumerate(model.responses)))}
+    pairs = [
+        (axes[axis], place)
+        for place, axis in enumerate(DegreeOfFreedom.parse(label).axis for label in model.excitations)
+        if axis in axes
+    ]
+    if not pairs:
+        raise InputError(f"responses {', '.join(model.responses)} share no axis with {', '.join(model.excitations)}")
+    return [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+
+
+def fineness(model: ModalModel, rate: float) -> int:
+    """Instants of the simulation a sample."""
+    return max(4, int(np.ceil(INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate)))
+
+
+def joint_force(model: ModalModel, lines: WindowedLines, force: Complex, direction: Real, law: JointLaw) -> Complex:
+    """Padded spectrum (n_padded_lines,) of the joint's force, N, the structure simulated freely under both forces.
+
+    Parameters
+    ----------
+    model
+        Linear structure.
+    lines
+        Of the recording.
+    force : (n_padded_lines, n_excitations)
+        Spectrum of the outer force.
+    direction : (n_axes,)
+        Of the joint over the common axes, of unit length.
+    law
+        Of the joint.
+    """
+    rows, columns = common_axes(model)
+    frequencies = lines.padded_frequencies
+    displacement = np.einsum("kpq,kq->kp", receptance_at(model, frequencies)[:, rows], force) @ direction
+    fine = fineness(model, lines.trial.rate)
+    n = fine * lines.padded
+    deflection = fine * irfft(displacement, n=n)
+    velocity = fine * irfft(2j * np.pi * frequencies * displacement, n=n)
+    step = 1.0 / (fine * lines.trial.rate)
+    result = np.empty(n)
+    free_run(
+        deflection,
+        velocity,
+        _dynamics(model, rows, columns, direction, step),
+        law.tables(),
+        (law.reach, law.speed),
+        _ramp(law, n, step, lines.trial.duration),
+        (law.springs, law.yields),
+        result,
+    )
+    return np.asarray(rfft(result)[: len(frequencies)] / fine)
+
+
+def driven_force(lines: WindowedLines, deflection: Real, velocity: Real, law: JointLaw) -> Real:
+    """The joint's force (n,), N, for a motion sampled at the trial's rate."""
+    result = np.empty(len(deflection))
+    ramp = _ramp(law, len(deflection), 1 / lines.trial.rate, lines.trial.duration)
+    driven_run(deflection, velocity, law.tables(), (law.reach, law.speed), ramp, (law.springs, law.yields), result)
+    return result
+
+
+def _ramp(law: JointLaw, n: int, step: float, duration: float) -> Real:
+    return np.asarray(law.ramp * (np.minimum(np.arange(n) * step / duration, 1.0) - 0.5))
+
+
+def _dynamics(
+    model: ModalModel, rows: list[int], columns: list[int], direction: Real, step: float
+) -> tuple[Complex, Complex, Complex, Complex, Complex]:
+    """Exact step of ``q' = p q + left.d g`` for g straight between instants."""
+    poles = model.poles
+    z = poles * step
+    turn = np.exp(z)
+    whole = (turn - 1) / poles
+    late = (turn - 1 - z) / (poles * z)
+    push = model.left[:, columns] @ direction
+    to_x = model.right[:, rows] @ direction
+    return turn, (whole - late) * push, late * push, to_x, to_x * poles

@@ -1,0 +1,92 @@
+"""A mode that the nominal model lacks: found by a scan over poles, fitted as one more mode."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .explanation import Explanation
+from .linear_floor import Floor, FloorRecord
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+DAMPINGS = (0.015, 0.05)
+FREQUENCIES = 48
+EVERY = 3
+"""Lines left out of two in the scan, which needs no precision."""
+
+
+@dataclass(frozen=True)
+class SightedMode:
+    """A further pole with a residue of rank one, and the misfit that it would gain."""
+
+    pole: complex
+    right: Complex
+    left: Complex
+    gain: float
+
+
+def find_mode(floor: Floor, explanation: Explanation) -> SightedMode:
+    """The pole and residue that explain most of the residual.
+
+    For poles over the band a residue of full rank is fitted by linear least squares after the modal parameters have
+    adapted; the best is brought to rank one by its singular value decomposition.
+    """
+    low = min(record.lines.frequencies[0] for record in floor.records)
+    high = max(record.lines.frequencies[-1] for record in floor.records)
+    best: tuple[float, complex, Real] | None = None
+    for frequency in np.geomspace(1.3 * low, 0.95 * high, FREQUENCIES):
+        for damping in DAMPINGS:
+            pole = 2 * np.pi * frequency * (-damping + 1j * np.sqrt(1 - damping**2))
+            gain, residue = _residue(floor, pole)
+            if best is None or gain > best[0]:
+                best = gain, pole, residue
+    assert best is not None
+    gain, pole, numbers = best
+    n, m = floor.records[0].through.shape[1:]
+    parts = numbers.reshape(2, n, m)
+    u, s, vh = np.linalg.svd(parts[0] + 1j * parts[1])
+    scale = np.sqrt(s[0] * np.linalg.norm(explanation.model.left) / np.linalg.norm(explanation.model.right))
+    return SightedMode(pole, u[:, 0] * s[0] / scale, vh[0] * scale, gain * s[0] ** 2 / np.sum(s**2))
+
+
+def _residue(floor: Floor, pole: complex) -> tuple[float, Real]:
+    """Gain and residue numbers (real parts, then imaginary parts) of a pole."""
+    count = 2 * floor.records[0].through.shape[1] * floor.records[0].through.shape[2]
+    own, shared, pull = np.zeros((count, count)), np.zeros((len(floor.gradient), count)), np.zeros(count)
+    for record in floor.records:
+        columns = _columns(record, pole)
+        chosen = _chosen(record)
+        slope, rest = EVERY * record.slope[chosen], EVERY * record.rest[chosen]
+        own = own + 2 * EVERY * columns.T @ columns
+        shared = shared + 2 * slope.T @ columns
+        pull = pull + 2 * columns.T @ rest
+    solved = floor.inverse @ shared
+    left, drive = own - shared.T @ solved, pull - solved.T @ floor.gradient
+    answer = np.linalg.lstsq(left, drive, rcond=1e-8)[0]
+    return float(drive @ answer), answer
+
+
+def _chosen(record: FloorRecord) -> NDArray[np.int64]:
+    """Rows of the real system that belong to every EVERYth line."""
+    n_lines, n = record.residual.shape
+    rows = (np.arange(0, n_lines, EVERY)[:, None] * n + np.arange(n)).ravel()
+    return np.concatenate([rows, rows + n_lines * n])
+
+
+def _columns(record: FloorRecord, pole: complex) -> Real:
+    """Whitened response to each real number of a residue, (n_rows, 2 n m)."""
+    lines = record.lines
+    frequencies = lines.frequencies[::EVERY]
+    force = lines.force_here[::EVERY]
+    s = 2j * np.pi * frequencies
+    up, down = 1 / (s - pole), 1 / (s - np.conj(pole))
+    kinematic = lines.kinematic(frequencies)
+    white = record.white[::EVERY] * kinematic[:, None, :]
+    n, m = record.through.shape[1:]
+    result = np.empty((len(s), white.shape[1], 2, n, m), dtype=complex)
+    for part, factor in enumerate((up + down, 1j * (up - down))):
+        result[:, :, part] = white[:, :, :, None] * (factor[:, None] * force)[:, None, None, :]
+    flat = result.reshape(len(s) * white.shape[1], -1)
+    return np.concatenate([flat.real, flat.imag])

@@ -1,0 +1,37 @@
+"""Responses behind a first-order high-pass."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modal_fit import ModalModel
+
+from .protocol import Chain, Parameter
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+class AcCoupling:
+    """An IEPE sensor or an amplifier with too high a corner frequency."""
+
+    name = "ac_coupling"
+    equation = "C(s) = s / (s + 2 pi f_c)"
+    source = "Ewins, Modal Testing, 2nd ed., section 3.5"
+    parameters = (Parameter("corner_hz", "Hz", 0.05, 1e-3, 50.0, logarithmic=True),)
+    confusable_with = ("channel_delay",)
+
+    def places(self, model: ModalModel) -> tuple[str, ...]:
+        """One place: the whole measuring chain."""
+        return ("",)
+
+    def start(self, model: ModalModel) -> Real:
+        """A corner so low that it is all but absent, Hz."""
+        return np.array([0.05])
+
+    def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
+        """Matrices at ``s``, rad/s."""
+        passed = s / (s + 2 * np.pi * values[0])
+        return Chain(response=passed[:, None, None] * np.eye(len(model.responses)))
+
+
+PHYSICS = AcCoupling()

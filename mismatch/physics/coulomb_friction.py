@@ -1,0 +1,37 @@
+"""Dry friction in a joint."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint_law import JointLaw, JointMotion
+from .protocol import Parameter
+
+Real = NDArray[np.float64]
+
+
+class CoulombFriction:
+    """A force of constant size against the velocity, smooth around standstill."""
+
+    name = "coulomb_friction"
+    equation = "g = F_c tanh(v / v0)"
+    source = "Coulomb 1785; Armstrong-Helouvry, Dupont & Canudas de Wit 1994, Automatica 30"
+    parameters = (
+        Parameter("friction_n", "N", 0.1, 0.0, 1e7, logarithmic=True),
+        Parameter("smooth_velocity_m_per_s", "m/s", 0.3, 1e-9, 10.0, logarithmic=True),
+    )
+    confusable_with = (
+        "hysteresis",
+        "quadratic_damping",
+    )
+
+    def starts(self, motion: JointMotion) -> tuple[Real, ...]:
+        """Shapes to try, amplitude 1."""
+        return tuple(np.array([1.0, k * motion.velocity]) for k in (0.03, 0.15, 0.5))
+
+    def law(self, values: Real, motion: JointMotion) -> JointLaw:
+        """The joint's force."""
+        v = motion.velocities
+        return JointLaw(speed=motion.speed, damping=values[0] * np.tanh(v / max(values[1], 4e-4 * motion.speed)))
+
+
+PHYSICS = CoulombFriction()

@@ -1,0 +1,40 @@
+"""Force channels that pass through the resonance of the dynamometer."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modal_fit import ModalModel
+
+from .protocol import Chain, Parameter
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+class DynamometerDynamics:
+    """The dynamometer shows the force through its own mass and spring; near its resonance it shows too much."""
+
+    name = "dynamometer_dynamics"
+    equation = "F_measured = F / (1 + 2 zeta s / w_n + (s / w_n)^2)"
+    source = "Korkmaz, Gozen, Bediz & Ozdoganlar 2015, Precision Engineering 39"
+    parameters = (
+        Parameter("squared_period_s2", "s^2", 2e-7, 0.0, 1e-3),
+        Parameter("damping_time_s", "s", 2e-5, -1e-2, 1e-2),
+    )
+    confusable_with = ("channel_delay",)
+
+    def places(self, model: ModalModel) -> tuple[str, ...]:
+        """One place: the whole measuring chain."""
+        return ("",)
+
+    def start(self, model: ModalModel) -> Real:
+        """Absent."""
+        return np.array([0.0, 0.0])
+
+    def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
+        """Matrices at ``s``, rad/s."""
+        whole = 1 + values[1] * s + values[0] * s**2
+        return Chain(force=whole[:, None, None] * np.eye(len(model.excitations)))
+
+
+PHYSICS = DynamometerDynamics()

@@ -1,0 +1,47 @@
+"""An elastic-plastic element with memory in a joint."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint_law import JointLaw, JointMotion
+from .protocol import Parameter
+
+Real = NDArray[np.float64]
+
+
+ELEMENTS = 6
+"""In parallel, yields spread evenly in their logarithm."""
+
+
+LEAST_YIELD = 0.03
+"""Of the typical deflection; an element that yields at less is dry friction."""
+
+
+class Hysteresis:
+    """Microslip: bolts, gears and bearings stick, slip little by little and remember where they turned."""
+
+    name = "hysteresis"
+    equation = "g = sum_i k_i p_i(x), elastic-plastic elements with yields spread around one"
+    source = "Iwan 1966, J. Applied Mechanics 33; Bouc 1967, Wen 1976"
+    parameters = (
+        Parameter("stiffness_n_per_m", "N/m", 0.1, 0.0, 1e12, logarithmic=True),
+        Parameter("yield_m", "m", 0.1, 1e-9, 1.0, logarithmic=True),
+        Parameter("spread", "", 0.2, 0.05, 3.0),
+    )
+    confusable_with = (
+        "coulomb_friction",
+        "stiffness_softening",
+    )
+
+    def starts(self, motion: JointMotion) -> tuple[Real, ...]:
+        """Shapes to try, amplitude 1."""
+        return tuple(np.array([1.0, k * motion.deflection, 0.8]) for k in (0.1, 0.3, 1.0, 2.5))
+
+    def law(self, values: Real, motion: JointMotion) -> JointLaw:
+        """The joint's force."""
+        steps = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
+        yields = max(values[1], LEAST_YIELD * motion.deflection) * np.exp(values[2] * 2 * (steps - 0.5))
+        return JointLaw(springs=np.full(ELEMENTS, values[0] / ELEMENTS), yields=yields)
+
+
+PHYSICS = Hysteresis()

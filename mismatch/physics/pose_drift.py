@@ -1,0 +1,34 @@
+"""A joint whose stiffness changes steadily during the cut."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint_law import JointLaw, JointMotion
+from .protocol import Parameter
+
+Real = NDArray[np.float64]
+
+
+SCALE = 1e3
+"""A noticeable step, N/m."""
+
+
+class PoseDrift:
+    """The robot moves along its path, or warms up: one joint softens or stiffens from beginning to end."""
+
+    name = "pose_drift"
+    equation = "g = r (t / T - 1/2) x"
+    source = "Verboven et al. 2004 on slowly varying structures; linear time-varying stiffness"
+    parameters = (Parameter("stiffness_change_n_per_m", "N/m", SCALE, -1e12, 1e12),)
+    confusable_with = ("stiffness_softening",)
+
+    def starts(self, motion: JointMotion) -> tuple[Real, ...]:
+        """Shapes to try, amplitude 1."""
+        return (np.array([1.0]),)
+
+    def law(self, values: Real, motion: JointMotion) -> JointLaw:
+        """The joint's force."""
+        return JointLaw(ramp=values[0])
+
+
+PHYSICS = PoseDrift()

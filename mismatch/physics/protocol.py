@@ -1,0 +1,114 @@
+"""What a hypothesis about left-out physics has to say: the protocols behind every file of this folder."""
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modal_fit import ModalModel
+
+from ..joint_law import JointLaw, JointMotion
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a hypothesis.
+
+    Parameters
+    ----------
+    name
+        With its unit as a suffix, as it stands in files: ``delay_s``.
+    unit
+        SI.
+    unit_step
+        What counts as a step of this number in a fit: a plain difference, or a relative one if ``logarithmic``.
+    low, high
+        Bounds.
+    logarithmic
+        The number is positive and its logarithm is fitted.
+    """
+
+    name: str
+    unit: str
+    unit_step: float
+    low: float = -np.inf
+    high: float = np.inf
+    logarithmic: bool = False
+
+    def to_fit(self, value: float) -> float:
+        """The number as the fit sees it: differences of about one are noticeable steps."""
+        return float(np.log(value) if self.logarithmic else value) / self.unit_step
+
+    def from_fit(self, coordinate: float) -> float:
+        """Back from :meth:`to_fit`, brought within the bounds."""
+        scaled = coordinate * self.unit_step
+        value = np.exp(np.clip(scaled, -300, 300)) if self.logarithmic else scaled
+        return float(np.clip(value, self.low, self.high))
+
+
+@dataclass(frozen=True)
+class Chain:
+    """How a linear cause stands around the structure: ``X = H (B F - K X)``, measured ``C X``; None is the identity.
+
+    Parameters
+    ----------
+    response : (n, n_responses, n_responses) or None
+        C.
+    force : (n, n_excitations, n_excitations) or None
+        B.
+    feedback : (n, n_excitations, n_responses) or None
+        K; None is zero.
+    """
+
+    response: Complex | None = None
+    force: Complex | None = None
+    feedback: Complex | None = None
+
+
+@runtime_checkable
+class ChainPhysics(Protocol):
+    """A linear cause of few numbers: measuring chain, coupling, mass."""
+
+    name: str
+    equation: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    confusable_with: tuple[str, ...]
+
+    def places(self, model: ModalModel) -> tuple[str, ...]:
+        """Where it may act: channel labels of the model, or one empty text."""
+        ...
+
+    def start(self, model: ModalModel) -> Real:
+        """The numbers at which the cause is absent, or all but."""
+        ...
+
+    def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
+        """Its matrices at ``s`` (n,), rad/s."""
+        ...
+
+
+@runtime_checkable
+class JointPhysics(Protocol):
+    """A law of one joint whose direction at the tool is unknown; the first number is an amplitude of the force."""
+
+    name: str
+    equation: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    confusable_with: tuple[str, ...]
+
+    def starts(self, motion: JointMotion) -> tuple[Real, ...]:
+        """Shapes to try, the amplitude 1."""
+        ...
+
+    def law(self, values: Real, motion: JointMotion) -> JointLaw:
+        """The joint's force law."""
+        ...
+
+
+Physics = ChainPhysics | JointPhysics

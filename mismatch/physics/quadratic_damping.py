@@ -1,0 +1,31 @@
+"""Damping that grows with the square of the velocity."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint_law import JointLaw, JointMotion
+from .protocol import Parameter
+
+Real = NDArray[np.float64]
+
+
+class QuadraticDamping:
+    """Lubricant and air, or hydraulic balancing: the force goes with v |v|."""
+
+    name = "quadratic_damping"
+    equation = "g = c2 |v| v"
+    source = "Worden & Tomlinson, Nonlinearity in Structural Dynamics, section 2.2"
+    parameters = (Parameter("damping_ns2_per_m2", "N s^2/m^2", 0.1, 0.0, 1e12, logarithmic=True),)
+    confusable_with = ("coulomb_friction",)
+
+    def starts(self, motion: JointMotion) -> tuple[Real, ...]:
+        """Shapes to try, amplitude 1."""
+        return (np.array([1.0]),)
+
+    def law(self, values: Real, motion: JointMotion) -> JointLaw:
+        """The joint's force."""
+        v = motion.velocities
+        return JointLaw(speed=motion.speed, damping=values[0] * np.abs(v) * v)
+
+
+PHYSICS = QuadraticDamping()

@@ -1,0 +1,163 @@
+"""Faults that are seen in the signals themselves and must go first: a tone from elsewhere, a channel that clips."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft
+from scipy.ndimage import median_filter
+
+from .explanation import predict_lines
+from .fitting import Fit, levels, through_structure
+from .noise_model import NoiseModel, whitening
+from .windowed_lines import WindowedLines
+
+Real = NDArray[np.float64]
+
+TONE_CONTRAST = 30.0
+"""Of a residual line against its neighbourhood, a channel; noise passes 15 once in 3 million lines."""
+
+NEAR = 41
+"""Lines of a neighbourhood."""
+
+
+@dataclass(frozen=True)
+class Tone:
+    """A steady tone that the forces do not know.
+
+    Parameters
+    ----------
+    frequency
+        Hz.
+    amplitudes : (n_responses,)
+        Of each response, mean over recordings.
+    gain
+        Twice the log likelihood gained.
+    """
+
+    frequency: float
+    amplitudes: Real
+    gain: float
+
+
+@dataclass(frozen=True)
+class Clipping:
+    """A response that cannot show more than a limit.
+
+    Parameters
+    ----------
+    response
+        Its number.
+    limit
+        In the channel's unit.
+    gain
+        Twice the log likelihood gained.
+    """
+
+    response: int
+    limit: float
+    gain: float
+
+
+def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
+    """The strongest residual line that stands out in every recording at one frequency, and in no force."""
+    if len(lines) == 0:
+        return None
+    contrasts = [_contrast(fitted, one, noise) for one, noise in zip(lines, fitted.noises, strict=True)]
+    axis = lines[0].frequencies
+    together = np.array(
+        [
+            np.max([np.interp(axis + shift * _step(one), one.frequencies, c) for shift in (-1, 0, 1)], axis=0)
+            for one, c in zip(lines, contrasts, strict=True)
+        ]
+    ).min(axis=0)
+    for k in np.argsort(-together)[:20]:
+        if together[k] < TONE_CONTRAST:
+            return None
+        frequency = float(axis[k])
+        if any(_force_contrast(one, frequency) > 12.0 for one in lines):
+            continue
+        shown = [np.interp(frequency, one.frequencies, c) for one, c in zip(lines, contrasts, strict=True)]
+        return Tone(frequency, _amplitudes(fitted, lines, frequency), 2 * float(np.sum(shown)))
+    return None
+
+
+def without_tone(lines: WindowedLines, tone: Tone) -> WindowedLines:
+    """The same recording without the lines that the tone reaches."""
+    width = 10 * _step(lines)
+    kept = np.abs(lines.frequencies - tone.frequency) > width
+    return replace(
+        lines,
+        band=lines.band[kept],
+        frequencies=lines.frequencies[kept],
+        force_here=lines.force_here[kept],
+        measured=lines.measured[kept],
+    )
+
+
+def find_clipping(fitted: Fit, lines: list[WindowedLines]) -> Clipping | None:
+    """The response, if any, that follows its prediction only up to a limit."""
+    best: Clipping | None = None
+    predicted = [_signal(fitted, one) for one in lines]
+    for p in range(lines[0].measured.shape[1]):
+        measured = np.concatenate([one.trial.response[one.start :, p] for one in lines])
+        shown = np.concatenate([signal[one.start :, p] for one, signal in zip(lines, predicted, strict=True)])
+        top = float(np.abs(measured).max())
+        plain = float(np.sum((measured - shown) ** 2))
+        for limit in top * np.linspace(0.25, 1.0, 76):
+            beyond = np.abs(shown) > 1.05 * limit
+            if beyond.sum() < 30:
+                continue
+            clipped = float(np.sum((measured - np.clip(shown, -limit, limit)) ** 2))
+            gain = len(measured) * np.log(plain / clipped)
+            # a limit holds: where much more was due, no more than the limit and some noise is shown
+            pile = np.abs(measured[beyond])
+            held = float(np.quantile(pile, 0.98)) < 1.12 * limit and float(np.median(pile)) > 0.88 * limit
+            if held and gain > 60 and (best is None or gain > best.gain):
+                best = Clipping(p, float(np.median(pile)), gain)
+    return best
+
+
+def unclipped(fitted: Fit, lines: WindowedLines, clipping: Clipping, original: Real) -> Real:
+    """The response (n_samples, n_responses) with what the limit cut off put back from the prediction."""
+    shown = _signal(fitted, lines)[:, clipping.response]
+    mended = original.copy()
+    mended[:, clipping.response] += shown - np.clip(shown, -clipping.limit, clipping.limit)
+    return mended
+
+
+def _signal(fitted: Fit, lines: WindowedLines) -> Real:
+    spectrum = predict_lines(fitted.explanation, lines).spectrum
+    return np.asarray(irfft(spectrum, n=lines.padded, axis=0)[: len(lines.trial.force)])
+
+
+def _step(lines: WindowedLines) -> float:
+    return lines.trial.rate / len(lines.window)
+
+
+def _contrast(fitted: Fit, lines: WindowedLines, noise: NoiseModel) -> Real:
+    """Power of each whitened residual line against its neighbourhood, a channel."""
+    predicted = predict_lines(fitted.explanation, lines)
+    through = through_structure(fitted.explanation, lines)
+    rest = lines.measured - predicted.response
+    own = noise.covariance(lines.frequencies, through)
+    white = whitening(own)
+    power = np.sum(np.abs(np.einsum("kij,kj->ki", white, rest)) ** 2, axis=1) / rest.shape[1]
+    return np.asarray(power / np.maximum(median_filter(power, NEAR, mode="nearest"), 1e-3 * power.mean() + 1e-300))
+
+
+def _force_contrast(lines: WindowedLines, frequency: float) -> float:
+    power = np.sum(np.abs(lines.force_here / levels(lines)[1]) ** 2, axis=1)
+    k = int(np.argmin(np.abs(lines.frequencies - frequency)))
+    near = power[max(0, k - NEAR // 2) : k + NEAR // 2 + 1]
+    return float(power[max(0, k - 1) : k + 2].max() / max(float(np.median(near)), 1e-300))
+
+
+def _amplitudes(fitted: Fit, lines: list[WindowedLines], frequency: float) -> Real:
+    found = []
+    for one in lines:
+        rest = one.measured - predict_lines(fitted.explanation, one).response
+        k = int(np.argmin(np.abs(one.frequencies - frequency)))
+        power = np.sum(np.abs(rest[max(0, k - 2) : k + 3]) ** 2, axis=0)
+        found.append(2 * np.sqrt(power / len(one.window)))
+    return np.asarray(np.mean(found, axis=0))

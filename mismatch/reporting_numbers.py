@@ -1,0 +1,66 @@
+"""Fitted coordinates as parameters with standard errors, in the units of files."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .diagnosis import AcceptedCause
+from .fitting import Fit
+
+Real = NDArray[np.float64]
+
+
+def accepted_cause(fitted: Fit, location: dict[str, object], evidence: float) -> AcceptedCause:
+    """The last cause of a fit with its numbers and their standard errors (to first order)."""
+    cause = fitted.explanation.causes[-1]
+    first = fitted.explanation.size - cause.size
+    spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[first:], 0.0))
+    parameters, errors = {}, {}
+    for parameter, value, error in zip(cause.physics.parameters, cause.values, spread, strict=False):
+        parameters[parameter.name] = float(value)
+        errors[parameter.name] = float(error * parameter.unit_step * (abs(value) if parameter.logarithmic else 1.0))
+    return AcceptedCause(cause.physics.name, dict(location), parameters, errors, evidence)
+
+
+def accepted_mode(fitted: Fit, evidence: float) -> AcceptedCause:
+    """The added mode of a fit: frequency, damping ratio and shape at the responses."""
+    shape, model = fitted.explanation.shape, fitted.explanation.model
+    first = shape.per_mode * (len(model.poles) - 1)
+    spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[first : first + 2], 0.0))
+    frequency, damping = float(model.natural_frequencies[-1]), float(model.damping_ratios[-1])
+    right = np.abs(model.right[-1]) / np.abs(model.right[-1]).max()
+    place = {"shape": dict(zip(model.responses, [round(float(x), 4) for x in right], strict=True))}
+    return AcceptedCause(
+        "missing_mode",
+        place,
+        {"frequency_hz": frequency, "damping_ratio": damping},
+        {
+            "frequency_hz": float(spread[0]) * shape.lab.frequency * frequency,
+            "damping_ratio": float(spread[1]) * shape.lab.damping * damping,
+        },
+        evidence,
+    )
+
+
+def modal_deviation(fitted: Fit) -> AcceptedCause | None:
+    """``modal_parameters`` where the refit lies farther from the nominal model than a lab's own error.
+
+    |u|^2 of believed parameters has the mean n for errors of that size (n without the two free numbers of each mode's
+    scale); it is odd four standard deviations above.
+    """
+    shape = fitted.explanation.shape
+    count = len(shape.nominal.poles) - shape.added
+    rows = fitted.explanation.u.reshape(-1, shape.per_mode)[:count]
+    n = count * (shape.per_mode - 2)
+    size = float(np.sum(rows**2))
+    if size < n + 4 * np.sqrt(2 * n):
+        return None
+    spread = np.sqrt(np.diag(fitted.covariance)[: shape.size]).reshape(-1, shape.per_mode)[:count]
+    model, nominal = fitted.explanation.model, shape.nominal
+    modes = [k for k in range(count) if np.sum(rows[k] ** 2) > shape.per_mode + 3 * np.sqrt(2 * shape.per_mode)]
+    parameters, errors = {}, {}
+    for k in range(count):
+        parameters[f"frequency_{k + 1}_hz"] = float(model.natural_frequencies[k])
+        errors[f"frequency_{k + 1}_hz"] = float(spread[k, 0] * shape.lab.frequency * nominal.natural_frequencies[k])
+        parameters[f"damping_ratio_{k + 1}"] = float(model.damping_ratios[k])
+        errors[f"damping_ratio_{k + 1}"] = float(spread[k, 1] * shape.lab.damping * nominal.damping_ratios[k])
+    return AcceptedCause("modal_parameters", {"modes": [k + 1 for k in modes]}, parameters, errors, size - n)

@@ -1,0 +1,125 @@
+"""The nominal model's numbers as deviations in units of what a lab's own fit may be off."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modal_fit import ModalModel
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LabError:
+    """One standard deviation of what a laboratory's modal fit is usually off.
+
+    Defaults are those of round-robin comparisons of modal tests: frequencies agree to a per cent, dampings scatter by
+    some ten, shapes by a few (Ewins, Modal Testing, 2nd ed., section 1.5, on the SAMM survey). They set what
+    counts as a deviation, not how well anything is estimated.
+
+    Parameters
+    ----------
+    frequency, damping
+        Relative.
+    shape
+        Of each real and imaginary part of a vector's entries, relative to the vector's root mean square.
+    """
+
+    frequency: float = 0.01
+    damping: float = 0.12
+    shape: float = 0.03
+
+
+@dataclass(frozen=True)
+class ModelShape:
+    """Parameters u of a modal model, all zero at the nominal one, in units of :class:`LabError`.
+
+    Order, mode by mode: ln frequency, ln damping ratio, Re right, Im right, Re left, Im left.
+
+    Parameters
+    ----------
+    nominal
+        The model that is believed.
+    lab
+        What one unit is.
+    added
+        Number of modes at the end that the believed model did not have: nothing is believed of them.
+    """
+
+    nominal: ModalModel
+    lab: LabError
+    added: int = 0
+
+    @property
+    def belief(self) -> Real:
+        """Precision of the belief that u is zero, (size,): 1, and all but nothing for added modes."""
+        precision = np.ones(self.size)
+        if self.added:
+            precision[-self.added * self.per_mode :] = 1e-4
+        return precision
+
+    def with_mode(self, pole: complex, right: Complex, left: Complex) -> "ModelShape":
+        """The same with one more mode at the end."""
+        model = replace(
+            self.nominal,
+            poles=np.append(self.nominal.poles, pole),
+            right=np.vstack([self.nominal.right, right]),
+            left=np.vstack([self.nominal.left, left]),
+            covariance=None,
+        )
+        return ModelShape(model, self.lab, self.added + 1)
+
+    @property
+    def per_mode(self) -> int:
+        """Parameters a mode."""
+        return 2 + 2 * int(self.nominal.right.shape[1] + self.nominal.left.shape[1])
+
+    @property
+    def size(self) -> int:
+        """Parameters altogether."""
+        return int(self.per_mode * len(self.nominal.poles))
+
+    def _scales(self) -> tuple[Real, Real]:
+        """Unit of a right and of a left entry, each (n_modes,)."""
+        right, left = (np.sqrt(np.mean(np.abs(v) ** 2, axis=1)) for v in (self.nominal.right, self.nominal.left))
+        return self.lab.shape * right, self.lab.shape * left
+
+    def model(self, u: Real) -> ModalModel:
+        """The modal model at ``u``, (size,)."""
+        rows = u.reshape(len(self.nominal.poles), self.per_mode)
+        omega = np.abs(self.nominal.poles) * np.exp(self.lab.frequency * rows[:, 0])
+        damping = np.clip(self.nominal.damping_ratios * np.exp(self.lab.damping * rows[:, 1]), 1e-5, 0.95)
+        poles = omega * (-damping + 1j * np.sqrt(1 - damping**2))
+        n, m = self.nominal.right.shape[1], self.nominal.left.shape[1]
+        right_unit, left_unit = self._scales()
+        right = self.nominal.right + right_unit[:, None] * (rows[:, 2 : 2 + n] + 1j * rows[:, 2 + n : 2 + 2 * n])
+        rest = rows[:, 2 + 2 * n :]
+        left = self.nominal.left + left_unit[:, None] * (rest[:, :m] + 1j * rest[:, m:])
+        return replace(self.nominal, poles=poles, right=right, left=left, covariance=None)
+
+    def jacobian(self, u: Real, frequencies: Real, force: Complex) -> Complex:
+        """Derivative of the displacement lines by u for force lines, (n_lines, n_responses, size)."""
+        model = self.model(u)
+        s = 2j * np.pi * frequencies
+        n, m = model.right.shape[1], model.left.shape[1]
+        right_unit, left_unit = self._scales()
+        result = np.zeros((len(s), n, len(model.poles), self.per_mode), dtype=complex)
+        for k, (pole, right, left) in enumerate(zip(model.poles, model.right, model.left, strict=True)):
+            up, down = 1 / (s - pole), 1 / (s - pole.conj())
+            push, pull = force @ left, force @ left.conj()
+            by_pole = np.outer(up**2 * push, right), np.outer(down**2 * pull, right.conj())
+            turn = pole * self.lab.frequency
+            zeta = -pole.real / abs(pole)
+            along = abs(pole) * zeta * self.lab.damping * (-1 - 1j * zeta / np.sqrt(1 - zeta**2))
+            for column, change in ((0, turn), (1, along)):
+                result[:, :, k, column] = by_pole[0] * change + by_pole[1] * np.conj(change)
+            for p in range(n):
+                result[:, p, k, 2 + p] = right_unit[k] * (up * push + down * pull)
+                result[:, p, k, 2 + n + p] = 1j * right_unit[k] * (up * push - down * pull)
+            for q in range(m):
+                one, other = np.outer(up * force[:, q], right), np.outer(down * force[:, q], right.conj())
+                result[:, :, k, 2 + 2 * n + q] = left_unit[k] * (one + other)
+                result[:, :, k, 2 + 2 * n + m + q] = 1j * left_unit[k] * (one - other)
+        return result.reshape(len(s), n, self.size)

@@ -1,0 +1,166 @@
+"""A `Trial`: one recording, reduced to the channels and the band that a model speaks of."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import resample_poly
+
+from acquisition import Channel, Recording, Stream
+from foundation import DegreeOfFreedom, InputError
+from modal_fit import ModalModel
+
+Real = NDArray[np.float64]
+
+POWERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
+"""Times that a receptance is differentiated to give the quantity."""
+
+SHORTEST = 20.0
+"""A trial lasts at least so many periods of the lowest mode."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Forces and responses of one recording in the order of a model's degrees of freedom.
+
+    Parameters
+    ----------
+    name
+        Of the recording.
+    rate
+        Hz.
+    force : (n_samples, n_excitations), N
+    response : (n_samples, n_responses)
+        In SI units of each response's quantity.
+    powers : (n_responses,)
+        0 displacement, 1 velocity, 2 acceleration.
+    channels
+        Names of the excitation channels, then of the response channels.
+    """
+
+    name: str
+    rate: float
+    force: Real
+    response: Real
+    powers: NDArray[np.int64]
+    channels: tuple[str, ...]
+
+    @property
+    def duration(self) -> float:
+        """s."""
+        return len(self.force) / self.rate
+
+    @property
+    def level(self) -> float:
+        """Root mean square of the force, all directions together, N."""
+        return float(np.sqrt(np.mean(np.sum((self.force - self.force.mean(axis=0)) ** 2, axis=1))))
+
+
+def band_of(model: ModalModel, rate: float) -> tuple[float, float]:
+    """Band (Hz) in which a model and a recording are compared: a third of the lowest to three times the highest mode.
+
+    Raises
+    ------
+    InputError
+        The recording is sampled too slowly for the model's highest mode.
+    """
+    natural = model.natural_frequencies
+    high = min(3.0 * float(natural.max()), 0.42 * rate)
+    if high < 1.1 * natural.max():
+        raise InputError(
+            f"sampled at {rate:g} Hz, too slowly for a mode at {natural.max():.4g} Hz; "
+            f"record at {4 * natural.max():.0f} Hz or more"
+        )
+    return float(natural.min()) / 3, high
+
+
+def read_trial(path: str | os.PathLike[str], model: ModalModel, *, stream: str | None = None) -> Trial:
+    """Read one recording for a model of receptances; sampled far above the band, it is brought down.
+
+    Parameters
+    ----------
+    path
+        Recording with a force channel at each of the model's excitations and a displacement, velocity or acceleration
+        at each of its responses.
+    model
+        What will be compared.
+    stream
+        Sample clock; None: the only one.
+
+    Raises
+    ------
+    InputError
+        A channel is missing, values are not finite, or the record is too short or sampled too slowly.
+    """
+    with Recording(path) as recording:
+        source = recording.stream(stream)
+        forces, force_signs = _matched(source, model.excitations, ("force", "voltage"))
+        responses, response_signs = _matched(source, model.responses, tuple(POWERS))
+        names = tuple(channel.name for channel in (*forces, *responses))
+        samples = source.read(channels=names) * np.array(force_signs + response_signs)
+        rate = source.sample_rate
+    bad = ~np.isfinite(samples).all(axis=0)
+    if bad.any():
+        name = names[int(np.argmax(bad))]
+        raise InputError(f"{Path(path).name}: channel {name} holds values that are not finite; cut them out first")
+    _, high = band_of(model, rate)
+    needed = 6.0 * high
+    if rate > 1.5 * needed:
+        ratio = Fraction(needed / rate).limit_denominator(200)
+        samples = resample_poly(samples, ratio.numerator, ratio.denominator, axis=0)
+        rate *= float(ratio)
+    if len(samples) / rate < SHORTEST / float(model.natural_frequencies.min()):
+        raise InputError(
+            f"{Path(path).name} lasts {len(samples) / rate:.3g} s; {SHORTEST:g} periods of the lowest mode, "
+            f"{SHORTEST / float(model.natural_frequencies.min()):.3g} s, are the least"
+        )
+    powers = np.array([POWERS[channel.quantity] for channel in responses])
+    count = len(forces)
+    return Trial(Path(path).stem, rate, samples[:, :count], samples[:, count:], powers, names)
+
+
+def read_trials(
+    paths: Sequence[str | os.PathLike[str]], model: ModalModel, *, stream: str | None = None
+) -> list[Trial]:
+    """Read recordings, weakest force first.
+
+    Raises
+    ------
+    InputError
+        No recording, or what :func:`read_trial` refuses.
+    """
+    if not paths:
+        raise InputError("no recording given; name one or more")
+    if model.quantity != "receptance":
+        raise InputError(
+            f"a diagnosis needs a model of receptances, this is one of {model.quantity}; calibrate it first"
+        )
+    return sorted((read_trial(path, model, stream=stream) for path in paths), key=lambda trial: trial.level)
+
+
+def _matched(stream: Stream, wanted: Sequence[str], quantities: tuple[str, ...]) -> tuple[list[Channel], list[float]]:
+    """The channel at each degree of freedom, and the sign that turns its direction into the wanted one."""
+    chosen, signs = [], []
+    for label in wanted:
+        aim = DegreeOfFreedom.parse(label)
+        for channel in stream.channels:
+            if channel.quantity not in quantities or not channel.node:
+                continue
+            here = DegreeOfFreedom(channel.node, channel.direction)
+            if (here.node, here.axis) == (aim.node, aim.axis):
+                chosen.append(channel)
+                signs.append(here.sign * aim.sign)
+                break
+        else:
+            there = ", ".join(
+                f"{channel.name} ({channel.quantity} {channel.degree_of_freedom})" for channel in stream.channels
+            )
+            raise InputError(
+                f"{stream.path.name}: no {' or '.join(quantities)} at {label}, which the model speaks of; "
+                f"it has {there}"
+            )
+    return chosen, signs

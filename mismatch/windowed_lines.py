@@ -1,0 +1,124 @@
+"""Spectra of one trial on the lines that count, and a linear model's prediction cut in exactly the same way."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+from scipy.signal.windows import tukey
+
+from modal_fit import ModalModel
+
+from .trial import Trial
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WindowedLines:
+    """A trial's window, its padded force spectrum and its measured lines.
+
+    The whole record is predicted: force ramped in over a second and padded with zeros, so that the structure rings out;
+    then prediction and measurement are cut and windowed alike, and nothing leaks that does not leak in both.
+
+    Parameters
+    ----------
+    trial
+        Forces and responses.
+    padded
+        Samples of the padded record.
+    start
+        First sample compared, after the run-in.
+    window : (n_kept,)
+    band : (n_lines,)
+        Which lines of the windowed spectrum are compared.
+    frequencies : (n_lines,), Hz
+    force_lines : (padded // 2 + 1, n_excitations)
+        Spectrum of the ramped and padded force.
+    force_here : (n_lines, n_excitations)
+        Spectrum of the windowed force.
+    measured : (n_lines, n_responses)
+        Spectrum of the windowed response, scaled so that white noise of variance v has variance v a line.
+    """
+
+    trial: Trial
+    padded: int
+    start: int
+    window: Real
+    band: NDArray[np.int64]
+    frequencies: Real
+    force_lines: Complex
+    force_here: Complex
+    measured: Complex
+
+    @property
+    def padded_frequencies(self) -> Real:
+        """Frequencies of ``force_lines``, Hz."""
+        return np.asarray(np.arange(self.padded // 2 + 1) * self.trial.rate / self.padded)
+
+    def cut(self, signal: Real) -> Complex:
+        """Windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the record."""
+        kept = signal[self.start : self.start + len(self.window)]
+        return np.asarray(rfft(kept * self.window[:, None], axis=0)[self.band])
+
+    def signal(self, spectrum: Complex) -> Real:
+        """Time signals (n_samples, n) of padded spectra (padded // 2 + 1, n)."""
+        return np.asarray(irfft(spectrum, n=self.padded, axis=0)[: len(self.trial.force)])
+
+    def kinematic(self, frequencies: Real) -> Complex:
+        """Factor (n, n_responses) from displacement to each response's quantity."""
+        return np.asarray((2j * np.pi * frequencies[:, None]) ** self.trial.powers)
+
+    def from_force(self, receptance: Complex, force_lines: Complex) -> Complex:
+        """Windowed response lines (n_lines, n_responses) of padded force lines through padded receptance lines."""
+        response = np.einsum("kpq,kq->kp", receptance, force_lines) * self.kinematic(self.padded_frequencies)
+        return self.cut(self.signal(response))
+
+
+def windowed_lines(trial: Trial, band: tuple[float, float], decay: float) -> WindowedLines:
+    """Prepare a trial.
+
+    Parameters
+    ----------
+    trial
+        Forces and responses.
+    band
+        Lowest and highest frequency compared, Hz.
+    decay
+        Of the slowest mode, 1/s: run-in and padding last seven of its time constants, at most a fifth of the record.
+    """
+    n = len(trial.force)
+    run_in = int(min(7.0 / decay * trial.rate, 0.2 * n))
+    padded = next_fast_len(n + run_in, real=True)
+    padded += padded % 2
+    ramp = np.ones(n)
+    rising = min(int(trial.rate), n // 20)
+    ramp[:rising] = 0.5 - 0.5 * np.cos(np.pi * np.arange(rising) / rising)
+    ramp[-rising:] = ramp[:rising][::-1]
+    force = trial.force * ramp[:, None]
+    kept = n - run_in - rising // 2
+    window = tukey(kept, 0.08)
+    window /= np.sqrt(np.sum(window**2))
+    axis = np.arange(kept // 2 + 1) * trial.rate / kept
+    lines = np.flatnonzero((axis >= max(band[0], 3 * trial.rate / kept)) & (axis <= band[1]))
+    none = np.zeros(0, dtype=complex)
+    stub = WindowedLines(trial, padded, run_in, window, lines, axis[lines], none, none, none)
+    return WindowedLines(
+        trial,
+        padded,
+        run_in,
+        window,
+        lines,
+        axis[lines],
+        np.asarray(rfft(force, n=padded, axis=0)),
+        stub.cut(trial.force),
+        stub.cut(trial.response),
+    )
+
+
+def receptance_at(model: ModalModel, frequencies: Real) -> Complex:
+    """Receptance (n, n_responses, n_excitations) at lines that may hold 0 Hz."""
+    if model.residuals is not None and model.residuals.lower.any():
+        frequencies = np.maximum(frequencies, frequencies[1] if len(frequencies) > 1 else 1e-3)
+    return model.receptance(frequencies)
