@@ -1,7 +1,7 @@
 """The diagnosis: plain faults, linear refit, one cause after the other, and a decision that may be to abstain."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -49,7 +49,7 @@ class Settings:
         By name; None: the whole library.
     """
 
-    lab: LabError = LabError()
+    lab: LabError = field(default_factory=LabError)
     causes: dict[str, Physics] | None = None
 
 

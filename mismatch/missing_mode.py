@@ -64,7 +64,7 @@ def _residue(floor: Floor, pole: complex) -> tuple[float, Real]:
         pull = pull + 2 * columns.T @ rest
     solved = floor.inverse @ shared
     left, drive = own - shared.T @ solved, pull - solved.T @ floor.gradient
-    answer = np.linalg.lstsq(left, drive, rcond=1e-8)[0]
+    answer = np.asarray(np.linalg.lstsq(left, drive, rcond=1e-8)[0], dtype=float)
     return float(drive @ answer), answer
 
 

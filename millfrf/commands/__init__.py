@@ -4,14 +4,16 @@ from .calibrate import calibrate
 from .chatter import chatter
 from .convert import convert
 from .demo import demo
+from .diagnose import diagnose
 from .estimate import estimate
 from .fit import fit
 from .inspect import inspect
 from .lobes import lobes
 from .plan import plan
+from .predict import predict
 from .report import report
 
-COMMANDS = (demo, plan, inspect, convert, estimate, fit, calibrate, lobes, chatter, report)
+COMMANDS = (demo, plan, inspect, convert, estimate, fit, calibrate, lobes, chatter, predict, diagnose, report)
 """In the order in which `--help` lists them."""
 
 __all__ = ["COMMANDS"]

@@ -1,0 +1,76 @@
+"""From a nominal model and recordings to a folder with the diagnosis and the improved model."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from foundation import InputError
+from mismatch import Diagnosis, Settings, diagnose, read_trials
+from mismatch.diagnosis_file import improved_model_of, write_diagnosis
+from modal_fit import read_modal_model, write_modal_model
+
+from ..progress import Watch, silent
+
+
+@dataclass(frozen=True)
+class DiagnosisFiles:
+    """What a diagnosis wrote, and lines that sum it up."""
+
+    diagnosis: Diagnosis
+    written: tuple[Path, ...]
+    summary: tuple[str, ...]
+
+
+def diagnose_files(
+    model_path: str | os.PathLike[str],
+    recordings: Sequence[str | os.PathLike[str]],
+    out: str | os.PathLike[str],
+    settings: Settings | None = None,
+    *,
+    stream: str | None = None,
+    watch: Watch = silent,
+) -> DiagnosisFiles:
+    """Diagnose and write ``diagnosis.json`` and ``improved_model.json`` into a folder, made if need be.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be used together, or a folder that cannot be made.
+    """
+    folder = Path(out)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder} is a file; name a folder with --out")
+    model = read_modal_model(model_path)
+    trials = read_trials(recordings, model, stream=stream)
+    with watch("diagnosing"):
+        diagnosis = diagnose(model, trials, settings)
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = (folder / "diagnosis.json", folder / "improved_model.json")
+    write_diagnosis(paths[0], diagnosis)
+    write_modal_model(paths[1], improved_model_of(diagnosis))
+    return DiagnosisFiles(diagnosis, paths, tuple(summary(diagnosis)))
+
+
+def summary(diagnosis: Diagnosis) -> list[str]:
+    """A few lines for the terminal: verdict, causes with numbers, error before and after."""
+    lines = [f"verdict: {diagnosis.verdict}"]
+    for cause in diagnosis.physics:
+        numbers = ", ".join(
+            f"{name} {value:.4g}" + (f" ± {cause.standard_errors[name]:.2g}" if name in cause.standard_errors else "")
+            for name, value in cause.parameters.items()
+        )
+        place = ", ".join(f"{key} {value}" for key, value in cause.location.items())
+        lines.append(f"{cause.name}{f' ({place})' if place else ''}: {numbers}; evidence {cause.evidence:.0f}")
+    if diagnosis.equivalents:
+        lines.append(f"cannot be told from: {', '.join(diagnosis.equivalents)}")
+    if diagnosis.verdict == "unexplained":
+        lines.append(
+            f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal: a cause is missing"
+        )
+    gain = diagnosis.improvement
+    lines.append(
+        f"error on {gain.held_out}, held out: {100 * gain.before:.3g} % nominal, {100 * gain.refitted:.3g} % refitted, "
+        f"{100 * gain.after:.3g} % improved, noise {100 * gain.noise_floor:.3g} %, p = {gain.p_value:.2g}"
+    )
+    return lines

@@ -1,0 +1,49 @@
+"""From a model and a recording to a recording of predicted responses."""
+
+import os
+from pathlib import Path
+
+from acquisition import Channel, Recording, RecordingWriter, StreamDescription
+from mismatch.prediction import predict
+from mismatch.trial import read_trial
+from modal_fit import read_modal_model
+
+
+def predict_file(
+    model_path: str | os.PathLike[str],
+    recording_path: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    *,
+    stream: str | None = None,
+) -> list[str]:
+    """Write predicted responses beside the forces; return lines that say how far they are off.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be used together.
+    """
+    model = read_modal_model(model_path)
+    trial = read_trial(recording_path, model, stream=stream)
+    result = predict(model, trial)
+    with Recording(recording_path) as recording:
+        source = recording.stream(stream)
+        known: dict[str, Channel] = {channel.name: channel for channel in source.channels}
+        start_time, name = source.start_time, source.name
+    names = trial.channels[trial.force.shape[1] :]
+    channels = tuple(known[one] for one in names)
+    description = StreamDescription(name, trial.rate, start_time, channels)
+    title = f"responses predicted for {Path(recording_path).name} by {Path(model_path).name}"
+    with RecordingWriter(out, (description,), title=title) as writer:
+        writer.append(name, result.response)
+    lines = [
+        f"{one}: error {100 * float(error):.3g} % of the measured root mean square"
+        for one, error in zip(names, result.error, strict=True)
+    ]
+    low, high = result.band
+    return [
+        *lines,
+        f"all responses: {100 * result.total_error:.3g} % ({low:.3g} to {high:.3g} Hz, after "
+        f"{result.run_in / trial.rate:.3g} s of run-in)",
+        f"wrote {out}",
+    ]
