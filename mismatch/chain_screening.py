@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .explanation import Cause, Explanation, predict_lines
+from .explanation import Cause, Explanation, line_response
 from .linear_floor import Floor
 from .physics import ChainPhysics
 
@@ -31,7 +31,7 @@ def screen_chains(floor: Floor, explanation: Explanation, causes: list[ChainPhys
         for place in physics.places(explanation.shape.nominal):
             start = Cause(physics, physics.start(explanation.shape.nominal), place)
             gain, step = _gain(floor, explanation, start)
-            found.append(ScreenedChain(start.moved(start.coordinates() + np.clip(step, -20, 20)), gain))
+            found.append(ScreenedChain(start.moved(start.coordinates() + np.clip(step, -60, 60)), gain))
     return sorted(found, key=lambda one: -one.gain)
 
 
@@ -42,12 +42,12 @@ def _gain(floor: Floor, explanation: Explanation, cause: Cause) -> tuple[float, 
     shared = np.zeros((len(floor.gradient), cause.size))
     pull = np.zeros(cause.size)
     for record in floor.records:
-        base = predict_lines(with_it, record.lines).response
+        base = line_response(with_it, record.lines)
         columns = []
         for k in range(len(here) - cause.size, len(here)):
             aside = here.copy()
             aside[k] += 0.1
-            changed = predict_lines(with_it.with_causes(aside), record.lines).response
+            changed = line_response(with_it.with_causes(aside), record.lines)
             columns.append(record.column((changed - base) / 0.1))
         slope = np.array(columns).T
         own += 2 * slope.T @ slope

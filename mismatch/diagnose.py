@@ -16,8 +16,8 @@ from .fitting import Fit, fit
 from .held_out import held_out_improvement
 from .joint_direction import find_direction
 from .joint_screening import screen_joints
-from .leftover import leftover_share
-from .linear_floor import Floor, linear_floor
+from .leftover import Leftover, leftover
+from .linear_floor import Floor, linear_floor, noise_floor
 from .missing_mode import find_mode
 from .physics import ChainPhysics, JointPhysics, Physics, library
 from .plain_faults import Clipping, Tone, find_clipping, find_tone, unclipped, without_tone
@@ -33,8 +33,20 @@ MOST_CAUSES = 3
 LEAST_EVIDENCE = 20.0
 """Gain in score below which nothing is accepted: odds of some twenty thousand to one."""
 
-ABSTAIN_ABOVE = 0.25
-"""Share of the final residual that still moves with the signal, above which a cause is missing."""
+MOST_LAWS = 4
+"""Joint laws that are fitted to the motion seen; the two best are then simulated freely."""
+
+NOISE_LIKE = 0.06
+"""Share of a residual that may seem to move with the signal by chance, hum or force noise."""
+
+EXPLAINED = 0.9
+"""Share of what moved with the signal that causes must have taken away, if what is left is not noise-like."""
+
+SMALL = 0.01
+"""Evidence of a further cause, as a share of what the first ones had, below which it may mend the form of their law."""
+
+SAME_JOINT = 0.9
+"""Cosine between the directions of two laws of one joint; the second must then bring three times SMALL."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +117,7 @@ def diagnose(
         options, weighed = _options(lines, current, causes)
         candidates += weighed
         best = min(options, key=lambda option: option.fitted.score, default=None)
-        if best is None or not _worth_it(best, current):
+        if best is None or not _worth_it(best, current, base):
             break
         rivals = [
             option.name
@@ -119,12 +131,18 @@ def diagnose(
     deviation = modal_deviation(current)
     if deviation is not None:
         accepted.append(deviation)
-    left = leftover_share(current.explanation, lines)
+    left = leftover(current.explanation, lines)
+    unexplained = _unexplained(left, leftover(base.explanation, lines))
+    if unexplained:
+        candidates += [Candidate(one.name, one.evidence, "rejected", one.location) for one in accepted]
+        accepted = []
     tell("held-out recording")
     improvement = held_out_improvement(lines, current.explanation, current.noises)
-    verdict = "unexplained" if left > ABSTAIN_ABOVE else "explained" if accepted else "none"
+    verdict = "unexplained" if unexplained else "explained" if accepted else "none"
     ranked = tuple(sorted(candidates, key=lambda one: -one.evidence))
-    return Diagnosis(verdict, tuple(accepted), ranked, equivalents, improvement, left, base, current, tuple(lines))
+    return Diagnosis(
+        verdict, tuple(accepted), ranked, equivalents, improvement, left.share, base, current, tuple(lines)
+    )
 
 
 def _plain_faults(
@@ -137,7 +155,7 @@ def _plain_faults(
         if tone is None:
             break
         lines = [without_tone(one, tone) for one in lines]
-        base = fit(lines, base.explanation, base.noises, iterations=4)
+        base = fit(lines, base.explanation, iterations=4)
         found.append(_tone_cause(tone, lines[0]))
     clipping = find_clipping(base, lines)
     if clipping is not None:
@@ -147,7 +165,7 @@ def _plain_faults(
                 _with_response(one, unclipped(base, one, clipping, original))
                 for one, original in zip(lines, originals, strict=True)
             ]
-            base = fit(lines, base.explanation, base.noises, iterations=4)
+            base = fit(lines, base.explanation, iterations=4)
             clipping = _same_clipping(base, lines, originals, clipping)
         found.append(_clipping_cause(clipping, lines[0]))
     return lines, base, found
@@ -181,24 +199,24 @@ def _options(
     lines: list[WindowedLines], current: Fit, causes: dict[str, Physics]
 ) -> tuple[list[_Option], list[Candidate]]:
     """Screen everything, fit what promises most."""
-    floor = linear_floor(current, lines)
+    own_noise = noise_floor(current, lines)
     cost = float(np.log(2 * sum(one.measured.size for one in lines)))
     taken = {(cause.physics.name, cause.place) for cause in current.explanation.causes}
     chains = [
         one
         for one in screen_chains(
-            floor, current.explanation, [p for p in causes.values() if isinstance(p, ChainPhysics)]
+            own_noise, current.explanation, [p for p in causes.values() if isinstance(p, ChainPhysics)]
         )
         if (one.cause.physics.name, one.cause.place) not in taken
     ]
     options: list[_Option] = []
     weighed = [Candidate(one.cause.physics.name, one.gain, "screened", _place(one.cause)) for one in chains]
-    mode = find_mode(floor, current.explanation)
+    mode = find_mode(own_noise, current.explanation)
     weighed.append(Candidate("missing_mode", mode.gain, "screened"))
-    joint_options, joint_weighed, joint_gain = _joints(lines, current, floor, causes)
+    joint_options, joint_weighed = _joints(lines, current, linear_floor(current, lines), causes)
     weighed += joint_weighed
     options += joint_options
-    largest = max([one.gain for one in chains] + [mode.gain, joint_gain, 0.0])
+    largest = max([one.gain for one in chains] + [mode.gain, 0.0])
     for one in chains[:4]:
         if one.gain > max(one.cause.size * cost, 0.03 * largest):
             start = replace(current.explanation, causes=(*current.explanation.causes, one.cause))
@@ -215,21 +233,21 @@ def _options(
 
 def _joints(
     lines: list[WindowedLines], current: Fit, floor: Floor, causes: dict[str, Physics]
-) -> tuple[list[_Option], list[Candidate], float]:
+) -> tuple[list[_Option], list[Candidate]]:
     """Joint laws along the likeliest direction: driven by the seen motion first, the best then simulated freely."""
     laws = [p for p in causes.values() if isinstance(p, JointPhysics)]
     laws = [p for p in laws if p.name not in {cause.physics.name for cause in current.explanation.causes}]
     sighting = find_direction(floor, current.explanation)
-    if not laws or sighting.gain < 60 * len(lines):
-        return [], [], 0.0
+    if not laws or sighting.gain < 50 * len(lines):
+        return [], []
     location = {"direction": [round(float(x), 6) for x in sighting.direction]}
     screened = screen_joints(floor, current.explanation, sighting.direction, laws)
     weighed = [Candidate(one.causes[0].physics.name, one.gain, "screened", location) for one in screened]
-    promising = [one for one in screened if one.gain > max(60.0, 0.003 * screened[0].gain)][:4]
+    promising = [one for one in screened if one.gain > max(60.0, 0.01 * screened[0].gain)][:MOST_LAWS]
     driven = []
     for one in promising:
         starts = [
-            fit(lines, _added(current.explanation, cause), current.noises, iterations=3) for cause in one.causes[:2]
+            fit(lines, _added(current.explanation, cause), current.noises, iterations=2) for cause in one.causes[:2]
         ]
         best = min(starts, key=lambda start: start.score)
         driven.append(fit(lines, best.explanation, best.noises, iterations=4))
@@ -237,13 +255,13 @@ def _joints(
     options = []
     for k, near in enumerate(driven):
         gain = current.score - near.score
-        if k > 2 or gain < max(LEAST_EVIDENCE / 2, 0.25 * (current.score - driven[0].score)):
+        if k > 1 or gain < max(LEAST_EVIDENCE / 2, 0.4 * (current.score - driven[0].score)):
             continue
         last = near.explanation.causes[-1]
         free = replace(near.explanation, causes=(*near.explanation.causes[:-1], replace(last, seen=None)))
         fitted = fit(lines, free, near.noises, iterations=10)
         options.append(_Option(last.physics.name, _place(fitted.explanation.causes[-1]), fitted))
-    return options, weighed, screened[0].gain if screened else 0.0
+    return options, weighed
 
 
 def _added(explanation: Explanation, cause: Cause) -> Explanation:
@@ -258,16 +276,32 @@ def _place(cause: Cause) -> dict[str, Any]:
     return {"channel": label, "role": kind} if kind in ("response", "force") else {}
 
 
-def _worth_it(option: _Option, current: Fit) -> bool:
+def _unexplained(left: Leftover, before: Leftover) -> bool:
+    """Whether too much still moves with the signal for the causes found, if any."""
+    return left.share > NOISE_LIKE and left.power > (1 - EXPLAINED) * before.power
+
+
+def _worth_it(option: _Option, current: Fit, base: Fit) -> bool:
     """Enough evidence; and if it lies in the lab's belief alone, most of what the belief found odd."""
     gain = current.score - option.fitted.score
-    if gain < LEAST_EVIDENCE:
+    if gain < max(LEAST_EVIDENCE, _mending(option, current) * (base.score - current.score)):
         return False
     if current.misfit - option.fitted.misfit > LEAST_EVIDENCE:
         return True
     size = current.explanation.shape.size
     odd = max(current.deviation - size, 1.0)
     return current.deviation - option.fitted.deviation > 0.6 * odd
+
+
+def _mending(option: _Option, current: Fit) -> float:
+    """Share of the evidence so far that a further cause needs."""
+    last = option.fitted.explanation.causes[-1:] if option.name != "missing_mode" else ()
+    for new in last:
+        for old in current.explanation.causes:
+            if new.direction is not None and old.direction is not None:
+                along = abs(float(new.direction @ old.direction))
+                return 3 * SMALL if along > SAME_JOINT else SMALL
+    return SMALL
 
 
 def _describe(option: _Option, current: Fit) -> AcceptedCause:

@@ -203,6 +203,26 @@ def predict_lines(explanation: Explanation, lines: WindowedLines) -> Predicted:
     return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint)
 
 
+def line_response(explanation: Explanation, lines: WindowedLines, joint: Complex | None = None) -> Complex:
+    """Response lines (n_lines, n_responses) of the linear part to the windowed forces: for derivatives, without leakage.
+
+    Parameters
+    ----------
+    explanation
+        Its joints are not simulated.
+    lines
+        Recording.
+    joint : (n_lines, n_excitations)
+        Windowed lines of the joints' forces, or None.
+    """
+    around = surround(explanation, lines.frequencies)
+    force = around.pushed(lines.force_here)
+    if joint is not None:
+        force = force - joint
+    closed = around.closed(explanation.model.receptance(lines.frequencies))
+    return around.shown(np.einsum("kpq,kq->kp", closed, force) * lines.kinematic(lines.frequencies))
+
+
 def columns_of(model: ModalModel) -> list[int]:
     """Excitations along which a joint's direction is counted."""
     return common_axes(model)[1]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .explanation import Cause, Explanation, Predicted, columns_of, predict_lines, surround
+from .explanation import Cause, Explanation, Predicted, columns_of, line_response, predict_lines, surround
 from .noise_model import NoiseModel, fit_noise, whitening
 from .windowed_lines import WindowedLines
 
@@ -108,6 +108,9 @@ def fit(
             if gain < tolerance:
                 break
             matrix, gradient = _normal_equations(pool, lines, explanation, seen)
+        cold = list(pool.map(_assess, lines, [explanation] * len(lines), [None] * len(lines)))
+    # a noise that crept along from a bad beginning may have stopped short: of two searches the better counts
+    seen = [min(pair, key=lambda one: one.misfit) for pair in zip(seen, cold, strict=True)]
     misfit = sum(one.misfit for one in seen)
     deviation = _deviation(explanation)
     count = 2 * sum(one.measured.size for one in lines)
@@ -164,11 +167,18 @@ def jacobian(explanation: Explanation, lines: WindowedLines, predicted: Predicte
     linear = around.shown(linear * lines.kinematic(lines.frequencies)[:, :, None])
     columns = [linear]
     here = explanation.coordinates()
+    joint = lines.cut(lines.signal(predicted.joint)) if predicted.joint.any() else None
+    plain = line_response(explanation, lines, joint)
+    free = np.concatenate([np.zeros(0)] + [np.full(c.size, c.direction is not None) for c in explanation.causes])
     for k in range(len(here)):
         aside = here.copy()
         aside[k] += 0.02
-        changed = predict_lines(explanation.with_causes(aside), lines).response
-        columns.append(((changed - predicted.response) / 0.02)[:, :, None])
+        moved = explanation.with_causes(aside)
+        if free[k]:
+            change = predict_lines(moved, lines).response - predicted.response
+        else:
+            change = line_response(moved, lines, joint) - plain
+        columns.append((change / 0.02)[:, :, None])
     return np.concatenate(columns, axis=2)
 
 

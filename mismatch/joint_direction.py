@@ -26,7 +26,7 @@ class JointSighting:
     direction : (n_axes,)
         Unit vector; its largest entry is positive.
     gain
-        Twice the log likelihood that one force along it explains, its spectrum free.
+        Twice the log likelihood that one force along it explains, its spectrum free, beyond what noise gains.
     share
         Of what a force in any direction would explain.
     """
@@ -59,8 +59,10 @@ def find_direction(floor: Floor, explanation: Explanation) -> JointSighting:
         best = answer.x
     direction = best / np.linalg.norm(best)
     direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
-    everything = sum(_gain_of_all(parts) for parts in bands)
-    found = gain(direction)
+    # noise alone gains half a unit a band on average where z > 1
+    chance = 0.5 * sum(len(parts.starts) for parts in bands)
+    everything = sum(_gain_of_all(parts) for parts in bands) - n * chance
+    found = gain(direction) - chance
     return JointSighting(direction, found, found / max(everything, 1e-12))
 
 

@@ -1,5 +1,7 @@
 """Is what remains noise? Noise stays when the signal goes; an omission comes and goes with it."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft
@@ -19,8 +21,24 @@ BINS = 12
 """Neighbouring bins that share one noise level."""
 
 
-def leftover_share(explanation: Explanation, lines: list[WindowedLines]) -> float:
-    """Share of the residual's power that moves with the predicted response, 0 (noise) to 1.
+@dataclass(frozen=True)
+class Leftover:
+    """What of a residual moves with the signal.
+
+    Parameters
+    ----------
+    share
+        Of the residual's power, 0 (noise) to 1.
+    power
+        The same power as a share of the response's, mean over channels and recordings.
+    """
+
+    share: float
+    power: float
+
+
+def leftover(explanation: Explanation, lines: list[WindowedLines]) -> Leftover:
+    """How much of the residual moves with the predicted response.
 
     In cells of time and frequency the residual's power is regressed, with non-negative factors, on a constant (noise of
     that band), on the predicted power in the same cell and on the predicted power of all frequencies at the same time
@@ -34,7 +52,7 @@ def leftover_share(explanation: Explanation, lines: list[WindowedLines]) -> floa
     lines
         Recordings.
     """
-    moving, total = 0.0, 0.0
+    shares, powers = [], []
     for one in lines:
         predicted = predict_lines(explanation, one)
         n = len(one.trial.force)
@@ -45,11 +63,10 @@ def leftover_share(explanation: Explanation, lines: list[WindowedLines]) -> floa
             r, s = _powers(rest[:, p], one), _powers(shown[:, p], one)
             own = _moving(r, s)
             chance = np.median([_moving(r, np.roll(s, shift, axis=1)) for shift in _shifts(s.shape[1])])
-            # each channel counts alike, however it is scaled
-            scale = 1 / np.sum(r)
-            moving += max(own - float(chance), 0.0) * scale
-            total += 1.0
-    return float(moving / total) if total else 0.0
+            moving = max(own - float(chance), 0.0)
+            shares.append(moving / float(np.sum(r)))
+            powers.append(moving / float(np.sum(s)))
+    return Leftover(float(np.mean(shares)), float(np.mean(powers)))
 
 
 def _shifts(count: int) -> list[int]:

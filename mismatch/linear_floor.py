@@ -1,9 +1,11 @@
 """A refitted linear model's residual, whitened by a cautious noise floor, with the modal parameters projected out."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import gamma
 
 from .explanation import predict_lines
 from .fitting import Fit, jacobian, levels, through_structure
@@ -94,21 +96,39 @@ class Floor:
 
 
 def linear_floor(fitted: Fit, lines: list[WindowedLines]) -> Floor:
-    """Put a fit's residual on the floor.
+    """Put a fit's residual on a cautious floor.
 
     The floor of a response is the level below which its residual lies in a fifth of all narrow bands: an omission that
     shows at resonances does not raise it, while the fitted noise model may have taken such an omission for noise.
     """
+
+    def covariance(k: int, rest: Complex, through: Complex) -> Complex:
+        return _floor_covariance(rest, through, levels(lines[k]))
+
+    return _floor(fitted, lines, covariance)
+
+
+def noise_floor(fitted: Fit, lines: list[WindowedLines]) -> Floor:
+    """Put a fit's residual on its own fitted noise: there the fit is at its optimum, and gains are a score test's."""
+
+    def covariance(k: int, rest: Complex, through: Complex) -> Complex:
+        del rest
+        return fitted.noises[k].covariance(lines[k].frequencies, through)
+
+    return _floor(fitted, lines, covariance)
+
+
+def _floor(fitted: Fit, lines: list[WindowedLines], covariance: Callable[[int, Complex, Complex], Complex]) -> Floor:
     records = []
     size = fitted.explanation.size
     matrix, gradient = np.zeros((size, size)), np.zeros(size)
     belief = np.full(size, 1e-6)
     belief[: fitted.explanation.shape.size] = fitted.explanation.shape.belief
-    for one in lines:
+    for k, one in enumerate(lines):
         predicted = predict_lines(fitted.explanation, one)
         rest = one.measured - predicted.response
         through = through_structure(fitted.explanation, one)
-        white = whitening(_floor_covariance(rest, through, levels(one)))
+        white = whitening(covariance(k, rest, through))
         slope = (white @ jacobian(fitted.explanation, one, predicted)).reshape(rest.size, -1)
         stacked = np.concatenate([slope.real, slope.imag])
         small = np.einsum("kij,kj->ki", white, rest).ravel()
@@ -122,7 +142,9 @@ def linear_floor(fitted: Fit, lines: list[WindowedLines]) -> Floor:
 
 def _floor_covariance(rest: Complex, through: Complex, level: tuple[Real, Real]) -> Complex:
     bands = np.array_split(np.abs(rest) ** 2, min(150, max(4, len(rest) // 12)))
-    quiet = np.quantile(np.array([band.mean(axis=0) for band in bands]), 0.2, axis=0)
+    # the fifth of bands that are quietest by chance alone is quieter than the noise
+    count = float(np.mean([len(band) for band in bands]))
+    quiet = np.quantile(np.array([band.mean(axis=0) for band in bands]), 0.2, axis=0) * count / gamma.ppf(0.2, count)
     share = np.median(np.sqrt(quiet) / level[0])
     passed = through * (FORCE_SHARE * share * level[1])
     covariance = passed @ passed.conj().swapaxes(1, 2)

@@ -36,10 +36,11 @@ def find_mode(floor: Floor, explanation: Explanation) -> SightedMode:
     low = min(record.lines.frequencies[0] for record in floor.records)
     high = max(record.lines.frequencies[-1] for record in floor.records)
     best: tuple[float, complex, Real] | None = None
+    thin = _thinned(floor, explanation)
     for frequency in np.geomspace(1.3 * low, 0.95 * high, FREQUENCIES):
         for damping in DAMPINGS:
             pole = 2 * np.pi * frequency * (-damping + 1j * np.sqrt(1 - damping**2))
-            gain, residue = _residue(floor, pole)
+            gain, residue = _residue(thin, pole)
             if best is None or gain > best[0]:
                 best = gain, pole, residue
     assert best is not None
@@ -51,19 +52,43 @@ def find_mode(floor: Floor, explanation: Explanation) -> SightedMode:
     return SightedMode(pole, u[:, 0] * s[0] / scale, vh[0] * scale, gain * s[0] ** 2 / np.sum(s**2))
 
 
-def _residue(floor: Floor, pole: complex) -> tuple[float, Real]:
-    """Gain and residue numbers (real parts, then imaginary parts) of a pole."""
-    count = 2 * floor.records[0].through.shape[1] * floor.records[0].through.shape[2]
-    own, shared, pull = np.zeros((count, count)), np.zeros((len(floor.gradient), count)), np.zeros(count)
+@dataclass(frozen=True)
+class _Thin:
+    """Every few lines of a floor: derivative and residual of each recording, and their own normal equations."""
+
+    records: tuple[tuple[FloorRecord, Real, Real], ...]
+    inverse: Real
+    gradient: Real
+
+
+def _thinned(floor: Floor, explanation: Explanation) -> _Thin:
+    size = len(floor.gradient)
+    matrix, gradient = np.diag(np.full(size, 1e-6)), np.zeros(size)
+    shape = explanation.shape
+    matrix[np.arange(shape.size), np.arange(shape.size)] = shape.belief
+    gradient[: shape.size] = -shape.belief * explanation.u
+    records = []
     for record in floor.records:
-        columns = _columns(record, pole)
         chosen = _chosen(record)
-        slope, rest = EVERY * record.slope[chosen], EVERY * record.rest[chosen]
-        own = own + 2 * EVERY * columns.T @ columns
-        shared = shared + 2 * slope.T @ columns
-        pull = pull + 2 * columns.T @ rest
-    solved = floor.inverse @ shared
-    left, drive = own - shared.T @ solved, pull - solved.T @ floor.gradient
+        slope, rest = record.slope[chosen], record.rest[chosen]
+        matrix += 2 * EVERY * slope.T @ slope
+        gradient += 2 * EVERY * slope.T @ rest
+        records.append((record, slope, rest))
+    return _Thin(tuple(records), np.asarray(np.linalg.inv(matrix), dtype=float), gradient)
+
+
+def _residue(thin: _Thin, pole: complex) -> tuple[float, Real]:
+    """Gain and residue numbers (real parts, then imaginary parts) of a pole."""
+    through = thin.records[0][0].through
+    count = 2 * through.shape[1] * through.shape[2]
+    own, shared, pull = np.zeros((count, count)), np.zeros((len(thin.gradient), count)), np.zeros(count)
+    for record, slope, rest in thin.records:
+        columns = _columns(record, pole)
+        own += 2 * EVERY * columns.T @ columns
+        shared += 2 * EVERY * slope.T @ columns
+        pull += 2 * EVERY * columns.T @ rest
+    solved = thin.inverse @ shared
+    left, drive = own - shared.T @ solved, pull - solved.T @ thin.gradient
     answer = np.asarray(np.linalg.lstsq(left, drive, rcond=1e-8)[0], dtype=float)
     return float(drive @ answer), answer
 

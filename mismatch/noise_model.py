@@ -89,7 +89,7 @@ def fit_noise(
         lumps = _lumped(frequencies, residual, through, weights, bands, knots)
         first = np.concatenate([noise.responses.ravel(), noise.forces])
         answer = minimize(
-            _cost, first, (lumps, n, m, levels), jac=True, method="L-BFGS-B", options={"maxiter": 20 if warm else 80}
+            _cost, first, (lumps, n, m, levels), jac=True, method="L-BFGS-B", options={"maxiter": 12 if warm else 150}
         )
         noise = NoiseModel(knots, answer.x[: n * KNOTS].reshape(n, KNOTS), answer.x[n * KNOTS :])
         white = whitening(noise.covariance(frequencies, through))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import irfft, next_fast_len, prev_fast_len, rfft
 from scipy.signal.windows import tukey
 
 from modal_fit import ModalModel
@@ -97,7 +97,7 @@ def windowed_lines(trial: Trial, band: tuple[float, float], decay: float) -> Win
     ramp[:rising] = 0.5 - 0.5 * np.cos(np.pi * np.arange(rising) / rising)
     ramp[-rising:] = ramp[:rising][::-1]
     force = trial.force * ramp[:, None]
-    kept = n - run_in - rising // 2
+    kept = prev_fast_len(n - run_in - rising // 2, real=True)
     window = tukey(kept, 0.08)
     window /= np.sqrt(np.sum(window**2))
     axis = np.arange(kept // 2 + 1) * trial.rate / kept
