@@ -1,8 +1,8 @@
 """Milling forces of the trial: speed sweeps in three immersions, porous material, both, or one constant speed.
 
 A tooth at angle phi that is engaged cuts the chip ``h = feed sin(phi) + runout`` times the material's state;
-tangential, radial and axial forces are ``K a h (1, kr, ka)`` (Altintas, Manufacturing Automation, 2nd ed., section 2.6).
-The force is given: the cut does not react to the vibration.
+tangential, radial and axial forces are ``K a h (1, kr, ka)`` (Altintas, Manufacturing Automation, 2nd ed., section
+2.6). The force is given: the cut does not react to the vibration.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
 """The trial's own integrator: classical Runge-Kutta of fourth order at 8192 Hz, far finer than the recordings.
 
 ``q_r' = p_r q_r + left_r . (F(t) - sum_e act_e g_e)``; the elements' deflection is ``sense_e . x``, their force acts
-along ``act_e`` at the tip. Forces are interpolated by Fourier (exact, for they are band-limited), accelerations low-passed
-without phase and decimated.
+along ``act_e`` at the tip. Forces are interpolated by Fourier (exact, for they are band-limited), accelerations
+low-passed without phase and decimated.
 """
 
 from collections.abc import Sequence

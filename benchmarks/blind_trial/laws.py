@@ -34,7 +34,7 @@ def elastic(code: int, p: NDArray[np.float64], u: float) -> float:
     if code == CUBIC:
         return a * x * x * x
     if code == POWER:
-        return a * x * abs(x) ** 1.5
+        return a * x * abs(x) * sqrt(abs(x))
     if code == SATURATING:
         return a * w * (x - tanh(x))
     if code == RATIONAL:
@@ -65,7 +65,7 @@ def resisting(code: int, p: NDArray[np.float64], v: float) -> float:
         return a * (1 + 0.5 * exp(-((v / c) ** 2))) * tanh(v / w)
     x = v / w
     if code == ROOT_SPEED:
-        return a * x / (0.01 + x * x) ** 0.25
+        return a * x / sqrt(sqrt(0.01 + x * x))
     return a * x * abs(x)
 
 

@@ -59,7 +59,7 @@ def drift(scene: Scene, family: str, dial: float) -> Change:
             share = (1 - np.exp(-share / 0.4)) / (1 - np.exp(-1 / 0.4))
         return (Element(laws.SCHEDULED, (change,), scene.direction, scene.direction, share),)
 
-    return Change(joint=elements, parameters={"stiffness_change": change, "duration": float(DURATION)})
+    return Change(joint=elements, parameters={"stiffness_change": change})
 
 
 def gyroscopic(scene: Scene, family: str, dial: float) -> Change:

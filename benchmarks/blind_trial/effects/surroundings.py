@@ -64,7 +64,7 @@ def rumble(scene: Scene, family: str, dial: float) -> Change:
         frequencies = np.fft.rfftfreq(n, 1 / RATE)
         spectrum[(frequencies < 5) | (frequencies > 40)] = 0
         wave = np.fft.irfft(spectrum, n)
-        return (wave / wave.std() * _eased(n))[:, None] * push
+        return np.asarray((wave / wave.std() * _eased(n))[:, None] * push)
 
     return Change(shake=shake)
 
