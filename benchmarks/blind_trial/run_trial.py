@@ -127,11 +127,20 @@ def _same_draw(out: Path, draw: dict[str, Any]) -> None:
 
 def _write_cases(out: Path, scores: list[Score]) -> None:
     """One line a case, for who wants to look closer."""
-    heads = "case,group,condition,effect,family,second,strength,reached,noise,expected,answered,outcome,angle,removed"
+    heads = "case,group,condition,effect,family,second,strength,reached,beyond,noise,expected,answered,outcome,angle,removed"
     lines = [heads]
     for s in scores:
         spec = [s.spec[key] for key in ("group", "condition", "effect", "family", "second", "strength")]
-        values = [s.name, *spec, f"{s.strength:.3g}", s.spec["noise"], s.expected, s.answered, s.outcome]
+        values = [
+            s.name,
+            *spec,
+            f"{s.strength:.3g}",
+            f"{s.beyond:.3g}",
+            s.spec["noise"],
+            s.expected,
+            s.answered,
+            s.outcome,
+        ]
         values += ["" if x is None else f"{x:.3g}" for x in (s.angle, s.removed)]
         lines.append(",".join(map(str, values)))
     (out / "cases.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Scores of opened truths: right, partial, equivalent, wrong, abstained, failed; direction, coverage, held-out error."""
+"""Scores of opened truths: right, partial, equivalent, wrong, abstained, failed; direction, coverage, held-out."""
 
 from dataclasses import dataclass
 from math import sqrt
@@ -50,6 +50,8 @@ class Score:
         ``right, partial, equivalent, wrong, abstained, failed``.
     strength
         Response change over noise that was reached.
+    beyond
+        What of it no linear structure could imitate, over noise.
     angle
         Between true and found joint direction, degrees, or None.
     covered
@@ -64,6 +66,7 @@ class Score:
     answered: str
     outcome: str
     strength: float
+    beyond: float
     angle: float | None
     covered: tuple[tuple[str, bool], ...]
     removed: float | None
@@ -86,6 +89,7 @@ def score_case(name: str, truth: dict[str, Any], answer: Answer, run: dict[str, 
         named,
         outcome,
         truth["residual_over_noise"],
+        truth["residual_after_refit_over_noise"],
         angle,
         tuple(_covered(truth, answer)) if outcome == "right" else (),
         excess_removed(run.get("held_out"), truth),
@@ -111,7 +115,9 @@ def outcome_of(truth: dict[str, Any], answer: Answer) -> str:
         return "right"
     if named < effects:
         return "partial"
-    return "equivalent" if effects <= named | set(answer.equivalents) else "wrong"
+    missing, extra = effects - named, named - effects
+    told = missing and missing <= set(answer.equivalents) and len(extra) <= len(missing)
+    return "equivalent" if told else "wrong"
 
 
 def _control(accepted: set[str], named: set[str], verdict: str) -> str:

@@ -13,6 +13,7 @@ from .effects import ALL, FOREIGN, Change, Effect, Scene
 from .excitation import KEPT, LEVELS, Test, milling_test
 from .integrator import linear_response, respond, tip_motion
 from .noise import measurement_noise
+from .refit import after_refit
 from .structures import LabError, Structure, draw_structure, nominal_model
 
 SMALL_MODES = 0.3
@@ -73,24 +74,25 @@ def over_noise(residual: NDArray[np.float64], noise: float) -> float:
 
 
 def find_dial(bench: Bench, scene: Scene, effect: Effect, family: str, strength: float, noise: float) -> float:
-    """Dial at which the effect has the wanted strength within 10 %, by secants in logarithms; or the nearest."""
+    """Dial at which the effect has the wanted strength within 10 %, or the nearest: bracketed secants in logarithms."""
     dial, slope = effect.start, 1.0
-    before: tuple[float, float] | None = None
-    best = (np.inf, dial)
-    for _ in range(7):
-        ratio = over_noise(bench.residual("mid", [effect.build(scene, family, dial)]), noise)
-        if not np.isfinite(ratio) or ratio > 1e6:
-            dial, before = dial / 5, None
-            continue
-        miss = np.log(strength / max(ratio, 1e-9))
-        best = min(best, (abs(miss), dial))
+    tried: list[tuple[float, float]] = []
+    for _ in range(9):
+        ratio = max(over_noise(bench.residual("mid", [effect.build(scene, family, dial)]), noise), 1e-6)
+        ratio = ratio if np.isfinite(ratio) else 1e6
+        tried.append((dial, ratio))
+        miss = np.log(strength / ratio)
         if abs(miss) < 0.1 or (dial >= effect.largest and miss > 0):
             break
-        if before is not None and abs(np.log(dial / before[0])) > 1e-6:
-            slope = float(np.clip(np.log(ratio / before[1]) / np.log(dial / before[0]), 0.3, 3.0))
-        before = (dial, max(ratio, 1e-9))
-        dial = float(min(dial * np.exp(np.clip(miss / slope, -4, 4)), effect.largest))
-    return best[1]
+        if len(tried) > 1 and tried[-2][0] != dial:
+            run = np.log(dial / tried[-2][0])
+            slope = float(np.clip(np.log(ratio / tried[-2][1]) / run, 0.3, 12.0))
+        low = max((d for d, r in tried if r < strength), default=0.0)
+        high = min((d for d, r in tried if r >= strength), default=np.inf)
+        dial = float(min(dial * np.exp(np.clip(miss / slope, -3, 3)), effect.largest))
+        if 0 < low < high < np.inf:
+            dial = float(np.clip(dial, low**0.8 * high**0.2, low**0.2 * high**0.8))
+    return min(tried, key=lambda pair: abs(float(np.log(strength / pair[1]))))[0]
 
 
 def build_case(spec: CaseSpec) -> Case:
@@ -184,12 +186,15 @@ def _record(
     passed_on = linear_response(bench.structure, force_noise)[KEPT].std(axis=0)
     residual = _converted(clean, changes, rng) - linear_response(bench.structure, forces)
     left = np.stack([residual[KEPT].std(axis=0), motion[KEPT].std(axis=0)])
-    facts = {
+    facts: dict[str, Any] = {
         "residual_over_noise": over_noise(left, spec.noise),
         "acceleration_rms": motion[KEPT].std(axis=0).tolist(),
         "nominal_error_rms": error[KEPT].std(axis=0).tolist(),
         "noise_floor_rms": np.hypot(noise.std(axis=0), passed_on).tolist(),
     }
+    if level == "mid":
+        left[0] = after_refit(bench.structure, forces, residual)
+        facts["residual_after_refit_over_noise"] = over_noise(left, spec.noise)
     return np.hstack([forces + force_noise, motion])[KEPT], facts
 
 
@@ -206,5 +211,6 @@ def _truth(spec: CaseSpec, scene: Scene, changes: list[Change], facts: dict[str,
         "joint_direction_at_tcp": scene.direction.tolist() if effects and ALL[spec.effect].directional else None,
         "parameters": [change.parameters for change in changes],
         "residual_over_noise": facts["mid"]["residual_over_noise"],
+        "residual_after_refit_over_noise": facts["mid"].pop("residual_after_refit_over_noise"),
         "recordings": facts,
     }

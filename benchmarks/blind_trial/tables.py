@@ -19,7 +19,8 @@ def report(scores: Sequence[Score], heading: str) -> str:
         f"{max(s.seconds for s in scores):.0f} s the slowest.",
         "## Targets\n\n" + _table(["what", "found", "of", "share", "95 % interval", "target"], targets(scores)),
         "## By effect, strength at least the noise\n\n" + _by(strong(scores), lambda s: s.expected),
-        "## By response change over noise\n\n" + _by(_sized(scores), _reached),
+        "## By response change over noise\n\n" + _by(_sized(scores), lambda s: _bin(s.strength)),
+        "## By what no linear structure could imitate, over noise\n\n" + _by(_sized(scores), lambda s: _bin(s.beyond)),
         "## By family of the law\n\n" + _by(_named(scores), lambda s: f"{s.spec['effect']}: {s.spec['family']}"),
         "## By condition\n\n" + _by(scores, lambda s: f"{s.spec['group']}: {s.spec['condition']}"),
         "## By excitation\n\n" + _by(_named(scores), lambda s: str(s.spec["excitation"])),
@@ -68,10 +69,17 @@ def _sized(scores: Iterable[Score]) -> list[Score]:
     return [s for s in _named(scores) if s.expected != "modal_parameters"]
 
 
-def _reached(score: Score) -> str:
-    """The strength that was reached, in words that sort."""
-    for upper, words in ((0.35, "0.00-0.35"), (0.75, "0.35-0.75"), (1.4, "0.75-1.4"), (3.0, "1.4-3"), (8.0, "3-8")):
-        if score.strength < upper:
+def _bin(ratio: float) -> str:
+    """A ratio in words that sort."""
+    for upper, words in (
+        (0.1, "0-0.1"),
+        (0.35, "0.1-0.35"),
+        (0.75, "0.35-0.75"),
+        (1.4, "0.75-1.4"),
+        (3.0, "1.4-3"),
+        (8.0, "3-8"),
+    ):
+        if ratio < upper:
             return words
     return "8 and more"
 

@@ -78,10 +78,10 @@ def gain(scene: Scene, family: str, dial: float) -> Change:
 
 
 def clipping(scene: Scene, family: str, dial: float) -> Change:
-    """One acceleration channel saturates at ``4 rms / (1 + dial)`` of the middle level: hard (noise before or after
+    """One acceleration channel saturates at ``4/dial`` times its RMS at the middle level: hard (noise before or after
     it), or softly, ``a/(1 + |a/l|^10)^(1/10)``."""
     column = int(scene.rng().integers(3))
-    limit = float(4 * scene.accelerations[column] / (1 + dial))
+    limit = float(4 * scene.accelerations[column] / dial)
 
     def clip(signals: Signals, _: np.random.Generator) -> Signals:
         clipped = signals.copy()
@@ -103,7 +103,7 @@ EFFECTS = (
     Effect("ac_coupling", ("one_pole", "two_poles"), ac_coupling, 0.3, 15),
     Effect("axis_misalignment", ("any_axis", "about_z"), misalignment, 2.0, 90),
     Effect("gain_error", ("force", "acceleration"), gain, 0.05, 5),
-    Effect("clipping", ("hard", "hard_noise_after", "soft"), clipping, 0.5, 20),
+    Effect("clipping", ("hard", "hard_noise_after", "soft"), clipping, 1.5, 20),
 )
 
 
