@@ -127,8 +127,8 @@ def _same_draw(out: Path, draw: dict[str, Any]) -> None:
 
 def _write_cases(out: Path, scores: list[Score]) -> None:
     """One line a case, for who wants to look closer."""
-    heads = "case,group,condition,effect,family,second,strength,reached,beyond,noise,expected,answered,outcome,angle,removed"
-    lines = [heads]
+    heads = "case,group,condition,effect,family,second,strength,reached,beyond,noise"
+    lines = [heads + ",expected,answered,outcome,angle,removed"]
     for s in scores:
         spec = [s.spec[key] for key in ("group", "condition", "effect", "family", "second", "strength")]
         values = [
