@@ -1,8 +1,9 @@
 """How much of an effect no linear structure could imitate: its size after the freest linear refit.
 
 A fault of gain, say, is a linear structure with other shapes: only what the lab believes of its model tells the two
-apart. A true joint law leaves a residual at any poles and residues. To first order a change of them adds to each acceleration
-a sum of ``2 Re(c w)``, ``w`` the responses of single modes to single forces and their derivatives by the poles.
+apart. A true joint law leaves a residual at any poles and residues. To first order a change of them adds to each
+acceleration a sum of ``2 Re(c w)``, ``w`` the responses of single modes to single forces and their derivatives by the
+poles.
 """
 
 import numpy as np

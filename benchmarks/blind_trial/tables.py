@@ -43,6 +43,7 @@ def targets(scores: Sequence[Score]) -> Rows:
         _rate("wrong physics named", named, _wrong, "<= 2 %"),
         _rate("right, residual >= noise", strong(listed), _right, ">= 95 %"),
         _rate("right, residual half the noise", half, _right, ">= 80 %"),
+        _rate("right, what no linear refit takes >= noise", [s for s in listed if s.beyond >= 0.9], _right, "-"),
         _rate("foreign effects named wrongly", foreign, _wrong, "<= 10 %"),
         _rate("foreign effects: unexplained", foreign, _right, "-"),
         _rate("pairs: both named", _group(scores, "pair"), _right, "-"),
