@@ -109,7 +109,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--out", type=Path, required=True, help="folder; an unfinished trial there is gone on with")
     parser.add_argument("--only", default="", help="one effect, group or condition")
-    parser.add_argument("--whole-grid", action="store_true", help="all 2295 cells and the other groups in proportion")
+    parser.add_argument("--whole-grid", action="store_true", help="all 2160 cells and the other groups in proportion")
     parser.add_argument("--timeout", type=float, default=300.0, help="s a call of the tool")
     parser.add_argument("--tool", default="", help="command of the tool; default: this Python's millfrf")
     parser.add_argument("--keep", action="store_true", help="keep recordings (2.4 MB a case); they can be made again")
