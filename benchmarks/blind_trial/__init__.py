@@ -1,0 +1,1 @@
+"""A blind trial of the diagnosis: cases with a concealed cause, sealed truths, and their scoring."""
