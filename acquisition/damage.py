@@ -21,6 +21,31 @@ def require_stored(samples: h5py.Dataset, name: str, path: Path) -> None:
             f"{path}: /signals/{name} announces {samples.shape[0]} samples but stores at most "
             f"{stored // max(samples.shape[1], 1)}; the file is damaged"
         )
+    if samples.chunks is not None and samples.shape[0]:
+        last = samples.id.get_chunk_info_by_coord(((samples.shape[0] - 1) // samples.chunks[0] * samples.chunks[0], 0))
+        if last.byte_offset is not None and last.byte_offset + last.size > path.stat().st_size:
+            raise FileFormatError(f"{path} ends before its samples do; save what is there with millfrf recover")
+
+
+def whole_rows(samples: h5py.Dataset, file_size: int) -> int:
+    """Leading rows whose bytes lie within a file of ``file_size`` bytes; all of them in a file that was not cut."""
+    n_rows = int(samples.shape[0])
+    if samples.chunks is None:
+        return n_rows
+    for start in range(0, n_rows, samples.chunks[0]):
+        stored = samples.id.get_chunk_info_by_coord((start, 0))
+        if stored.byte_offset is None or stored.byte_offset + stored.size > file_size:
+            return start
+    return n_rows
+
+
+def superblock_end(path: Path) -> int | None:
+    """Where the file says that it ends, bytes, if its superblock has version 3; else None."""
+    with path.open("rb") as file:
+        superblock = file.read(48)
+    if len(superblock) < 48 or superblock[:9] != b"\x89HDF\r\n\x1a\n\x03":
+        return None
+    return int.from_bytes(superblock[28:36], "little")
 
 
 def open_for_reading(path: Path) -> h5py.File:
@@ -44,12 +69,10 @@ def _writer_was_killed(path: Path) -> bool:
 
     Other files must not be opened so: the library would wait, practically forever, for damaged parts to be written.
     """
+    end, still_written = superblock_end(path), 0b101
     with path.open("rb") as file:
-        superblock = file.read(48)
-    signature, still_written = b"\x89HDF\r\n\x1a\n", 0b101
-    if len(superblock) < 48 or superblock[:9] != signature + b"\x03" or superblock[11] != still_written:
-        return False
-    return path.stat().st_size >= int.from_bytes(superblock[28:36], "little")
+        flags = file.read(12)[11:]
+    return end is not None and flags == bytes([still_written]) and path.stat().st_size >= end
 
 
 @contextmanager

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from foundation import FileFormatError, InputError
 
 from .channel import Channel
-from .damage import open_for_reading, reporting_damage, require_stored
+from .damage import open_for_reading, reporting_damage, require_stored, whole_rows
+from .event_series import EventSeries
 from .recording_format import check_format, stream_from_attributes, text_attribute
 from .source import StreamDescription
 
@@ -71,6 +72,11 @@ class Stream:
         """n_samples / sample_rate, s."""
         return self.n_samples / self.sample_rate
 
+    def whole_rows(self, file_size: int) -> int:
+        """Leading rows whose bytes lie within a file of ``file_size`` bytes; fewer than n_samples in a cut file."""
+        with reporting_damage(self.path):
+            return whole_rows(self._samples, file_size)
+
     def channels_of(self, quantity: str) -> tuple[Channel, ...]:
         """The channels of one quantity, in column order."""
         return tuple(channel for channel in self.channels if channel.quantity == quantity)
@@ -121,28 +127,6 @@ class Stream:
             yield self.read(start, min(start + block_length, self.n_samples), channels)
 
 
-class EventSeries:
-    """Slow or asynchronous values: times and values, read when asked for."""
-
-    def __init__(self, group: h5py.Group) -> None:
-        self._group = group
-
-    def read(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times (s) and values, each (n_events,).
-
-        Raises
-        ------
-        FileFormatError
-            The series is damaged.
-        """
-        try:
-            times, values = (np.asarray(self._group[column][:], dtype=float) for column in ("time", "value"))
-        except (OSError, KeyError, AttributeError, TypeError, ValueError) as error:
-            raise FileFormatError(f"events {self._group.name} lack readable 'time' and 'value'; record anew") from error
-        n_whole = min(len(times), len(values))  # a writer killed between the two leaves one time more
-        return times[:n_whole], values[:n_whole]
-
-
 class Recording:
     """A recording opened for reading; use it in a ``with`` block.
 
@@ -150,6 +134,8 @@ class Recording:
     ----------
     path
         An HDF5 file of format ``millfrf.recording``, version 1.
+    accept_cut
+        Open a file that ends before its samples do; their missing part must then not be read. For recovery.
 
     Raises
     ------
@@ -159,8 +145,9 @@ class Recording:
         No such file.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], *, accept_cut: bool = False) -> None:
         self.path = Path(path)
+        self._accept_cut = accept_cut
         self._file = open_for_reading(self.path)
         try:
             with reporting_damage(self.path):
@@ -179,7 +166,8 @@ class Recording:
             samples = clock.get("samples") if isinstance(clock, h5py.Group) else None
             if not isinstance(samples, h5py.Dataset) or samples.ndim != 2 or samples.dtype.kind != "f":
                 raise FileFormatError(f"{self.path}: /signals/{name} has no table 'samples' of floats; convert anew")
-            require_stored(samples, name, self.path)
+            if not self._accept_cut:
+                require_stored(samples, name, self.path)
             described = stream_from_attributes(name, clock.attrs, samples.shape[1], self.path)
             streams[name] = Stream(described, samples, self.path)
         return streams
@@ -208,6 +196,11 @@ class Recording:
         """Whether the writer closed the file in order; None where the file does not say."""
         value = self._file.attrs.get("complete")
         return None if value is None else bool(value)
+
+    @property
+    def ending(self) -> str:
+        """How the recording ended, in one line; empty where it ended in order or its writer was killed."""
+        return self._text("ending")
 
     @property
     def events(self) -> dict[str, EventSeries]:

@@ -9,9 +9,10 @@ from .fit import fit
 from .inspect import inspect
 from .lobes import lobes
 from .plan import plan
+from .recover import recover
 from .report import report
 
-COMMANDS = (demo, plan, inspect, convert, estimate, fit, calibrate, lobes, chatter, report)
+COMMANDS = (demo, plan, recover, inspect, convert, estimate, fit, calibrate, lobes, chatter, report)
 """In the order in which `--help` lists them."""
 
 __all__ = ["COMMANDS"]
