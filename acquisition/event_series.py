@@ -1,5 +1,7 @@
 """`EventSeries`: slow or asynchronous values of an open recording."""
 
+from collections.abc import Callable
+
 import h5py
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +10,7 @@ from foundation import FileFormatError, InputError
 
 from .events import EventAxis
 
+Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
 Columns = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]
 
 
@@ -18,10 +21,13 @@ class EventSeries:
     ----------
     group
         ``/events/<name>``.
+    aligned
+        Gives the times on the samples' axis and the values; None: the stored times are taken as they are.
     """
 
-    def __init__(self, group: h5py.Group) -> None:
+    def __init__(self, group: h5py.Group, aligned: Callable[[], Pair] | None = None) -> None:
         self._group = group
+        self._aligned = aligned
 
     @property
     def axis(self) -> EventAxis:
@@ -57,12 +63,11 @@ class EventSeries:
         return times, values, arrivals[0] if arrivals else None
 
     def read(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times (s) and values, each (n_events,).
+        """Times on the samples' axis (s) and values, each (n_events,).
 
         Raises
         ------
         FileFormatError
-            The series is damaged.
+            The series is damaged, or its clock cannot be aligned.
         """
-        times, values, _ = self.read_raw()
-        return times, values
+        return self.read_raw()[:2] if self._aligned is None else self._aligned()

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError, InputError
 
+from .alignment import Alignment
 from .channel import Channel
 from .damage import open_for_reading, reporting_damage, require_stored, whole_rows
 from .event_series import EventSeries
@@ -204,10 +206,23 @@ class Recording:
 
     @property
     def events(self) -> dict[str, EventSeries]:
-        """Slow values by name."""
+        """Slow values by name; their times on the axis of the first stream."""
+        return self.events_on(next(iter(self.streams)))
+
+    def events_on(self, stream: str) -> dict[str, EventSeries]:
+        """Slow values by name, their times on the axis of a stream: offset and drift of all clocks are fitted.
+
+        Raises
+        ------
+        InputError
+            No such stream.
+        """
+        described = self.stream(stream).description
         with reporting_damage(self.path):
             group = self._file.get("events")
-            return {} if group is None else {name: EventSeries(entry) for name, entry in group.items()}
+            plain = {} if group is None else {name: EventSeries(entry) for name, entry in group.items()}
+            alignment = Alignment(described, self.clock_pairs(stream), plain)
+            return {name: EventSeries(group[name], partial(alignment.read, name)) for name in plain}
 
     def clock_pairs(self, stream: str) -> NDArray[np.float64]:
         """Pairs (sample index, host monotonic time in s) of a stream, shape (n_pairs, 2)."""

@@ -161,11 +161,10 @@ class NiSource:
     def _block(self, first: int, raw: NDArray[np.float64]) -> Block:
         """The block with a pair of sample count and host time, both taken now."""
         with speaking_to(self._devices):
-            before = time.monotonic()
             count = int(self._task.in_stream.total_samp_per_chan_acquired)
-            after = time.monotonic()
+            noticed = time.monotonic()  # after asking: a pair may be late, never early
         samples = np.ascontiguousarray(raw.T) * self._scales
-        return Block(self.streams[0].name, first, samples, 0.5 * (before + after), count)
+        return Block(self.streams[0].name, first, samples, noticed, count)
 
     def _counted(self, error: Overrun) -> Overrun:
         """The overrun with the number of samples that the driver had to drop, where it still tells."""
