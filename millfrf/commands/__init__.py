@@ -1,5 +1,6 @@
 """The commands, one a file. Their modules import nothing heavy, so that `--help` is quick."""
 
+from .acquire import acquire
 from .calibrate import calibrate
 from .chatter import chatter
 from .convert import convert
@@ -12,7 +13,7 @@ from .plan import plan
 from .recover import recover
 from .report import report
 
-COMMANDS = (demo, plan, recover, inspect, convert, estimate, fit, calibrate, lobes, chatter, report)
+COMMANDS = (demo, plan, acquire, recover, inspect, convert, estimate, fit, calibrate, lobes, chatter, report)
 """In the order in which `--help` lists them."""
 
 __all__ = ["COMMANDS"]
