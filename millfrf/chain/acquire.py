@@ -151,7 +151,7 @@ def acquire(
         for watcher in watchers:
             watcher(taken)
 
-    with _interrupts() as interrupted:
+    with interrupts() as interrupted:
         record(
             opened.source,
             out,
@@ -163,7 +163,7 @@ def acquire(
 
 
 @contextmanager
-def _interrupts() -> Iterator[Callable[[], bool]]:
+def interrupts() -> Iterator[Callable[[], bool]]:
     """Ctrl-C and SIGTERM as a question that is asked between blocks; a second Ctrl-C interrupts at once."""
     asked = False
 

@@ -13,8 +13,16 @@ def acquire(
         bool, typer.Option("--check", help="Listen, judge every channel and record nothing; tap to check signs.")
     ] = False,
     seconds: Annotated[float, typer.Option("--seconds", min=0.1, help="How long --check listens, s.")] = 3.0,
+    live: Annotated[
+        bool, typer.Option("--live", help="Show the signals on a page; its Start button begins the recording.")
+    ] = False,
+    live_address: Annotated[
+        str, typer.Option("--live-address", metavar="IP", help="Where the page listens; else on this machine only.")
+    ] = "127.0.0.1",
+    live_port: Annotated[int, typer.Option("--live-port", min=0, max=65535, help="0: any free port.")] = 0,
+    at_once: Annotated[bool, typer.Option("--at-once", help="With --live: record without waiting for Start.")] = False,
 ) -> None:
-    """Record from the devices of a session until its duration is over or Ctrl-C."""
+    """Record from the devices of a session until its duration is over, Stop is pressed or Ctrl-C."""
     from foundation import InputError
 
     from ..chain.acquire import open_session
@@ -31,6 +39,11 @@ def acquire(
         typer.echo(f"stream {stream.name}: {len(stream.channels)} channels at {stream.sample_rate:.9g} Hz")
     if out is None:
         _check(opened.source, seconds)
+    elif live:
+        from ..chain.acquire_live import acquire_live
+
+        tally = acquire_live(opened, out, address=live_address, port=live_port, at_once=at_once, say=_say)
+        _report(tally, out)
     else:
         _record(opened, out)
 
@@ -62,5 +75,19 @@ def _record(opened: object, out: Path) -> None:
     assert isinstance(opened, OpenedSession)
     with bar(f"recording {out.name}", opened.source.n_samples) as update:
         tally = acquire(opened, out, progress=update)
+    _report(tally, out)
+
+
+def _say(line: str) -> None:
+    """At once, also into a pipe: somebody waits for the address."""
+    print(line, flush=True)
+
+
+def _report(tally: object, out: Path) -> None:
+    from ..chain.acquire import Tally
+
+    if not isinstance(tally, Tally):
+        typer.echo("stopped before Start; nothing was recorded")
+        return
     typer.echo(tally.summary())
     typer.echo(f"wrote {out}")
