@@ -8,6 +8,9 @@ import h5py
 
 from foundation import FileFormatError, InputError
 
+from .durability import is_being_written
+from .unclosed_file import UnclosedFile, is_marked_as_written, superblock
+
 
 def require_stored(samples: h5py.Dataset, name: str, path: Path) -> None:
     """Refuse a damaged size: a table that announces more than the file stores would read as endless zeros."""
@@ -39,17 +42,23 @@ def whole_rows(samples: h5py.Dataset, file_size: int) -> int:
     return n_rows
 
 
-def superblock_end(path: Path) -> int | None:
-    """Where the file says that it ends, bytes, if its superblock has version 3; else None."""
-    with path.open("rb") as file:
-        superblock = file.read(48)
-    if len(superblock) < 48 or superblock[:9] != b"\x89HDF\r\n\x1a\n\x03":
-        return None
-    return int.from_bytes(superblock[28:36], "little")
+def open_for_reading(path: Path, *, accept_cut: bool = False) -> h5py.File:
+    """Open for reading, also beside a living writer, and what a killed one left behind.
 
+    Parameters
+    ----------
+    path
+        The file.
+    accept_cut
+        Open a file that ends before it says; parts of it must then not be read.
 
-def open_for_reading(path: Path) -> h5py.File:
-    """Open for reading; a file whose writer was killed opens only with ``swmr=True``."""
+    Raises
+    ------
+    InputError
+        No such file.
+    FileFormatError
+        It cannot be opened.
+    """
     if not path.is_file():
         raise InputError(f"no file {path}; check the name")
     try:
@@ -57,22 +66,13 @@ def open_for_reading(path: Path) -> h5py.File:
     except OSError:
         pass
     try:
-        if _writer_was_killed(path):
+        if is_marked_as_written(path) and is_being_written(path):
             return h5py.File(path, "r", libver="latest", swmr=True)
-    except (OSError, ValueError) as error:
+        if is_marked_as_written(path) or (accept_cut and superblock(path) is not None):
+            return h5py.File(UnclosedFile(path), "r")
+    except (OSError, ValueError, RuntimeError) as error:
         raise FileFormatError(f"{path} is damaged beyond what a killed writer leaves; take a copy of it") from error
     raise FileFormatError(f"{path} is not an HDF5 file, or it was cut short or damaged; give a whole recording")
-
-
-def _writer_was_killed(path: Path) -> bool:
-    """Whether the superblock (version 3) says that a single-writer, multiple-reader session was never closed.
-
-    Other files must not be opened so: the library would wait, practically forever, for damaged parts to be written.
-    """
-    end, still_written = superblock_end(path), 0b101
-    with path.open("rb") as file:
-        flags = file.read(12)[11:]
-    return end is not None and flags == bytes([still_written]) and path.stat().st_size >= end
 
 
 @contextmanager

@@ -150,7 +150,7 @@ class Recording:
     def __init__(self, path: str | os.PathLike[str], *, accept_cut: bool = False) -> None:
         self.path = Path(path)
         self._accept_cut = accept_cut
-        self._file = open_for_reading(self.path)
+        self._file = open_for_reading(self.path, accept_cut=accept_cut)
         try:
             with reporting_damage(self.path):
                 check_format(self._file.attrs, self.path)

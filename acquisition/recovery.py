@@ -1,14 +1,12 @@
 """`recover`: whatever a killed writer acknowledged, copied into a whole new recording."""
 
 import os
-import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from foundation import FileFormatError, InputError, writing_whole_file
+from foundation import InputError, writing_whole_file
 
-from .damage import superblock_end
 from .durability import is_being_written
 from .events import Events
 from .recording import Recording, Stream
@@ -71,32 +69,11 @@ def recover(
     if is_being_written(source):
         raise InputError(f"{source} is still being written; stop its writer first")
     with writing_whole_file(target) as temporary:
-        readable = _with_full_length(source, temporary)
-        try:
-            return _copy(source, readable, temporary, target, progress)
-        finally:
-            if readable != source:
-                readable.unlink()
+        return _copy(source, temporary, target, progress)
 
 
-def _with_full_length(source: Path, temporary: Path) -> Path:
-    """A file that ends before its own announced end (power failure, full disk) as a copy made long enough to open."""
-    end = superblock_end(source)
-    if end is None or end <= source.stat().st_size:
-        return source
-    if end > 2 * source.stat().st_size + (1 << 30):
-        raise FileFormatError(f"{source} announces {end} bytes but has {source.stat().st_size}; it is damaged")
-    longer = temporary.with_name(f"{temporary.name}.longer")
-    shutil.copyfile(source, longer)
-    with longer.open("r+b") as file:
-        file.truncate(end)
-    return longer
-
-
-def _copy(
-    source: Path, readable: Path, temporary: Path, target: Path, progress: Callable[[int], None] | None
-) -> Recovered:
-    with Recording(readable, accept_cut=True) as recording:
+def _copy(source: Path, temporary: Path, target: Path, progress: Callable[[int], None] | None) -> Recovered:
+    with Recording(source, accept_cut=True) as recording:
         if recording.complete:
             raise InputError(f"{source} was closed in order; there is nothing to recover")
         events = recording.events

@@ -173,7 +173,7 @@ def enough() -> Drawing:
     from bokeh.plotting import figure
 
     plot = figure(
-        title="Enough data? Share of what the planned error needs (green: nine tenths of the lines are there)",
+        title="Enough data? Share of what the planned error needs",
         x_range=(0, 1),
         height=300,
         tools="",
