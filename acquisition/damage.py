@@ -72,7 +72,9 @@ def open_for_reading(path: Path, *, accept_cut: bool = False) -> h5py.File:
             return h5py.File(UnclosedFile(path), "r")
     except (OSError, ValueError, RuntimeError) as error:
         raise FileFormatError(f"{path} is damaged beyond what a killed writer leaves; take a copy of it") from error
-    raise FileFormatError(f"{path} is not an HDF5 file, or it was cut short or damaged; give a whole recording")
+    raise FileFormatError(
+        f"{path} is not an HDF5 file, or it was cut short or damaged; give a whole recording, or try millfrf recover"
+    )
 
 
 @contextmanager

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from .appending import append_rows
-from .durability import SpareSpace, Syncer, is_being_written
+from .durability import SpareSpace, Syncer, is_being_written, is_disk_full
+from .errors import DiskFull
 from .events import SAMPLES_AXIS, EventAxis, Events
 from .recording_format import ENDING_BYTES, FORMAT, FORMAT_VERSION
 from .source import StreamDescription
@@ -204,19 +205,34 @@ class RecordingWriter:
         return self.streams[stream]
 
     def close(self, *, complete: bool = True, ending: str = "") -> None:
-        """Close the file; ``complete``: it ended in order; ``ending``: one line that says how it did."""
+        """Close the file; ``complete``: it ended in order; ``ending``: one line that says how it did.
+
+        Raises
+        ------
+        DiskFull
+            Not even the spare space was enough; the file is readable by :func:`recover` alone.
+        """
         if not self._file:
             return
         if self._spare is not None:
             self._spare.release()
-        # in place: reopening the file would leave a moment in which a kill makes it unreadable
-        if ending:
-            cut = " ".join(ending.split()).encode()[:ENDING_BYTES]
-            self._file.attrs.modify("ending", np.array(cut, f"S{ENDING_BYTES}"))
-        if complete:
-            self._file.attrs.modify("complete", np.bool_(True))
-        self._file.close()
-        self._syncer.close()
+        try:
+            # in place: reopening the file would leave a moment in which a kill makes it unreadable
+            if ending:
+                cut = " ".join(ending.split()).encode()[:ENDING_BYTES]
+                self._file.attrs.modify("ending", np.array(cut, f"S{ENDING_BYTES}"))
+            if complete:
+                self._file.attrs.modify("complete", np.bool_(True))
+            self._file.close()
+        except (OSError, RuntimeError) as error:
+            if not is_disk_full(error):
+                raise
+            raise DiskFull(
+                f"{self.path} could not be closed, there is no more room for it (a FAT32 disk ends a file at 4 GB); "
+                "save what is there with millfrf recover, onto another disk"
+            ) from error
+        finally:
+            self._syncer.close()
 
     def __enter__(self) -> "RecordingWriter":
         return self

@@ -69,6 +69,12 @@ def test_units_become_si_at_this_edge() -> None:
     assert len(session.feeds) == 4
 
 
+def test_the_example_is_a_session() -> None:
+    session = read_session(Path(__file__).parents[2] / "examples" / "session.toml")
+    assert [channel.wired().channel.name for channel in session.channels] == ["fx", "ax"]
+    assert len(session.feeds) == 2
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

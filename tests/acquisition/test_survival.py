@@ -138,6 +138,22 @@ def test_a_full_disk_ends_the_recording_with_a_closed_file_and_one_line(tmp_path
         np.testing.assert_array_equal(recording.stream().read()[::1000, 0], np.arange(int(kept)))
 
 
+@posix
+def test_a_file_that_may_not_grow_is_recovered(tmp_path: Path) -> None:
+    limited = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))\n"
+    path = tmp_path / "a.h5"
+    done = subprocess.run([sys.executable, "-c", limited + FULL, str(path)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    kept, line = done.stdout.split(maxsplit=1)
+    assert "save what is there with millfrf recover" in line
+    with pytest.raises(FileFormatError, match="millfrf recover"):
+        Recording(path)
+    with Recording(recover(path).path) as recording:
+        rows = recording.stream().read()[:, 0]
+    assert len(rows) >= 1000 * int(kept) > 100_000
+    np.testing.assert_array_equal(rows, np.arange(len(rows)) // 1000)
+
+
 def test_too_little_room_is_said_before_recording(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="free; make room first"):
         RecordingWriter(tmp_path / "a.h5", [STREAM], spare_bytes=1 << 60)
