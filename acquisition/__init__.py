@@ -6,6 +6,7 @@ from .drivers import ReplaySource
 from .errors import DeviceError, DeviceTimeout, Disconnected, DiskFull, DriverMissing, Overrun
 from .event_series import EventSeries
 from .events import HOST_AXIS, SAMPLES_AXIS, EventAxis, Events
+from .feeds import EventFeed, WithFeeds
 from .pacing import Paced
 from .record import record
 from .recording import Recording, Stream
@@ -24,6 +25,7 @@ __all__ = [
     "DiskFull",
     "DriverMissing",
     "EventAxis",
+    "EventFeed",
     "EventSeries",
     "Events",
     "Overrun",
@@ -35,6 +37,7 @@ __all__ = [
     "Source",
     "Stream",
     "StreamDescription",
+    "WithFeeds",
     "convert",
     "record",
     "recover",

@@ -82,5 +82,5 @@ def reporting_damage(path: Path) -> Iterator[None]:
     """What the HDF5 library raises on damaged bytes, as one line."""
     try:
         yield
-    except (KeyError, OSError, RuntimeError, ValueError, TypeError, AttributeError) as error:
+    except (KeyError, OSError, RuntimeError, ValueError, TypeError, AttributeError, OverflowError) as error:
         raise FileFormatError(f"{path} is damaged: {' '.join(str(error).split())}; take a copy of it") from error

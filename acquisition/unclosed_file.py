@@ -65,8 +65,11 @@ class UnclosedFile(io.RawIOBase):
         return True
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """As of any file."""
-        return self._file.seek(offset, whence)
+        """As of any file; a damaged address beyond all files is an OSError."""
+        try:
+            return self._file.seek(offset, whence)
+        except OverflowError as error:
+            raise OSError(f"address {offset} is beyond any file") from error
 
     def tell(self) -> int:
         """As of any file."""
