@@ -1,5 +1,6 @@
 """What lets a recording survive: a spare piece of disk, a sync each second, a lock that dies with its writer."""
 
+import contextlib
 import os
 import re
 import tempfile
@@ -39,16 +40,23 @@ class SpareSpace:
     def __init__(self, folder: Path, size: int) -> None:
         self._file = tempfile.TemporaryFile(dir=folder)  # noqa: SIM115  # held until it is needed
         try:
-            if hasattr(os, "posix_fallocate"):
-                os.posix_fallocate(self._file.fileno(), 0, size)
-            else:
-                self._file.write(bytes(size))
-                self._file.flush()
-        except OSError as error:
+            self._fill(size)
+        except (OSError, OverflowError, MemoryError) as error:
             self._file.close()
             raise InputError(
                 f"cannot record in {folder}: less than {size / 1e6:.0f} MB free; make room first"
             ) from error
+
+    def _fill(self, size: int) -> None:
+        if hasattr(os, "posix_fallocate"):
+            try:
+                os.posix_fallocate(self._file.fileno(), 0, size)
+                return
+            except OSError as error:
+                if is_disk_full(error):
+                    raise
+        self._file.write(bytes(size))
+        self._file.flush()
 
     def release(self) -> None:
         """Give the space back; harmless when done before."""
@@ -71,7 +79,8 @@ class Syncer:
     def __init__(self, path: Path, period: float = 1.0) -> None:
         self._descriptor = os.open(path, os.O_RDWR)
         if _fcntl is not None:
-            _fcntl.flock(self._descriptor, _fcntl.LOCK_SH | _fcntl.LOCK_NB)
+            with contextlib.suppress(OSError):  # some network disks know no locks
+                _fcntl.flock(self._descriptor, _fcntl.LOCK_SH | _fcntl.LOCK_NB)
         self._period = period
         self._ended = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"sync {path.name}", daemon=True)
@@ -105,8 +114,10 @@ def is_being_written(path: Path) -> bool:
     descriptor = os.open(path, os.O_RDONLY)
     try:
         _fcntl.flock(descriptor, _fcntl.LOCK_EX | _fcntl.LOCK_NB)
-    except OSError:
+    except BlockingIOError:
         return True
+    except OSError:  # some network disks know no locks
+        return False
     finally:
         os.close(descriptor)
     return False

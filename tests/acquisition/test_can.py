@@ -30,7 +30,7 @@ STREAM = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))
 
 
 class Clockwork:
-    """Ten blocks of 0.1 s in real time; calls ``at_block`` before each."""
+    """Ten blocks of 0.1 s in real time, with exact clock pairs."""
 
     title, setup, streams, n_samples = "", "", (STREAM,), None
 
@@ -45,7 +45,7 @@ class Clockwork:
             return None
         self.done += 1
         time.sleep(max(0.0, self.started + self.done * 0.1 - time.monotonic()))
-        return Block("main", (self.done - 1) * 100, np.zeros((100, 1)), time.monotonic())
+        return Block("main", (self.done - 1) * 100, np.zeros((100, 1)), self.started + self.done * 0.1)
 
     def close(self) -> None:
         pass

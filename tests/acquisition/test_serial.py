@@ -48,7 +48,7 @@ class Clockwork:
         self.done += 1
         due = self.started + self.done * 0.05
         time.sleep(max(0.0, due - time.monotonic()))
-        return Block("main", (self.done - 1) * 50, np.zeros((50, 1)), time.monotonic())
+        return Block("main", (self.done - 1) * 50, np.zeros((50, 1)), due)
 
     def close(self) -> None:
         pass

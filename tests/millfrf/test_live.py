@@ -17,6 +17,7 @@ import pytest
 from acquisition import Block, Channel, Events, Recording, StreamDescription
 from estimation import SpectralAccumulator, h1, settings_for
 from foundation import InputError
+from millfrf.__main__ import run
 from millfrf.live import LiveControl, LiveMonitor, LiveServer, LiveSettings
 from millfrf.live.enough import band_progress
 from millfrf.live.traces import TraceBuffer
@@ -169,6 +170,21 @@ driver = "simulated"
 [live]
 segment_s = 0.5
 """
+
+
+def test_without_any_browser_a_live_recording_ends_by_its_duration(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("millfrf.chain.acquire_live._LINGER", 0.1)
+    (tmp_path / "s.toml").write_text("duration_s = 1.0\n" + SESSION)
+    out = tmp_path / "a.h5"
+    assert run(["acquire", str(tmp_path / "s.toml"), "--out", str(out), "--live", "--at-once"]) == 0
+    assert "live page: http://127.0.0.1:" in capsys.readouterr().out
+    with Recording(out) as recording:
+        assert recording.complete
+        assert recording.stream().n_samples == 2048
+        assert recording.events["mark"].read()[0].size == 0
+    assert run(["acquire", str(tmp_path / "s.toml"), "--out", str(out), "--live", "--live-address", "me"]) == 2
 
 
 def _browser() -> str:
