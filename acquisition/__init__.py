@@ -3,23 +3,42 @@
 from .channel import Channel
 from .conversion import convert
 from .drivers import ReplaySource
+from .errors import DeviceError, DeviceTimeout, Disconnected, DiskFull, DriverMissing, Overrun
+from .event_series import EventSeries
+from .events import HOST_AXIS, SAMPLES_AXIS, EventAxis, Events
+from .feeds import EventFeed, WithFeeds
 from .pacing import Paced
 from .record import record
-from .recording import EventSeries, Recording, Stream
+from .recording import Recording, Stream
 from .recording_writer import RecordingWriter
+from .recovery import Recovered, recover
 from .source import Block, Source, StreamDescription
 
 __all__ = [
+    "HOST_AXIS",
+    "SAMPLES_AXIS",
     "Block",
     "Channel",
+    "DeviceError",
+    "DeviceTimeout",
+    "Disconnected",
+    "DiskFull",
+    "DriverMissing",
+    "EventAxis",
+    "EventFeed",
     "EventSeries",
+    "Events",
+    "Overrun",
     "Paced",
     "Recording",
     "RecordingWriter",
+    "Recovered",
     "ReplaySource",
     "Source",
     "Stream",
     "StreamDescription",
+    "WithFeeds",
     "convert",
     "record",
+    "recover",
 ]

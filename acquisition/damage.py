@@ -8,6 +8,9 @@ import h5py
 
 from foundation import FileFormatError, InputError
 
+from .durability import is_being_written
+from .unclosed_file import UnclosedFile, is_marked_as_written, superblock
+
 
 def require_stored(samples: h5py.Dataset, name: str, path: Path) -> None:
     """Refuse a damaged size: a table that announces more than the file stores would read as endless zeros."""
@@ -21,10 +24,41 @@ def require_stored(samples: h5py.Dataset, name: str, path: Path) -> None:
             f"{path}: /signals/{name} announces {samples.shape[0]} samples but stores at most "
             f"{stored // max(samples.shape[1], 1)}; the file is damaged"
         )
+    if samples.chunks is not None and samples.shape[0]:
+        last = samples.id.get_chunk_info_by_coord(((samples.shape[0] - 1) // samples.chunks[0] * samples.chunks[0], 0))
+        if last.byte_offset is not None and last.byte_offset + last.size > path.stat().st_size:
+            raise FileFormatError(f"{path} ends before its samples do; save what is there with millfrf recover")
 
 
-def open_for_reading(path: Path) -> h5py.File:
-    """Open for reading; a file whose writer was killed opens only with ``swmr=True``."""
+def whole_rows(samples: h5py.Dataset, file_size: int) -> int:
+    """Leading rows whose bytes lie within a file of ``file_size`` bytes; all of them in a file that was not cut."""
+    n_rows = int(samples.shape[0])
+    if samples.chunks is None:
+        return n_rows
+    for start in range(0, n_rows, samples.chunks[0]):
+        stored = samples.id.get_chunk_info_by_coord((start, 0))
+        if stored.byte_offset is None or stored.byte_offset + stored.size > file_size:
+            return start
+    return n_rows
+
+
+def open_for_reading(path: Path, *, accept_cut: bool = False) -> h5py.File:
+    """Open for reading, also beside a living writer, and what a killed one left behind.
+
+    Parameters
+    ----------
+    path
+        The file.
+    accept_cut
+        Open a file that ends before it says; parts of it must then not be read.
+
+    Raises
+    ------
+    InputError
+        No such file.
+    FileFormatError
+        It cannot be opened.
+    """
     if not path.is_file():
         raise InputError(f"no file {path}; check the name")
     try:
@@ -32,24 +66,15 @@ def open_for_reading(path: Path) -> h5py.File:
     except OSError:
         pass
     try:
-        if _writer_was_killed(path):
+        if is_marked_as_written(path) and is_being_written(path):
             return h5py.File(path, "r", libver="latest", swmr=True)
-    except (OSError, ValueError) as error:
+        if is_marked_as_written(path) or (accept_cut and superblock(path) is not None):
+            return h5py.File(UnclosedFile(path), "r")
+    except (OSError, ValueError, RuntimeError) as error:
         raise FileFormatError(f"{path} is damaged beyond what a killed writer leaves; take a copy of it") from error
-    raise FileFormatError(f"{path} is not an HDF5 file, or it was cut short or damaged; give a whole recording")
-
-
-def _writer_was_killed(path: Path) -> bool:
-    """Whether the superblock (version 3) says that a single-writer, multiple-reader session was never closed.
-
-    Other files must not be opened so: the library would wait, practically forever, for damaged parts to be written.
-    """
-    with path.open("rb") as file:
-        superblock = file.read(48)
-    signature, still_written = b"\x89HDF\r\n\x1a\n", 0b101
-    if len(superblock) < 48 or superblock[:9] != signature + b"\x03" or superblock[11] != still_written:
-        return False
-    return path.stat().st_size >= int.from_bytes(superblock[28:36], "little")
+    raise FileFormatError(
+        f"{path} is not an HDF5 file, or it was cut short or damaged; give a whole recording, or try millfrf recover"
+    )
 
 
 @contextmanager
@@ -57,5 +82,5 @@ def reporting_damage(path: Path) -> Iterator[None]:
     """What the HDF5 library raises on damaged bytes, as one line."""
     try:
         yield
-    except (KeyError, OSError, RuntimeError, ValueError, TypeError, AttributeError) as error:
+    except (KeyError, OSError, RuntimeError, ValueError, TypeError, AttributeError, OverflowError) as error:
         raise FileFormatError(f"{path} is damaged: {' '.join(str(error).split())}; take a copy of it") from error

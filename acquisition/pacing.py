@@ -5,6 +5,7 @@ import time
 
 from foundation import InputError
 
+from .events import EventAxis, Events, announced_events
 from .source import Block, Source, StreamDescription
 
 
@@ -88,11 +89,16 @@ class Paced:
         self._source.open()
         self._pace.start()
 
-    def read(self) -> Block | None:
-        """The next block, not before its time."""
+    @property
+    def event_series(self) -> dict[str, EventAxis]:
+        """The source's event series."""
+        return announced_events(self._source)
+
+    def read(self) -> Block | Events | None:
+        """The next block, not before its time; events at once."""
         block = self._source.read()
-        if block is None:
-            return None
+        if block is None or isinstance(block, Events):
+            return block
         end = (block.first_sample + len(block.samples)) / self._rates[block.stream]
         now = self._pace.wait_until(end)
         return block if math.isnan(now) else Block(block.stream, block.first_sample, block.samples, now)

@@ -1,12 +1,16 @@
-"""Record: take every block a source gives and write it to a file."""
+"""Record: take every block and event a source gives and write it to a file."""
 
 import math
 import os
 from collections.abc import Callable
 from typing import Literal
 
+from .events import Events, announced_events
 from .recording_writer import RecordingWriter
-from .source import Source
+from .source import Block, Source
+
+SPARE_BYTES = 16_000_000
+"""Disk space kept aside while recording, so that a full disk does not cost the file."""
 
 
 def record(
@@ -15,11 +19,14 @@ def record(
     *,
     dtype: Literal["float32", "float64"] = "float32",
     progress: Callable[[int], None] | None = None,
+    stop: Callable[[], bool] | None = None,
+    watch: Callable[[Block | Events], None] | None = None,
+    spare_bytes: int = SPARE_BYTES,
 ) -> None:
-    """Write ``source`` to a new recording until it ends.
+    """Write ``source`` to a new recording until it ends or ``stop`` says so.
 
-    Whatever happens (a device unplugged, Ctrl-C), the source is closed and the file is closed and readable,
-    marked complete only when the source ended in order.
+    Whatever happens (a device unplugged, a full disk, Ctrl-C), the source and the file are closed, the file is readable
+    and its attribute ``ending`` says what happened; it is marked complete only when it ended in order.
 
     Parameters
     ----------
@@ -31,23 +38,52 @@ def record(
         How samples are stored.
     progress
         Called with the number of samples written so far, over all streams.
+    stop
+        Asked before each block; True ends the recording in order.
+    watch
+        Shown every block and event after it was written; it must return quickly.
+    spare_bytes
+        Disk space kept aside.
 
     Raises
     ------
     InputError
         The file exists or cannot be written, or the source gave samples that are not finite.
+    DeviceError
+        Overrun, Disconnected or DeviceTimeout of a device.
+    DiskFull
+        No room was left.
     """
-    with RecordingWriter(path, source.streams, title=source.title, setup=source.setup, dtype=dtype) as writer:
+    with RecordingWriter(
+        path,
+        source.streams,
+        title=source.title,
+        setup=source.setup,
+        dtype=dtype,
+        event_axes=announced_events(source),
+        spare_bytes=spare_bytes,
+    ) as writer:
         try:
             source.open()
             written = 0
-            while (block := source.read()) is not None:
-                writer.append(block.stream, block.samples)
-                if math.isfinite(block.host_time):
-                    last = block.first_sample + len(block.samples)
-                    writer.append_clock_pair(block.stream, last, block.host_time)
-                written += len(block.samples)
+            while not (stop is not None and stop()) and (taken := source.read()) is not None:
+                written += _write(writer, taken)
+                if watch is not None:
+                    watch(taken)
                 if progress is not None:
                     progress(written)
         finally:
             source.close()
+
+
+def _write(writer: RecordingWriter, taken: Block | Events) -> int:
+    """Write what a source gave; returns the number of samples."""
+    if isinstance(taken, Events):
+        writer.append_events(taken)
+        return 0
+    writer.append(taken.stream, taken.samples)
+    if math.isfinite(taken.host_time):
+        last = taken.first_sample + len(taken.samples)
+        pair = last if taken.host_sample is None else taken.host_sample
+        writer.append_clock_pair(taken.stream, pair, taken.host_time)
+    return len(taken.samples)

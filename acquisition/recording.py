@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 
@@ -11,8 +12,10 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError, InputError
 
+from .alignment import Alignment
 from .channel import Channel
-from .damage import open_for_reading, reporting_damage, require_stored
+from .damage import open_for_reading, reporting_damage, require_stored, whole_rows
+from .event_series import EventSeries
 from .recording_format import check_format, stream_from_attributes, text_attribute
 from .source import StreamDescription
 
@@ -71,6 +74,11 @@ class Stream:
         """n_samples / sample_rate, s."""
         return self.n_samples / self.sample_rate
 
+    def whole_rows(self, file_size: int) -> int:
+        """Leading rows whose bytes lie within a file of ``file_size`` bytes; fewer than n_samples in a cut file."""
+        with reporting_damage(self.path):
+            return whole_rows(self._samples, file_size)
+
     def channels_of(self, quantity: str) -> tuple[Channel, ...]:
         """The channels of one quantity, in column order."""
         return tuple(channel for channel in self.channels if channel.quantity == quantity)
@@ -121,28 +129,6 @@ class Stream:
             yield self.read(start, min(start + block_length, self.n_samples), channels)
 
 
-class EventSeries:
-    """Slow or asynchronous values: times and values, read when asked for."""
-
-    def __init__(self, group: h5py.Group) -> None:
-        self._group = group
-
-    def read(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Times (s) and values, each (n_events,).
-
-        Raises
-        ------
-        FileFormatError
-            The series is damaged.
-        """
-        try:
-            times, values = (np.asarray(self._group[column][:], dtype=float) for column in ("time", "value"))
-        except (OSError, KeyError, AttributeError, TypeError, ValueError) as error:
-            raise FileFormatError(f"events {self._group.name} lack readable 'time' and 'value'; record anew") from error
-        n_whole = min(len(times), len(values))  # a writer killed between the two leaves one time more
-        return times[:n_whole], values[:n_whole]
-
-
 class Recording:
     """A recording opened for reading; use it in a ``with`` block.
 
@@ -150,6 +136,8 @@ class Recording:
     ----------
     path
         An HDF5 file of format ``millfrf.recording``, version 1.
+    accept_cut
+        Open a file that ends before its samples do; their missing part must then not be read. For recovery.
 
     Raises
     ------
@@ -159,9 +147,10 @@ class Recording:
         No such file.
     """
 
-    def __init__(self, path: str | os.PathLike[str]) -> None:
+    def __init__(self, path: str | os.PathLike[str], *, accept_cut: bool = False) -> None:
         self.path = Path(path)
-        self._file = open_for_reading(self.path)
+        self._accept_cut = accept_cut
+        self._file = open_for_reading(self.path, accept_cut=accept_cut)
         try:
             with reporting_damage(self.path):
                 check_format(self._file.attrs, self.path)
@@ -179,7 +168,8 @@ class Recording:
             samples = clock.get("samples") if isinstance(clock, h5py.Group) else None
             if not isinstance(samples, h5py.Dataset) or samples.ndim != 2 or samples.dtype.kind != "f":
                 raise FileFormatError(f"{self.path}: /signals/{name} has no table 'samples' of floats; convert anew")
-            require_stored(samples, name, self.path)
+            if not self._accept_cut:
+                require_stored(samples, name, self.path)
             described = stream_from_attributes(name, clock.attrs, samples.shape[1], self.path)
             streams[name] = Stream(described, samples, self.path)
         return streams
@@ -210,11 +200,29 @@ class Recording:
         return None if value is None else bool(value)
 
     @property
+    def ending(self) -> str:
+        """How the recording ended, in one line; empty where it ended in order or its writer was killed."""
+        return self._text("ending")
+
+    @property
     def events(self) -> dict[str, EventSeries]:
-        """Slow values by name."""
+        """Slow values by name; their times on the axis of the first stream."""
+        return self.events_on(next(iter(self.streams)))
+
+    def events_on(self, stream: str) -> dict[str, EventSeries]:
+        """Slow values by name, their times on the axis of a stream: offset and drift of all clocks are fitted.
+
+        Raises
+        ------
+        InputError
+            No such stream.
+        """
+        described = self.stream(stream).description
         with reporting_damage(self.path):
             group = self._file.get("events")
-            return {} if group is None else {name: EventSeries(entry) for name, entry in group.items()}
+            plain = {} if group is None else {name: EventSeries(entry) for name, entry in group.items()}
+            alignment = Alignment(described, self.clock_pairs(stream), plain)
+            return {name: EventSeries(group[name], partial(alignment.read, name)) for name in plain}
 
     def clock_pairs(self, stream: str) -> NDArray[np.float64]:
         """Pairs (sample index, host monotonic time in s) of a stream, shape (n_pairs, 2)."""

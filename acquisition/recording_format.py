@@ -12,6 +12,8 @@ from .source import StreamDescription
 
 FORMAT = "millfrf.recording"
 FORMAT_VERSION = 1
+ENDING_BYTES = 240
+"""Room for the line that says how the recording ended; attributes cannot grow while a file is written."""
 
 
 def text_attribute(attributes: Any, name: str, default: str = "") -> str:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from .channel import Channel
+from .events import Events
 
 
 @dataclass(frozen=True)
@@ -63,12 +64,15 @@ class Block:
     samples : (n_samples, n_channels), SI units
     host_time
         Host's monotonic time when the last sample was there, s; NaN where there is none.
+    host_sample
+        Samples that were there at ``host_time``, where the device can tell; None: up to the block's last.
     """
 
     stream: str
     first_sample: int
     samples: NDArray[np.float64]
     host_time: float = float("nan")
+    host_sample: int | None = None
 
 
 @runtime_checkable
@@ -94,8 +98,8 @@ class Source(Protocol):
     def open(self) -> None:
         """Start; may be called again after ``close`` to start anew."""
 
-    def read(self) -> Block | None:
-        """The next block, or None when there is no more."""
+    def read(self) -> Block | Events | None:
+        """The next block or events, or None when there is no more; a source of events also has `event_series`."""
 
     def close(self) -> None:
         """Stop and release the device; harmless when not open."""

@@ -41,7 +41,7 @@ def _hdf5_kind(file: Path) -> str | None:
     try:
         with h5py.File(file, "r") as opened:
             return _FORMATS.get(str(opened.attrs.get("format", "")))
-    except OSError:  # a recording whose writer was killed opens only for a reader beside a writer
+    except (OSError, KeyError, RuntimeError):  # damaged, or a recording whose writer was killed: `Recording` says which
         return RECORDING
 
 

@@ -64,7 +64,8 @@ def _recording(path: str | os.PathLike[str], watch: Watch) -> Findings:
     tables, concerns = [], []
     with Recording(path) as recording:
         if recording.complete is not True:
-            concerns.append("the recording was not closed in order: its end may be missing")
+            how = f" ({recording.ending})" if recording.ending else ""
+            concerns.append(f"the recording was not closed in order{how}: its end may be missing")
         for stream in recording.streams.values():
             if stream.n_samples == 0:
                 concerns.append(f"stream {stream.name} holds no sample")

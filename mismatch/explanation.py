@@ -204,7 +204,7 @@ def predict_lines(explanation: Explanation, lines: WindowedLines) -> Predicted:
 
 
 def line_response(explanation: Explanation, lines: WindowedLines, joint: Complex | None = None) -> Complex:
-    """Response lines (n_lines, n_responses) of the linear part to the windowed forces: for derivatives, without leakage.
+    """Response lines (n_lines, n_responses) of the linear part to the windowed forces: for derivatives, no leakage.
 
     Parameters
     ----------

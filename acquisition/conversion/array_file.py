@@ -1,4 +1,4 @@
-"""Named arrays in a file of another program: NPY, NPZ, MAT (any version), HDF5, TDMS, CSV."""
+"""Named arrays in a file of another program: NPY, NPZ, MAT (any version), HDF5, TDMS, CSV, WAV, UFF."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -13,8 +13,10 @@ from foundation import FileFormatError, InputError
 
 from .csv_file import read_csv
 from .flat_fields import numbers
+from .mat_check import require_whole_tags
+from .sampled_files import read_uff_times, read_wav
 
-SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5", ".tdms", ".csv", ".txt")
+SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5", ".tdms", ".csv", ".txt", ".wav", ".uff", ".unv")
 
 
 class ArrayFile:
@@ -28,12 +30,21 @@ class ArrayFile:
         Whatever it holds, by name.
     headings
         Of the columns of its only table.
+    sample_rate
+        Hz, where the file states it.
     """
 
-    def __init__(self, path: Path, fields: Mapping[str, Any], headings: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self,
+        path: Path,
+        fields: Mapping[str, Any],
+        headings: tuple[str, ...] = (),
+        sample_rate: float | None = None,
+    ) -> None:
         self.path = path
         self.fields = fields
         self.headings = headings
+        self.sample_rate = sample_rate
 
     def array(self, name: str | None) -> NDArray[np.floating]:
         """The array of that name; None asks for the only one.
@@ -76,9 +87,17 @@ def open_arrays(path: Path, **csv_options: Any) -> ArrayFile:
         ".hdf5": _hdf5,
         ".tdms": _tdms,
     }
-    if suffix not in readers:
+    sampled: dict[str, Callable[[Path], tuple[dict[str, Any], float]]] = {
+        ".wav": read_wav,
+        ".uff": read_uff_times,
+        ".unv": read_uff_times,
+    }
+    if suffix not in readers and suffix not in sampled:
         raise InputError(f"cannot read {path.name}: suffix {path.suffix!r}; use one of {', '.join(SUFFIXES)}")
     try:
+        if suffix in sampled:
+            fields, rate = sampled[suffix](path)
+            return ArrayFile(path, fields, sample_rate=rate)
         return ArrayFile(path, readers[suffix](path))
     except InputError:
         raise
@@ -114,6 +133,7 @@ def _mat(path: Path) -> dict[str, Any]:
     """Version 5 by scipy; version 7.3 is HDF5 with the axes reversed."""
     if h5py.is_hdf5(path):
         return {name: _reversed_axes(value) for name, value in _hdf5(path).items()}
+    require_whole_tags(path)
     loaded = loadmat(path, squeeze_me=False, struct_as_record=True)
     fields: dict[str, Any] = {}
     for name, value in loaded.items():

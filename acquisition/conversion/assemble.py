@@ -142,6 +142,13 @@ def _clock(input_path: Path, mapping: Mapping, files: dict[Path, ArrayFile]) -> 
     """Sample rate in Hz and time of the first sample in s."""
     if mapping.sample_rate is not None:
         return mapping.sample_rate, mapping.start_time
+    if mapping.time is None:
+        stated = {file.sample_rate for file in files.values()} - {None}
+        if len(stated) != 1:
+            raise InputError(
+                "the mapping must give either sample_rate (Hz) or time (name of the array or column of times)"
+            )
+        return float(next(iter(stated)) or 0.0), mapping.start_time
     asked = mapping.time or ""
     table = files.get(input_path)
     if table is not None and asked in table.headings:

@@ -122,7 +122,8 @@ class Mapping(BaseModel):
     channels
         One a column of the recording, in this order.
     sample_rate
-        Hz; or instead ``time``, the evenly spaced array or column of times, in ``time_unit``.
+        Hz; or instead ``time``, the evenly spaced array or column of times, in ``time_unit``; neither where the file
+        states its own (WAV, UFF).
     arrays
         Arrays by key, for those not simply found by name in the input.
     axes
@@ -155,7 +156,7 @@ class Mapping(BaseModel):
         twice = [name for name, count in Counter(channel.name for channel in self.channels).items() if count > 1]
         if twice:
             raise ValueError(f"channel {', '.join(twice)} appears twice; give unique names")
-        if (self.sample_rate is None) == (self.time is None):
+        if self.sample_rate is not None and self.time is not None:
             raise ValueError("give either sample_rate (Hz) or time (name of the array or column of times), one of them")
         for key, axes in [("axes", self.axes), *((f"arrays.{k}.axes", a.axes) for k, a in self.arrays.items())]:
             self._check_axes(key, axes)
@@ -187,10 +188,10 @@ def load_mapping(path: str | os.PathLike[str]) -> Mapping:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"mapping {file} is not TOML: {error}") from error
     except ValidationError as error:
-        raise InputError(f"mapping {file}: {_first_complaint(error)}") from error
+        raise InputError(f"mapping {file}: {first_complaint(error)}") from error
 
 
-def _first_complaint(error: ValidationError) -> str:
+def first_complaint(error: ValidationError) -> str:
     """The first complaint as one line: key, what is wrong, the value."""
     first = error.errors(include_url=False)[0]
     key = ""

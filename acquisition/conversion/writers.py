@@ -67,8 +67,8 @@ def _write_h5(content: Content, path: Path, progress: Progress) -> None:
         for name, (times, values) in content.events.items():
             writer.append_event(name, times, values)
         for name, pairs in content.clock_pairs.items():
-            for index, host_time in pairs:
-                writer.append_clock_pair(name, int(index), float(host_time))
+            if len(pairs):
+                writer.append_clock_pairs(name, np.asarray(pairs, dtype=float))
 
 
 def _write_npz(content: Content, path: Path, progress: Progress) -> None:

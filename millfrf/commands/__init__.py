@@ -1,5 +1,6 @@
 """The commands, one a file. Their modules import nothing heavy, so that `--help` is quick."""
 
+from .acquire import acquire
 from .calibrate import calibrate
 from .chatter import chatter
 from .convert import convert
@@ -11,9 +12,25 @@ from .inspect import inspect
 from .lobes import lobes
 from .plan import plan
 from .predict import predict
+from .recover import recover
 from .report import report
 
-COMMANDS = (demo, plan, inspect, convert, estimate, fit, calibrate, lobes, chatter, predict, diagnose, report)
+COMMANDS = (
+    demo,
+    plan,
+    acquire,
+    recover,
+    inspect,
+    convert,
+    estimate,
+    fit,
+    calibrate,
+    lobes,
+    chatter,
+    predict,
+    diagnose,
+    report,
+)
 """In the order in which `--help` lists them."""
 
 __all__ = ["COMMANDS"]

@@ -15,15 +15,24 @@ def convert(
         Path | None, typer.Option("--map", metavar="MAP.toml", help="Which array or column is which channel.")
     ] = None,
 ) -> None:
-    """Convert by suffix: recordings .h5 .npz .npy .mat .tdms .csv into .h5 .npz .mat .csv; FRFs .h5 into .uff and back;
-    modal models .json into .uff and back.
+    """Convert by suffix: recordings .h5 .npz .npy .mat .tdms .csv .wav .uff into .h5 .npz .mat .csv; FRFs .h5 into
+    .uff and back; modal models .json into .uff and back; CAN logs .blf .asc into the events of a recording.
     """
     from acquisition import convert as convert_file
+    from acquisition.conversion.can_log import SUFFIXES as CAN_LOGS
+    from acquisition.conversion.can_log import add_can_log
+    from foundation import InputError
 
     from ..chain.convert_uff import convert_uff, is_uff_conversion
     from ..progress import bar
 
-    if is_uff_conversion(source, target):
+    if source.suffix.lower() in CAN_LOGS:
+        if mapping is None:
+            raise InputError(f"{source} needs --map MAP.toml with recording, dbc and signals")
+        with bar(f"adding {source.name}") as update:
+            typer.echo(f"wrote {add_can_log(source, target, mapping, update)}")
+        return
+    if mapping is None and is_uff_conversion(source, target):
         check_output(target, (".h5", ".hdf5", ".json", ".uff", ".unv"))
         convert_uff(source, target)
         typer.echo(f"wrote {target}")

@@ -1,0 +1,144 @@
+"""CAN logs (BLF of Vector's tools, ASC text) become the events of a recording that was made at the same time."""
+
+import os
+import tomllib
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from foundation import FileFormatError, InputError, writing_whole_file
+
+from ..drivers.can_bus import CanSignal, DbcDecoder
+from ..errors import DriverMissing
+from ..recording import Recording
+from .content import recording_content
+from .mapping import first_complaint
+from .writers import require_writable, write_content
+
+SUFFIXES = (".blf", ".asc")
+_STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class LogSignal(BaseModel):
+    """A signal to keep; see `CanSignal`."""
+
+    model_config = _STRICT
+    signal: Annotated[str, Field(min_length=1)]
+    series: str = ""
+    factor: float = 1.0
+
+
+class LogMapping(BaseModel):
+    """What a log belongs to.
+
+    Parameters
+    ----------
+    recording
+        File beside the log; its samples and events go into the output too.
+    dbc
+        File beside the log that names the signals.
+    offset_s
+        Time of the log's first message on the recording's axis, s.
+    signals
+        Those to keep.
+    """
+
+    model_config = _STRICT
+    recording: Annotated[str, Field(min_length=1)]
+    dbc: Annotated[str, Field(min_length=1)]
+    offset_s: float = 0.0
+    signals: Annotated[tuple[LogSignal, ...], Field(min_length=1)]
+
+
+def add_can_log(
+    log: str | os.PathLike[str],
+    target: str | os.PathLike[str],
+    mapping: str | os.PathLike[str],
+    progress: Callable[[int], None] | None = None,
+) -> Path:
+    """Write the recording that the mapping names with the log's signals among its events.
+
+    Parameters
+    ----------
+    log
+        ``.blf`` or ``.asc``.
+    target
+        New recording (or another kind that `convert` writes).
+    mapping
+        TOML file with the keys of `LogMapping`.
+    progress
+        Called with the number of samples written.
+
+    Raises
+    ------
+    InputError, FileFormatError
+        What is given cannot be used; nothing is written.
+    """
+    source, out = Path(log), Path(target)
+    require_writable(out)
+    wanted = _read_mapping(Path(mapping))
+    signals = [CanSignal(each.signal, each.series, each.factor) for each in wanted.signals]
+    events = read_can_log(source, DbcDecoder(source.parent / wanted.dbc, signals))
+    shifted = {name: (times + wanted.offset_s, values) for name, (times, values) in events.items()}
+    with Recording(source.parent / wanted.recording) as recording:
+        content = recording_content(recording)
+        twice = sorted(set(content.events) & set(shifted))
+        if twice:
+            raise InputError(f"{recording.path.name} has events {', '.join(twice)} already; name another series")
+        with writing_whole_file(out) as temporary:
+            write_content(replace(content, events={**content.events, **shifted}), temporary, progress)
+    return out
+
+
+def read_can_log(log: Path, decoder: DbcDecoder) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Times since the first message (s) and values by series.
+
+    Raises
+    ------
+    InputError, FileFormatError, DriverMissing
+        No such file, a damaged one, or none of the signals in it.
+    """
+    if not log.is_file():
+        raise InputError(f"no CAN log {log}; check the name")
+    try:
+        import can
+    except ImportError as error:
+        raise DriverMissing("CAN logs need the package python-can; pip install millfrf[devices]") from error
+    found: dict[str, tuple[list[float], list[float]]] = {}
+    first: float | None = None
+    try:
+        with can.LogReader(log) as messages:
+            for message in messages:
+                first = message.timestamp if first is None else first
+                if not (message.is_error_frame or message.is_remote_frame):
+                    _take(message, first, decoder, found)
+    except Exception as error:  # damaged logs make python-can, struct and zlib raise nearly anything
+        raise FileFormatError(
+            f"{log} cannot be read as {log.suffix}: {' '.join(str(error).split()) or type(error).__name__}"
+        ) from error
+    if not found:
+        raise FileFormatError(f"{log} holds none of the wanted signals; check the DBC file and the bus")
+    return {name: (np.array(times), np.array(values)) for name, (times, values) in found.items()}
+
+
+def _take(message: Any, first: float, decoder: DbcDecoder, found: dict[str, tuple[list[float], list[float]]]) -> None:
+    for name, value in decoder.decode(message.arbitration_id, bytes(message.data)):
+        times, values = found.setdefault(name, ([], []))
+        times.append(message.timestamp - first)
+        values.append(value)
+
+
+def _read_mapping(path: Path) -> LogMapping:
+    try:
+        return LogMapping.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise InputError(f"cannot read mapping {path}: {error.strerror}; check the name") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"mapping {path} is not TOML: {error}") from error
+    except ValidationError as error:
+        raise InputError(f"mapping {path}: {first_complaint(error)}") from error

@@ -1,0 +1,142 @@
+"""A spindle drive that is asked for its registers through Modbus-RTU."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import DeviceTimeout, Disconnected, DriverMissing
+from ..events import HOST_AXIS, EventAxis, Events
+from ..receiver import Put, Receiver
+from .serial_line import BITS_A_BYTE, LINE_FAILURES
+
+_REPLY_BYTES = 7  # address, function, length, two data bytes, two of the checksum
+_PATIENCE = 5
+
+
+@dataclass(frozen=True)
+class Register:
+    """One register of the drive as a series of events.
+
+    Parameters
+    ----------
+    address
+        Of the register, counted from 0.
+    series
+        Its name in the recording.
+    factor
+        Multiplies the integer.
+    signed
+        Two's complement.
+    input_register
+        Read with function 4 instead of 3 (holding register).
+    """
+
+    address: int
+    series: str
+    factor: float = 1.0
+    signed: bool = False
+    input_register: bool = False
+
+
+class ModbusFeed:
+    """Registers of one slave, asked in turn.
+
+    Parameters
+    ----------
+    port, baud
+        Of the line.
+    slave
+        Address of the drive, 1 ... 247.
+    registers
+        Those to read.
+    interval
+        s between two rounds.
+    timeout
+        s to wait for an answer; after five in a row without one the drive counts as lost.
+    """
+
+    def __init__(
+        self,
+        port: str,
+        baud: int,
+        slave: int,
+        registers: Sequence[Register],
+        *,
+        interval: float = 0.1,
+        timeout: float = 0.2,
+    ) -> None:
+        self._port, self._baud, self._slave = port, baud, slave
+        self._registers = tuple(registers)
+        self._interval, self._timeout = interval, timeout
+        self.event_series: dict[str, EventAxis] = {register.series: HOST_AXIS for register in registers}
+        self._receiver = Receiver(f"Modbus {port}")
+        self._drive: Any = None
+
+    def open(self) -> None:
+        """Open the line and start to ask.
+
+        Raises
+        ------
+        DriverMissing, Disconnected
+        """
+        self.close()
+        try:
+            import minimalmodbus
+        except ImportError as error:
+            raise DriverMissing(f"Modbus on {self._port}: needs minimalmodbus; pip install millfrf[devices]") from error
+        try:
+            self._drive = minimalmodbus.Instrument(self._port, self._slave)
+        except OSError as error:
+            raise Disconnected(f"serial line {self._port} cannot be opened: {error}; check its name") from error
+        self._drive.serial.baudrate = self._baud
+        self._drive.serial.timeout = self._timeout
+        self._receiver.start(self._receive)
+
+    def _receive(self, put: Put, stopped: Callable[[], bool]) -> None:
+        failures, due = 0, time.monotonic()
+        while not stopped():
+            for register in self._registers:
+                value = self._ask(register)
+                failures = failures + 1 if value is None else 0
+                if failures >= _PATIENCE:
+                    raise DeviceTimeout(
+                        f"drive {self._slave} on {self._port} does not answer; check address, baud rate and register "
+                        f"{register.address}"
+                    )
+                if value is not None:
+                    sampled = time.monotonic() - _REPLY_BYTES * BITS_A_BYTE / self._baud
+                    put(Events(register.series, np.array([sampled]), np.array([value * register.factor])))
+            due = max(due + self._interval, time.monotonic())
+            while not stopped() and (wait := due - time.monotonic()) > 0:
+                time.sleep(min(wait, 0.1))
+
+    def _ask(self, register: Register) -> float | None:
+        """The register's integer, or None where no proper answer came."""
+        import minimalmodbus
+
+        try:
+            function = 4 if register.input_register else 3
+            return float(self._drive.read_register(register.address, functioncode=function, signed=register.signed))
+        except minimalmodbus.ModbusException:
+            return None
+        except LINE_FAILURES as error:
+            raise Disconnected(f"serial line {self._port} is gone ({error}); check its plug") from error
+
+    def poll(self) -> list[Events]:
+        """What came since the last call.
+
+        Raises
+        ------
+        Disconnected, DeviceTimeout
+        """
+        return self._receiver.drain()
+
+    def close(self) -> None:
+        """Stop and close the line."""
+        self._receiver.stop()
+        if self._drive is not None:
+            self._drive.serial.close()
+            self._drive = None

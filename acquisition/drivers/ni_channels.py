@@ -1,0 +1,118 @@
+"""What is wired to a National Instruments input, and how it becomes a channel of a DAQmx task."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from foundation import InputError
+
+from ..channel import Channel
+
+STANDARD_GRAVITY = 9.80665
+IEPE_QUANTITIES = ("acceleration", "force")
+
+
+@dataclass(frozen=True)
+class NiInput:
+    """One input terminal with what is wired to it.
+
+    Parameters
+    ----------
+    channel
+        Name, quantity and place; its full scale is set from the range where it is None.
+    terminal
+        ``cDAQ1Mod1/ai0``.
+    sensitivity
+        V per SI unit of the channel: V/(m/s²), V/N; of a charge amplifier the reciprocal of its N/V.
+    range_volts
+        Largest magnitude of the input, V.
+    iepe_current
+        Excitation of an IEPE sensor, A; 0: a plain voltage.
+
+    Raises
+    ------
+    InputError
+        A sensitivity of zero, a range that is not positive, or IEPE for a quantity that has no such sensor.
+    """
+
+    channel: Channel
+    terminal: str
+    sensitivity: float
+    range_volts: float = 5.0
+    iepe_current: float = 0.0
+
+    def __post_init__(self) -> None:
+        name = self.channel.name
+        if self.sensitivity == 0:
+            raise InputError(f"channel {name}: sensitivity 0 V per unit; take it from the calibration sheet")
+        if not self.range_volts > 0:
+            raise InputError(f"channel {name}: range {self.range_volts} V must be positive")
+        if self.iepe_current and self.channel.quantity not in IEPE_QUANTITIES:
+            raise InputError(
+                f"channel {name}: IEPE is for {' and '.join(IEPE_QUANTITIES)}, not {self.channel.quantity}; "
+                "leave iepe_current out"
+            )
+
+    @property
+    def device(self) -> str:
+        """The module: ``cDAQ1Mod1``."""
+        return self.terminal.split("/")[0]
+
+    @property
+    def full_scale(self) -> float:
+        """In the channel's unit."""
+        return self.range_volts / abs(self.sensitivity)
+
+    @property
+    def scale(self) -> float:
+        """What the task's values are multiplied by: 1 where DAQmx scales, else SI units per V."""
+        return 1.0 if self.iepe_current else 1.0 / self.sensitivity
+
+    def described(self, input_delay: float | None) -> Channel:
+        """The channel as recorded, with its terminal, sensitivity and the module's input delay (s; None: not known)."""
+        extra = {**self.channel.extra, "terminal": self.terminal, "sensitivity_v_per_unit": self.sensitivity}
+        if input_delay is not None:
+            extra["input_delay_s"] = input_delay
+        full_scale = self.channel.full_scale if self.channel.full_scale is not None else self.full_scale
+        return replace(self.channel, full_scale=full_scale, extra=extra)
+
+    def add_to(self, channels: Any) -> Any:
+        """Create the channel among those of a DAQmx task, and return what DAQmx calls it."""
+        from nidaqmx import constants
+
+        if not self.iepe_current:
+            return channels.add_ai_voltage_chan(
+                self.terminal, self.channel.name, min_val=-self.range_volts, max_val=self.range_volts
+            )
+        common = {
+            "min_val": -self.full_scale,
+            "max_val": self.full_scale,
+            "current_excit_source": constants.ExcitationSource.INTERNAL,
+            "current_excit_val": self.iepe_current,
+        }
+        if self.channel.quantity == "force":
+            return channels.add_ai_force_iepe_chan(
+                self.terminal,
+                self.channel.name,
+                units=constants.ForceUnits.NEWTONS,
+                sensitivity=self.sensitivity * 1e3,
+                sensitivity_units=constants.ForceIEPESensorSensitivityUnits.MILLIVOLTS_PER_NEWTON,
+                **common,
+            )
+        return channels.add_ai_accel_chan(
+            self.terminal,
+            self.channel.name,
+            units=constants.AccelUnits.METERS_PER_SECOND_SQUARED,
+            sensitivity=self.sensitivity * 1e3 * STANDARD_GRAVITY,
+            sensitivity_units=constants.AccelSensitivityUnits.MILLIVOLTS_PER_G,
+            **common,
+        )
+
+
+def input_delay(created: Any) -> float | None:
+    """Time between a signal and its sample in this module, s, where the driver tells it; ask after the rate is set."""
+    from nidaqmx.errors import DaqError, DaqFunctionNotSupportedError
+
+    try:
+        return float(created.ai_filter_delay)
+    except (DaqError, DaqFunctionNotSupportedError):  # not every module has such a filter
+        return None

@@ -1,0 +1,122 @@
+"""An ASCII tachometer or any instrument that sends a number a line."""
+
+import re
+import time
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from foundation import InputError
+
+from ..errors import DeviceTimeout
+from ..events import HOST_AXIS, EventAxis, Events
+from ..receiver import Put, Receiver
+from .serial_line import BITS_A_BYTE, on_line, open_line
+
+_NUMBER = r"([-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)"
+_LONGEST_LINE = 4096
+
+
+class TachometerFeed:
+    """Lines of text, each with a value, as a feed of events.
+
+    Parameters
+    ----------
+    port, baud
+        ``COM3`` or ``/dev/ttyUSB0``; bits/s.
+    series
+        Name of the event series.
+    pattern
+        Regular expression whose first group is the number.
+    factor
+        Multiplies it.
+    period
+        s between two lines where the instrument keeps it exactly: then its own clock is followed, and a computer that
+        is busy does not blur the times. None: a line's time is its arrival less its transmission.
+    silence
+        s without a line after which the instrument counts as lost.
+
+    Raises
+    ------
+    InputError
+        A pattern that is not one, or has no group.
+    """
+
+    def __init__(
+        self,
+        port: str,
+        baud: int,
+        series: str,
+        *,
+        pattern: str = _NUMBER,
+        factor: float = 1.0,
+        period: float | None = None,
+        silence: float = 3.0,
+    ) -> None:
+        try:
+            self._pattern = re.compile(pattern)
+        except re.error as error:
+            raise InputError(f"serial line {port}: pattern {pattern!r} is not a regular expression: {error}") from error
+        if not self._pattern.groups:
+            raise InputError(f"serial line {port}: pattern {pattern!r} needs a group ( ) around the number")
+        self._port, self._baud, self._series = port, baud, series
+        self._factor, self._period, self._silence = factor, period, silence
+        axis = HOST_AXIS if period is None else EventAxis("device", f"line:{port}")
+        self.event_series: dict[str, EventAxis] = {series: axis}
+        self._receiver = Receiver(f"line {port}")
+        self._line: Any = None
+
+    def open(self) -> None:
+        """Open the line and start to receive.
+
+        Raises
+        ------
+        DriverMissing, Disconnected
+        """
+        self.close()
+        self._line = open_line(self._port, self._baud, 0.1)
+        self._receiver.start(self._receive)
+
+    def _receive(self, put: Put, stopped: Callable[[], bool]) -> None:
+        pending, n_lines, heard = b"", 0, time.monotonic()
+        while not stopped():
+            with on_line(self._port):
+                came = self._line.read(max(1, self._line.in_waiting))
+            arrival = time.monotonic()
+            *lines, pending = (pending + came).replace(b"\r", b"\n").split(b"\n")
+            pending = pending[-_LONGEST_LINE:]
+            for line in filter(None, lines):
+                n_lines, heard = n_lines + 1, arrival
+                self._take(line, n_lines, arrival, put)
+            if arrival - heard > self._silence:
+                raise DeviceTimeout(f"serial line {self._port}: nothing came for {self._silence:g} s; check instrument")
+
+    def _take(self, line: bytes, count: int, arrival: float, put: Put) -> None:
+        found = self._pattern.search(line.decode("ascii", "replace"))
+        if found is None:
+            return
+        try:
+            value = float(found.group(1)) * self._factor
+        except (TypeError, ValueError):
+            return
+        begun = arrival - (len(line) + 1) * BITS_A_BYTE / self._baud
+        stamp = begun if self._period is None else count * self._period
+        arrivals = None if self._period is None else np.array([begun])
+        put(Events(self._series, np.array([stamp]), np.array([value]), arrivals))
+
+    def poll(self) -> list[Events]:
+        """What came since the last call.
+
+        Raises
+        ------
+        Disconnected, DeviceTimeout
+        """
+        return self._receiver.drain()
+
+    def close(self) -> None:
+        """Stop and close the line."""
+        self._receiver.stop()
+        if self._line is not None:
+            self._line.close()
+            self._line = None

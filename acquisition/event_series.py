@@ -1,0 +1,73 @@
+"""`EventSeries`: slow or asynchronous values of an open recording."""
+
+from collections.abc import Callable
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import FileFormatError, InputError
+
+from .events import EventAxis
+
+Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
+Columns = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]
+
+
+class EventSeries:
+    """Slow or asynchronous values: times and values, read when asked for.
+
+    Parameters
+    ----------
+    group
+        ``/events/<name>``.
+    aligned
+        Gives the times on the samples' axis and the values; None: the stored times are taken as they are.
+    """
+
+    def __init__(self, group: h5py.Group, aligned: Callable[[], Pair] | None = None) -> None:
+        self._group = group
+        self._aligned = aligned
+
+    @property
+    def axis(self) -> EventAxis:
+        """In which clock the stored times are told.
+
+        Raises
+        ------
+        FileFormatError
+            The file names none that is known.
+        """
+        stored = [self._group.attrs.get(name, default) for name, default in (("time_axis", "samples"), ("clock", ""))]
+        kind, clock = (text.decode() if isinstance(text, bytes) else str(text) for text in stored)
+        try:
+            return EventAxis(kind, clock)  # type: ignore[arg-type]  # checked by EventAxis
+        except InputError as error:
+            raise FileFormatError(f"events {self._group.name}: {error}") from error
+
+    def read_raw(self) -> Columns:
+        """Times in the clock of `axis` (s), values, and the host's arrival times (s) or None, each (n_events,).
+
+        Raises
+        ------
+        FileFormatError
+            The series is damaged.
+        """
+        names = ("time", "value", *(("arrival",) if self.axis.kind == "device" else ()))
+        try:
+            columns = [np.asarray(self._group[name][:], dtype=float) for name in names]
+        except (OSError, KeyError, AttributeError, TypeError, ValueError) as error:
+            raise FileFormatError(f"events {self._group.name} lack readable 'time' and 'value'; record anew") from error
+        n_whole = min(len(column) for column in columns)  # a writer killed between two leaves some longer
+        times, values, *arrivals = (column[:n_whole] for column in columns)
+        return times, values, arrivals[0] if arrivals else None
+
+    def read(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Times on the samples' axis (s) and values, each (n_events,).
+
+        Raises
+        ------
+        FileFormatError
+            The series is damaged, or its clock cannot be aligned.
+        """
+        return self.read_raw()[:2] if self._aligned is None else self._aligned()

@@ -1,0 +1,93 @@
+"""`[[channels]]` of a session: what is wired to a terminal, in the lab's own units."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from foundation import SI_UNITS, InputError, si_factor
+
+from ..channel import Channel
+from ..drivers.ni_channels import NiInput
+
+STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
+Positive = Annotated[float, Field(gt=0)]
+Name = Annotated[str, Field(min_length=1)]
+
+
+class ChannelTable(BaseModel):
+    """One input.
+
+    Parameters
+    ----------
+    name, quantity, node, direction, high_pass_hz, sensor
+        As in a recording's `Channel`.
+    unit
+        In which the calibration sheet speaks: ``N``, ``kN``, ``g``, ``m/s^2``, ``V``.
+    terminal
+        ``cDAQ1Mod1/ai0``.
+    mv_per_unit
+        Sensor's sensitivity, mV per ``unit``.
+    units_per_volt
+        Instead: a charge amplifier's setting, ``unit`` per V.
+    range_v
+        Largest magnitude of the input, V.
+    iepe_ma
+        Excitation current of an IEPE sensor, mA; 0: none.
+    """
+
+    model_config = STRICT
+    name: Name
+    quantity: str
+    unit: str
+    terminal: Name
+    mv_per_unit: float | None = None
+    units_per_volt: float | None = None
+    range_v: Positive = 5.0
+    iepe_ma: Annotated[float, Field(ge=0, le=20)] = 0.0
+    node: str = ""
+    direction: str = ""
+    high_pass_hz: Positive | None = None
+    sensor: str = ""
+
+    @model_validator(mode="after")
+    def _understood(self) -> "ChannelTable":
+        if (self.mv_per_unit is None) == (self.units_per_volt is None):
+            raise ValueError(
+                f"channel {self.name}: give either mv_per_unit (a sensor's sheet) or units_per_volt (an amplifier)"
+            )
+        if 0 in (self.mv_per_unit, self.units_per_volt):
+            raise ValueError(f"channel {self.name}: a sensitivity of 0; take it from the calibration sheet")
+        try:
+            self.wired()
+        except InputError as error:
+            raise ValueError(str(error)) from error
+        return self
+
+    @property
+    def volts_per_si_unit(self) -> float:
+        """V per SI unit of the quantity."""
+        factor = si_factor(self.quantity, self.unit)
+        if self.mv_per_unit is not None:
+            return self.mv_per_unit * 1e-3 / factor
+        return 1.0 / ((self.units_per_volt or 1.0) * factor)
+
+    def wired(self) -> NiInput:
+        """The input in SI units.
+
+        Raises
+        ------
+        InputError
+            A unit, quantity or direction that is not known.
+        """
+        si_factor(self.quantity, self.unit)
+        channel = Channel(
+            self.name,
+            self.quantity,
+            SI_UNITS[self.quantity],
+            self.node,
+            self.direction,
+            None,
+            self.high_pass_hz,
+            self.sensor,
+        )
+        return NiInput(channel, self.terminal, self.volts_per_si_unit, self.range_v, self.iepe_ma * 1e-3)

@@ -1,0 +1,127 @@
+"""`[[can]]`, `[[tachometer]]`, `[[modbus]]` and `[[amplifier]]` of a session."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, Field
+
+from ..drivers.amplifier import Amplifier, Command
+from ..drivers.can_bus import CanFeed, CanSignal
+from ..drivers.modbus_drive import ModbusFeed, Register
+from ..drivers.tachometer_line import TachometerFeed
+from .channel_table import STRICT, Name, Positive
+
+Baud = Annotated[int, Field(ge=50, le=10_000_000)]
+
+
+class SignalTable(BaseModel):
+    """One signal of a DBC file; see `CanSignal`."""
+
+    model_config = STRICT
+    signal: Name
+    series: str = ""
+    factor: float = 1.0
+
+
+class CanTable(BaseModel):
+    """A CAN bus; see `CanFeed`. ``dbc`` is looked for beside the session file."""
+
+    model_config = STRICT
+    interface: Name
+    channel: Name
+    dbc: Name
+    signals: Annotated[tuple[SignalTable, ...], Field(min_length=1)]
+    silence_s: Positive = 2.0
+    options: dict[str, Any] = Field(default_factory=dict)
+
+    def feed(self, folder: Path) -> CanFeed:
+        """The bus as a feed."""
+        signals = [CanSignal(each.signal, each.series, each.factor) for each in self.signals]
+        path = folder / self.dbc
+        return CanFeed(self.interface, self.channel, path, signals, silence=self.silence_s, options=self.options)
+
+
+class TachometerTable(BaseModel):
+    """An instrument that sends a number a line; see `TachometerFeed`."""
+
+    model_config = STRICT
+    port: Name
+    baud: Baud
+    series: Name
+    pattern: str | None = None
+    factor: float = 1.0
+    period_s: Positive | None = None
+    silence_s: Positive = 3.0
+
+    def feed(self, folder: Path) -> TachometerFeed:
+        """The line as a feed."""
+        del folder
+        chosen = {} if self.pattern is None else {"pattern": self.pattern}
+        return TachometerFeed(
+            self.port,
+            self.baud,
+            self.series,
+            factor=self.factor,
+            period=self.period_s,
+            silence=self.silence_s,
+            **chosen,
+        )
+
+
+class RegisterTable(BaseModel):
+    """One register; see `Register`."""
+
+    model_config = STRICT
+    address: Annotated[int, Field(ge=0, le=65535)]
+    series: Name
+    factor: float = 1.0
+    signed: bool = False
+    input_register: bool = False
+
+
+class ModbusTable(BaseModel):
+    """A drive; see `ModbusFeed`."""
+
+    model_config = STRICT
+    port: Name
+    baud: Baud
+    slave: Annotated[int, Field(ge=1, le=247)]
+    registers: Annotated[tuple[RegisterTable, ...], Field(min_length=1)]
+    interval_s: Positive = 0.1
+    timeout_s: Positive = 0.2
+
+    def feed(self, folder: Path) -> ModbusFeed:
+        """The drive as a feed."""
+        del folder
+        registers = [Register(**each.model_dump()) for each in self.registers]
+        return ModbusFeed(self.port, self.baud, self.slave, registers, interval=self.interval_s, timeout=self.timeout_s)
+
+
+class CommandTable(BaseModel):
+    """One command; see `Command`."""
+
+    model_config = STRICT
+    send: Name
+    expect: str = ""
+    wait_s: Positive = 1.0
+
+    def command(self) -> Command:
+        """As the driver takes it."""
+        return Command(self.send, self.expect, self.wait_s)
+
+
+class AmplifierTable(BaseModel):
+    """A charge amplifier; see `Amplifier`."""
+
+    model_config = STRICT
+    port: Name
+    baud: Baud
+    ending: str = "\r\n"
+    on_open: tuple[CommandTable, ...] = ()
+    on_close: tuple[CommandTable, ...] = ()
+
+    def feed(self, folder: Path) -> Amplifier:
+        """The amplifier as a feed without events."""
+        del folder
+        opening, closing = [each.command() for each in self.on_open], [each.command() for each in self.on_close]
+        return Amplifier(self.port, self.baud, opening, closing, self.ending)

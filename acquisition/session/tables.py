@@ -1,0 +1,146 @@
+"""`Session`: the whole session file, in the lab's words and units."""
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field, model_validator
+
+from .channel_table import STRICT, ChannelTable, Name, Positive
+from .feed_tables import AmplifierTable, CanTable, ModbusTable, TachometerTable
+
+FREQUENCIES_A_SAMPLE_RATE = 2.56
+"""A sample rate must be at least this many times the band's upper end, so that the anti-alias filter fits between."""
+
+
+class NiDevice(BaseModel):
+    """`[device]` with ``driver = "ni"``."""
+
+    model_config = STRICT
+    driver: Literal["ni"]
+    sample_rate_hz: Positive
+    block_s: Annotated[float, Field(gt=0.001, le=10)] = 0.1
+    buffer_s: Annotated[float, Field(ge=0.2, le=600)] = 10.0
+    timeout_s: Positive = 5.0
+
+
+class ReplayDevice(BaseModel):
+    """`[device]` with ``driver = "replay"``: a recording instead of a device, ``speed`` times as fast as it was."""
+
+    model_config = STRICT
+    driver: Literal["replay"]
+    file: Name
+    speed: Positive = 1.0
+
+
+class SimulatedDevice(BaseModel):
+    """`[device]` with ``driver = "simulated"``: the simulated cell, milling, ``speed`` times as fast as real."""
+
+    model_config = STRICT
+    driver: Literal["simulated"]
+    sample_rate_hz: Positive = 2048.0
+    spindle_speed_rpm: Positive = 6000.0
+    noise: Annotated[float, Field(ge=0, le=10)] = 0.01
+    seed: Annotated[int, Field(ge=0)] = 0
+    speed: Positive = 1.0
+
+
+class LiveTable(BaseModel):
+    """`[live]`: what the live page estimates.
+
+    Parameters
+    ----------
+    segment_s
+        Length of a segment of the spectra, s.
+    frf_error
+        Wanted standard deviation of the FRF over its magnitude; lines below it count as having enough data.
+    bands
+        Number of frequency bands for which that is told.
+    """
+
+    model_config = STRICT
+    segment_s: Annotated[float, Field(gt=0, le=60)] = 1.0
+    frf_error: Positive = 0.1
+    bands: Annotated[int, Field(ge=1, le=40)] = 8
+
+
+Device = Annotated[NiDevice | ReplayDevice | SimulatedDevice, Field(discriminator="driver")]
+FeedTable = CanTable | TachometerTable | ModbusTable | AmplifierTable
+
+
+class Session(BaseModel):
+    """What is recorded, from what, for how long.
+
+    Parameters
+    ----------
+    title
+        Of the recording.
+    duration_s
+        s; None: until stopped.
+    band_hz
+        Frequencies that matter, Hz; the sample rate is held against them.
+    tool, cut, pose, cutting, plan
+        Free tables; they go into the recording as its set-up (``cutting`` and ``plan`` are those of `millfrf plan`).
+    live
+        What the live page estimates.
+    device
+        The sampled one.
+    channels
+        Its inputs; needed for ``ni``, refused for the others, which bring their own.
+    can, tachometer, modbus, amplifier
+        Further devices.
+    """
+
+    model_config = STRICT
+    title: str = ""
+    duration_s: Positive | None = None
+    band_hz: tuple[Annotated[float, Field(ge=0)], Positive] | None = None
+    tool: dict[str, Any] = Field(default_factory=dict)
+    cut: dict[str, Any] = Field(default_factory=dict)
+    pose: dict[str, Any] = Field(default_factory=dict)
+    cutting: dict[str, Any] = Field(default_factory=dict)
+    plan: dict[str, Any] = Field(default_factory=dict)
+    live: LiveTable = LiveTable()
+    device: Device
+    channels: tuple[ChannelTable, ...] = ()
+    can: tuple[CanTable, ...] = ()
+    tachometer: tuple[TachometerTable, ...] = ()
+    modbus: tuple[ModbusTable, ...] = ()
+    amplifier: tuple[AmplifierTable, ...] = ()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Session":
+        for complaint in self._complaints():
+            raise ValueError(complaint)
+        return self
+
+    def _complaints(self) -> Iterator[str]:
+        driver = self.device.driver
+        if driver == "ni" and not self.channels:
+            yield "no [[channels]]; describe what is wired to the device"
+        if driver != "ni" and self.channels:
+            yield f"[[channels]] do not go with driver {driver!r}, which brings its own; remove them"
+        for what, values in (
+            ("channel name", [channel.name for channel in self.channels]),
+            ("terminal", [channel.terminal for channel in self.channels]),
+        ):
+            twice = sorted({value for value in values if values.count(value) > 1})
+            if twice:
+                yield f"{what} {', '.join(twice)} appears twice; each must be unique"
+        if self.band_hz is not None:
+            yield from self._band_complaints(self.band_hz)
+
+    def _band_complaints(self, band: tuple[float, float]) -> Iterator[str]:
+        if band[0] >= band[1]:
+            yield f"band_hz {list(band)} is empty; give the lower frequency first"
+        rate = getattr(self.device, "sample_rate_hz", None)
+        needed = FREQUENCIES_A_SAMPLE_RATE * band[1]
+        if rate is not None and rate < needed:
+            yield (
+                f"sample_rate_hz {rate:g} is too low for band_hz up to {band[1]:g} Hz; "
+                f"sample at {needed:g} Hz or more, or narrow the band"
+            )
+
+    @property
+    def feeds(self) -> tuple[FeedTable, ...]:
+        """All tables of further devices; amplifiers first, so that they are set before anything runs."""
+        return (*self.amplifier, *self.can, *self.tachometer, *self.modbus)

@@ -1,0 +1,93 @@
+"""`millfrf acquire`: record a session, or check it before the cut."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def acquire(
+    session: Annotated[Path, typer.Argument(metavar="SESSION.toml", help="What is wired where, and for how long.")],
+    out: Annotated[Path | None, typer.Option("--out", metavar="REC.h5", help="Recording to write.")] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Listen, judge every channel and record nothing; tap to check signs.")
+    ] = False,
+    seconds: Annotated[float, typer.Option("--seconds", min=0.1, help="How long --check listens, s.")] = 3.0,
+    live: Annotated[
+        bool, typer.Option("--live", help="Show the signals on a page; its Start button begins the recording.")
+    ] = False,
+    live_address: Annotated[
+        str, typer.Option("--live-address", metavar="IP", help="Where the page listens; else on this machine only.")
+    ] = "127.0.0.1",
+    live_port: Annotated[int, typer.Option("--live-port", min=0, max=65535, help="0: any free port.")] = 0,
+    at_once: Annotated[bool, typer.Option("--at-once", help="With --live: record without waiting for Start.")] = False,
+) -> None:
+    """Record from the devices of a session until its duration is over, Stop is pressed or Ctrl-C."""
+    from foundation import InputError
+
+    from ..chain.acquire import open_session
+    from .options import check_output
+
+    if (out is None) == (not check):
+        raise InputError("give either --out REC.h5 to record or --check to look at the signals first")
+    if out is not None:
+        check_output(out, (".h5", ".hdf5"))
+        if out.exists():
+            raise InputError(f"{out} exists; choose another name or remove it first")
+    opened = open_session(session)
+    for stream in opened.source.streams:
+        typer.echo(f"stream {stream.name}: {len(stream.channels)} channels at {stream.sample_rate:.9g} Hz")
+    if out is None:
+        _check(opened.source, seconds)
+    elif live:
+        from ..chain.acquire_live import acquire_live
+
+        tally = acquire_live(opened, out, address=live_address, port=live_port, at_once=at_once, say=_say)
+        _report(tally, out)
+    else:
+        _record(opened, out)
+
+
+def _check(source: object, seconds: float) -> None:
+    from acquisition import Source
+    from foundation import MillfrfError
+
+    from ..chain.preflight import listen, preflight
+    from ..tables import show
+
+    assert isinstance(source, Source)
+    found = preflight(listen(source, seconds))
+    show(found.table())
+    for tap in found.taps:
+        typer.echo(f"tap: {tap.acceleration.name} {1e6 * tap.delay:+.0f} us after {tap.force.name}")
+    concerns = found.concerns()
+    for line in concerns:
+        typer.echo(f"concern: {line}")
+    if concerns:
+        raise MillfrfError(f"pre-flight: {len(concerns)} concerns about {len(found.checks)} channels; see above")
+    typer.echo("pre-flight: nothing wrong")
+
+
+def _record(opened: object, out: Path) -> None:
+    from ..chain.acquire import OpenedSession, acquire
+    from ..progress import bar
+
+    assert isinstance(opened, OpenedSession)
+    with bar(f"recording {out.name}", opened.source.n_samples) as update:
+        tally = acquire(opened, out, progress=update)
+    _report(tally, out)
+
+
+def _say(line: str) -> None:
+    """At once, also into a pipe: somebody waits for the address."""
+    print(line, flush=True)
+
+
+def _report(tally: object, out: Path) -> None:
+    from ..chain.acquire import Tally
+
+    if not isinstance(tally, Tally):
+        typer.echo("stopped before Start; nothing was recorded")
+        return
+    typer.echo(tally.summary())
+    typer.echo(f"wrote {out}")

@@ -1,0 +1,214 @@
+"""`LiveMonitor`: takes every block without holding the recording up, and says what a page shall draw."""
+
+import queue
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Block, Channel, Events, StreamDescription
+from foundation import InputError
+
+from .enough import BandProgress, band_progress
+from .spectra import GrownSpectra, LiveSpectra
+from .traces import TraceBuffer
+
+SPEED_EVENTS = "spindle_speed_rpm"
+_WAITING = 64
+_OVERLOAD = 0.999
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LiveSettings:
+    """What is estimated.
+
+    Parameters
+    ----------
+    band
+        Hz; None: up to 2 kHz or what the sample rate allows.
+    segment
+        s.
+    relative_error, absolute_error
+        Wanted standard deviation of the FRF, see :func:`millfrf.live.enough.band_progress`.
+    n_bands
+        For which that is told.
+    teeth
+        Of the cutter; 0: unknown, no tooth-passing line.
+    spindle_speed_rpm
+        As planned; replaced by what a device says.
+    """
+
+    band: tuple[float, float] | None = None
+    segment: float = 1.0
+    relative_error: float = 0.1
+    absolute_error: float | None = None
+    n_bands: int = 8
+    teeth: int = 0
+    spindle_speed_rpm: float = 0.0
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """All that a page draws.
+
+    Parameters
+    ----------
+    seconds, n_samples
+        Of the stream since the start.
+    times : (n,), s
+    traces : (n, n_channels)
+    peaks, overloads : (n_channels,)
+        Largest magnitude of the last second, in the channel's unit; samples at full scale since the start.
+    spectra
+        None until a segment is full.
+    bands
+        Enough data?
+    tooth_passing
+        Hz; 0: unknown.
+    n_skipped
+        Blocks that were recorded but not drawn, because the page did not keep up.
+    """
+
+    seconds: float
+    n_samples: int
+    times: Real
+    traces: Real
+    peaks: Real
+    overloads: Real
+    spectra: GrownSpectra | None
+    bands: tuple[BandProgress, ...]
+    tooth_passing: float
+    n_skipped: int
+
+
+class LiveMonitor:
+    """A watcher for `record`: blocks go into a short queue, a thread of its own works them off.
+
+    Parameters
+    ----------
+    streams
+        Of the source; the one with most channels is shown.
+    settings
+        What is estimated.
+    """
+
+    def __init__(self, streams: Sequence[StreamDescription], settings: LiveSettings) -> None:
+        self.stream = max(streams, key=lambda stream: len(stream.channels))
+        self.settings = settings
+        rate = self.stream.sample_rate
+        low, high = settings.band or (0.0, 2000.0)
+        self.band = (low, min(high, 0.4 * rate))
+        self._queue: queue.Queue[Block] = queue.Queue(_WAITING)
+        self._lock = threading.Lock()
+        self._stop = threading.Event()
+        self._gap = False
+        self._speed_rpm = settings.spindle_speed_rpm
+        self.n_skipped = 0
+        self._begin()
+        self._thread = threading.Thread(target=self._run, name="live monitor", daemon=True)
+        self._thread.start()
+
+    @property
+    def channels(self) -> tuple[Channel, ...]:
+        """Those shown."""
+        return self.stream.channels
+
+    def _begin(self) -> None:
+        n = len(self.channels)
+        self._traces = TraceBuffer(n, self.stream.sample_rate)
+        self._recent: list[tuple[float, Real]] = []
+        self._overloads = np.zeros(n)
+        self._n_samples = 0
+        self._spectra = self._fresh_spectra()
+        self._grown: GrownSpectra | None = None
+        self._bands = self._judged(None)
+
+    def _fresh_spectra(self) -> LiveSpectra | None:
+        try:
+            return LiveSpectra(self.channels, self.stream.sample_rate, self.band[1], self.settings.segment)
+        except InputError:
+            return None
+
+    def restart(self) -> None:
+        """Forget everything drawn so far: the recording proper begins."""
+        with self._lock:
+            while not self._queue.empty():
+                self._queue.get_nowait()
+            self._begin()
+
+    def __call__(self, taken: Block | Events) -> None:
+        """Take a block or event; never waits."""
+        if isinstance(taken, Events):
+            if taken.series == SPEED_EVENTS and len(taken.values):
+                self._speed_rpm = float(taken.values[-1])
+            return
+        if taken.stream != self.stream.name:
+            return
+        try:
+            self._queue.put_nowait(taken)
+        except queue.Full:
+            self.n_skipped += 1
+            self._gap = True
+
+    def _run(self) -> None:
+        estimated = time.monotonic()
+        while not self._stop.is_set():
+            try:
+                block = self._queue.get(timeout=0.2)
+            except queue.Empty:
+                continue
+            with self._lock:
+                self._add(block)
+                if time.monotonic() - estimated > 1.0 and self._spectra is not None:
+                    self._grown = self._spectra.grown()
+                    self._bands = self._judged(self._grown)
+                    estimated = time.monotonic()
+
+    def _add(self, block: Block) -> None:
+        samples = block.samples
+        self._n_samples = block.first_sample + len(samples)
+        self._traces.add(samples)
+        now = time.monotonic()
+        self._recent = [entry for entry in self._recent if now - entry[0] < 1.0]
+        size = np.abs(samples).max(axis=0)
+        self._recent.append((now, size))
+        limits = np.array([channel.full_scale or np.inf for channel in self.channels]) * _OVERLOAD
+        if (size >= limits).any():
+            self._overloads += np.sum(np.abs(samples) >= limits, axis=0)
+        if self._gap:  # segments must not reach over samples that were not seen
+            self._gap, self._spectra = False, self._fresh_spectra()
+        if self._spectra is not None:
+            self._spectra.add(samples)
+
+    def _judged(self, grown: GrownSpectra | None) -> tuple[BandProgress, ...]:
+        s = self.settings
+        frf = None if grown is None else grown.frf
+        return band_progress(frf, self.band, s.n_bands, relative=s.relative_error, absolute=s.absolute_error)
+
+    def snapshot(self) -> Snapshot:
+        """What a page shall draw now."""
+        with self._lock:
+            times, traces = self._traces.drawn()
+            peaks = np.max([size for _, size in self._recent], axis=0) if self._recent else 0 * self._overloads
+            return Snapshot(
+                self._n_samples / self.stream.sample_rate,
+                self._n_samples,
+                times,
+                traces,
+                peaks,
+                self._overloads.copy(),
+                self._grown,
+                self._bands,
+                self.settings.teeth * self._speed_rpm / 60,
+                self.n_skipped,
+            )
+
+    def close(self) -> None:
+        """End the thread."""
+        self._stop.set()
+        self._thread.join()

@@ -1,0 +1,97 @@
+"""The page itself: buttons above, figures below, fed a few times a second."""
+
+import html
+import time
+from typing import Any
+
+from .control import LiveControl
+from .drawings import Drawing, enough, levels, spectrum, traces, transfer
+from .monitor import LiveMonitor, Snapshot
+
+PERIOD_MS = 500
+_SPECTRA_SHOWN = 4
+
+
+def build_page(document: Any, monitor: LiveMonitor, control: LiveControl) -> None:
+    """Fill a Bokeh document; called once for every browser that connects."""
+    from bokeh.layouts import column, row
+    from bokeh.models import Button, Div, MultiChoice, Select
+
+    responses, excitations, names = _choices(monitor)
+    start = Button(label="Start", button_type="success", name="start")
+    mark = Button(label="Mark", name="mark")
+    stop = Button(label="Stop", button_type="danger", name="stop")
+    start.on_click(control.start)
+    mark.on_click(control.mark)
+    stop.on_click(control.stop)
+    status = Div(text="connected", name="status", width=900)
+    shown = MultiChoice(title="Spectra of", options=names, value=names[:_SPECTRA_SHOWN], width=420)
+    response = Select(title="Response", options=responses or ["none"], value=(responses or ["none"])[0])
+    excitation = Select(title="Excitation", options=excitations or ["none"], value=(excitations or ["none"])[0])
+
+    def entry() -> tuple[int, int]:
+        return response.options.index(response.value), excitation.options.index(excitation.value)
+
+    drawings = [
+        *(traces(monitor.channels), levels(monitor.channels), spectrum(lambda: list(shown.value))),
+        *(transfer("frf", entry), transfer("coherence", entry), enough()),
+    ]
+    figures = [drawing.figure for drawing in drawings]
+    for figure in figures:
+        figure.sizing_mode = "stretch_width"
+    document.title = "millfrf live"
+    document.add_root(
+        column(
+            row(start, mark, stop, status, sizing_mode="stretch_width"),
+            row(figures[0], figures[1], sizing_mode="stretch_width"),
+            row(shown, response, excitation),
+            row(figures[2], figures[3], sizing_mode="stretch_width"),
+            row(figures[4], figures[5], sizing_mode="stretch_width"),
+            sizing_mode="stretch_width",
+        )
+    )
+    document.add_periodic_callback(_feeder(drawings, status, (start, mark, stop), monitor, control), PERIOD_MS)
+
+
+def _choices(monitor: LiveMonitor) -> tuple[list[str], list[str], list[str]]:
+    """Response, excitation and all names, in the order of the spectra."""
+    from estimation.recording_spectra import EXCITING, RESPONDING
+
+    excitations = [c.name for c in monitor.channels if c.quantity in EXCITING and c.node]
+    responses = [c.name for c in monitor.channels if c.quantity in RESPONDING]
+    return responses, excitations, [*excitations, *responses]
+
+
+def _feeder(
+    drawings: list[Drawing], status: Any, buttons: tuple[Any, Any, Any], monitor: LiveMonitor, control: LiveControl
+) -> Any:
+    """What feeds one page; it leaves a beat out where drawing takes longer than half a period."""
+    rest_until = 0.0
+
+    def feed() -> None:
+        nonlocal rest_until
+        began = time.monotonic()
+        if began < rest_until:
+            return
+        now = monitor.snapshot()
+        for drawing in drawings:
+            drawing.update(now)
+        status.text = status_line(now, control)
+        start, mark, stop = buttons
+        start.disabled = control.state != "waiting"
+        mark.disabled = control.state != "recording"
+        stop.disabled = control.state not in ("waiting", "recording")
+        rest_until = began + 3 * (time.monotonic() - began)
+
+    return feed
+
+
+def status_line(now: Snapshot, control: LiveControl) -> str:
+    """State, time, samples, marks, and what was left out of the drawing; as HTML."""
+    skipped = f", {now.n_skipped} blocks recorded but not drawn" if now.n_skipped else ""
+    averages = "" if now.spectra is None else f", {now.spectra.averages:.0f} averages"
+    message = f" {html.escape(control.message)}" if control.message else ""
+    return (
+        f"<b>{control.state}</b> {now.seconds:.1f} s, {now.n_samples} samples a channel{averages}, "
+        f"{control.n_marks} marks{skipped}.{message}"
+    )

@@ -1,0 +1,95 @@
+"""Spectra, coherence and FRF as they grow, of the band that matters: samples are reduced to its rate first."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Channel
+from estimation import Frf, SpectralAccumulator, h1, settings_for
+from estimation.band_records import BandDecimator
+from estimation.recording_spectra import EXCITING, RESPONDING
+from foundation import InputError
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GrownSpectra:
+    """What came out so far.
+
+    Parameters
+    ----------
+    frequencies : (n,), Hz
+    power : (n, n_channels), unit^2/Hz
+        Of the excitations, then the responses.
+    channels
+        Their names, in that order.
+    frf
+        None until there are more segments than excitations.
+    averages
+        Independent averages.
+    """
+
+    frequencies: Real
+    power: Real
+    channels: tuple[str, ...]
+    frf: Frf | None
+    averages: float
+
+
+class LiveSpectra:
+    """Grows while samples come.
+
+    Parameters
+    ----------
+    channels
+        Of the stream; forces excite, motions respond.
+    sample_rate
+        Hz.
+    highest_frequency
+        Upper end of the band, Hz.
+    segment
+        Length of a segment, s.
+
+    Raises
+    ------
+    InputError
+        No force or no motion among the channels, or a band that does not fit.
+    """
+
+    def __init__(
+        self, channels: Sequence[Channel], sample_rate: float, highest_frequency: float, segment: float
+    ) -> None:
+        self._exciting = [k for k, channel in enumerate(channels) if channel.quantity in EXCITING and channel.node]
+        self._responding = [k for k, channel in enumerate(channels) if channel.quantity in RESPONDING]
+        if not self._exciting or not self._responding:
+            raise InputError("no force or no motion with a place among the channels; there is no FRF to grow")
+        self._decimator = BandDecimator(sample_rate, highest_frequency)
+        rate = self._decimator.sample_rate
+        self._highest = highest_frequency
+        settings = settings_for(rate, max(segment, 16 / rate), window="hann")
+        exciting, responding = ([channels[k] for k in chosen] for chosen in (self._exciting, self._responding))
+        self._names = tuple(channel.name for channel in (*exciting, *responding))
+        self._accumulator = SpectralAccumulator(exciting, responding, rate, settings)
+
+    def add(self, samples: Real) -> None:
+        """Take the next samples (n, n_channels)."""
+        low = self._decimator.add(samples[:, [*self._exciting, *self._responding]])
+        if len(low):
+            n = len(self._exciting)
+            self._accumulator.add(low[:, :n], low[:, n:])
+
+    def grown(self) -> GrownSpectra | None:
+        """What came out so far; None before the first segment is full."""
+        try:
+            spectra = self._accumulator.result()
+        except InputError:
+            return None
+        shown = (spectra.frequencies <= self._highest) & (spectra.frequencies > 0)
+        inputs = np.real(np.einsum("kii->ki", spectra.input_spectra))
+        outputs = np.real(np.einsum("kii->ki", spectra.output_spectra))
+        frf = h1(spectra) if spectra.effective_averages > len(self._exciting) + 0.5 else None
+        power = np.concatenate([inputs, outputs], axis=1)[shown]
+        return GrownSpectra(spectra.frequencies[shown], power, self._names, frf, spectra.effective_averages)
