@@ -1,10 +1,18 @@
 """Robots as data: posture to stiffness, modes, receptance and deviation; knows nothing of recordings."""
 
+from .beam_element import beam_mass, beam_stiffness
+from .constrained_statics import constrained_system, tip_compliance, tip_stiffness
 from .exact_beam import planar_dynamic_stiffness, spatial_dynamic_stiffness
 from .exact_chain import coupled_receptance, exact_receptance
+from .generalised_coordinates import coordinate_basis
 from .identification import Identification, identify
+from .inverse_kinematics import inverse_kinematics
+from .loop_closure import close_loops, posture_warnings, tool_jacobian
+from .mechanism import Frame, Mechanism
 from .modal_damping import modal_damping_matrix, rayleigh_constants
 from .modal_reduction import modal_model
+from .path_compensation import CompensatedPath, ToolPath, compensate_path
+from .path_file import read_tool_path, write_compensated_path
 from .planar_file import PlanarCase, read_planar_robot
 from .planar_identification import apply_identified, identify_from_frequencies, identify_from_frfs
 from .planar_robot import PlanarRobot
@@ -12,16 +20,47 @@ from .receptance_coupling import block_diagonal, couple_receptances
 from .rigid_links import rigid_matrices, rigid_model
 from .robot_files import assumptions, robot_names
 from .section import Material, Section, hollow_circle
+from .spatial_file import SpatialCase, read_spatial_robot
+from .spatial_robot import ElasticJoint, Link, LumpedBody, SpatialRobot, structure_at
+from .stiffness_identification import (
+    Deflection,
+    apply_joint_stiffness,
+    identify_joint_stiffness,
+    predicted_deflections,
+    stiffness_names,
+)
+from .structure import Beam, Body, Spring, Structure, mass_matrix, stiffness_matrix
 
 __all__ = [
+    "Beam",
+    "Body",
+    "CompensatedPath",
+    "Deflection",
+    "ElasticJoint",
+    "Frame",
     "Identification",
+    "Link",
+    "LumpedBody",
     "Material",
+    "Mechanism",
     "PlanarCase",
     "PlanarRobot",
     "Section",
+    "SpatialCase",
+    "SpatialRobot",
+    "Spring",
+    "Structure",
+    "ToolPath",
     "apply_identified",
+    "apply_joint_stiffness",
     "assumptions",
+    "beam_mass",
+    "beam_stiffness",
     "block_diagonal",
+    "close_loops",
+    "compensate_path",
+    "constrained_system",
+    "coordinate_basis",
     "couple_receptances",
     "coupled_receptance",
     "exact_receptance",
@@ -29,13 +68,27 @@ __all__ = [
     "identify",
     "identify_from_frequencies",
     "identify_from_frfs",
+    "identify_joint_stiffness",
+    "inverse_kinematics",
+    "mass_matrix",
     "modal_damping_matrix",
     "modal_model",
     "planar_dynamic_stiffness",
+    "posture_warnings",
+    "predicted_deflections",
     "rayleigh_constants",
     "read_planar_robot",
+    "read_spatial_robot",
+    "read_tool_path",
     "rigid_matrices",
     "rigid_model",
     "robot_names",
     "spatial_dynamic_stiffness",
+    "stiffness_matrix",
+    "stiffness_names",
+    "structure_at",
+    "tip_compliance",
+    "tip_stiffness",
+    "tool_jacobian",
+    "write_compensated_path",
 ]

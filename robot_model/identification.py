@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,7 @@ def identify(
     upper: Real,
     *,
     start: Real | None = None,
+    jacobian: Callable[[Real], Real] | None = None,
     seed: int = 0,
     generations: int = 120,
 ) -> Identification:
@@ -74,6 +76,8 @@ def identify(
         Bounds are positive.
     start : (n_parameters,) or None
         None: global search.
+    jacobian
+        Derivative of the residuals over the logarithms, (n_data, n_parameters); None: by differences.
     seed, generations
         Of the global search.
 
@@ -99,8 +103,16 @@ def identify(
         begin = np.log(np.asarray(start, dtype=float))
     margin = 1e-9 * (high - low)
     begin = np.clip(begin, low + margin, high - margin)
+    slope: Any = "2-point" if jacobian is None else lambda x: jacobian(np.exp(x))
     best = least_squares(
-        lambda x: residuals(np.exp(x)), begin, bounds=(low, high), x_scale="jac", xtol=1e-13, ftol=1e-13, gtol=1e-13
+        lambda x: residuals(np.exp(x)),
+        begin,
+        slope,
+        bounds=(low, high),
+        xtol=1e-9,
+        ftol=1e-9,
+        gtol=1e-9,
+        max_nfev=400 if jacobian is None else 80,
     )
     at_bound = tuple(name for name, active in zip(names, _near(best.x, low, high), strict=True) if active)
     return judged(tuple(names), np.exp(best.x), best.jac, best.fun, at_bound)

@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigvalsh
+from scipy.linalg import eigh, eigvalsh
 
 from estimation import Frf
 from foundation import InputError
 
 from .identification import Identification, identify
 from .planar_robot import TIP_IN_PLANE, PlanarRobot
-from .rigid_links import rigid_matrices, rigid_model
+from .rigid_links import rigid_matrices, tip_jacobian
 
 Real = NDArray[np.float64]
 
@@ -57,7 +57,7 @@ def identify_from_frfs(
     def residuals(trial: PlanarRobot) -> Real:
         parts = []
         for angles, frf, rows, columns in cases:
-            model = rigid_model(trial, angles).receptance(frf.frequencies[frf.valid])
+            model = _receptance(trial, angles, frf.frequencies[frf.valid])
             given = frf.values[frf.valid]
             ratio = (model[:, rows][:, :, columns] - given) / np.abs(given)
             parts += [ratio.real.ravel(), ratio.imag.ravel()]
@@ -94,6 +94,16 @@ def identify_from_frequencies(
 def _first_frequency(robot: PlanarRobot, angles: Real) -> float:
     mass, stiffness = rigid_matrices(robot, angles)
     return float(np.sqrt(eigvalsh(stiffness, mass)[0]) / (2 * np.pi))
+
+
+def _receptance(robot: PlanarRobot, angles: Real, frequencies: Real) -> NDArray[np.complex128]:
+    """What ``rigid_model(...).receptance(...)`` gives, without its checks: the search calls it often."""
+    mass, stiffness = rigid_matrices(robot, angles)
+    squares, shapes = eigh(stiffness, mass)
+    tip = tip_jacobian(robot, angles) @ shapes
+    omega = 2 * np.pi * frequencies[:, None]
+    modes = 1 / (squares - omega**2 + 2j * robot.damping_ratios * np.sqrt(squares) * omega)
+    return np.asarray((modes[:, None, :] * tip) @ tip.T)
 
 
 def apply_identified(robot: PlanarRobot, found: Identification) -> PlanarRobot:
