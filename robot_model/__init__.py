@@ -16,12 +16,15 @@ from .path_file import read_tool_path, write_compensated_path
 from .planar_file import PlanarCase, read_planar_robot
 from .planar_identification import apply_identified, identify_from_frequencies, identify_from_frfs
 from .planar_robot import PlanarRobot
+from .posture_map import CutPlace, PostureMap, frequencies_over, posture_map, tool_down, turned_place
 from .receptance_coupling import block_diagonal, couple_receptances
 from .rigid_links import rigid_matrices, rigid_model
 from .robot_files import assumptions, robot_names
 from .section import Material, Section, hollow_circle
 from .spatial_file import SpatialCase, read_spatial_robot
+from .spatial_modes import StructureModes, damping_warnings, frf_at, modal_model_at, model_of_modes, modes_at
 from .spatial_robot import ElasticJoint, Link, LumpedBody, SpatialRobot, structure_at
+from .spherical_wrist import nearest_solution, wrist_solutions
 from .stiffness_identification import (
     Deflection,
     apply_joint_stiffness,
@@ -35,6 +38,7 @@ __all__ = [
     "Beam",
     "Body",
     "CompensatedPath",
+    "CutPlace",
     "Deflection",
     "ElasticJoint",
     "Frame",
@@ -45,11 +49,13 @@ __all__ = [
     "Mechanism",
     "PlanarCase",
     "PlanarRobot",
+    "PostureMap",
     "Section",
     "SpatialCase",
     "SpatialRobot",
     "Spring",
     "Structure",
+    "StructureModes",
     "ToolPath",
     "apply_identified",
     "apply_joint_stiffness",
@@ -63,7 +69,10 @@ __all__ = [
     "coordinate_basis",
     "couple_receptances",
     "coupled_receptance",
+    "damping_warnings",
     "exact_receptance",
+    "frequencies_over",
+    "frf_at",
     "hollow_circle",
     "identify",
     "identify_from_frequencies",
@@ -73,7 +82,12 @@ __all__ = [
     "mass_matrix",
     "modal_damping_matrix",
     "modal_model",
+    "modal_model_at",
+    "model_of_modes",
+    "modes_at",
+    "nearest_solution",
     "planar_dynamic_stiffness",
+    "posture_map",
     "posture_warnings",
     "predicted_deflections",
     "rayleigh_constants",
@@ -89,6 +103,9 @@ __all__ = [
     "structure_at",
     "tip_compliance",
     "tip_stiffness",
+    "tool_down",
     "tool_jacobian",
+    "turned_place",
+    "wrist_solutions",
     "write_compensated_path",
 ]

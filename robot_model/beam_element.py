@@ -1,5 +1,7 @@
 """Stiffness and consistent mass of a straight beam element with two nodes, 12 x 12, both beam theories."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -8,6 +10,7 @@ from .section import Section
 Real = NDArray[np.float64]
 
 
+@lru_cache(maxsize=256)
 def beam_stiffness(section: Section, length: float) -> Real:
     """Stiffness over ``(u, v, w, theta_x, theta_y, theta_z)`` of both nodes, local axes, shape (12, 12).
 
@@ -23,6 +26,7 @@ def beam_stiffness(section: Section, length: float) -> Real:
     return stiffness
 
 
+@lru_cache(maxsize=256)
 def beam_mass(section: Section, length: float) -> Real:
     """Consistent mass on the same degrees of freedom, shape (12, 12), kg, kg m and kg m^2.
 

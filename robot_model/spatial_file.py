@@ -79,8 +79,11 @@ class _Body(Table):
 
 
 class _Damping(Table):
-    frequencies_hz: tuple[float, float]
-    ratios: tuple[float, float]
+    """Either two ratios at two frequencies (Rayleigh), or one ratio for all modes."""
+
+    frequencies_hz: tuple[float, float] | None = None
+    ratios: tuple[float, float] | None = None
+    ratio: float | None = Field(None, ge=0, lt=1)
 
 
 class _Closure(Table):
@@ -135,7 +138,6 @@ def read_spatial_robot(robot: str | os.PathLike[str]) -> SpatialCase:
 def _case(content: _File) -> SpatialCase:
     frames = tuple(_frame(row) for row in content.frames)
     closures = tuple(closure.frames for closure in content.closures)
-    damping = content.damping
     spatial = SpatialRobot(
         mechanism=Mechanism(frames, content.robot.tool_frame, closures),
         joints=tuple(ElasticJoint(row.frame, row.nodes, _stiffness(row)) for row in content.joints),
@@ -143,10 +145,19 @@ def _case(content: _File) -> SpatialCase:
         bodies=tuple(_body(row) for row in content.bodies),
         points={row.node: (row.frame, np.array(row.at_m)) for row in content.points},
         tip=content.robot.tip_node,
-        rayleigh=(0.0, 0.0) if damping is None else rayleigh_constants(damping.frequencies_hz, damping.ratios),
+        rayleigh=_rayleigh(content.damping),
+        damping_ratio=None if content.damping is None else content.damping.ratio,
     )
     poses = {pose.name: np.radians(pose.driven_deg) for pose in content.poses}
     return SpatialCase(content.robot.name, spatial, poses)
+
+
+def _rayleigh(damping: _Damping | None) -> tuple[float, float]:
+    if damping is None or damping.ratio is not None:
+        return (0.0, 0.0)
+    if damping.frequencies_hz is None or damping.ratios is None:
+        raise InputError("damping: give frequencies_hz and ratios (two each), or one ratio")
+    return rayleigh_constants(damping.frequencies_hz, damping.ratios)
 
 
 def _frame(row: _Frame) -> Frame:

@@ -68,6 +68,8 @@ class SpatialRobot:
         Node of the tool tip.
     rayleigh
         ``(a, b)`` of ``C = a M + b K``, 1/s and s.
+    damping_ratio
+        One for all modes, instead of Rayleigh's constants; or None.
 
     Raises
     ------
@@ -82,6 +84,7 @@ class SpatialRobot:
     points: dict[int, tuple[str, Real]]
     tip: int
     rayleigh: tuple[float, float] = (0.0, 0.0)
+    damping_ratio: float | None = None
 
     def __post_init__(self) -> None:
         placed = {node for joint in self.joints for node in joint.nodes} | set(self.points)

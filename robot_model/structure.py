@@ -153,7 +153,8 @@ def six_by_six(axes: Real) -> Real:
 def _lengths(structure: Structure) -> Iterable[tuple[Beam, float]]:
     for beam in structure.beams:
         first, second = beam.nodes
-        yield beam, float(np.linalg.norm(structure.positions[second] - structure.positions[first]))
+        arm = structure.positions[second] - structure.positions[first]
+        yield beam, round(float(np.sqrt(arm @ arm)), 12)  # the same length in every posture: its matrices are kept
 
 
 def _turned(local: Real, axes: Real) -> Real:
