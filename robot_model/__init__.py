@@ -2,6 +2,8 @@
 
 from .beam_element import beam_mass, beam_stiffness
 from .constrained_statics import constrained_system, tip_compliance, tip_stiffness
+from .drilling_deviation import DeviationMap, deviation_map, drilling_wrench, joint_deformation, joint_deviation
+from .drilling_force import Drill, DrillingLoad, SpecificForce, catalogue_load, drilling_load, fitted_to_catalogue
 from .exact_beam import planar_dynamic_stiffness, spatial_dynamic_stiffness
 from .exact_chain import coupled_receptance, exact_receptance
 from .generalised_coordinates import coordinate_basis
@@ -11,6 +13,7 @@ from .loop_closure import close_loops, posture_warnings, tool_jacobian
 from .mechanism import Frame, Mechanism
 from .modal_damping import modal_damping_matrix, rayleigh_constants
 from .modal_reduction import modal_model
+from .natural_coordinates import NaturalChain
 from .path_compensation import CompensatedPath, ToolPath, compensate_path
 from .path_file import read_tool_path, write_compensated_path
 from .planar_file import PlanarCase, read_planar_robot
@@ -33,6 +36,15 @@ from .stiffness_identification import (
     stiffness_names,
 )
 from .structure import Beam, Body, Spring, Structure, mass_matrix, stiffness_matrix
+from .uncertainty_budget import (
+    LoadUncertainty,
+    UncertaintyBudget,
+    deformation_uncertainty,
+    machining_uncertainty,
+    measured_machining_uncertainty,
+    monte_carlo_deformation,
+    tolerance_grade,
+)
 
 __all__ = [
     "Beam",
@@ -40,29 +52,37 @@ __all__ = [
     "CompensatedPath",
     "CutPlace",
     "Deflection",
+    "DeviationMap",
+    "Drill",
+    "DrillingLoad",
     "ElasticJoint",
     "Frame",
     "Identification",
     "Link",
+    "LoadUncertainty",
     "LumpedBody",
     "Material",
     "Mechanism",
+    "NaturalChain",
     "PlanarCase",
     "PlanarRobot",
     "PostureMap",
     "Section",
     "SpatialCase",
     "SpatialRobot",
+    "SpecificForce",
     "Spring",
     "Structure",
     "StructureModes",
     "ToolPath",
+    "UncertaintyBudget",
     "apply_identified",
     "apply_joint_stiffness",
     "assumptions",
     "beam_mass",
     "beam_stiffness",
     "block_diagonal",
+    "catalogue_load",
     "close_loops",
     "compensate_path",
     "constrained_system",
@@ -70,7 +90,12 @@ __all__ = [
     "couple_receptances",
     "coupled_receptance",
     "damping_warnings",
+    "deformation_uncertainty",
+    "deviation_map",
+    "drilling_load",
+    "drilling_wrench",
     "exact_receptance",
+    "fitted_to_catalogue",
     "frequencies_over",
     "frf_at",
     "hollow_circle",
@@ -79,12 +104,17 @@ __all__ = [
     "identify_from_frfs",
     "identify_joint_stiffness",
     "inverse_kinematics",
+    "joint_deformation",
+    "joint_deviation",
+    "machining_uncertainty",
     "mass_matrix",
+    "measured_machining_uncertainty",
     "modal_damping_matrix",
     "modal_model",
     "modal_model_at",
     "model_of_modes",
     "modes_at",
+    "monte_carlo_deformation",
     "nearest_solution",
     "planar_dynamic_stiffness",
     "posture_map",
@@ -103,6 +133,7 @@ __all__ = [
     "structure_at",
     "tip_compliance",
     "tip_stiffness",
+    "tolerance_grade",
     "tool_down",
     "tool_jacobian",
     "turned_place",
