@@ -1,5 +1,6 @@
 """Robots as data: posture to stiffness, modes, receptance and deviation; knows nothing of recordings."""
 
+from .any_robot import PostureResult, in_posture, named_posture, read_robot
 from .beam_element import beam_mass, beam_stiffness
 from .constrained_statics import constrained_system, tip_compliance, tip_stiffness
 from .drilling_deviation import DeviationMap, deviation_map, drilling_wrench, joint_deformation, joint_deviation
@@ -19,7 +20,7 @@ from .path_file import read_tool_path, write_compensated_path
 from .planar_file import PlanarCase, read_planar_robot
 from .planar_identification import apply_identified, identify_from_frequencies, identify_from_frfs
 from .planar_robot import PlanarRobot
-from .posture_map import CutPlace, PostureMap, frequencies_over, posture_map, tool_down, turned_place
+from .posture_map import CutPlace, PostureMap, frequencies_over, posture_map, target_of, tool_down, turned_place
 from .receptance_coupling import block_diagonal, couple_receptances
 from .rigid_links import rigid_matrices, rigid_model
 from .robot_files import assumptions, robot_names
@@ -67,6 +68,7 @@ __all__ = [
     "PlanarCase",
     "PlanarRobot",
     "PostureMap",
+    "PostureResult",
     "Section",
     "SpatialCase",
     "SpatialRobot",
@@ -103,6 +105,7 @@ __all__ = [
     "identify_from_frequencies",
     "identify_from_frfs",
     "identify_joint_stiffness",
+    "in_posture",
     "inverse_kinematics",
     "joint_deformation",
     "joint_deviation",
@@ -115,6 +118,7 @@ __all__ = [
     "model_of_modes",
     "modes_at",
     "monte_carlo_deformation",
+    "named_posture",
     "nearest_solution",
     "planar_dynamic_stiffness",
     "posture_map",
@@ -122,6 +126,7 @@ __all__ = [
     "predicted_deflections",
     "rayleigh_constants",
     "read_planar_robot",
+    "read_robot",
     "read_spatial_robot",
     "read_tool_path",
     "rigid_matrices",
@@ -131,6 +136,7 @@ __all__ = [
     "stiffness_matrix",
     "stiffness_names",
     "structure_at",
+    "target_of",
     "tip_compliance",
     "tip_stiffness",
     "tolerance_grade",
