@@ -26,7 +26,7 @@ class Identification:
         Of the parameters.
     values : (n_parameters,)
     relative_errors : (n_parameters,)
-        Standard error of the logarithm, within the identifiable directions only.
+        Standard error of the logarithm; without a prior, within the identifiable directions only.
     identifiable : (n_parameters,), bool
         False where the parameter is part of an unidentifiable combination.
     unidentifiable
@@ -59,6 +59,7 @@ def identify(
     *,
     start: Real | None = None,
     jacobian: Callable[[Real], Real] | None = None,
+    prior: float = np.inf,
     seed: int = 0,
     generations: int = 120,
 ) -> Identification:
@@ -66,7 +67,8 @@ def identify(
 
     Without a start the bounds are searched by differential evolution (Storn & Price 1997), where Chen et al. 2026,
     section 3.1, use a particle swarm; both need no gradient. Either way a trust-region polish follows. Standard errors
-    are ``(J^T J)^-1`` scaled by the residual; singular vectors of J with an error above a factor e are named.
+    are ``(J^T J / s^2 + I / prior^2)^-1`` with s the size of the residuals; singular vectors of J along which the data
+    alone leaves a factor e open are named.
 
     Parameters
     ----------
@@ -78,6 +80,9 @@ def identify(
         None: global search.
     jacobian
         Derivative of the residuals over the logarithms, (n_data, n_parameters); None: by differences.
+    prior
+        Standard deviation of ln(parameter) about the start, before the data speaks: it keeps parameters that the data
+        does not fix from running off; infinite: none.
     seed, generations
         Of the global search.
 
@@ -103,9 +108,15 @@ def identify(
         begin = np.log(np.asarray(start, dtype=float))
     margin = 1e-9 * (high - low)
     begin = np.clip(begin, low + margin, high - margin)
-    slope: Any = "2-point" if jacobian is None else lambda x: jacobian(np.exp(x))
+    held = np.isfinite(prior)
+    anchor = np.eye(len(begin)) / prior if held else np.zeros((0, len(begin)))
+
+    def whole(x: Real) -> Real:
+        return np.concatenate([residuals(np.exp(x)), anchor @ (x - begin)])
+
+    slope: Any = "2-point" if jacobian is None else lambda x: np.vstack([jacobian(np.exp(x)), anchor])
     best = least_squares(
-        lambda x: residuals(np.exp(x)),
+        whole,
         begin,
         slope,
         bounds=(low, high),
@@ -115,11 +126,17 @@ def identify(
         max_nfev=400 if jacobian is None else 80,
     )
     at_bound = tuple(name for name, active in zip(names, _near(best.x, low, high), strict=True) if active)
-    return judged(tuple(names), np.exp(best.x), best.jac, best.fun, at_bound)
+    n_data = len(best.fun) - len(anchor)
+    return judged(tuple(names), np.exp(best.x), best.jac[:n_data], best.fun[:n_data], at_bound, prior)
 
 
 def judged(
-    names: tuple[str, ...], values: Real, jacobian: Real, residual: Real, at_bound: tuple[str, ...] = ()
+    names: tuple[str, ...],
+    values: Real,
+    jacobian: Real,
+    residual: Real,
+    at_bound: tuple[str, ...] = (),
+    prior: float = np.inf,
 ) -> Identification:
     """Standard errors and unidentifiable combinations from the Jacobian over the logarithms (n_data, n_parameters)."""
     n_data, n_parameters = jacobian.shape
@@ -130,7 +147,10 @@ def judged(
     positive = strengths > 1e-12 * strengths.max(initial=1e-300)
     errors[: len(strengths)][positive] = scale / strengths[positive]
     known = errors <= UNKNOWN_BEYOND
-    variance = (directions[known] ** 2).T @ errors[known] ** 2
+    information = 1 / errors**2 + 1 / prior**2
+    both = np.divide(1, np.sqrt(information), out=np.full(n_parameters, np.inf), where=information > 0)
+    told = known | np.isfinite(both)
+    variance = (directions[told] ** 2).T @ both[told] ** 2
     share = np.sum(directions[~known] ** 2, axis=0)
     combinations = tuple(_combination(names, direction) for direction in _simplified(directions[~known]))
     root_mean_square = float(np.sqrt(np.mean(residual**2))) if n_data else 0.0

@@ -157,12 +157,17 @@ class Mechanism:
                 column = self.moving.index(ancestor)
                 axis = placed[ancestor, :3, 2]
                 if self.frames[ancestor].motion == "revolute":
-                    columns[:3, column] = np.cross(axis, target - placed[ancestor, :3, 3])
+                    columns[:3, column] = _cross(axis, target - placed[ancestor, :3, 3])
                     columns[3:, column] = axis
                 else:
                     columns[:3, column] = axis
             ancestor = self._parents[ancestor]
         return columns
+
+
+def _cross(a: Real, b: Real) -> Real:
+    """``a x b`` of two vectors: several times quicker than NumPy's, which takes any shape."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def rotation_vector(rotation: Real) -> Real:

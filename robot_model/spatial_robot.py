@@ -10,7 +10,7 @@ from foundation import InputError
 
 from .mechanism import Mechanism
 from .section import Section
-from .structure import Beam, Body, Spring, Structure
+from .structure import Beam, Body, Spring, Structure, cross_matrix
 
 Real = NDArray[np.float64]
 
@@ -145,15 +145,14 @@ def _divide(link: Link, frames: dict[str, Real], places: Real, beams: list[Beam]
 
 
 def _axes(link: Link, frames: dict[str, Real], along: Real) -> Real:
-    length = np.linalg.norm(along)
+    length = float(np.sqrt(along @ along))
     if length < 1e-9:
         raise InputError(f"link {link.nodes}: its nodes are at one place; leave the link out or make it rigid")
     x = along / length
     if link.frame is None:
-        helper = np.eye(3)[np.argmin(np.abs(x))]
-        y = np.cross(helper, x)
-        y /= np.linalg.norm(y)
-        return np.column_stack([x, y, np.cross(x, y)])
+        y = cross_matrix(np.eye(3)[np.argmin(np.abs(x))]) @ x
+        y /= np.sqrt(y @ y)
+        return np.array([x, y, cross_matrix(x) @ y]).T
     axes = frames[link.frame][:3, :3] @ link_rotation(*link.angles)
     if axes[:, 0] @ x < 1 - 1e-6:
         raise InputError(f"link {link.nodes}: x of its frame lies {axes[:, 0].round(3)}, the link {x.round(3)}")

@@ -46,6 +46,7 @@ def identify_joint_stiffness(
     error: float,
     *,
     bounds: tuple[float, float] = (1e3, 1e12),
+    prior: float = 1.0,
 ) -> Identification:
     """Joint stiffnesses that bring the model's deflections nearest to the measured ones.
 
@@ -63,6 +64,8 @@ def identify_joint_stiffness(
         Standard error of a measured displacement, m.
     bounds
         Of every stiffness, N/m or N m/rad.
+    prior
+        How well the start is known: standard deviation of ln k, 1.0: within a factor e.
 
     Raises
     ------
@@ -75,7 +78,7 @@ def identify_joint_stiffness(
     names = stiffness_names(robot)
     start = np.array([robot.joints[joint].stiffness[GROUPS[group][0]] for joint, group in _free(robot)])
     lower, upper = (np.full(len(names), bound) for bound in bounds)
-    return identify(problem.residuals, names, lower, upper, start=start, jacobian=problem.jacobian)
+    return identify(problem.residuals, names, lower, upper, start=start, jacobian=problem.jacobian, prior=prior)
 
 
 def apply_joint_stiffness(robot: SpatialRobot, values: Real) -> SpatialRobot:

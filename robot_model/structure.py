@@ -83,7 +83,11 @@ def stiffness_matrix(structure: Structure) -> Real:
         elastic = np.where(np.isfinite(spring.stiffness), spring.stiffness, 0.0)
         turn = six_by_six(spring.axes)
         block = (turn * elastic) @ turn.T
-        _add(whole, spring.nodes, np.block([[block, -block], [-block, block]]))
+        first, second = (slice(6 * node, 6 * node + 6) for node in spring.nodes)
+        whole[first, first] += block
+        whole[second, second] += block
+        whole[first, second] -= block
+        whole[second, first] -= block
     for beam, length in _lengths(structure):
         _add(whole, beam.nodes, _turned(beam_stiffness(beam.section, length), beam.axes))
     return whole
@@ -159,8 +163,10 @@ def _lengths(structure: Structure) -> Iterable[tuple[Beam, float]]:
 
 def _turned(local: Real, axes: Real) -> Real:
     """``B K B^T`` with the axes on the diagonal (Belchior et al. 2013, Eqs. 10-11)."""
-    blocks = local.reshape(4, 3, 4, 3)
-    return np.asarray(np.einsum("ia,paqb,jb->piqj", axes, blocks, axes, optimize=True).reshape(12, 12))
+    turn = np.zeros((12, 12))
+    for start in range(0, 12, 3):
+        turn[start : start + 3, start : start + 3] = axes
+    return np.asarray(turn @ local @ turn.T)
 
 
 def _add(whole: Real, nodes: tuple[int, int], block: Real) -> None:
