@@ -7,6 +7,7 @@ from .drilling_deviation import DeviationMap, deviation_map, drilling_wrench, jo
 from .drilling_force import Drill, DrillingLoad, SpecificForce, catalogue_load, drilling_load, fitted_to_catalogue
 from .exact_beam import planar_dynamic_stiffness, spatial_dynamic_stiffness
 from .exact_chain import coupled_receptance, exact_receptance
+from .exact_structure import exact_frf_at
 from .generalised_coordinates import coordinate_basis
 from .identification import Identification, identify
 from .inverse_kinematics import inverse_kinematics
@@ -96,6 +97,7 @@ __all__ = [
     "deviation_map",
     "drilling_load",
     "drilling_wrench",
+    "exact_frf_at",
     "exact_receptance",
     "fitted_to_catalogue",
     "frequencies_over",

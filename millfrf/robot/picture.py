@@ -1,5 +1,6 @@
 """Pictures of a robot: its structure and mode shapes, and maps of deviation over a work area."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foundation import writing_whole_file
-from robot_model import DeviationMap, SpatialCase, StructureModes, close_loops, modes_at
+from robot_model import CutPlace, DeviationMap, SpatialCase, StructureModes, close_loops, modes_at
 
 from ..figures.style import COLOURS, SHADE, house_style, new_figure
 from .mode_page import mode_page
@@ -72,6 +73,26 @@ def deviation_figure(found: DeviationMap, shape: tuple[int, int]) -> Figure:
         axes.set_ylabel("x (m)")
         axes.set_aspect("equal")
     return figure
+
+
+def draw_workspace(path: Path, places: Sequence[CutPlace], shape: tuple[int, int], lowest: Real, limits: Real) -> None:
+    """Lowest frequency (Hz) over y and x, and beside it the depth limit (mm) where there is one."""
+    positions = np.array([place.position for place in places])
+    x, y = (positions[:, axis].reshape(shape) for axis in (0, 1))
+    fields = [(lowest, "lowest frequency (Hz)")]
+    if np.isfinite(limits).any():
+        fields.append((1e3 * limits, "depth limit (mm)"))
+    with house_style():
+        figure = new_figure(75.0)
+        panels = figure.subplots(1, len(fields), squeeze=False)[0]
+        for axes, (field, label) in zip(panels, fields, strict=True):
+            shown = np.ma.masked_invalid(field.reshape(shape))
+            drawn = axes.pcolormesh(y, x, shown, shading="nearest", cmap="viridis")
+            figure.colorbar(drawn, ax=axes, label=label)
+            axes.set_xlabel("y (m)")
+            axes.set_ylabel("x (m)")
+            axes.set_aspect("equal")
+    _save(figure, path)
 
 
 def _lines(axes: Axes, modes: StructureModes, positions: Real, colour: str, width: float) -> None:

@@ -50,14 +50,15 @@ def depth_over_redundancy(
 def depth_over_places(
     robot: SpatialRobot,
     places: Sequence[CutPlace],
-    process: MillingProcess,
+    process: MillingProcess | None,
     spindle_speed: float,
     max_depth: float,
     workers: int = 1,
 ) -> tuple[Real, Real]:
     """Depth limit (m) and lowest natural frequency (Hz) at each place, each (n_places,); NaN where not reached.
 
-    The first branch of the inverse kinematics is taken: arm on the side of the base, elbow as the closed form gives it.
+    Without a process the limits are NaN. The first branch of the inverse kinematics is taken: arm on the side of the
+    base, elbow as the closed form gives it.
     """
     job = partial(_places, robot, process, spindle_speed, max_depth)
     if workers <= 1:
@@ -71,7 +72,11 @@ def depth_over_places(
 
 
 def _places(
-    robot: SpatialRobot, process: MillingProcess, spindle_speed: float, max_depth: float, places: Sequence[CutPlace]
+    robot: SpatialRobot,
+    process: MillingProcess | None,
+    spindle_speed: float,
+    max_depth: float,
+    places: Sequence[CutPlace],
 ) -> tuple[Real, Real]:
     limits, lowest, models, at = np.full(len(places), np.nan), np.full(len(places), np.nan), [], []
     for i, place in enumerate(places):
@@ -81,7 +86,8 @@ def _places(
             lowest[i] = modes.frequencies[0]
             models.append(model_of_modes(modes, robot, axes=place.axes))
             at.append(i)
-    limits[at] = np.minimum(max_depth, depth_limits(models, process, spindle_speed, max_depth))
+    if process is not None:
+        limits[at] = np.minimum(max_depth, depth_limits(models, process, spindle_speed, max_depth))
     return limits, lowest
 
 

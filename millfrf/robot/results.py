@@ -39,7 +39,7 @@ from ..chain.lobes import compute_lobes, speed_axis
 from ..commands.options import check_band, check_output
 from ..progress import bar
 from ..tables import Table, show
-from .posture_maps import depth_over_redundancy, write_posture_map
+from .posture_maps import depth_over_places, depth_over_redundancy, write_posture_map
 from .postures import Asked, cut_place, posture_of, spatial
 
 RPM = np.pi / 30
@@ -227,6 +227,35 @@ def write_map_over_redundancy(
         f"wrote {out}: {found.reached.sum()} of {len(axis)} angles reached; best {1e3 * found.values[best]:.3g} mm at "
         f"{np.degrees(axis[best]):.1f} deg, worst {1e3 * np.nanmin(found.values):.3g} mm"
     )
+
+
+def write_workspace_map(
+    robot: str,
+    picture: Path,
+    area: tuple[tuple[float, float, int], tuple[float, float, int], float, float],
+    cutting: Path | None,
+    speed: float | None,
+    max_depth: float,
+) -> None:
+    """Map of the lowest frequency, and of the depth limit where a cut is given."""
+    from .picture import draw_workspace
+
+    check_output(picture, (".png", ".pdf"))
+    if (cutting is None) != (speed is None):
+        raise InputError("a map of depth limits needs both --cutting CUT.toml and --speed RPM")
+    x, y, z, feed = area
+    case = spatial(read_robot(robot))
+    places = [tool_down([u, v, z], np.radians(feed)) for u in np.linspace(*x) for v in np.linspace(*y)]
+    process = None if cutting is None else read_cutting_process(cutting)
+    with bar("map"):
+        limits, lowest = depth_over_places(case.robot, places, process, (speed or 1.0) * RPM, max_depth, workers=2)
+    if np.isnan(lowest).all():
+        raise InputError("no place of the area is reached; move --x, --y or --z")
+    draw_workspace(picture, places, (x[2], y[2]), lowest, limits)
+    typer.echo(f"lowest frequency {np.nanmin(lowest):.2f} to {np.nanmax(lowest):.2f} Hz")
+    if process is not None:
+        typer.echo(f"depth limit {1e3 * np.nanmin(limits):.2f} to {1e3 * np.nanmax(limits):.2f} mm")
+    typer.echo(f"wrote {picture}: {np.isfinite(lowest).sum()} of {len(places)} places reached")
 
 
 def write_compensation(robot: str, path: Path, asked: Asked, out: Path) -> None:

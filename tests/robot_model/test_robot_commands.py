@@ -119,6 +119,16 @@ def test_lobes_and_posture_map(tmp_path: Path, cut: str) -> None:
     assert run(["robot", "lobes", *common, "--angles", "-20", "20", "3"]) == BAD_INPUT
 
 
+def test_workspace_map(tmp_path: Path, cut: str, capsys: pytest.CaptureFixture[str]) -> None:
+    picture = tmp_path / "w.png"
+    area = ["staubli_rx170", "--picture", str(picture), "--x", "0.7", "1.1", "3", "--y", "-0.2", "0.2", "2"]
+    assert run(["robot", "map", *area]) == DONE
+    assert "6 of 6 places reached" in capsys.readouterr().out
+    assert run(["robot", "map", *area, "--cutting", cut, "--speed", "3000"]) == DONE
+    assert "depth limit" in capsys.readouterr().out
+    assert run(["robot", "map", *area, "--speed", "3000"]) == BAD_INPUT
+
+
 def test_compensation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, out = tmp_path / "p.csv", tmp_path / "c.csv"
     path.write_text(

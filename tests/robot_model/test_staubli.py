@@ -19,6 +19,7 @@ from robot_model import (
     Mechanism,
     SpatialRobot,
     damping_warnings,
+    exact_frf_at,
     exact_receptance,
     frequencies_over,
     frf_at,
@@ -184,3 +185,28 @@ def test_the_robot_of_the_in_process_measurements() -> None:
     target = case.robot.mechanism.transforms(case.poses["ready"])[-1]
     found = nearest_solution(case.robot.mechanism, target, case.poses["ready"])
     assert found == pytest.approx(case.poses["ready"], abs=1e-9)
+
+
+def test_elements_of_a_whole_robot_tend_to_its_exact_structure() -> None:
+    """Six joints, five beams in space; thin beams: bending has order 4, the rods 2."""
+    q = CASE.poses["ready"]
+    lines = np.array([0.0, 6.0, 30.0, 120.0])
+    exact = exact_frf_at(ROBOT, q, lines).values
+    errors = []
+    for n in (1, 2, 4):
+        links = tuple(replace(link, elements=n) for link in ROBOT.links)
+        found = frf_at(replace(ROBOT, links=links, damping_ratio=0.0), q, lines).values
+        errors.append(np.abs(found - exact).max(axis=(1, 2)) / np.abs(exact).max(axis=(1, 2)))
+    assert errors[0][0] < 1e-9  # statics are exact with one element
+    assert errors[0][1] < 1e-4
+    assert errors[2][3] < 1e-3
+    assert errors[1][3] / errors[2][3] > 3.5
+
+
+def test_exact_structure_in_the_plane_is_the_exact_chain() -> None:
+    case = read_planar_robot("chen_2026")
+    robot = replace(case.robot, damping_ratios=np.full(3, 0.01))
+    lines = np.array([4.0, 11.5, 80.0])
+    chain = exact_receptance(robot, case.poses["P2"], lines).values[:, :2, :2]
+    space = exact_frf_at(chen_in_space(flexible=True), case.poses["P2"], lines, 0.02).values
+    assert space[np.ix_([0, 1, 2], [0, 2], [0, 2])] == pytest.approx(chain, rel=1e-7, abs=1e-13)
