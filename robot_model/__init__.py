@@ -2,6 +2,7 @@
 
 from .any_robot import PostureResult, in_posture, named_posture, read_robot
 from .beam_element import beam_mass, beam_stiffness
+from .cell_structure import cell_structure_at
 from .constrained_statics import constrained_system, tip_compliance, tip_stiffness
 from .drilling_deviation import DeviationMap, deviation_map, drilling_wrench, joint_deformation, joint_deviation
 from .drilling_force import Drill, DrillingLoad, SpecificForce, catalogue_load, drilling_load, fitted_to_catalogue
@@ -86,6 +87,7 @@ __all__ = [
     "beam_stiffness",
     "block_diagonal",
     "catalogue_load",
+    "cell_structure_at",
     "close_loops",
     "compensate_path",
     "constrained_system",

@@ -76,12 +76,16 @@ def frf(
     redundancy: Redundancy = "tool",
     band: Annotated[tuple[float, float], typer.Option("--band", metavar="LO HI", help="Hz.")] = (1.0, 100.0),
     lines: Annotated[int, typer.Option("--lines", help="Frequency lines.")] = 1000,
+    sensor: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option("--sensor", metavar="X Y Z", help="Housing sensor, m from the tip: its motion too (.json)."),
+    ] = None,
 ) -> None:
     """Receptance at the tool tip in a posture, as an FRF file or as the modal model behind it."""
     from .postures import Asked
     from .results import write_receptance
 
-    write_receptance(robot, Asked(pose, joints, at, feed, turn, redundancy), out, band, lines)
+    write_receptance(robot, Asked(pose, joints, at, feed, turn, redundancy), out, band, lines, sensor)
 
 
 @robot_app.command()

@@ -17,6 +17,7 @@ from robot_model import (
     LoadUncertainty,
     PostureResult,
     UncertaintyBudget,
+    cell_structure_at,
     close_loops,
     compensate_path,
     deformation_uncertainty,
@@ -65,9 +66,16 @@ def show_modes(robot: str, asked: Asked, count: int, picture: Path | None) -> No
         typer.echo(f"wrote {picture}")
 
 
-def write_receptance(robot: str, asked: Asked, out: Path, band: tuple[float, float], lines: int) -> None:
-    """FRF or modal model at the tool tip."""
-    check_output(out, (".h5", ".json"))
+def write_receptance(
+    robot: str,
+    asked: Asked,
+    out: Path,
+    band: tuple[float, float],
+    lines: int,
+    sensor: tuple[float, float, float] | None = None,
+) -> None:
+    """FRF or modal model at the tool tip; with a sensor, a modal model with the housing's motion."""
+    check_output(out, (".json",) if sensor is not None else (".h5", ".json"))
     check_band(band)
     if lines < 2:
         raise InputError(f"{lines} frequency lines: give 2 or more")
@@ -75,6 +83,8 @@ def write_receptance(robot: str, asked: Asked, out: Path, band: tuple[float, flo
     driven, axes = posture_of(case, asked)
     result = in_posture(case, driven, axes)
     model = result.known_model()
+    if sensor is not None:
+        model = cell_structure_at(spatial(case).robot, driven, np.array(sensor), axes=axes)
     if out.suffix == ".json":
         write_modal_model(out, model)
     else:

@@ -14,6 +14,7 @@ from millfrf.__main__ import BAD_INPUT, DONE, run
 from millfrf.robot.depth_map import depth_limits
 from millfrf.robot.posture_maps import depth_over_places, depth_over_redundancy
 from modal_fit import read_modal_model
+from replay_data import MillingCell
 from robot_model import modal_model_at, read_spatial_robot, tool_down
 from stability import read_lobes, zero_order
 
@@ -84,6 +85,20 @@ def test_frf_and_model_files(tmp_path: Path) -> None:
     assert run(["robot", "frf", "staubli_rx170", *posture, "--out", str(model)]) == DONE
     stored = read_frf(frf)
     assert stored.values == pytest.approx(read_modal_model(model).receptance(stored.frequencies), rel=1e-6, abs=1e-13)
+
+
+def test_a_robot_mills_in_the_simulated_cell(tmp_path: Path) -> None:
+    out = tmp_path / "cell.json"
+    place = ["--at", "1.5", "0.1", "0.7", "--sensor", "0.06", "-0.04", "0.25"]
+    assert run(["robot", "frf", "kuka_kr90_r3100", *place, "--out", str(out)]) == DONE
+    structure = read_modal_model(out)
+    step = 2 * np.real(np.einsum("rp,rq->pq", structure.right, structure.left))
+    assert np.abs(step).max() < 1e-9 * np.abs(structure.right).max() * np.abs(structure.left).max()
+    cut = MillingProcess(2, 12.7e-3, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 0.15e-3)
+    samples = MillingCell(structure, cut, 0.5e-3, 1000 * pi / 30, duration=0.2, sample_rate=8192.0).samples()
+    assert samples.shape == (1638, 6)
+    assert np.isfinite(samples).all()
+    assert np.abs(samples[:, 3:]).max() > 0
 
 
 def test_stiffness_and_list(capsys: pytest.CaptureFixture[str]) -> None:
