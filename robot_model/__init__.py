@@ -17,6 +17,7 @@ from .mechanism import Frame, Mechanism
 from .modal_damping import modal_damping_matrix, rayleigh_constants
 from .modal_reduction import modal_model
 from .natural_coordinates import NaturalChain
+from .natural_robot import NaturalRobot, natural_robot
 from .path_compensation import CompensatedPath, ToolPath, compensate_path
 from .path_file import read_tool_path, write_compensated_path
 from .planar_file import PlanarCase, read_planar_robot
@@ -67,6 +68,7 @@ __all__ = [
     "Material",
     "Mechanism",
     "NaturalChain",
+    "NaturalRobot",
     "PlanarCase",
     "PlanarRobot",
     "PostureMap",
@@ -123,6 +125,7 @@ __all__ = [
     "modes_at",
     "monte_carlo_deformation",
     "named_posture",
+    "natural_robot",
     "nearest_solution",
     "planar_dynamic_stiffness",
     "posture_map",

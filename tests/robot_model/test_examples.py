@@ -43,3 +43,8 @@ def test_stiffness_identification() -> None:
     assert np.abs(trial.pulls).max() < 3.5
     assert trial.verification.max() < 0.15e-3  # the paper's mean, on the real robot
     assert trial.verification.mean() < 0.02 * trial.deflections.mean()
+
+
+def test_path_compensation() -> None:
+    outcome = load("robot_path_compensation").run(points=10)
+    assert outcome.corrected.mean() < 0.25 * outcome.without.mean()
