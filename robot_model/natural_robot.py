@@ -40,7 +40,7 @@ class NaturalRobot:
 
     Each joint has a point and the unit vector of its axis; neighbours share them where they coincide or are parallel,
     so that few are left. A body's vectors keep the products that they have in the reference posture: constraints 1000
-    to 1003. Where they lie in a plane, the third is a combination of two, which is linear and has no singularity. Angles
+    to 1003. Where they lie in a plane, the third is a combination of two, which is linear and never singular. Angles
     are tied by ``sin_ab cos(psi) - cos_ab sin(psi) = 0`` (Garcia de Jalon & Bayo, Kinematic and Dynamic Simulation of
     Multibody Systems, chapters 2 and 3).
 

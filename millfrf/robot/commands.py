@@ -123,7 +123,7 @@ def deviation(
     picture: Annotated[Path | None, typer.Option("--picture", metavar="FILE.png", help="Map of the deviation.")] = None,
 ) -> None:
     """Deviation of drilled holes over a work area (vertical drill, aluminium), and its uncertainty budget."""
-    from .results import DrillingArea, show_deviation
+    from .drilled_holes import DrillingArea, show_deviation
 
     show_deviation(robot, DrillingArea(1e-3 * drill, 1e-3 * feed_rev, x, y, z, links), out, picture)
 
