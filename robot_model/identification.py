@@ -94,18 +94,7 @@ def identify(
     if not (np.all(lower > 0) and np.all(upper > lower)):
         raise InputError("identification: bounds must be positive, with the lower below the upper")
     low, high = np.log(lower), np.log(upper)
-    if start is None:
-        search = differential_evolution(
-            lambda x: float(np.sum(residuals(np.exp(x)) ** 2)),
-            np.column_stack([low, high]),
-            seed=seed,
-            maxiter=generations,
-            tol=1e-3,
-            polish=False,
-        )
-        begin = search.x
-    else:
-        begin = np.log(np.asarray(start, dtype=float))
+    begin = _searched(residuals, low, high, seed, generations) if start is None else np.log(np.asarray(start, float))
     margin = 1e-9 * (high - low)
     begin = np.clip(begin, low + margin, high - margin)
     held = np.isfinite(prior)
@@ -128,6 +117,19 @@ def identify(
     at_bound = tuple(name for name, active in zip(names, _near(best.x, low, high), strict=True) if active)
     n_data = len(best.fun) - len(anchor)
     return judged(tuple(names), np.exp(best.x), best.jac[:n_data], best.fun[:n_data], at_bound, prior)
+
+
+def _searched(residuals: Callable[[Real], Real], low: Real, high: Real, seed: int, generations: int) -> Real:
+    """Logarithms of the best parameters of a global search."""
+    search = differential_evolution(
+        lambda x: float(np.sum(residuals(np.exp(x)) ** 2)),
+        np.column_stack([low, high]),
+        seed=seed,
+        maxiter=generations,
+        tol=1e-3,
+        polish=False,
+    )
+    return np.asarray(search.x)
 
 
 def judged(

@@ -48,7 +48,7 @@ def close_loops(mechanism: Mechanism, driven: Real, start: Real | None = None) -
     if np.abs(gap).max() < 1e3 * _CLOSED:
         return q
     raise InputError(
-        f"a closed loop does not close at joint values {np.round(driven, 4).tolist()}; gap {gap.max():.2g}"
+        f"a closed loop does not close at joint values {np.round(driven, 4).tolist()}; gap {np.abs(gap).max():.2g}"
     )
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess, average_directional_matrix
+from cutting import MillingProcess, average_directional_matrix, refuse_varied
 from cutting.compiled import compiled
 from foundation import InputError
 from modal_fit import ModalModel
@@ -33,6 +33,7 @@ def depth_limits(models: Sequence[ModalModel], process: MillingProcess, spindle_
     """
     if not (spindle_speed > 0 and max_depth > 0):
         raise InputError(f"spindle speed {spindle_speed!r} rad/s and depth {max_depth!r} m must be positive")
+    refuse_varied(process, "a map of depth limits", "use the lobes of single postures", takes=("helix",))
     loop = process.ktc * average_directional_matrix(process)
     delay = 2 * np.pi / (process.teeth * spindle_speed)
     limits = np.empty(len(models))
