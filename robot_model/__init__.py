@@ -2,6 +2,7 @@
 
 from .any_robot import PostureResult, in_posture, named_posture, read_robot
 from .beam_element import beam_mass, beam_stiffness
+from .causes import Cause, PostureFrequencies, equivalent_causes, explain_frequencies
 from .cell_structure import cell_structure_at
 from .constrained_statics import constrained_system, tip_compliance, tip_stiffness
 from .drilling_deviation import DeviationMap, deviation_map, drilling_wrench, joint_deformation, joint_deviation
@@ -49,10 +50,12 @@ from .uncertainty_budget import (
     monte_carlo_deformation,
     tolerance_grade,
 )
+from .variations import with_joint_factor, with_link_factor, with_payload, with_rigid_links
 
 __all__ = [
     "Beam",
     "Body",
+    "Cause",
     "CompensatedPath",
     "CutPlace",
     "Deflection",
@@ -71,6 +74,7 @@ __all__ = [
     "NaturalRobot",
     "PlanarCase",
     "PlanarRobot",
+    "PostureFrequencies",
     "PostureMap",
     "PostureResult",
     "Section",
@@ -101,8 +105,10 @@ __all__ = [
     "deviation_map",
     "drilling_load",
     "drilling_wrench",
+    "equivalent_causes",
     "exact_frf_at",
     "exact_receptance",
+    "explain_frequencies",
     "fitted_to_catalogue",
     "frequencies_over",
     "frf_at",
@@ -150,6 +156,10 @@ __all__ = [
     "tool_down",
     "tool_jacobian",
     "turned_place",
+    "with_joint_factor",
+    "with_link_factor",
+    "with_payload",
+    "with_rigid_links",
     "wrist_solutions",
     "write_compensated_path",
 ]
