@@ -9,6 +9,7 @@ import typer
 from foundation import InputError, MillfrfError
 
 from .commands import COMMANDS
+from .robot.commands import robot_app
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 
@@ -21,6 +22,7 @@ app = typer.Typer(
 )
 for _function in COMMANDS:
     app.command()(_function)
+app.add_typer(robot_app)
 
 
 def run(arguments: Sequence[str]) -> int:

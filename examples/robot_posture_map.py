@@ -1,0 +1,81 @@
+"""Depth limits over postures: the redundancy of a six-joint robot, and a map of 10 000 places on two processes.
+
+Run it: `python examples/robot_posture_map.py [NUMBER OF PLACES]`. The first table is what Mousavi et al. show in Fig.
+11: at one speed and depth, turning tool and table together decides whether the cut chatters. The map's time is printed
+beside that of a plain loop over the zero-order solution, measured on a sample of the same places.
+"""
+
+import sys
+import time
+from math import pi
+
+import numpy as np
+
+from cutting import MillingProcess
+from millfrf.robot.posture_maps import depth_over_places, depth_over_redundancy
+from robot_model import (
+    CutPlace,
+    SpatialRobot,
+    modal_model_at,
+    read_spatial_robot,
+    target_of,
+    tool_down,
+    wrist_solutions,
+)
+from stability import zero_order
+
+HALF_DOWN = MillingProcess(2, 0.02, pi / 2, 700e6, 0.3, 0.1, pi / 2, pi, 1e-4)
+"""Aluminium, assumed: Table 4 of the paper is missing."""
+
+SPEED = 3000 * pi / 30
+MAX_DEPTH = 0.02
+
+
+def over_redundancy(robot: SpatialRobot, angles_deg: np.ndarray) -> np.ndarray:
+    """Depth limits, m, of a cut at (0.9, 0.1, 0.8) m that feeds along y."""
+    place = tool_down([0.9, 0.1, 0.8], pi / 2)
+    return depth_over_redundancy(robot, place, np.radians(angles_deg), HALF_DOWN, SPEED, MAX_DEPTH, "table").values
+
+
+def work_area(count: int) -> list[CutPlace]:
+    """About ``count`` places of a vertical tool in front of the robot."""
+    side = max(2, round(np.sqrt(count)))
+    return [tool_down([x, y, 0.8]) for x in np.linspace(0.5, 1.4, side) for y in np.linspace(-0.7, 0.7, side)]
+
+
+def plain_loop(robot: SpatialRobot, places: list[CutPlace]) -> np.ndarray:
+    """The same limits place by place with ``stability.zero_order``."""
+    limits = np.full(len(places), np.nan)
+    for i, place in enumerate(places):
+        solutions = wrist_solutions(robot.mechanism, target_of(place))
+        if len(solutions):
+            model = modal_model_at(robot, solutions[0], axes=place.axes)
+            limits[i] = min(MAX_DEPTH, zero_order(model, HALF_DOWN, np.array([SPEED]), MAX_DEPTH).depth_limits[0])
+    return limits
+
+
+def main(count: int = 10_000) -> float:
+    """Print both; returns how many times faster the map was than the plain loop."""
+    robot = read_spatial_robot("staubli_rx170").robot
+    print("angle (deg)   depth limit (mm)")
+    angles = np.arange(-90.0, 61.0, 15.0)
+    for angle, limit in zip(angles, over_redundancy(robot, angles), strict=True):
+        print(f"{angle:8.0f}      {1e3 * limit:8.2f}   {'3 mm is stable' if limit > 3e-3 else '3 mm chatters'}")
+    places = work_area(count)
+    sample = places[:: max(1, len(places) // 100)]
+    depth_over_places(robot, sample[:2], HALF_DOWN, SPEED, MAX_DEPTH)  # compiled on a machine's first run
+    started = time.perf_counter()
+    limits, lowest = depth_over_places(robot, places, HALF_DOWN, SPEED, MAX_DEPTH, workers=2)
+    taken = time.perf_counter() - started
+    started = time.perf_counter()
+    plain = plain_loop(robot, sample)
+    plain_taken = (time.perf_counter() - started) * len(places) / len(sample)
+    same = np.nanmax(np.abs(limits[:: max(1, len(places) // 100)] / plain - 1))
+    print(f"{len(places)} places, {np.isfinite(limits).sum()} reached: {taken:.1f} s on two processes")
+    print(f"lowest frequency {np.nanmin(lowest):.2f} to {np.nanmax(lowest):.2f} Hz")
+    print(f"plain loop {plain_taken:.1f} s, {plain_taken / taken:.1f} times; largest difference {same:.1e}")
+    return plain_taken / taken
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000)

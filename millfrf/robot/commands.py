@@ -1,0 +1,193 @@
+"""`millfrf robot`: modes, FRFs, stiffness, deviation, lobes and path compensation of robot models."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+robot_app = typer.Typer(
+    name="robot",
+    help="Robot models as data: a posture gives modes, FRF, stiffness, deviation and stability.",
+    add_completion=False,
+    rich_markup_mode=None,
+)
+
+Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file (.toml), or a name that `robot list` shows.")]
+Pose = Annotated[str | None, typer.Option("--pose", help="Posture named in the robot's file; default: its first.")]
+Joints = Annotated[str | None, typer.Option("--joints", metavar="DEG,DEG,...", help="Driven joints, degrees.")]
+At = Annotated[
+    tuple[float, float, float] | None, typer.Option("--at", metavar="X Y Z", help="Tip of a vertical tool, m.")
+]
+Feed = Annotated[float, typer.Option("--feed", metavar="DEG", help="Direction of feed from the base's x, with --at.")]
+Turn = Annotated[float, typer.Option("--turn", metavar="DEG", help="Turn of the redundancy, with --at.")]
+Redundancy = Annotated[
+    str, typer.Option("--redundancy", help="tool: about the tool's axis; table: tool and work about the feed.")
+]
+Speed = Annotated[float | None, typer.Option("--speed", metavar="RPM", help="Spindle speed of a posture map.")]
+
+
+@robot_app.command("list")
+def list_robots(
+    robot: Annotated[str | None, typer.Argument(metavar="[ROBOT]", help="Show what this one assumes.")] = None,
+) -> None:
+    """Robots that come along; with a name, every number in it that is assumed, and why."""
+    from robot_model import assumptions, named_posture, read_robot, robot_names
+
+    if robot is None:
+        for name in robot_names():
+            typer.echo(f"{name}: {len(assumptions(name))} assumed tables")
+        return
+    case = read_robot(robot)
+    typer.echo(f"postures: {', '.join(case.poses) or 'none'}; {len(named_posture(case, None))} driven joints")
+    for line in assumptions(robot):
+        typer.echo(line)
+
+
+@robot_app.command()
+def modes(
+    robot: Robot,
+    pose: Pose = None,
+    joints: Joints = None,
+    at: At = None,
+    feed: Feed = 0.0,
+    turn: Turn = 0.0,
+    redundancy: Redundancy = "tool",
+    count: Annotated[int, typer.Option("--count", help="Modes to show.")] = 10,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help=".png or .pdf, or .html: a page to turn and play.")
+    ] = None,
+) -> None:
+    """Natural frequencies and damping in a posture, and a picture of the robot and its mode shapes."""
+    from .postures import Asked
+    from .results import show_modes
+
+    show_modes(robot, Asked(pose, joints, at, feed, turn, redundancy), count, picture)
+
+
+@robot_app.command()
+def frf(
+    robot: Robot,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help=".h5: FRF; .json: modal model.")],
+    pose: Pose = None,
+    joints: Joints = None,
+    at: At = None,
+    feed: Feed = 0.0,
+    turn: Turn = 0.0,
+    redundancy: Redundancy = "tool",
+    band: Annotated[tuple[float, float], typer.Option("--band", metavar="LO HI", help="Hz.")] = (1.0, 100.0),
+    lines: Annotated[int, typer.Option("--lines", help="Frequency lines.")] = 1000,
+    sensor: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option("--sensor", metavar="X Y Z", help="Housing sensor, m from the tip: its motion too (.json)."),
+    ] = None,
+) -> None:
+    """Receptance at the tool tip in a posture, as an FRF file or as the modal model behind it."""
+    from .postures import Asked
+    from .results import write_receptance
+
+    write_receptance(robot, Asked(pose, joints, at, feed, turn, redundancy), out, band, lines, sensor)
+
+
+@robot_app.command()
+def stiffness(
+    robot: Robot,
+    pose: Pose = None,
+    joints: Joints = None,
+    at: At = None,
+    feed: Feed = 0.0,
+    turn: Turn = 0.0,
+    redundancy: Redundancy = "tool",
+    force: Annotated[float, typer.Option("--force", metavar="N", help="Force to deflect it with.")] = 650.0,
+) -> None:
+    """Static compliance at the tool tip, its softest and stiffest directions, and the deflection under a force."""
+    from .postures import Asked
+    from .results import show_stiffness
+
+    show_stiffness(robot, Asked(pose, joints, at, feed, turn, redundancy), force)
+
+
+@robot_app.command()
+def deviation(
+    robot: Robot,
+    drill: Annotated[float, typer.Option("--drill", metavar="MM", help="Diameter of the drill.")] = 10.0,
+    feed_rev: Annotated[float, typer.Option("--feed-per-rev", metavar="MM", help="Feed a revolution.")] = 0.2,
+    x: Annotated[tuple[float, float, int], typer.Option("--x", metavar="LO HI N", help="Area, m.")] = (
+        0.6,
+        1.4,
+        9,
+    ),
+    y: Annotated[tuple[float, float, int], typer.Option("--y", metavar="LO HI N", help="m.")] = (-0.6, 0.6, 13),
+    z: Annotated[float, typer.Option("--z", metavar="M", help="Height of the holes, m.")] = 0.8,
+    links: Annotated[bool, typer.Option("--links", help="Flexible links and bearings too, not joints alone.")] = False,
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE.csv", help="Deviation of every hole.")] = None,
+    picture: Annotated[Path | None, typer.Option("--picture", metavar="FILE.png", help="Map of the deviation.")] = None,
+) -> None:
+    """Deviation of drilled holes over a work area (vertical drill, aluminium), and its uncertainty budget."""
+    from .drilled_holes import DrillingArea, show_deviation
+
+    show_deviation(robot, DrillingArea(1e-3 * drill, 1e-3 * feed_rev, x, y, z, links), out, picture)
+
+
+@robot_app.command()
+def lobes(
+    robot: Robot,
+    cutting: Annotated[Path, typer.Option("--cutting", metavar="CUT.toml", help="Cutter, engagement, coefficients.")],
+    max_depth: Annotated[float, typer.Option("--max-depth", metavar="M", help="Largest depth looked at, m.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.csv", help="Lobes, or with --angles a posture map.")],
+    at: Annotated[tuple[float, float, float], typer.Option("--at", metavar="X Y Z", help="Tip of the tool, m.")],
+    feed: Feed = 0.0,
+    turn: Turn = 0.0,
+    redundancy: Redundancy = "table",
+    speeds: Annotated[
+        tuple[float, float, int] | None, typer.Option("--speeds", metavar="LO HI N", help="Spindle speeds, rpm.")
+    ] = None,
+    angles: Annotated[
+        tuple[float, float, int] | None, typer.Option("--angles", metavar="LO HI N", help="Redundancy angles, degrees.")
+    ] = None,
+    speed: Speed = None,
+    method: Annotated[str, typer.Option("--method", help="Solver of the lobes, as `millfrf lobes`.")] = "zero-order",
+) -> None:
+    """Stability lobes in a posture (--speeds), or the depth limit over a redundancy angle (--angles and --speed)."""
+    from .postures import Asked
+    from .results import write_lobes_in_posture, write_map_over_redundancy
+
+    asked = Asked(None, None, at, feed, turn, redundancy)
+    if angles is not None:
+        write_map_over_redundancy(robot, asked, cutting, angles, speed, max_depth, out)
+    else:
+        write_lobes_in_posture(robot, asked, cutting, speeds, max_depth, method, out)
+
+
+@robot_app.command("map")
+def map_command(
+    robot: Robot,
+    picture: Annotated[Path, typer.Option("--picture", metavar="FILE.png", help="Map over the area.")],
+    x: Annotated[tuple[float, float, int], typer.Option("--x", metavar="LO HI N", help="Area, m.")] = (0.5, 1.4, 19),
+    y: Annotated[tuple[float, float, int], typer.Option("--y", metavar="LO HI N", help="m.")] = (-0.7, 0.7, 29),
+    z: Annotated[float, typer.Option("--z", metavar="M", help="Height of the tool's tip, m.")] = 0.8,
+    feed: Feed = 0.0,
+    cutting: Annotated[
+        Path | None, typer.Option("--cutting", metavar="CUT.toml", help="Depth limits too, at one spindle speed.")
+    ] = None,
+    speed: Speed = None,
+    max_depth: Annotated[float, typer.Option("--max-depth", metavar="M", help="Largest depth looked at, m.")] = 0.02,
+) -> None:
+    """Lowest natural frequency of a vertical tool over an area, and with --cutting the depth limit."""
+    from .results import write_workspace_map
+
+    write_workspace_map(robot, picture, (x, y, z, feed), cutting, speed, max_depth)
+
+
+@robot_app.command()
+def compensate(
+    robot: Robot,
+    path: Annotated[Path, typer.Argument(metavar="PATH.csv", help="x_m y_m z_m rx_rad ry_rad rz_rad fx_n fy_n fz_n.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.csv", help="Corrected path.")],
+    joints: Joints = None,
+    pose: Pose = None,
+) -> None:
+    """Move a tool path against the deflection that its forces will cause."""
+    from .postures import Asked
+    from .results import write_compensation
+
+    write_compensation(robot, path, Asked(pose, joints), out)

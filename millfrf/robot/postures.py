@@ -1,0 +1,111 @@
+"""What a user says about a posture, as joint values and cutting axes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import InputError
+from robot_model import (
+    CutPlace,
+    PlanarCase,
+    SpatialCase,
+    SpatialRobot,
+    close_loops,
+    inverse_kinematics,
+    named_posture,
+    nearest_solution,
+    tool_down,
+    turned_place,
+)
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Options of a posture as they were typed.
+
+    Parameters
+    ----------
+    pose
+        Name in the robot's file, or None.
+    joints
+        Driven joint values, degrees, comma-separated, or None.
+    at
+        Place of a vertical tool, m, or None.
+    feed
+        Direction of feed in the horizontal plane from the base's x, degrees.
+    turn
+        Turn of the redundancy, degrees.
+    redundancy
+        ``tool`` or ``table``.
+    """
+
+    pose: str | None = None
+    joints: str | None = None
+    at: tuple[float, float, float] | None = None
+    feed: float = 0.0
+    turn: float = 0.0
+    redundancy: str = "tool"
+
+
+def posture_of(case: PlanarCase | SpatialCase, asked: Asked) -> tuple[Real, Real | None]:
+    """Driven joint values, rad, and the axes of the cut (None: the base frame).
+
+    Raises
+    ------
+    InputError
+        More than one way of saying it, joint values that are no numbers, or a place out of reach.
+    """
+    given = sum(option is not None for option in (asked.pose, asked.joints, asked.at))
+    if given > 1:
+        raise InputError("give the posture once: --pose NAME, --joints DEG,DEG,... or --at X Y Z")
+    if asked.at is not None:
+        place = cut_place(asked)
+        return solve_place(spatial(case).robot, place, named_posture(case, None)), place.axes
+    if asked.joints is not None:
+        try:
+            return np.radians([float(value) for value in asked.joints.split(",")]), None
+        except ValueError as error:
+            raise InputError(f"--joints {asked.joints!r} is not a list of degrees such as 0,-20,110,0,90,0") from error
+    return named_posture(case, asked.pose), None
+
+
+def cut_place(asked: Asked) -> CutPlace:
+    """The place of a vertical tool, after the redundancy turned."""
+    if asked.at is None:
+        raise InputError("give the place of the tool tip: --at X Y Z, in metres")
+    return turned_place(tool_down(asked.at, np.radians(asked.feed)), np.radians(asked.turn), asked.redundancy)
+
+
+def solve_place(robot: SpatialRobot, place: CutPlace, start: Real) -> Real:
+    """Driven joint values at a place: the branch nearest to ``start`` where there is a closed form, else by steps.
+
+    Raises
+    ------
+    InputError
+        Out of reach.
+    """
+    target = np.eye(4)
+    target[:3, :3], target[:3, 3] = place.attitude, place.position
+    if robot.mechanism.closures:
+        q = inverse_kinematics(robot.mechanism, target, start)
+        return np.asarray(q[robot.mechanism.active])
+    found = nearest_solution(robot.mechanism, target, close_loops(robot.mechanism, start))
+    if found is None:
+        raise InputError(f"the tool does not reach {place.position.tolist()} m in that attitude; move or turn it")
+    return found
+
+
+def spatial(case: PlanarCase | SpatialCase) -> SpatialCase:
+    """The robot, if it is one in space.
+
+    Raises
+    ------
+    InputError
+        A planar one.
+    """
+    if isinstance(case, PlanarCase):
+        raise InputError("this robot is planar; places, maps, pictures and paths need a robot in space")
+    return case

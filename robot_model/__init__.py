@@ -1,0 +1,165 @@
+"""Robots as data: posture to stiffness, modes, receptance and deviation; knows nothing of recordings."""
+
+from .any_robot import PostureResult, in_posture, named_posture, read_robot
+from .beam_element import beam_mass, beam_stiffness
+from .causes import Cause, PostureFrequencies, equivalent_causes, explain_frequencies
+from .cell_structure import cell_structure_at
+from .constrained_statics import constrained_system, tip_compliance, tip_stiffness
+from .drilling_deviation import DeviationMap, deviation_map, drilling_wrench, joint_deformation, joint_deviation
+from .drilling_force import Drill, DrillingLoad, SpecificForce, catalogue_load, drilling_load, fitted_to_catalogue
+from .exact_beam import planar_dynamic_stiffness, spatial_dynamic_stiffness
+from .exact_chain import coupled_receptance, exact_receptance
+from .exact_structure import exact_frf_at
+from .generalised_coordinates import coordinate_basis
+from .identification import Identification, identify
+from .inverse_kinematics import inverse_kinematics
+from .loop_closure import close_loops, posture_warnings, tool_jacobian
+from .mechanism import Frame, Mechanism
+from .modal_damping import modal_damping_matrix, rayleigh_constants
+from .modal_reduction import modal_model
+from .natural_coordinates import NaturalChain
+from .natural_robot import NaturalRobot, natural_robot
+from .path_compensation import CompensatedPath, ToolPath, compensate_path
+from .path_file import read_tool_path, write_compensated_path
+from .planar_file import PlanarCase, read_planar_robot
+from .planar_identification import apply_identified, identify_from_frequencies, identify_from_frfs
+from .planar_robot import PlanarRobot
+from .posture_map import CutPlace, PostureMap, frequencies_over, posture_map, target_of, tool_down, turned_place
+from .receptance_coupling import block_diagonal, couple_receptances
+from .rigid_links import rigid_matrices, rigid_model
+from .robot_files import assumptions, robot_names
+from .section import Material, Section, hollow_circle
+from .spatial_file import SpatialCase, read_spatial_robot
+from .spatial_modes import StructureModes, damping_warnings, frf_at, modal_model_at, model_of_modes, modes_at
+from .spatial_robot import ElasticJoint, Link, LumpedBody, SpatialRobot, structure_at
+from .spherical_wrist import nearest_solution, wrist_solutions
+from .stiffness_identification import (
+    Deflection,
+    apply_joint_stiffness,
+    identify_joint_stiffness,
+    predicted_deflections,
+    stiffness_names,
+)
+from .structure import Beam, Body, Spring, Structure, mass_matrix, stiffness_matrix
+from .uncertainty_budget import (
+    LoadUncertainty,
+    UncertaintyBudget,
+    deformation_uncertainty,
+    machining_uncertainty,
+    measured_machining_uncertainty,
+    monte_carlo_deformation,
+    tolerance_grade,
+)
+from .variations import with_joint_factor, with_link_factor, with_payload, with_rigid_links
+
+__all__ = [
+    "Beam",
+    "Body",
+    "Cause",
+    "CompensatedPath",
+    "CutPlace",
+    "Deflection",
+    "DeviationMap",
+    "Drill",
+    "DrillingLoad",
+    "ElasticJoint",
+    "Frame",
+    "Identification",
+    "Link",
+    "LoadUncertainty",
+    "LumpedBody",
+    "Material",
+    "Mechanism",
+    "NaturalChain",
+    "NaturalRobot",
+    "PlanarCase",
+    "PlanarRobot",
+    "PostureFrequencies",
+    "PostureMap",
+    "PostureResult",
+    "Section",
+    "SpatialCase",
+    "SpatialRobot",
+    "SpecificForce",
+    "Spring",
+    "Structure",
+    "StructureModes",
+    "ToolPath",
+    "UncertaintyBudget",
+    "apply_identified",
+    "apply_joint_stiffness",
+    "assumptions",
+    "beam_mass",
+    "beam_stiffness",
+    "block_diagonal",
+    "catalogue_load",
+    "cell_structure_at",
+    "close_loops",
+    "compensate_path",
+    "constrained_system",
+    "coordinate_basis",
+    "couple_receptances",
+    "coupled_receptance",
+    "damping_warnings",
+    "deformation_uncertainty",
+    "deviation_map",
+    "drilling_load",
+    "drilling_wrench",
+    "equivalent_causes",
+    "exact_frf_at",
+    "exact_receptance",
+    "explain_frequencies",
+    "fitted_to_catalogue",
+    "frequencies_over",
+    "frf_at",
+    "hollow_circle",
+    "identify",
+    "identify_from_frequencies",
+    "identify_from_frfs",
+    "identify_joint_stiffness",
+    "in_posture",
+    "inverse_kinematics",
+    "joint_deformation",
+    "joint_deviation",
+    "machining_uncertainty",
+    "mass_matrix",
+    "measured_machining_uncertainty",
+    "modal_damping_matrix",
+    "modal_model",
+    "modal_model_at",
+    "model_of_modes",
+    "modes_at",
+    "monte_carlo_deformation",
+    "named_posture",
+    "natural_robot",
+    "nearest_solution",
+    "planar_dynamic_stiffness",
+    "posture_map",
+    "posture_warnings",
+    "predicted_deflections",
+    "rayleigh_constants",
+    "read_planar_robot",
+    "read_robot",
+    "read_spatial_robot",
+    "read_tool_path",
+    "rigid_matrices",
+    "rigid_model",
+    "robot_names",
+    "spatial_dynamic_stiffness",
+    "stiffness_matrix",
+    "stiffness_names",
+    "structure_at",
+    "target_of",
+    "tip_compliance",
+    "tip_stiffness",
+    "tolerance_grade",
+    "tool_down",
+    "tool_jacobian",
+    "turned_place",
+    "with_joint_factor",
+    "with_link_factor",
+    "with_payload",
+    "with_rigid_links",
+    "wrist_solutions",
+    "write_compensated_path",
+]

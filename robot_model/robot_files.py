@@ -1,0 +1,94 @@
+"""Robots as data: TOML files, the ones that come along by name, each number with its source or `assumed`."""
+
+import os
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from foundation import FileFormatError, InputError
+
+Schema = TypeVar("Schema", bound=BaseModel)
+
+
+class Table(BaseModel):
+    """A table of a robot file: unknown keys and infinite values are refused, and it says where it comes from."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+
+    source: str
+
+
+def robot_names() -> tuple[str, ...]:
+    """Names of the robots that come with the program."""
+    folder = files("robot_model") / "robots"
+    return tuple(sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml")))
+
+
+def read_table(robot: str | os.PathLike[str]) -> dict[str, Any]:
+    """Content of a robot file, given by path or by the name of one that comes along.
+
+    Raises
+    ------
+    InputError
+        No such robot.
+    FileFormatError
+        Not TOML.
+    """
+    path = Path(robot)
+    if path.suffix == ".toml":
+        if not path.is_file():
+            raise InputError(f"no robot file {robot}; check the name, or use one of {', '.join(robot_names())}")
+        text = path.read_text(encoding="utf-8", errors="replace")
+    elif str(robot) in robot_names():
+        text = (files("robot_model") / "robots" / f"{robot}.toml").read_text(encoding="utf-8")
+    else:
+        raise InputError(f"no robot {robot}; give a .toml file or one of {', '.join(robot_names())}")
+    try:
+        return tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise FileFormatError(f"{robot} is not TOML: {error}") from error
+
+
+def read_as(schema: type[Schema], robot: str | os.PathLike[str], kind: str) -> Schema:
+    """Content of a robot file checked against a schema.
+
+    Raises
+    ------
+    FileFormatError
+        Another kind of robot, or a key unknown, missing or of the wrong type.
+    """
+    content = read_table(robot)
+    found = content.get("robot", {}).get("kind") if isinstance(content.get("robot"), dict) else None
+    if found != kind:
+        raise FileFormatError(f"{robot} describes a robot of kind {found!r}; {kind!r} is needed here")
+    try:
+        return schema.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        key = ".".join(str(part) for part in first["loc"])
+        raise FileFormatError(f"{robot}: {key}: {first['msg']} ({first['input']!r:.60})") from error
+
+
+def assumptions(robot: str | os.PathLike[str]) -> tuple[str, ...]:
+    """Where a robot's file says `assumed`, with the reason: one line a table.
+
+    Examples
+    --------
+    >>> assumptions("chen_2026")[0].split(":")[:2]
+    ['links[0].section', ' assumed']
+    """
+    return tuple(_assumed(read_table(robot), ""))
+
+
+def _assumed(part: Any, place: str) -> list[str]:
+    if isinstance(part, list):
+        return [line for index, entry in enumerate(part) for line in _assumed(entry, f"{place}[{index}]")]
+    if not isinstance(part, dict):
+        return []
+    source = part.get("source", "")
+    own = [f"{place}: {source}"] if isinstance(source, str) and "assumed" in source else []
+    inner = [line for key, entry in part.items() for line in _assumed(entry, f"{place}.{key}".lstrip("."))]
+    return own + inner

@@ -1,0 +1,106 @@
+"""`Section`: what a beam's cross-section carries, apart from any beam theory."""
+
+import math
+from dataclasses import dataclass
+
+from foundation import InputError
+
+
+@dataclass(frozen=True)
+class Section:
+    """Stiffness and inertia per length of a uniform beam along its local x axis.
+
+    Euler-Bernoulli theory is infinite shear stiffness without rotary inertia; anything else is Timoshenko's.
+
+    Parameters
+    ----------
+    axial
+        E A, N.
+    bending_y, bending_z
+        E I about the local y and z axes, N m^2.
+    torsion
+        G J, N m^2.
+    mass
+        rho A, kg/m.
+    shear_y, shear_z
+        kappa G A for deflection along y and z, N; infinite: no shear deformation.
+    rotary_y, rotary_z
+        rho I about y and z, kg m; 0: no rotary inertia of bending.
+    polar
+        rho (I_y + I_z), kg m, the inertia of torsion.
+
+    Raises
+    ------
+    InputError
+        A stiffness or mass that is not positive, or a negative rotary inertia.
+    """
+
+    axial: float
+    bending_y: float
+    bending_z: float
+    torsion: float
+    mass: float
+    shear_y: float = math.inf
+    shear_z: float = math.inf
+    rotary_y: float = 0.0
+    rotary_z: float = 0.0
+    polar: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("axial", "bending_y", "bending_z", "torsion", "mass", "shear_y", "shear_z"):
+            if not getattr(self, name) > 0:
+                raise InputError(f"section: {name} = {getattr(self, name)!r} must be positive")
+        for name in ("rotary_y", "rotary_z", "polar"):
+            if not getattr(self, name) >= 0:
+                raise InputError(f"section: {name} = {getattr(self, name)!r} must be zero or more")
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic elastic material: Young's and shear modulus in Pa, density in kg/m^3."""
+
+    young: float
+    shear: float
+    density: float
+
+
+def hollow_circle(outer: float, inner: float, material: Material, *, timoshenko: bool = True) -> Section:
+    """Section of a round tube with diameters ``outer`` and ``inner``, m.
+
+    Shear factor of a hollow circle ``kappa = 6 (1 + nu)(1 + m^2)^2 / ((7 + 6 nu)(1 + m^2)^2 + (20 + 12 nu) m^2)``,
+    ``m = inner / outer`` (Cowper 1966, The shear coefficient in Timoshenko's beam theory, Table 1).
+
+    Raises
+    ------
+    InputError
+        Not ``0 <= inner < outer``.
+
+    Examples
+    --------
+    >>> steel = Material(210e9, 81e9, 7850.0)
+    >>> round(hollow_circle(0.02, 0.0, steel).mass, 3)
+    2.466
+    """
+    if not 0 <= inner < outer:
+        raise InputError(f"tube with outer diameter {outer!r} m and inner {inner!r} m: give 0 <= inner < outer")
+    area = math.pi / 4 * (outer**2 - inner**2)
+    second_moment = math.pi / 64 * (outer**4 - inner**4)
+    poisson = material.young / (2 * material.shear) - 1
+    ratio = inner / outer
+    whole = (1 + ratio**2) ** 2
+    kappa = 6 * (1 + poisson) * whole / ((7 + 6 * poisson) * whole + (20 + 12 * poisson) * ratio**2)
+    shear = kappa * material.shear * area if timoshenko else math.inf
+    rotary = material.density * second_moment if timoshenko else 0.0
+    bending = material.young * second_moment
+    return Section(
+        axial=material.young * area,
+        bending_y=bending,
+        bending_z=bending,
+        torsion=2 * material.shear * second_moment,
+        mass=material.density * area,
+        shear_y=shear,
+        shear_z=shear,
+        rotary_y=rotary,
+        rotary_z=rotary,
+        polar=2 * material.density * second_moment,
+    )

@@ -1,0 +1,204 @@
+"""Robots in space from their files."""
+
+import os
+from dataclasses import dataclass
+from math import inf, radians
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from foundation import InputError
+
+from .mechanism import Frame, Mechanism
+from .modal_damping import rayleigh_constants
+from .robot_files import Table, read_as
+from .section import Material, Section, hollow_circle
+from .spatial_robot import ElasticJoint, Link, LumpedBody, SpatialRobot
+
+
+class _Head(Table):
+    name: str
+    kind: str
+    tip_node: int
+    tool_frame: str
+
+
+class _Frame(Table):
+    name: str
+    antecedent: str
+    motion: str = "revolute"
+    active: bool = True
+    gamma_deg: float = 0.0
+    b_m: float = 0.0
+    alpha_deg: float = 0.0
+    d_m: float = 0.0
+    theta_deg: float = 0.0
+    r_m: float = 0.0
+    limits_deg: tuple[float, float] | None = None
+
+
+class _Joint(Table):
+    frame: str
+    nodes: tuple[int, int]
+    radial_n_per_m: float | None = Field(None, gt=0)
+    axial_n_per_m: float | None = Field(None, gt=0)
+    tilting_nm_per_rad: float | None = Field(None, gt=0)
+    turning_nm_per_rad: float | None = Field(None, gt=0)
+
+
+class _Tube(Table):
+    outer_m: float
+    inner_m: float = 0.0
+    young_pa: float = Field(gt=0)
+    shear_pa: float = Field(gt=0)
+    density_kg_per_m3: float = Field(gt=0)
+    theory: str = "timoshenko"
+
+
+class _Link(Table):
+    nodes: tuple[int, int]
+    tube: _Tube | None = None
+    elements: int = Field(1, ge=1)
+    frame: str | None = None
+    angles_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class _Point(Table):
+    node: int
+    frame: str
+    at_m: tuple[float, float, float]
+
+
+class _Body(Table):
+    node: int
+    frame: str
+    mass_kg: float = Field(gt=0)
+    centre_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    inertia_kg_m2: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class _Damping(Table):
+    """Either two ratios at two frequencies (Rayleigh), or one ratio for all modes."""
+
+    frequencies_hz: tuple[float, float] | None = None
+    ratios: tuple[float, float] | None = None
+    ratio: float | None = Field(None, ge=0, lt=1)
+
+
+class _Closure(Table):
+    frames: tuple[str, str]
+
+
+class _Pose(Table):
+    name: str
+    driven_deg: list[float]
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    robot: _Head
+    frames: list[_Frame]
+    closures: list[_Closure] = []
+    joints: list[_Joint]
+    links: list[_Link] = []
+    points: list[_Point] = []
+    bodies: list[_Body] = []
+    damping: _Damping | None = None
+    poses: list[_Pose] = []
+
+
+@dataclass(frozen=True)
+class SpatialCase:
+    """A robot in space and named postures: driven joint values, rad."""
+
+    name: str
+    robot: SpatialRobot
+    poses: dict[str, NDArray[np.float64]]
+
+
+def read_spatial_robot(robot: str | os.PathLike[str]) -> SpatialCase:
+    """Read a robot of kind ``spatial``, by path or by name.
+
+    Raises
+    ------
+    InputError
+        No such robot, or frames and nodes that do not fit together.
+    FileFormatError
+        Not a robot in space, or a key unknown, missing or of the wrong type.
+    """
+    content = read_as(_File, robot, "spatial")
+    try:
+        return _case(content)
+    except InputError as error:
+        raise InputError(f"{robot}: {error}") from error
+
+
+def _case(content: _File) -> SpatialCase:
+    frames = tuple(_frame(row) for row in content.frames)
+    closures = tuple(closure.frames for closure in content.closures)
+    spatial = SpatialRobot(
+        mechanism=Mechanism(frames, content.robot.tool_frame, closures),
+        joints=tuple(ElasticJoint(row.frame, row.nodes, _stiffness(row)) for row in content.joints),
+        links=tuple(_link(row) for row in content.links),
+        bodies=tuple(_body(row) for row in content.bodies),
+        points={row.node: (row.frame, np.array(row.at_m)) for row in content.points},
+        tip=content.robot.tip_node,
+        rayleigh=_rayleigh(content.damping),
+        damping_ratio=None if content.damping is None else content.damping.ratio,
+    )
+    poses = {pose.name: np.radians(pose.driven_deg) for pose in content.poses}
+    return SpatialCase(content.robot.name, spatial, poses)
+
+
+def _rayleigh(damping: _Damping | None) -> tuple[float, float]:
+    if damping is None or damping.ratio is not None:
+        return (0.0, 0.0)
+    if damping.frequencies_hz is None or damping.ratios is None:
+        raise InputError("damping: give frequencies_hz and ratios (two each), or one ratio")
+    return rayleigh_constants(damping.frequencies_hz, damping.ratios)
+
+
+def _frame(row: _Frame) -> Frame:
+    lower, upper = (-inf, inf) if row.limits_deg is None else (radians(limit) for limit in row.limits_deg)
+    return Frame(
+        row.name,
+        row.antecedent,
+        row.motion,
+        row.active,
+        radians(row.gamma_deg),
+        row.b_m,
+        radians(row.alpha_deg),
+        row.d_m,
+        radians(row.theta_deg),
+        row.r_m,
+        lower,
+        upper,
+    )
+
+
+def _stiffness(row: _Joint) -> NDArray[np.float64]:
+    """A stiffness that is not given is infinite: the joint is rigid in that direction."""
+    radial, axial, tilting, turning = (
+        inf if value is None else value
+        for value in (row.radial_n_per_m, row.axial_n_per_m, row.tilting_nm_per_rad, row.turning_nm_per_rad)
+    )
+    return np.array([radial, radial, axial, tilting, tilting, turning])
+
+
+def _link(row: _Link) -> Link:
+    section = None if row.tube is None else _section(row.tube)
+    delta, eta, kappa = (radians(angle) for angle in row.angles_deg)
+    return Link(row.nodes, section, row.elements, row.frame, (delta, eta, kappa))
+
+
+def _section(tube: _Tube) -> Section:
+    if tube.theory not in ("timoshenko", "euler-bernoulli"):
+        raise InputError(f"beam theory {tube.theory!r} is none of timoshenko, euler-bernoulli")
+    material = Material(tube.young_pa, tube.shear_pa, tube.density_kg_per_m3)
+    return hollow_circle(tube.outer_m, tube.inner_m, material, timoshenko=tube.theory == "timoshenko")
+
+
+def _body(row: _Body) -> LumpedBody:
+    return LumpedBody(row.node, row.frame, row.mass_kg, np.array(row.centre_m), np.diag(row.inertia_kg_m2))

@@ -1,0 +1,178 @@
+"""`SpatialRobot`: a mechanism with the compliance and mass of its joints, links and bodies."""
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import InputError
+
+from .mechanism import Mechanism
+from .section import Section
+from .structure import Beam, Body, Spring, Structure, cross_matrix
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ElasticJoint:
+    """Joint at the origin of a frame, between two nodes.
+
+    ``stiffness`` (6,) is ``(K_r, K_r, K_a, K_rr, K_rr, K_ar)`` in N/m and N m/rad about the frame's axes, infinite
+    where rigid (Belchior et al. 2013, Eq. 6).
+    """
+
+    frame: str
+    nodes: tuple[int, int]
+    stiffness: Real
+
+
+@dataclass(frozen=True)
+class Link:
+    """From one node to another; a section makes it flexible, in ``elements`` beam elements.
+
+    ``frame`` and ``angles`` (delta, eta, kappa; rad) turn a frame into the link's, x along the neutral axis (Belchior
+    et al. 2013, Eq. 2); without a frame, z is any normal (round sections).
+    """
+
+    nodes: tuple[int, int]
+    section: Section | None = None
+    elements: int = 1
+    frame: str | None = None
+    angles: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class LumpedBody:
+    """Rigid body on a node: mass, kg; centre from the node, m, and inertia about it, kg m^2, in the axes of a frame."""
+
+    node: int
+    frame: str
+    mass: float
+    centre: Real
+    inertia: Real
+
+
+@dataclass(frozen=True)
+class SpatialRobot:
+    """A robot as data; node 0 is clamped.
+
+    Parameters
+    ----------
+    mechanism
+    joints, links, bodies
+    points
+        Nodes that are at no joint: frame and place in it, m.
+    tip
+        Node of the tool tip.
+    rayleigh
+        ``(a, b)`` of ``C = a M + b K``, 1/s and s.
+    damping_ratio
+        One for all modes, instead of Rayleigh's constants; or None.
+
+    Raises
+    ------
+    InputError
+        A node that is placed nowhere.
+    """
+
+    mechanism: Mechanism
+    joints: tuple[ElasticJoint, ...]
+    links: tuple[Link, ...]
+    bodies: tuple[LumpedBody, ...]
+    points: dict[int, tuple[str, Real]]
+    tip: int
+    rayleigh: tuple[float, float] = (0.0, 0.0)
+    damping_ratio: float | None = None
+
+    def __post_init__(self) -> None:
+        placed = {node for joint in self.joints for node in joint.nodes} | set(self.points)
+        wanted = {node for link in self.links for node in link.nodes} | {body.node for body in self.bodies} | {self.tip}
+        missing = sorted((wanted | set(range(max(wanted | placed) + 1))) - placed)
+        if missing:
+            raise InputError(f"robot: nodes {missing} are at no joint and no point; give their place")
+
+    @property
+    def n_nodes(self) -> int:
+        """Nodes H, before beams are divided."""
+        return 1 + max({node for joint in self.joints for node in joint.nodes} | set(self.points))
+
+    def with_stiffness(self, stiffness: Real) -> "SpatialRobot":
+        """The robot with other joint stiffnesses, shape (n_joints, 6)."""
+        joints = tuple(replace(j, stiffness=row) for j, row in zip(self.joints, stiffness, strict=True))
+        return replace(self, joints=joints)
+
+
+def structure_at(robot: SpatialRobot, q: Real) -> Structure:
+    """The elastic structure at the joint values q (n_moving,), in the base frame.
+
+    Raises
+    ------
+    InputError
+        A link frame whose x axis does not lie along its link.
+    """
+    mechanism = robot.mechanism
+    placed = mechanism.transforms(q)
+    frames = {frame.name: placed[i] for i, frame in enumerate(mechanism.frames)} | {"0": np.eye(4)}
+    places = np.zeros((robot.n_nodes, 3))
+    springs = []
+    for joint in robot.joints:
+        places[list(joint.nodes)] = frames[joint.frame][:3, 3]
+        springs.append(Spring(joint.nodes, frames[joint.frame][:3, :3], joint.stiffness))
+    for node, (name, place) in robot.points.items():
+        places[node] = frames[name][:3, :3] @ place + frames[name][:3, 3]
+    beams: list[Beam] = []
+    extra: list[Real] = []
+    for link in robot.links:
+        if link.section is not None:
+            _divide(link, frames, places, beams, extra)
+    positions = np.vstack([places, *extra]) if extra else places
+    rigid = tuple(link.nodes for link in robot.links if link.section is None)
+    bodies = tuple(_body(body, frames[body.frame][:3, :3]) for body in robot.bodies)
+    return Structure(positions, tuple(springs), tuple(beams), rigid, bodies, robot.tip)
+
+
+def _divide(link: Link, frames: dict[str, Real], places: Real, beams: list[Beam], extra: list[Real]) -> None:
+    """Beam elements of one link; nodes between are numbered after all others."""
+    assert link.section is not None
+    start, end = places[link.nodes[0]], places[link.nodes[1]]
+    axes = _axes(link, frames, end - start)
+    inner = [len(places) + len(extra) + i for i in range(link.elements - 1)]
+    extra += [(start + (end - start) * (i + 1) / link.elements)[None] for i in range(link.elements - 1)]
+    chain = [link.nodes[0], *inner, link.nodes[1]]
+    beams += [Beam(pair, axes, link.section) for pair in pairwise(chain)]
+
+
+def _axes(link: Link, frames: dict[str, Real], along: Real) -> Real:
+    length = float(np.sqrt(along @ along))
+    if length < 1e-9:
+        raise InputError(f"link {link.nodes}: its nodes are at one place; leave the link out or make it rigid")
+    x = along / length
+    if link.frame is None:
+        y = cross_matrix(np.eye(3)[np.argmin(np.abs(x))]) @ x
+        y /= np.sqrt(y @ y)
+        return np.array([x, y, cross_matrix(x) @ y]).T
+    axes = frames[link.frame][:3, :3] @ link_rotation(*link.angles)
+    if axes[:, 0] @ x < 1 - 1e-6:
+        raise InputError(f"link {link.nodes}: x of its frame lies {axes[:, 0].round(3)}, the link {x.round(3)}")
+    return np.asarray(axes)
+
+
+def link_rotation(delta: float, eta: float, kappa: float) -> Real:
+    """``Rot(x, delta) Rot(y, eta) Rot(z, kappa)``, shape (3, 3) (Belchior et al. 2013, Eq. 2).
+
+    Examples
+    --------
+    >>> link_rotation(0.0, np.pi / 2, 0.0)[:, 0].round(12).tolist()
+    [0.0, 0.0, -1.0]
+    """
+    (cx, sx), (cy, sy), (cz, sz) = ((np.cos(angle), np.sin(angle)) for angle in (delta, eta, kappa))
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    return np.asarray(about_x @ about_y @ about_z)
+
+
+def _body(body: LumpedBody, axes: Real) -> Body:
+    return Body(body.node, body.mass, axes @ body.centre, axes @ body.inertia @ axes.T)

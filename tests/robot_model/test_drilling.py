@@ -1,0 +1,163 @@
+"""Drilling: catalogue loads, tool entry, deviations, budget; and the chain in natural coordinates."""
+
+from math import pi, radians
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.linalg import eigh
+
+from foundation import InputError
+from robot_model import (
+    Drill,
+    LoadUncertainty,
+    NaturalChain,
+    SpecificForce,
+    UncertaintyBudget,
+    catalogue_load,
+    deformation_uncertainty,
+    deviation_map,
+    drilling_load,
+    drilling_wrench,
+    fitted_to_catalogue,
+    joint_deformation,
+    joint_deviation,
+    machining_uncertainty,
+    measured_machining_uncertainty,
+    monte_carlo_deformation,
+    read_planar_robot,
+    read_spatial_robot,
+    rigid_matrices,
+    structure_at,
+    tip_compliance,
+    tolerance_grade,
+    tool_down,
+    tool_jacobian,
+)
+
+ROBOT = read_spatial_robot("staubli_rx170").robot
+READY = read_spatial_robot("staubli_rx170").poses["ready"]
+DRILL = Drill(8e-3)
+
+
+@pytest.mark.parametrize("diameter", [5e-3, 8e-3, 10e-3, 12e-3])
+@pytest.mark.parametrize("feed", [0.1e-3, 0.15e-3, 0.2e-3, 0.3e-3])
+def test_one_drill_fitted_gives_the_catalogue_for_all_within_a_tenth(diameter: float, feed: float) -> None:
+    tangential, axial = fitted_to_catalogue(DRILL)
+    found, expected = drilling_load(Drill(diameter), feed, tangential, axial), catalogue_load(diameter, feed)
+    assert found.thrust == pytest.approx(expected.thrust, rel=0.1)
+    assert found.torque == pytest.approx(expected.torque, rel=0.1)
+
+
+def test_published_figures_of_the_eight_millimetre_drill() -> None:
+    load = drilling_load(DRILL, 0.2e-3, *fitted_to_catalogue(DRILL))
+    assert load.thrust == pytest.approx(1170, rel=0.1)
+    assert load.torque == pytest.approx(2.6, rel=0.1)
+
+
+def test_constant_pressure_has_a_closed_form() -> None:
+    """With m = b = 0: ``F_a = k f D / 2`` and ``M = k f D^2 / 8``, whatever the point angle."""
+    force = SpecificForce(1e9, 0.0, 1.0, 0.0, 0.0)
+    for angle in (50.0, 70.0, 90.0):
+        load = drilling_load(Drill(10e-3, radians(angle)), 0.2e-3, force, force)
+        assert load.thrust == pytest.approx(1e9 * 0.2e-3 * 10e-3 / 2, rel=1e-12)
+        assert load.torque == pytest.approx(1e9 * 0.2e-3 * 10e-3**2 / 8, rel=1e-12)
+
+
+@settings(max_examples=30)
+@given(st.floats(0.0, 5e-3), st.floats(0.0, 5e-3))
+def test_load_grows_as_the_drill_enters(first: float, second: float) -> None:
+    forces = fitted_to_catalogue(DRILL)
+    low, high = (drilling_load(DRILL, 0.2e-3, *forces, depth=d) for d in sorted((first, second)))
+    whole = drilling_load(DRILL, 0.2e-3, *forces)
+    assert 0 <= low.thrust <= high.thrust * (1 + 1e-12) <= whole.thrust * (1 + 1e-9)
+    assert 0 <= low.torque <= high.torque * (1 + 1e-12) <= whole.torque * (1 + 1e-9)
+    if min(first, second) >= 4e-3 / np.tan(DRILL.edge_angle):
+        assert low.thrust == pytest.approx(whole.thrust, rel=1e-12)
+
+
+def test_inclination_counts_where_its_coefficient_is_not_zero() -> None:
+    force = SpecificForce(1e9, 0.2, 1.0, 0.0, 0.5)
+    flat, inclined = (drilling_load(Drill(8e-3, inclination=angle), 0.2e-3, force, force) for angle in (0.0, -0.2))
+    assert inclined.thrust < flat.thrust
+
+
+def test_deviation_is_the_joint_compliance_for_small_loads() -> None:
+    wrench = np.array([1.0, -0.5, 2.0, 0.1, 0.0, 0.2])
+    jacobian = tool_jacobian(ROBOT.mechanism, READY)
+    stiffness = np.array([joint.stiffness[5] for joint in ROBOT.joints])
+    linear = -((jacobian / stiffness) @ jacobian.T @ wrench)[:3]
+    assert joint_deviation(ROBOT, READY, wrench) == pytest.approx(linear, rel=1e-4, abs=1e-12)
+    elastic = -(tip_compliance(structure_at(ROBOT, READY)) @ wrench)[:3]
+    assert np.linalg.norm(elastic) > np.linalg.norm(linear)  # links give way too
+    assert np.linalg.norm(elastic) < 1.3 * np.linalg.norm(linear)
+    soft = joint_deformation(ROBOT, READY, wrench, position_gain=stiffness)
+    assert soft == pytest.approx(2 * joint_deformation(ROBOT, READY, wrench))
+
+
+def test_thrust_pushes_the_robot_back_and_feed_makes_it_worse() -> None:
+    places = [tool_down([x, 0.1, 0.8]) for x in (0.6, 1.0, 1.4, 3.0)]
+    forces = fitted_to_catalogue(DRILL)
+    maps = [deviation_map(ROBOT, places, drilling_load(DRILL, feed, *forces)) for feed in (0.1e-3, 0.2e-3)]
+    assert maps[0].reached.tolist() == [True, True, True, False]
+    sizes = [np.linalg.norm(found.deviations[:3], axis=1) for found in maps]
+    assert np.all(sizes[1] > sizes[0])
+    assert sizes[0][2] > sizes[0][0]  # an extended arm gives way more
+    assert np.all(maps[0].deviations[:3, 2] < 0)  # the real place is higher than the nominal one
+    with pytest.raises(InputError, match="either"):
+        deviation_map(ROBOT, places, drilling_load(DRILL, 1e-4, *forces), links=True, position_gain=np.ones(6))
+
+
+def test_budget_of_the_paper() -> None:
+    """+-40 um of the robot with +-30 um (8 mm) and +-60 um (12 mm) of machining."""
+    small = UncertaintyBudget(40e-6, 0.0, measured_machining_uncertainty(8e-3))
+    large = UncertaintyBudget(40e-6, 0.0, measured_machining_uncertainty(12e-3))
+    assert small.work == pytest.approx(50e-6)
+    assert large.work == pytest.approx(72.1e-6, abs=0.05e-6)
+    assert small.process_share == pytest.approx(0.36)
+    assert machining_uncertainty(2e-6, 3e-6, 6e-6) == pytest.approx(7e-6)
+    with pytest.raises(InputError, match="8 to 12 mm"):
+        measured_machining_uncertainty(5e-3)
+
+
+def test_monte_carlo_agrees_with_the_budget() -> None:
+    load = drilling_load(DRILL, 0.2e-3, *fitted_to_catalogue(DRILL))
+    wrench = drilling_wrench(load, np.array([0.0, 0.0, -1.0]))
+    known = LoadUncertainty()
+    first_order = deformation_uncertainty(ROBOT, READY, wrench, known)
+    _, trial = monte_carlo_deformation(ROBOT, READY, wrench, known, trials=600)
+    assert trial == pytest.approx(first_order, rel=0.12)
+
+
+def test_tolerance_grades() -> None:
+    assert tolerance_grade(14e-6, 8e-3) == 7  # IT7 of 6 to 10 mm: 15 um rounded, 14.4 by formula
+    assert tolerance_grade(1.0, 8e-3) == 17
+    with pytest.raises(InputError, match="3 to 30 mm"):
+        tolerance_grade(1e-5, 0.1)
+
+
+@pytest.mark.parametrize("name", ["P1", "P2", "P3"])
+def test_natural_coordinates_are_the_lagrange_model(name: str) -> None:
+    case = read_planar_robot("chen_2026")
+    chain = NaturalChain(case.robot)
+    mass, stiffness = chain.matrices(chain.start(case.poses[name]))
+    expected_mass, expected_stiffness = rigid_matrices(case.robot, case.poses[name])
+    assert mass == pytest.approx(expected_mass, rel=1e-9)
+    frequencies = np.sqrt(eigh(stiffness, mass, eigvals_only=True)) / (2 * pi)
+    expected = np.sqrt(eigh(expected_stiffness, expected_mass, eigvals_only=True)) / (2 * pi)
+    assert frequencies == pytest.approx(expected, rel=1e-9)
+
+
+@settings(max_examples=30)
+@given(st.lists(st.floats(-3.1, 3.1), min_size=3, max_size=3))
+def test_constraints_hold_and_their_jacobian_is_the_derivative(angles: list[float]) -> None:
+    chain = NaturalChain(read_planar_robot("chen_2026").robot)
+    coordinates = chain.start(np.array(angles))
+    assert np.abs(chain.constraints(coordinates)).max() < 1e-12
+    step = 1e-6
+    for column, row in enumerate(np.eye(9)):
+        slope = (chain.constraints(coordinates + step * row) - chain.constraints(coordinates - step * row)) / (2 * step)
+        assert chain.jacobian(coordinates)[:, column] == pytest.approx(slope, abs=1e-8)
+    moved = chain.place(np.array(angles) + 0.05, coordinates)
+    assert moved[4:6] == pytest.approx(chain.robot.tip(np.array(angles) + 0.05), abs=1e-9)

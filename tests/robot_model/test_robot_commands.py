@@ -1,0 +1,190 @@
+"""`millfrf robot ...`: what the commands print and write, and what they refuse."""
+
+import csv
+import shutil
+from math import pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cutting import MillingProcess
+from estimation import read_frf
+from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.robot.depth_map import depth_limits
+from millfrf.robot.posture_maps import depth_over_places, depth_over_redundancy
+from modal_fit import read_modal_model
+from replay_data import MillingCell
+from robot_model import modal_model_at, read_spatial_robot, tool_down
+from stability import read_lobes, zero_order
+
+STAUBLI = read_spatial_robot("staubli_rx170").robot
+HALF_DOWN = MillingProcess(2, 0.02, pi / 2, 700e6, 0.3, 0.1, pi / 2, pi, 1e-4)
+FACE = MillingProcess(4, 0.05, pi / 4, 700e6, 0.3, 0.1, 0.0, pi, 1e-4)
+CUT = """[cutting]
+teeth = 2
+diameter_m = 0.02
+ktc_pa = 700e6
+krc = 0.3
+kac = 0.1
+start_angle_deg = 90.0
+exit_angle_deg = 180.0
+"""
+
+
+@pytest.fixture
+def cut(tmp_path: Path) -> str:
+    path = tmp_path / "cut.toml"
+    path.write_text(CUT)
+    return str(path)
+
+
+@pytest.mark.parametrize("process", [HALF_DOWN, FACE], ids=["end mill", "face mill"])
+@pytest.mark.parametrize("rpm", [800.0, 3000.0, 9000.0])
+def test_compiled_limits_are_the_zero_order_solution(process: MillingProcess, rpm: float) -> None:
+    rng = np.random.default_rng(4)
+    low, high = np.radians([-90, -60, 40, -90, 20, -90]), np.radians([90, 60, 140, 90, 120, 90])
+    models = [modal_model_at(STAUBLI, rng.uniform(low, high)) for _ in range(6)]
+    speed = rpm * pi / 30
+    slow = [float(zero_order(model, process, np.array([speed]), 0.05).depth_limits[0]) for model in models]
+    assert depth_limits(models, process, speed, 0.05) == pytest.approx(slow, rel=1e-7)
+
+
+def test_turning_the_redundancy_makes_an_unstable_cut_stable() -> None:
+    """3 mm at 3000 rpm chatters with the tool upright and is stable with tool and table turned by 30 degrees."""
+    place = tool_down([0.9, 0.1, 0.8], pi / 2)
+    found = depth_over_redundancy(STAUBLI, place, np.radians([0.0, -30.0]), HALF_DOWN, 100 * pi, 0.02, "table")
+    assert found.values[0] < 3e-3 < found.values[1]
+
+
+def test_places_on_two_processes_are_those_on_one() -> None:
+    places = [tool_down([x, 0.1, 0.8]) for x in (0.7, 0.9, 1.1, 5.0)]
+    one = depth_over_places(STAUBLI, places, HALF_DOWN, 100 * pi, 0.02)
+    two = depth_over_places(STAUBLI, places, HALF_DOWN, 100 * pi, 0.02, workers=2)
+    for first, second in zip(one, two, strict=True):
+        assert first == pytest.approx(second, rel=1e-12, nan_ok=True)
+    assert np.isnan(one[0]).tolist() == [False, False, False, True]
+
+
+def test_modes_and_pictures(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page, picture = tmp_path / "m.html", tmp_path / "m.png"
+    assert run(["robot", "modes", "staubli_rx170", "--picture", str(page)]) == DONE
+    assert "8.93" in capsys.readouterr().out
+    assert "mode shapes" in page.read_text()
+    assert "http" not in page.read_text()  # it needs no network
+    assert run(["robot", "modes", "staubli_rx170", "--at", "0.9", "0.1", "0.8", "--picture", str(picture)]) == DONE
+    assert picture.stat().st_size > 1000
+    assert run(["robot", "modes", "chen_2026", "--pose", "P1"]) == DONE
+    assert "11.956" in capsys.readouterr().out
+
+
+def test_frf_and_model_files(tmp_path: Path) -> None:
+    frf, model = tmp_path / "f.h5", tmp_path / "m.json"
+    posture = ["--joints", "0,-20,110,0,90,0"]
+    assert run(["robot", "frf", "staubli_rx170", *posture, "--out", str(frf), "--lines", "50"]) == DONE
+    assert run(["robot", "frf", "staubli_rx170", *posture, "--out", str(model)]) == DONE
+    stored = read_frf(frf)
+    assert stored.values == pytest.approx(read_modal_model(model).receptance(stored.frequencies), rel=1e-6, abs=1e-13)
+
+
+def test_a_robot_mills_in_the_simulated_cell(tmp_path: Path) -> None:
+    out = tmp_path / "cell.json"
+    place = ["--at", "1.5", "0.1", "0.7", "--sensor", "0.06", "-0.04", "0.25"]
+    assert run(["robot", "frf", "kuka_kr90_r3100", *place, "--out", str(out)]) == DONE
+    structure = read_modal_model(out)
+    step = 2 * np.real(np.einsum("rp,rq->pq", structure.right, structure.left))
+    assert np.abs(step).max() < 1e-9 * np.abs(structure.right).max() * np.abs(structure.left).max()
+    cut = MillingProcess(2, 12.7e-3, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 0.15e-3)
+    samples = MillingCell(structure, cut, 0.5e-3, 1000 * pi / 30, duration=0.2, sample_rate=8192.0).samples()
+    assert samples.shape == (1638, 6)
+    assert np.isfinite(samples).all()
+    assert np.abs(samples[:, 3:]).max() > 0
+
+
+def test_stiffness_and_list(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["robot", "stiffness", "fanuc_s420if"]) == DONE
+    assert "largest deflection under 650 N: 3.173 mm" in capsys.readouterr().out
+    assert run(["robot", "list"]) == DONE
+    assert "staubli_rx170" in capsys.readouterr().out
+    assert run(["robot", "list", "staubli_rx170"]) == DONE
+    assert "Table 3 is missing" in capsys.readouterr().out
+
+
+def test_deviation_of_drilled_holes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table, picture = tmp_path / "d.csv", tmp_path / "d.png"
+    area = ["--x", "0.7", "1.0", "2", "--y", "-0.2", "0.2", "3"]
+    options = ["--drill", "8", *area, "--out", str(table), "--picture", str(picture)]
+    assert run(["robot", "deviation", "staubli_rx170", *options]) == DONE
+    assert "thrust 1" in capsys.readouterr().out
+    with table.open() as stream:
+        assert len(list(csv.DictReader(stream))) == 6
+    assert picture.exists()
+
+
+def test_lobes_and_posture_map(tmp_path: Path, cut: str) -> None:
+    out = tmp_path / "l.csv"
+    common = ["staubli_rx170", "--cutting", cut, "--max-depth", "0.02", "--at", "0.9", "0.1", "0.8", "--out", str(out)]
+    assert run(["robot", "lobes", *common, "--speeds", "2500", "3000", "3"]) == DONE
+    assert len(read_lobes(out).depth_limits) == 3
+    assert run(["robot", "lobes", *common, "--angles", "-20", "20", "3", "--speed", "3000"]) == DONE
+    with out.open() as stream:
+        rows = list(csv.DictReader(stream))
+    assert [float(row["angle_deg"]) for row in rows] == pytest.approx([-20, 0, 20])
+    assert run(["robot", "lobes", *common]) == BAD_INPUT
+    assert run(["robot", "lobes", *common, "--angles", "-20", "20", "3"]) == BAD_INPUT
+
+
+def test_workspace_map(tmp_path: Path, cut: str, capsys: pytest.CaptureFixture[str]) -> None:
+    picture = tmp_path / "w.png"
+    area = ["staubli_rx170", "--picture", str(picture), "--x", "0.7", "1.1", "3", "--y", "-0.2", "0.2", "2"]
+    assert run(["robot", "map", *area]) == DONE
+    assert "6 of 6 places reached" in capsys.readouterr().out
+    assert run(["robot", "map", *area, "--cutting", cut, "--speed", "3000"]) == DONE
+    assert "depth limit" in capsys.readouterr().out
+    assert run(["robot", "map", *area, "--speed", "3000"]) == BAD_INPUT
+
+
+def test_compensation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, out = tmp_path / "p.csv", tmp_path / "c.csv"
+    path.write_text(
+        "x_m,y_m,z_m,rx_rad,ry_rad,rz_rad,fx_n,fy_n,fz_n\n1.858,0,2.519,0.9573,0,2.9924,0,100,500\n"
+        "1.85,0.02,2.51,0.9573,0,2.9924,0,100,500\n"
+    )
+    assert run(["robot", "compensate", "fanuc_s420if", str(path), "--out", str(out)]) == DONE
+    assert "after correction" in capsys.readouterr().out
+    assert out.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["modes", "nobody"], "chen_2026"),
+        (["modes", "fanuc_s420if"], "no masses"),
+        (["modes", "staubli_rx170", "--pose", "no"], "no posture 'no'"),
+        (["modes", "staubli_rx170", "--joints", "a,b"], "list of degrees"),
+        (["modes", "staubli_rx170", "--joints", "1,2"], "2 joint values for 6"),
+        (["modes", "staubli_rx170", "--pose", "ready", "--joints", "0,0,0,0,0,0"], "once"),
+        (["modes", "staubli_rx170", "--at", "9", "0", "0"], "does not reach"),
+        (["modes", "chen_2026", "--at", "1", "0", "0"], "planar"),
+        (["deviation", "staubli_rx170", "--x", "8", "9", "2"], "no hole"),
+        (["frf", "staubli_rx170", "--out", "x.txt"], "suffix"),
+    ],
+)
+def test_refusals(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["robot", *arguments]) == BAD_INPUT
+    assert message in capsys.readouterr().err
+
+
+def test_a_robot_file_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    import robot_model
+
+    source = Path(robot_model.__file__).parent / "robots" / "staubli_rx170.toml"
+    own = tmp_path / "mine.toml"
+    shutil.copy(source, own)
+    own.write_text(
+        own.read_text().replace("ratios = [0.065, 0.065]\n", "").replace("frequencies_hz = [5.9, 8.2]", "ratio = 0.03")
+    )
+    assert run(["robot", "modes", str(own)]) == DONE
+    captured = capsys.readouterr()
+    assert "3.00" in captured.out
+    assert "Rayleigh" not in captured.err
