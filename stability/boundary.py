@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,7 @@ class StabilityBoundary:
     Parameters
     ----------
     limits
-        All crossings at each speed that was needed.
+        At each speed that was needed the lowest crossing; all of them where ``every_limit`` was asked for.
     tolerance
         Between neighbouring speeds the lowest limit bends away from a straight line by less than this share of itself,
         except where it jumps or has a corner; those are known in speed to 1e-4 of themselves.
@@ -80,7 +81,7 @@ def trace_boundary(
     every_limit
         Hold all limits to the tolerance, not the lowest alone: islands are then drawn as finely.
     solver
-        Gives all limits at given speeds.
+        Gives all limits at given speeds; collocation looks for the lowest alone unless all are wanted.
 
     Raises
     ------
@@ -91,6 +92,8 @@ def trace_boundary(
         raise InputError(f"speeds {lowest_speed:g} to {highest_speed:g} rad/s are not positive and increasing")
     if not 0 < tolerance < 1:
         raise InputError(f"tolerance {tolerance!r} of depth is not between 0 and 1; 1e-3 is a good one")
+    if solver is collocation_limits:
+        solver = partial(collocation_limits, threads=os.cpu_count() or 1, lowest_only=not every_limit)
     first = np.geomspace(lowest_speed, highest_speed, _first_count(structure, process, lowest_speed, highest_speed))
     limits = solver(structure, process, first, max_depth)
     waiting = np.column_stack([first[:-1], first[1:]])

@@ -1,53 +1,97 @@
-"""Crossings of the unit circle of a discretised tooth period: by power series, or by eigenvalues where these cancel."""
+"""Crossings of the unit circle of a discretised tooth period: by power series, or by eigenvalues where these fail."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .characteristic import Characteristic, characteristic
 from .characteristic_roots import all_roots
+from .chatter_frequency import strongest_lines
+from .critical_lines import critical_lines
 from .crossings import Crossings, find_crossings
+from .delay_system import DelaySystem
 from .loop_gain import LoopGain
-from .period_operator import PeriodOperator
+from .period_operator import period_operator
 from .polish import polished
+from .transition_series import transition_series
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
+MOST_ROOTS = 256
+"""At one speed."""
+
 
 def circle_crossings(
-    operator: PeriodOperator, finer: PeriodOperator, poles: Complex, max_depth: float
-) -> tuple[Crossings, Real]:
-    """All crossings up to ``max_depth`` (m) at the operator's speeds, and the error of their depths.
+    system: DelaySystem, periods: Real, max_depth: float, *, lowest: bool = False
+) -> tuple[Crossings, Real, Real]:
+    """All crossings up to ``max_depth`` (m) at several tooth periods, with frequency and error.
 
     Parameters
     ----------
-    operator
-        One tooth period at several speeds.
-    finer
-        The same with more nodes; the crossings are refined on it, and what that changes is their error.
-    poles : (n_modes,), rad/s
-        Of the structure: where along the circle to look closely.
+    system
+        Structure and process.
+    periods : (n_speeds,), s
+        They share their nodes, so they should not differ by much.
     max_depth
         m.
+    lowest
+        The lowest crossing at each speed will do.
 
     Returns
     -------
     crossings
+    frequency : (n_crossings,), Hz
+        Of the strongest line of the tool's motion.
     error : (n_crossings,), m
+        What more nodes change.
     """
-    angles = first_angles(poles, operator.periods)
-    series = characteristic(operator, max_depth)
-    if series.usable:
-        found, settled = polished(operator, _by_series(series, angles, max_depth))
-        final, settled_again = polished(finer, found)
-        if settled.all() and settled_again.all():
-            return final, np.abs(final.depth - found.depth) + 1e-9 * final.depth
+    if not system.upper.any():
+        found = _by_series(system, periods, max_depth, lowest)
+        if found is not None:
+            return found
+    return _by_eigenvalues(system, periods, max_depth)
+
+
+def _by_series(
+    system: DelaySystem, periods: Real, max_depth: float, lowest: bool
+) -> tuple[Crossings, Real, Real] | None:
+    """None where the series do not converge."""
+    series = transition_series(system, periods, max_depth)
+    finer = transition_series(system, periods, max_depth, extra=4, chips=True)
+    if not (series.complete and finer.complete):
+        return None
+    angles = first_angles(system.poles, periods, count=max(24, int(np.ceil(0.8 * series.growth))))
+    rows = max(24, int(np.ceil(0.8 * series.growth)))
+    found = np.empty((len(periods), MOST_ROOTS, 4))
+    counts = all_roots(
+        series.coefficients,
+        finer.coefficients,
+        series.needed,
+        series.radius,
+        max_depth,
+        angles,
+        rows,
+        lowest,
+        found,
+    )
+    together = np.concatenate([rows[:count] for rows, count in zip(found, counts, strict=True)])
+    speed = np.repeat(np.arange(len(angles)), counts)
+    order = np.lexsort([together[:, 1], speed])
+    theta, depth, growth, error = together[order].T
+    crossings = Crossings(speed[order], depth.copy(), theta.copy(), growth > 0)
+    return crossings, critical_lines(system, finer, crossings), error.copy()
+
+
+def _by_eigenvalues(system: DelaySystem, periods: Real, max_depth: float) -> tuple[Crossings, Real, Real]:
+    operator = period_operator(system, periods)
+    finer = period_operator(system, periods, extra=5)
+    angles = first_angles(system.poles, periods)
     found = find_crossings(LoopGain(operator).eigenvalues, angles, max_depth)
     final, settled = polished(finer, found)
     depth = np.where(settled, final.depth, found.depth)
     theta = np.where(settled, final.theta, found.theta)
     error = np.where(settled, np.abs(final.depth - found.depth) + 1e-9 * final.depth, found.depth)
-    return Crossings(found.speed, depth, theta, found.outward), error
+    crossings = Crossings(found.speed, depth, theta, found.outward)
+    return crossings, strongest_lines(system, finer, crossings), error
 
 
 def first_angles(poles: Complex, periods: Real, *, count: int = 24) -> Real:
@@ -64,13 +108,3 @@ def first_angles(poles: Complex, periods: Real, *, count: int = 24) -> Real:
     folded = np.abs(np.mod(near + np.pi, 2 * np.pi) - np.pi).reshape(len(periods), -1)
     together = [np.broadcast_to(even, (len(periods), count)), np.clip(folded, 1e-3, np.pi - 1e-3)]
     return np.asarray(np.sort(np.concatenate(together, axis=1), axis=1))
-
-
-def _by_series(series: Characteristic, angles: Real, max_depth: float) -> Crossings:
-    found = np.empty((len(angles), 128, 3))
-    counts = all_roots(series.coefficients, series.needed_powers(), series.radius, max_depth, angles, 24, found)
-    together = np.concatenate(
-        [rows[:count][np.argsort(rows[:count, 1])] for rows, count in zip(found, counts, strict=True)]
-    )
-    speed = np.repeat(np.arange(len(angles)), counts)
-    return Crossings(speed, together[:, 1].copy(), together[:, 0].copy(), together[:, 2] > 0)

@@ -10,10 +10,8 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .chatter_frequency import strongest_lines
 from .circle_crossings import circle_crossings
 from .delay_system import DelaySystem, delay_system
-from .period_operator import period_operator
 from .stability_limits import StabilityLimits
 from .stability_lobes import StabilityLobes
 from .zero_order import checked_speeds
@@ -53,6 +51,7 @@ def collocation_limits(
     max_depth: float,
     *,
     threads: int = 1,
+    lowest_only: bool = False,
 ) -> StabilityLimits:
     """All depths at which a Floquet multiplier crosses the unit circle, with frequency, kind and error.
 
@@ -66,6 +65,8 @@ def collocation_limits(
         As :func:`collocation`.
     threads
         Over which the speeds are spread.
+    lowest_only
+        Do not look above the lowest limit at each speed; a few times faster. Islands below it are still seen.
 
     Raises
     ------
@@ -78,7 +79,7 @@ def collocation_limits(
     system = delay_system(structure, process)
     chunks = _chunks(speeds)
     with ThreadPoolExecutor(max(1, threads)) as pool:
-        parts = list(pool.map(lambda chunk: _limits_of(system, speeds, chunk, max_depth), chunks))
+        parts = list(pool.map(lambda chunk: _limits_of(system, speeds, chunk, max_depth, lowest_only), chunks))
     speed, depth, frequency, at_pi, change, error = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.lexsort([depth, speed])
     kinds = tuple("period-doubling" if doubling else "hopf" for doubling in at_pi[order])
@@ -105,12 +106,10 @@ def _chunks(speeds: Real) -> list[Index]:
 
 
 def _limits_of(
-    system: DelaySystem, speeds: Real, chunk: Index, max_depth: float
+    system: DelaySystem, speeds: Real, chunk: Index, max_depth: float, lowest: bool
 ) -> tuple[Index, Real, Real, NDArray[np.bool_], Index, Real]:
     periods = 2 * np.pi / (system.process.teeth * speeds[chunk])
-    operator = period_operator(system, periods)
-    finer = period_operator(system, periods, extra=5)
-    found, error = circle_crossings(operator, finer, system.poles, max_depth)
+    found, frequency, error = circle_crossings(system, periods, max_depth, lowest=lowest)
     at_pi = found.theta == np.pi
     change = np.where(found.outward, 1, -1) * np.where(at_pi, 1, 2)
-    return chunk[found.speed], found.depth, strongest_lines(system, operator, found), at_pi, change, error
+    return chunk[found.speed], found.depth, frequency, at_pi, change, error
