@@ -62,6 +62,7 @@ def trace_boundary(
     tolerance: float = 1e-3,
     every_limit: bool = False,
     solver: Solver = collocation_limits,
+    threads: int | None = None,
 ) -> StabilityBoundary:
     """Follow the boundary between two speeds, with speeds only where they are needed.
 
@@ -82,6 +83,8 @@ def trace_boundary(
         Hold all limits to the tolerance, not the lowest alone: islands are then drawn as finely.
     solver
         Gives all limits at given speeds; collocation looks for the lowest alone unless all are wanted.
+    threads
+        Of collocation; None: one a core.
 
     Raises
     ------
@@ -93,7 +96,7 @@ def trace_boundary(
     if not 0 < tolerance < 1:
         raise InputError(f"tolerance {tolerance!r} of depth is not between 0 and 1; 1e-3 is a good one")
     if solver is collocation_limits:
-        solver = partial(collocation_limits, threads=os.cpu_count() or 1, lowest_only=not every_limit)
+        solver = partial(collocation_limits, threads=threads or os.cpu_count() or 1, lowest_only=not every_limit)
     first = np.geomspace(lowest_speed, highest_speed, _first_count(structure, process, lowest_speed, highest_speed))
     limits = solver(structure, process, first, max_depth)
     waiting = np.column_stack([first[:-1], first[1:]])
@@ -147,19 +150,20 @@ def _straight(
     """Whether the limits at the middles lie on the straight lines between those at the ends."""
     begins = np.searchsorted(limits.speed, np.arange(len(limits.spindle_speeds) + 1))
     places = np.searchsorted(limits.spindle_speeds, np.column_stack([intervals, middle]))
-    result = np.zeros(len(middle), dtype=bool)
-    for k, (left, right, between) in enumerate(places):
-        rows = [slice(begins[at], begins[at + 1]) for at in (left, right, between)]
-        if not every_limit:
-            rows = [slice(row.start, min(row.stop, row.start + 1)) for row in rows]
-        kinds = [limits.bifurcation[row] for row in rows]
-        if len({len(kind) for kind in kinds}) > 1:
-            continue
-        one, other, here = (limits.depth[row] for row in rows)
+    counts = np.diff(begins)[places]
+    if not every_limit:
+        counts = np.minimum(counts, 1)
+    result = (counts == counts[:, :1]).all(axis=1)
+    kinds = np.array(limits.bifurcation)
+    for k in range(int(counts[result].max(initial=0))):
+        compared = np.flatnonzero(result & (counts[:, 0] > k))
+        rows = begins[places[compared]] + k
+        one, other, here = limits.depth[rows].T
         # halving divides the error of straight lines by four; 2.5 leaves room where they bend unevenly
         bent = np.abs(here - (one + other) / 2) > 2.5 * tolerance * here
         apart = np.maximum(np.abs(one - here), np.abs(other - here)) > tolerance * here
-        result[k] = not ((bent | (len(set(kinds)) > 1)) & apart).any()
+        changed = (kinds[rows] != kinds[rows[:, :1]]).any(axis=1)
+        result[compared] &= ~((bent | changed) & apart)
     return np.asarray(result)
 
 

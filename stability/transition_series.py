@@ -18,8 +18,8 @@ Real = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 MOST_POWERS = 64
-LONGEST_TURN = 12.0
-LARGEST_GROWTH = 8.0
+LONGEST_TURN = 18.0
+LARGEST_GROWTH = 12.0
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def transition_series(
     """
     radius, longest = 2 * max_depth, float(periods.max())
     windows, turn, growth, total = _windows(system, longest, radius)
-    count = 13 + extra + int(np.ceil(0.6 * turn + 0.5 * growth))
+    count = 9 + extra + int(np.ceil(0.6 * turn + 0.5 * growth))
     if count * sum(len(window.immersions) for window in windows) > 4000:
         raise InputError(
             f"more than 4000 nodes a tooth period at {2 * np.pi / (system.process.teeth * longest):.4g} rad/s: the "
