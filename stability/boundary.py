@@ -3,7 +3,6 @@
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +12,7 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .collocation import collocation_limits
+from .collocation import collocation_limits, lowest_limits
 from .stability_limits import StabilityLimits
 from .stability_lobes import StabilityLobes
 from .zero_order import checked_speeds
@@ -95,20 +94,36 @@ def trace_boundary(
         raise InputError(f"speeds {lowest_speed:g} to {highest_speed:g} rad/s are not positive and increasing")
     if not 0 < tolerance < 1:
         raise InputError(f"tolerance {tolerance!r} of depth is not between 0 and 1; 1e-3 is a good one")
-    if solver is collocation_limits:
-        solver = partial(collocation_limits, threads=threads or os.cpu_count() or 1, lowest_only=not every_limit)
     first = np.geomspace(lowest_speed, highest_speed, _first_count(structure, process, lowest_speed, highest_speed))
-    limits = solver(structure, process, first, max_depth)
+    lowest = solver is collocation_limits and not every_limit
+    threads = threads or os.cpu_count() or 1
+
+    def solved(speeds: Real, expected: Real | None) -> StabilityLimits:
+        if lowest:
+            return lowest_limits(structure, process, speeds, max_depth, expected=expected, threads=threads)
+        if solver is collocation_limits:
+            return collocation_limits(structure, process, speeds, max_depth, threads=threads)
+        return solver(structure, process, speeds, max_depth)
+
+    limits = solved(first, None)
     waiting = np.column_stack([first[:-1], first[1:]])
     while len(waiting):
         middle = waiting.mean(axis=1)
-        limits = joined(limits, solver(structure, process, middle, max_depth))
+        limits = joined(limits, solved(middle, _deepest_end(limits, waiting)))
         straight = _straight(limits, waiting, middle, tolerance, every_limit)
         wide = waiting[:, 1] - waiting[:, 0] > NARROWEST * waiting[:, 1]
         left, right = waiting.copy(), waiting.copy()
         left[:, 1] = right[:, 0] = middle
         waiting = np.concatenate([half[~straight & wide] for half in (left, right)])
     return StabilityBoundary(limits, tolerance, len(limits.spindle_speeds))
+
+
+def _deepest_end(limits: StabilityLimits, intervals: Real) -> Real:
+    """The larger of the lowest limits at the two ends of each interval, infinite where there is none."""
+    depths = np.full(len(limits.spindle_speeds), np.inf)
+    present, first = np.unique(limits.speed, return_index=True)
+    depths[present] = limits.depth[first]
+    return np.asarray(depths[np.searchsorted(limits.spindle_speeds, intervals)].max(axis=1))
 
 
 def _first_count(structure: Frf | ModalModel, process: MillingProcess, lowest: float, highest: float) -> int:

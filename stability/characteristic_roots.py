@@ -84,7 +84,7 @@ def roots(
     lowest: bool,
     found: Real,
 ) -> int:
-    """Write roots below ``max_depth`` into rows (theta, depth, growth) of ``found``; return how many.
+    """Write roots below ``max_depth`` into rows (theta, depth, growth) of ``found``; return how many, -1 if F is lost.
 
     On each cell the turns of F along the four edges are added: a sum of one whole turn is one root inside. Cells with
     edges that turn by more than 1.2 rad are split into four until they are clear. At pi, where F is real, its changes
@@ -120,6 +120,8 @@ def roots(
         for k in range(lanes):
             depth[k] = top if k < count else bottom + (top - bottom) * (k - count + 1) / DOUBLINGS
         values(series, needed, radius, theta, depth, lanes, work, above)
+        if (above == 0).any():
+            return -1
         before, step = below[lanes - 1].real, (top - bottom) / DOUBLINGS
         for k in range(count, lanes):
             here = above[k].real
@@ -227,12 +229,15 @@ def all_roots(
     Returns
     -------
     (n_speeds,)
-        How many.
+        How many; -1 where the characteristic function is lost in rounding.
     """
     counts = np.zeros(len(series), dtype=np.int64)
     for s in range(len(series)):
         first = np.empty((found.shape[1], 3))
         count = roots(series[s], needed[s], radius, max_depth, angles[s], rows, lowest, first)
+        if count < 0:
+            counts[s] = -1
+            continue
         order = np.argsort(first[:count, 1])
         if lowest:
             order = order[:1]

@@ -1,5 +1,7 @@
 """Crossings of the unit circle of a discretised tooth period: by power series, or by eigenvalues where these fail."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,7 +13,7 @@ from .delay_system import DelaySystem
 from .loop_gain import LoopGain
 from .period_operator import period_operator
 from .polish import polished
-from .transition_series import transition_series
+from .transition_series import series_windows, transition_series
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -44,41 +46,46 @@ def circle_crossings(
     error : (n_crossings,), m
         What more nodes change.
     """
-    if not system.upper.any():
-        found = _by_series(system, periods, max_depth, lowest)
-        if found is not None:
-            return found
-    return _by_eigenvalues(system, periods, max_depth)
+    if system.upper.any():
+        return _by_eigenvalues(system, periods, max_depth)
+    (found, frequency, error), lost = _by_series(system, periods, max_depth, lowest)
+    if not lost.any():
+        return found, frequency, error
+    rest, rest_frequency, rest_error = _by_eigenvalues(system, periods[lost], max_depth)
+    rest = replace(rest, speed=np.flatnonzero(lost)[rest.speed])
+    order = np.lexsort([np.concatenate([found.depth, rest.depth]), np.concatenate([found.speed, rest.speed])])
+    columns = (
+        np.concatenate([getattr(found, name), getattr(rest, name)])[order]
+        for name in ("speed", "depth", "theta", "outward")
+    )
+    return (
+        Crossings(*columns),
+        np.concatenate([frequency, rest_frequency])[order],
+        np.concatenate([error, rest_error])[order],
+    )
 
 
 def _by_series(
     system: DelaySystem, periods: Real, max_depth: float, lowest: bool
-) -> tuple[Crossings, Real, Real] | None:
-    """None where the series do not converge."""
-    series = transition_series(system, periods, max_depth)
-    finer = transition_series(system, periods, max_depth, extra=4, chips=True)
-    if not (series.complete and finer.complete):
-        return None
-    angles = first_angles(system.poles, periods, count=max(24, int(np.ceil(0.8 * series.growth))))
-    rows = max(24, int(np.ceil(0.8 * series.growth)))
-    found = np.empty((len(periods), MOST_ROOTS, 4))
+) -> tuple[tuple[Crossings, Real, Real], NDArray[np.bool_]]:
+    """Crossings, and at which speeds rounding leaves too little of the series."""
+    windows = series_windows(system, float(periods.max()), max_depth)
+    series = transition_series(system, periods, windows)
+    finer = transition_series(system, periods, windows, extra=4, chips=True)
+    rows = max(12 if lowest else 24, int(np.ceil(0.8 * windows.total_growth)))
+    angles = first_angles(system.poles, periods, count=max(24, rows))
+    table = np.empty((len(periods), MOST_ROOTS, 4))
     counts = all_roots(
-        series.coefficients,
-        finer.coefficients,
-        series.needed,
-        series.radius,
-        max_depth,
-        angles,
-        rows,
-        lowest,
-        found,
+        series.coefficients, finer.coefficients, series.needed, series.radius, max_depth, angles, rows, lowest, table
     )
-    together = np.concatenate([rows[:count] for rows, count in zip(found, counts, strict=True)])
-    speed = np.repeat(np.arange(len(angles)), counts)
+    lost = (counts < 0) | (not (series.complete and finer.complete))
+    counts = np.where(lost, 0, counts)
+    together = np.concatenate([rows[:count] for rows, count in zip(table, counts, strict=True)])
+    speed = np.repeat(np.arange(len(periods)), counts)
     order = np.lexsort([together[:, 1], speed])
-    theta, depth, growth, error = together[order].T
-    crossings = Crossings(speed[order], depth.copy(), theta.copy(), growth > 0)
-    return crossings, critical_lines(system, finer, crossings), error.copy()
+    theta, depth, growth, error = together[order].T.copy()
+    found = Crossings(speed[order], depth, theta, growth > 0)
+    return (found, critical_lines(system, finer, found), error), lost
 
 
 def _by_eigenvalues(system: DelaySystem, periods: Real, max_depth: float) -> tuple[Crossings, Real, Real]:

@@ -41,7 +41,7 @@ def collocation(
     InputError
         As :func:`collocation_limits`.
     """
-    return collocation_limits(structure, process, spindle_speeds, max_depth).lowest()
+    return lowest_limits(structure, process, spindle_speeds, max_depth).lowest()
 
 
 def collocation_limits(
@@ -51,7 +51,6 @@ def collocation_limits(
     max_depth: float,
     *,
     threads: int = 1,
-    lowest_only: bool = False,
 ) -> StabilityLimits:
     """All depths at which a Floquet multiplier crosses the unit circle, with frequency, kind and error.
 
@@ -65,24 +64,82 @@ def collocation_limits(
         As :func:`collocation`.
     threads
         Over which the speeds are spread.
-    lowest_only
-        Do not look above the lowest limit at each speed; a few times faster. Islands below it are still seen.
 
     Raises
     ------
     InputError
         Speeds or depth not positive, an FRF (fit it, or take ``multi_frequency``), or a structure that cannot be used.
     """
+    speeds, system = _checked(structure, process, spindle_speeds, max_depth)
+    parts = _in_parallel(system, speeds, [(chunk, max_depth) for chunk in _chunks(speeds)], False, threads)
+    return _together(system, speeds, max_depth, parts)
+
+
+def lowest_limits(
+    structure: Frf | ModalModel,
+    process: MillingProcess,
+    spindle_speeds: Real,
+    max_depth: float,
+    *,
+    expected: Real | None = None,
+    threads: int = 1,
+) -> StabilityLimits:
+    """The lowest limit alone at each speed, several times faster than :func:`collocation_limits`.
+
+    Depths are searched from zero up; at or just above an expected limit the search ends, and only where nothing has
+    been found it goes on up to ``max_depth``. Islands below the limit are seen.
+
+    Parameters
+    ----------
+    structure, process, spindle_speeds, max_depth, threads
+        As :func:`collocation_limits`.
+    expected : (n_speeds,), m
+        Limits at speeds nearby, infinite where not known.
+
+    Raises
+    ------
+    InputError
+        As :func:`collocation_limits`.
+    """
+    speeds, system = _checked(structure, process, spindle_speeds, max_depth)
+    first = np.full(len(speeds), np.inf) if expected is None else np.asarray(expected, dtype=float)
+    caps = np.minimum(1.2 * first, max_depth)
+    jobs = [(chunk, float(caps[chunk].max())) for chunk in _chunks(speeds, caps)]
+    parts = _in_parallel(system, speeds, jobs, True, threads)
+    seen = np.zeros(len(speeds), dtype=bool)
+    for part, (chunk, cap) in zip(parts, jobs, strict=True):
+        seen[part[0]] = True
+        seen[chunk] |= cap >= max_depth
+    if not seen.all():
+        rest = np.flatnonzero(~seen)
+        parts += _in_parallel(system, speeds, [(rest[k], max_depth) for k in _chunks(speeds[rest])], True, threads)
+    return _together(system, speeds, max_depth, parts)
+
+
+_Part = tuple[Index, Real, Real, NDArray[np.bool_], Index, Real]
+"""Index of the speed, depth, frequency, whether at pi, change and error of some crossings."""
+
+
+def _checked(
+    structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
+) -> tuple[Real, DelaySystem]:
     if isinstance(structure, Frf):
         raise InputError("collocation needs a modal model, this is an FRF; fit it first, or use multi-frequency")
-    speeds = checked_speeds(spindle_speeds, max_depth)
-    system = delay_system(structure, process)
-    chunks = _chunks(speeds)
+    return checked_speeds(spindle_speeds, max_depth), delay_system(structure, process)
+
+
+def _in_parallel(
+    system: DelaySystem, speeds: Real, jobs: list[tuple[Index, float]], lowest: bool, threads: int
+) -> list[_Part]:
+    """Solve for chunks of speeds, each up to its depth."""
     with ThreadPoolExecutor(max(1, threads)) as pool:
-        parts = list(pool.map(lambda chunk: _limits_of(system, speeds, chunk, max_depth, lowest_only), chunks))
+        return list(pool.map(lambda job: _limits_of(system, speeds, job[0], job[1], lowest), jobs))
+
+
+def _together(system: DelaySystem, speeds: Real, max_depth: float, parts: list[_Part]) -> StabilityLimits:
     speed, depth, frequency, at_pi, change, error = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.lexsort([depth, speed])
-    kinds = tuple("period-doubling" if doubling else "hopf" for doubling in at_pi[order])
+    kinds = tuple(np.where(at_pi[order], "period-doubling", "hopf").tolist())
     return StabilityLimits(
         speeds,
         float(max_depth),
@@ -97,17 +154,20 @@ def collocation_limits(
     )
 
 
-def _chunks(speeds: Real) -> list[Index]:
-    """Indices of speeds whose tooth periods differ by less than two fifths: they share their nodes."""
-    order = np.argsort(speeds)
-    octave = np.floor(np.log(speeds[order] / speeds[order][0]) / np.log(1.4)).astype(int)
-    groups = np.split(order, np.flatnonzero(np.diff(octave)) + 1)
+def _chunks(speeds: Real, depths: Real | None = None) -> list[Index]:
+    """Indices of speeds, up to 32 together, that can share nodes.
+
+    Their tooth periods differ by less than two fifths, and the depths of interest by less than a factor of 2.
+    """
+    octave = np.floor(np.log(speeds / speeds.min()) / np.log(1.4)).astype(int)
+    if depths is not None:
+        octave = 64 * octave + np.minimum(np.log2(depths.max() / depths), 63).astype(int)
+    order = np.lexsort([speeds, octave])
+    groups = np.split(order, np.flatnonzero(np.diff(octave[order])) + 1)
     return [part for group in groups for part in np.array_split(group, max(1, len(group) // 32))]
 
 
-def _limits_of(
-    system: DelaySystem, speeds: Real, chunk: Index, max_depth: float, lowest: bool
-) -> tuple[Index, Real, Real, NDArray[np.bool_], Index, Real]:
+def _limits_of(system: DelaySystem, speeds: Real, chunk: Index, max_depth: float, lowest: bool) -> _Part:
     periods = 2 * np.pi / (system.process.teeth * speeds[chunk])
     found, frequency, error = circle_crossings(system, periods, max_depth, lowest=lowest)
     at_pi = found.theta == np.pi

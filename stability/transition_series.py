@@ -1,6 +1,7 @@
 """The transition of the structure over a tooth period as a product of short power series in depth; compiled."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+MOST_NODES = 4000
 MOST_POWERS = 64
 LONGEST_TURN = 18.0
 LARGEST_GROWTH = 12.0
@@ -48,8 +50,6 @@ class TransitionSeries:
     forces : (n_nodes, 3)
         Force per unit depth and chip, Pa.
     periods : (n_speeds,), s
-    growth
-        Bound of the exponent by which solutions grow over a period at the radius.
     complete
         Whether all series have converged.
     """
@@ -63,14 +63,90 @@ class TransitionSeries:
     weights: Real
     forces: Real
     periods: Real
-    growth: float
     complete: bool
 
 
+@dataclass(frozen=True)
+class Windows:
+    """Windows of a tooth period in which teeth cut, short enough for their series not to cancel.
+
+    Parameters
+    ----------
+    begins, lengths : (n_windows,)
+        In periods.
+    teeth : (n_windows,)
+        In the cut.
+    immersions : (sum of teeth,)
+        Of each tooth at the beginning of its window, rad, window by window.
+    radius
+        Largest ``|b|`` meant, m.
+    turn, growth
+        By how much the fastest mode turns in a window, rad, and the exponent by which solutions grow, at most.
+    total_growth
+        The latter over the period.
+    """
+
+    begins: Real
+    lengths: Real
+    teeth: Index
+    immersions: Real
+    radius: float
+    turn: float
+    growth: float
+    total_growth: float
+
+
+def series_windows(system: DelaySystem, longest: float, max_depth: float) -> Windows:
+    """Windows for tooth periods up to ``longest`` (s) and depths up to ``max_depth`` (m).
+
+    A stiffness b k(t) makes solutions grow no faster than ``exp(sqrt(|b| k / m) t)``; here 1 / m is the rate at which
+    an impulse makes the chip grow.
+    """
+    process, radius = system.process, 2 * max_depth
+    pitch = 2 * np.pi / process.teeth
+    fastest = float(np.abs(system.poles).max())
+    at_once = 2 * np.real(system.right.T @ system.left)
+    soon = 2 * np.real((system.right * system.poles[:, None]).T @ system.left)
+    windows: list[Piece] = []
+    turn, growth, total = 0.0, 0.0, 0.0
+    for whole in engagement_pieces(process):
+        along = np.linspace(0, whole.end - whole.begin, 9)
+        angles = np.concatenate([phi + along for phi in whole.immersions])
+        chip = chip_direction(process, angles)
+        force = process.ktc * len(whole.immersions) * force_direction(process, angles)
+        steep, jump = (float(np.abs((chip @ gain * force).sum(axis=1)).max()) for gain in (soon, at_once))
+        duration = (whole.end - whole.begin) / pitch * longest
+        whole_growth = (np.sqrt(radius * steep) + radius * jump) * duration
+        whole_turn = fastest * duration
+        count = max(1, int(np.ceil(max(whole_turn / LONGEST_TURN, whole_growth / LARGEST_GROWTH))))
+        if 20 * count > MOST_NODES:
+            raise _too_many(system, longest)
+        windows += whole.split(count)
+        turn, growth = max(turn, whole_turn / count), max(growth, whole_growth / count)
+        total += float(whole_growth)
+    return Windows(
+        np.array([window.begin for window in windows]) / pitch,
+        np.array([window.end - window.begin for window in windows]) / pitch,
+        np.array([len(window.immersions) for window in windows]),
+        np.array([phi for window in windows for phi in window.immersions]),
+        radius,
+        turn,
+        growth,
+        total,
+    )
+
+
+def _too_many(system: DelaySystem, longest: float) -> InputError:
+    return InputError(
+        f"more than {MOST_NODES} nodes a tooth period at {2 * np.pi / (system.process.teeth * longest):.4g} rad/s: the "
+        "modes turn too often between two teeth; leave out the highest modes, or raise the speed"
+    )
+
+
 def transition_series(
-    system: DelaySystem, periods: Real, max_depth: float, *, extra: int = 0, chips: bool = False
+    system: DelaySystem, periods: Real, windows: Windows, *, extra: int = 0, chips: bool = False
 ) -> TransitionSeries:
-    """Series for depths up to ``max_depth`` (m) at several tooth periods, which share windows and nodes.
+    """Series at several tooth periods, which share windows and nodes.
 
     In a window the forced motion is ``y = A z + b G y`` with ``G = Q o (A B^T)``: Q integrates at Radau's nodes, and A
     and B^T are the structure's free motion to and from a node. So ``y = sum b^k G^k A z``, and the k-th term dies out
@@ -81,8 +157,8 @@ def transition_series(
     system
         Structure without residual flexibility, and process.
     periods : (n_speeds,), s
-    max_depth
-        m.
+    windows
+        For the longest of them.
     extra
         Nodes a window beyond what is needed, to see what they change.
     chips
@@ -93,84 +169,56 @@ def transition_series(
     InputError
         The structure turns so often in a period that more than 4000 nodes would be needed.
     """
-    radius, longest = 2 * max_depth, float(periods.max())
-    windows, turn, growth, total = _windows(system, longest, radius)
-    count = 9 + extra + int(np.ceil(0.6 * turn + 0.5 * growth))
-    if count * sum(len(window.immersions) for window in windows) > 4000:
-        raise InputError(
-            f"more than 4000 nodes a tooth period at {2 * np.pi / (system.process.teeth * longest):.4g} rad/s: the "
-            "modes turn too often between two teeth; leave out the highest modes, or raise the speed"
-        )
-    nodes, weights, derivative = radau_nodes(count)
+    count = 12 + extra + int(np.ceil(0.8 * windows.turn + 0.6 * windows.growth))
+    if count * len(windows.immersions) > MOST_NODES:
+        raise _too_many(system, float(periods.max()))
+    nodes, weights, integral = _integration(count)
     pitch = 2 * np.pi / system.process.teeth
-    angles, owner, times, shares = [], [], [], []
-    for k, window in enumerate(windows):
-        length = window.end - window.begin
-        for phi in window.immersions:
-            angles.append(phi + length / 2 * (nodes + 1))
-            times.append((window.begin + length / 2 * (nodes + 1)) / pitch)
-            shares.append(weights * length / 2 / pitch)
-            owner.append(np.full(count, k))
-    immersions = np.concatenate(angles)
+    owner = np.repeat(np.arange(len(windows.begins)), windows.teeth)
+    half = windows.lengths[owner, None] / 2
+    immersions = (windows.immersions[:, None] + pitch * half * (nodes + 1)).ravel()
     forces = system.process.ktc * force_direction(system.process, immersions)
-    seen = chip_direction(system.process, immersions) @ system.right.T
-    pushed = forces @ system.left.T
-    size, n_windows = 2 * len(system.poles), len(windows)
-    coefficients = np.zeros((len(periods), n_windows, MOST_POWERS, size, size))
+    size = 2 * len(system.poles)
+    # modal coordinates in which forces and motions have the same size, so that rounding can be told from M itself
+    scale = np.sqrt(np.linalg.norm(system.left, axis=1) / np.maximum(np.linalg.norm(system.right, axis=1), 1e-300))
+    scale = np.where(scale > 0, scale, 1.0)
+    coefficients = np.zeros((len(periods), len(windows.begins), MOST_POWERS, size, size))
     kept = np.zeros((len(periods), MOST_POWERS if chips else 0, size, len(immersions)))
+    needed = np.ones((len(periods), 16), dtype=np.int64)
     used = _fill(
         system.poles,
-        seen,
-        pushed,
+        chip_direction(system.process, immersions) @ (system.right * scale[:, None]).T,
+        forces @ (system.left / scale[:, None]).T,
         nodes,
-        np.ascontiguousarray(np.linalg.inv(derivative)),
-        np.array([window.begin for window in windows]) / pitch,
-        np.array([window.end - window.begin for window in windows]) / pitch,
-        np.array([len(window.immersions) for window in windows]),
+        integral,
+        windows.begins,
+        windows.lengths,
+        windows.teeth,
         periods,
-        radius,
+        windows.radius,
         coefficients,
         kept,
-    )
-    coefficients = np.ascontiguousarray(coefficients[:, :, :used])
-    needed = _needed_powers(coefficients, 1e-9)
-    return TransitionSeries(
-        coefficients,
-        kept[:, :used],
         needed,
-        radius,
-        np.concatenate(owner),
-        np.concatenate(times),
-        np.concatenate(shares),
+    )
+    return TransitionSeries(
+        np.ascontiguousarray(coefficients[:, :, :used]),
+        kept,
+        needed,
+        windows.radius,
+        np.repeat(owner, count),
+        (windows.begins[owner, None] + half * (nodes + 1)).ravel(),
+        (half * weights).ravel(),
         forces,
         periods,
-        total,
         used < MOST_POWERS,
     )
 
 
-def _windows(system: DelaySystem, period: float, radius: float) -> tuple[list[Piece], float, float, float]:
-    """Windows of a period, the largest turn and growth in one, and the growth over all."""
-    pitch = 2 * np.pi / system.process.teeth
-    fastest = float(np.abs(system.poles).max())
-    at_once = 2 * np.real(system.right.T @ system.left)
-    soon = 2 * np.real((system.right * system.poles[:, None]).T @ system.left)
-    windows, turn, growth, total = [], 0.0, 0.0, 0.0
-    for whole in engagement_pieces(system.process):
-        share = np.linspace(0, whole.end - whole.begin, 9)
-        angles = np.concatenate([phi + share for phi in whole.immersions])
-        chip, force = chip_direction(system.process, angles), force_direction(system.process, angles)
-        force = force * system.process.ktc * len(whole.immersions)
-        steep = np.abs(np.einsum("ni,ij,nj->n", chip, soon, force)).max()
-        jump = np.abs(np.einsum("ni,ij,nj->n", chip, at_once, force)).max()
-        duration = (whole.end - whole.begin) / pitch * period
-        whole_growth = (np.sqrt(radius * steep) + radius * jump) * duration
-        whole_turn = fastest * duration
-        count = max(1, int(np.ceil(max(whole_turn / LONGEST_TURN, whole_growth / LARGEST_GROWTH))))
-        windows += whole.split(count) if count < 4000 else [whole] * 4000
-        turn, growth = max(turn, whole_turn / count), max(growth, whole_growth / count)
-        total += float(whole_growth)
-    return windows, turn, growth, total
+@cache
+def _integration(count: int) -> tuple[Real, Real, Real]:
+    """Radau's nodes in (-1, 1], their weights, and the integral from -1 to each node."""
+    nodes, weights, derivative = radau_nodes(count)
+    return nodes, weights, np.ascontiguousarray(np.linalg.inv(derivative))
 
 
 @compiled
@@ -187,6 +235,7 @@ def _fill(
     radius: float,
     coefficients: Real,
     chips: Real,
+    needed: Index,
 ) -> int:
     """Write the series of every speed and window; return how many powers were needed at most.
 
@@ -204,7 +253,7 @@ def _fill(
     periods : (n_speeds,), s
     radius
         m.
-    coefficients, chips
+    coefficients, chips, needed
         Receive the result.
     """
     count, size = len(nodes), 2 * len(poles)
@@ -232,6 +281,7 @@ def _fill(
                         total += before[c, i] * after[c, j]
                     gain[j, i] = total * half * radius * integral[i % count, j % count]
             used = max(used, _powers(gain, impulse, motion, block, coefficients[s, w], chips[s, :, :, here]))
+            _count_needed(coefficients[s, w], 1e-9, needed[s])
             start += block
     return used
 
@@ -317,11 +367,21 @@ def _follow(gain: Real, motion: Real, block: int, moved: Real) -> None:
                 moved[c, i] += gain[j, i] * factor
 
 
-def _needed_powers(coefficients: Real, tolerance: float) -> Index:
-    """Powers whose share of the largest term matters in any window, in each sixteenth of the radius."""
-    count = coefficients.shape[2]
-    size = np.abs(coefficients).max(axis=(3, 4))
-    share = np.arange(1, 17) / 16
-    reach = size[:, :, None, :] * share[:, None] ** np.arange(count)
-    matters = (reach > tolerance * reach.max(axis=3, keepdims=True)).any(axis=1)
-    return np.asarray(count - np.argmax(matters[:, :, ::-1], axis=2), dtype=np.int64)
+@compiled
+def _count_needed(coefficients: Real, tolerance: float, needed: Index) -> None:
+    """Raise ``needed`` to the powers whose share of the largest term matters in each sixteenth of the radius."""
+    most = len(coefficients)
+    sizes = np.empty(most)
+    for k in range(most):
+        sizes[k] = np.abs(coefficients[k]).max()
+    for part in range(16):
+        share, reach, largest, last = (part + 1) / 16, 1.0, 0.0, 1
+        for k in range(most):
+            largest = max(largest, sizes[k] * reach)
+            reach *= share
+        reach = 1.0
+        for k in range(most):
+            if sizes[k] * reach > tolerance * largest:
+                last = k + 1
+            reach *= share
+        needed[part] = max(needed[part], last)
