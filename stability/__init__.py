@@ -2,7 +2,7 @@
 
 from .boundary import StabilityBoundary, StabilityGrid, stability_grid, trace_boundary
 from .chatter import ChatterVerdict, classify_cut
-from .collocation import collocation, collocation_limits
+from .collocation import collocation, collocation_limits, lowest_limits
 from .delay_system import DelaySystem, delay_system
 from .lobes_file import read_lobes, write_lobes
 from .mode_coupling import ModeCouplingLimit, mode_coupling_limit
@@ -33,6 +33,7 @@ __all__ = [
     "delay_system",
     "depth_errors",
     "is_stable",
+    "lowest_limits",
     "mode_coupling_limit",
     "multi_frequency",
     "multi_frequency_limits",

@@ -12,7 +12,7 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .collocation import collocation_limits
+from .collocation import collocation_limits, lowest_limits
 from .stability_limits import StabilityLimits
 from .stability_lobes import StabilityLobes
 from .zero_order import checked_speeds
@@ -33,7 +33,7 @@ class StabilityBoundary:
     Parameters
     ----------
     limits
-        All crossings at each speed that was needed.
+        At each speed that was needed the lowest crossing; all of them where ``every_limit`` was asked for.
     tolerance
         Between neighbouring speeds the lowest limit bends away from a straight line by less than this share of itself,
         except where it jumps or has a corner; those are known in speed to 1e-4 of themselves.
@@ -61,6 +61,7 @@ def trace_boundary(
     tolerance: float = 1e-3,
     every_limit: bool = False,
     solver: Solver = collocation_limits,
+    threads: int | None = None,
 ) -> StabilityBoundary:
     """Follow the boundary between two speeds, with speeds only where they are needed.
 
@@ -80,7 +81,9 @@ def trace_boundary(
     every_limit
         Hold all limits to the tolerance, not the lowest alone: islands are then drawn as finely.
     solver
-        Gives all limits at given speeds.
+        Gives all limits at given speeds; collocation looks for the lowest alone unless all are wanted.
+    threads
+        Of collocation; None: one a core.
 
     Raises
     ------
@@ -92,17 +95,35 @@ def trace_boundary(
     if not 0 < tolerance < 1:
         raise InputError(f"tolerance {tolerance!r} of depth is not between 0 and 1; 1e-3 is a good one")
     first = np.geomspace(lowest_speed, highest_speed, _first_count(structure, process, lowest_speed, highest_speed))
-    limits = solver(structure, process, first, max_depth)
+    lowest = solver is collocation_limits and not every_limit
+    threads = threads or os.cpu_count() or 1
+
+    def solved(speeds: Real, expected: Real | None) -> StabilityLimits:
+        if lowest:
+            return lowest_limits(structure, process, speeds, max_depth, expected=expected, threads=threads)
+        if solver is collocation_limits:
+            return collocation_limits(structure, process, speeds, max_depth, threads=threads)
+        return solver(structure, process, speeds, max_depth)
+
+    limits = solved(first, None)
     waiting = np.column_stack([first[:-1], first[1:]])
     while len(waiting):
         middle = waiting.mean(axis=1)
-        limits = joined(limits, solver(structure, process, middle, max_depth))
+        limits = joined(limits, solved(middle, _deepest_end(limits, waiting)))
         straight = _straight(limits, waiting, middle, tolerance, every_limit)
         wide = waiting[:, 1] - waiting[:, 0] > NARROWEST * waiting[:, 1]
         left, right = waiting.copy(), waiting.copy()
         left[:, 1] = right[:, 0] = middle
         waiting = np.concatenate([half[~straight & wide] for half in (left, right)])
     return StabilityBoundary(limits, tolerance, len(limits.spindle_speeds))
+
+
+def _deepest_end(limits: StabilityLimits, intervals: Real) -> Real:
+    """The larger of the lowest limits at the two ends of each interval, infinite where there is none."""
+    depths = np.full(len(limits.spindle_speeds), np.inf)
+    present, first = np.unique(limits.speed, return_index=True)
+    depths[present] = limits.depth[first]
+    return np.asarray(depths[np.searchsorted(limits.spindle_speeds, intervals)].max(axis=1))
 
 
 def _first_count(structure: Frf | ModalModel, process: MillingProcess, lowest: float, highest: float) -> int:
@@ -144,19 +165,20 @@ def _straight(
     """Whether the limits at the middles lie on the straight lines between those at the ends."""
     begins = np.searchsorted(limits.speed, np.arange(len(limits.spindle_speeds) + 1))
     places = np.searchsorted(limits.spindle_speeds, np.column_stack([intervals, middle]))
-    result = np.zeros(len(middle), dtype=bool)
-    for k, (left, right, between) in enumerate(places):
-        rows = [slice(begins[at], begins[at + 1]) for at in (left, right, between)]
-        if not every_limit:
-            rows = [slice(row.start, min(row.stop, row.start + 1)) for row in rows]
-        kinds = [limits.bifurcation[row] for row in rows]
-        if len({len(kind) for kind in kinds}) > 1:
-            continue
-        one, other, here = (limits.depth[row] for row in rows)
+    counts = np.diff(begins)[places]
+    if not every_limit:
+        counts = np.minimum(counts, 1)
+    result = (counts == counts[:, :1]).all(axis=1)
+    kinds = np.array(limits.bifurcation)
+    for k in range(int(counts[result].max(initial=0))):
+        compared = np.flatnonzero(result & (counts[:, 0] > k))
+        rows = begins[places[compared]] + k
+        one, other, here = limits.depth[rows].T
         # halving divides the error of straight lines by four; 2.5 leaves room where they bend unevenly
         bent = np.abs(here - (one + other) / 2) > 2.5 * tolerance * here
         apart = np.maximum(np.abs(one - here), np.abs(other - here)) > tolerance * here
-        result[k] = not ((bent | (len(set(kinds)) > 1)) & apart).any()
+        changed = (kinds[rows] != kinds[rows[:, :1]]).any(axis=1)
+        result[compared] &= ~((bent | changed) & apart)
     return np.asarray(result)
 
 

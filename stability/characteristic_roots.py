@@ -7,108 +7,14 @@ from numpy.typing import NDArray
 
 from cutting.compiled import compiled
 
+from .characteristic import newton, values, workspace
+
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-
-@compiled
-def value(coefficients: Real, radius: float, theta: float, depth: float) -> tuple[complex, complex, complex]:
-    """F and its derivatives by theta and by depth.
-
-    Parameters
-    ----------
-    coefficients : (n + 1, n_powers)
-        As in :class:`Characteristic`, of one speed.
-    radius, depth
-        m.
-    theta
-        rad.
-    """
-    degree = coefficients.shape[0] - 1
-    powers = coefficients.shape[1]
-    multiplier = complex(math.cos(theta), math.sin(theta))
-    factor = 1.0 - multiplier.conjugate()
-    b = depth / radius * factor
-    total, by_theta, by_b = 0j, 0j, 0j
-    turned = 1.0 + 0j
-    for _ in range(degree // 2):
-        turned *= multiplier
-    for k in range(degree + 1):
-        series, slope = complex(coefficients[k, powers - 1]), 0j
-        for j in range(powers - 2, -1, -1):
-            slope = slope * b + series
-            series = series * b + coefficients[k, j]
-        total += turned * series
-        by_theta += 1j * (degree / 2 - k) * turned * series
-        by_b += turned * slope
-        turned *= multiplier.conjugate()
-    by_theta += by_b * depth / radius * 1j * multiplier.conjugate()
-    return total, by_theta, by_b * factor / radius
-
-
-@compiled
-def quick_value(coefficients: Real, needed: Index, radius: float, theta: float, depth: float) -> complex:
-    """F alone, with only the powers that matter at this depth.
-
-    Parameters
-    ----------
-    coefficients, radius, theta, depth
-        As for :func:`value`.
-    needed : (16,)
-        Powers that matter in each sixteenth of the radius.
-    """
-    degree = coefficients.shape[0] - 1
-    multiplier = complex(math.cos(theta), math.sin(theta))
-    b = depth / radius * (1.0 - multiplier.conjugate())
-    powers = needed[min(15, int(16 * abs(b)))]
-    # real recurrence for a polynomial with real coefficients at a complex point (Knuth, TAOCP 2, section 4.6.4)
-    twice, square = 2.0 * b.real, b.real * b.real + b.imag * b.imag
-    turned = 1.0 + 0j
-    for _ in range(degree // 2):
-        turned *= multiplier
-    total = 0j
-    for k in range(degree + 1):
-        one, two = coefficients[k, powers - 1], 0.0
-        for j in range(powers - 2, 0, -1):
-            one, two = coefficients[k, j] + twice * one + two, -square * one
-        if powers > 1:
-            total += turned * (b * one + (coefficients[k, 0] + two))
-        else:
-            total += turned * one
-        turned *= multiplier.conjugate()
-    return total
-
-
-@compiled
-def newton(
-    coefficients: Real, radius: float, theta: float, depth: float, reach_theta: float, reach_depth: float
-) -> tuple[bool, float, float, float]:
-    """Refine a root; give it up where it leaves the reach of its first guess.
-
-    Returns
-    -------
-    converged
-    theta, depth
-    growth
-        Sign of d|mu|/da: positive where the multiplier leaves the circle with growing depth.
-    """
-    first_theta, first_depth = theta, depth
-    for _ in range(30):
-        total, by_theta, by_depth = value(coefficients, radius, theta, depth)
-        determinant = by_theta.real * by_depth.imag - by_theta.imag * by_depth.real
-        if determinant == 0.0:
-            return False, theta, depth, 0.0
-        step_theta = (total.real * by_depth.imag - total.imag * by_depth.real) / determinant
-        step_depth = (by_theta.real * total.imag - by_theta.imag * total.real) / determinant
-        theta -= step_theta
-        depth -= step_depth
-        if abs(theta - first_theta) > reach_theta or abs(depth - first_depth) > reach_depth:
-            return False, theta, depth, 0.0
-        if abs(step_theta) < 1e-12 and abs(step_depth) < 1e-11 * radius:
-            # F is analytic in log mu = rho + i theta: d rho / da = Im(F_a / F_theta)
-            return True, theta, depth, (by_depth / by_theta).imag
-    return False, theta, depth, 0.0
+DOUBLINGS = 8
+"""Depths a row of cells at which the real F(pi, a) is looked at."""
 
 
 @compiled
@@ -119,32 +25,32 @@ def turn(one: complex, other: complex) -> float:
 
 
 @compiled
-def period_doublings(
-    coefficients: Real, needed: Index, radius: float, max_depth: float, count: int, found: Real, filled: int
-) -> int:
-    """Write roots at theta = pi, where F is real, into rows (theta, depth, growth) of ``found``."""
-    step = max_depth / count
-    before = quick_value(coefficients, needed, radius, math.pi, 0.0).real
-    for k in range(1, count + 1):
-        here = quick_value(coefficients, needed, radius, math.pi, k * step).real
-        if before * here < 0.0 and filled < found.shape[0]:
-            low, high, low_value, high_value = (k - 1) * step, k * step, before, here
-            for _ in range(60):
-                middle = low - low_value * (high - low) / (high_value - low_value)
-                middle_value = value(coefficients, radius, math.pi, middle)[0].real
-                if middle_value * high_value < 0.0:
-                    low, low_value = high, high_value
-                else:
-                    low_value *= 0.5
-                high, high_value = middle, middle_value
-                if abs(high - low) < 1e-13 * radius or middle_value == 0.0:
-                    break
-            _, by_theta, by_depth = value(coefficients, radius, math.pi, high)
-            found[filled, 0], found[filled, 1] = math.pi, high
-            found[filled, 2] = (by_depth / by_theta).imag
-            filled += 1
-        before = here
-    return filled
+def _clear(one: complex, other: complex) -> bool:
+    """Whether one complex number is turned by less than 1.2 rad from another."""
+    ratio = other * one.conjugate()
+    return abs(ratio.imag) < 2.572 * ratio.real
+
+
+@compiled
+def _period_doubling(
+    series: Real, needed: Index, radius: float, low: float, high: float, low_value: float, high_value: float
+) -> tuple[float, float]:
+    """Depth between two where the real F(pi, a) changes sign, by the Illinois rule and Newton's; sign of its growth."""
+    theta, depth = np.full(1, math.pi), np.empty(1)
+    out, work = np.empty(1, dtype=np.complex128), workspace(series.shape[2], 1)
+    bottom, top = low, high
+    for _ in range(60):
+        depth[0] = low - low_value * (high - low) / (high_value - low_value)
+        values(series, needed, radius, theta, depth, 1, work, out)
+        if out[0].real * high_value < 0.0:
+            low, low_value = high, high_value
+        else:
+            low_value *= 0.5
+        high, high_value = depth[0], out[0].real
+        if abs(high - low) < 1e-6 * radius or high_value == 0.0:
+            break
+    _, _, refined, growth = newton(series, radius, math.pi, high, top - bottom, top - bottom)
+    return refined, growth
 
 
 @compiled
@@ -169,51 +75,88 @@ def _put(
 
 @compiled
 def roots(
-    coefficients: Real, needed: Index, radius: float, max_depth: float, angles: Real, rows: int, found: Real
+    series: Real,
+    needed: Index,
+    radius: float,
+    max_depth: float,
+    angles: Real,
+    rows: int,
+    lowest: bool,
+    found: Real,
 ) -> int:
-    """Write all roots below ``max_depth`` into rows (theta, depth, growth) of ``found``; return how many.
+    """Write roots below ``max_depth`` into rows (theta, depth, growth) of ``found``; return how many, -1 if F is lost.
 
     On each cell the turns of F along the four edges are added: a sum of one whole turn is one root inside. Cells with
-    edges that turn by more than 1.2 rad are split into four until they are clear.
+    edges that turn by more than 1.2 rad are split into four until they are clear. At pi, where F is real, its changes
+    of sign are period doublings.
 
     Parameters
     ----------
-    coefficients, needed, radius
-        Of one speed.
+    series, needed, radius
+        Of one speed, as for :func:`values`.
     angles : (n_angles,), rad
         First edges of cells in theta, increasing, the last pi.
     rows
         First number of cells in depth.
+    lowest
+        Stop above the row of cells with the lowest root.
     found : (most, 3)
         Receives the roots.
     """
     count = len(angles)
-    filled = period_doublings(coefficients, needed, radius, max_depth, 8 * rows, found, 0)
-    stack = np.empty((4096, 5))
-    corners = np.empty((4096, 4), dtype=np.complex128)
-    left = np.empty(rows + 1, dtype=np.complex128)
-    right = np.empty(rows + 1, dtype=np.complex128)
-    for j in range(rows + 1):
-        left[j] = quick_value(coefficients, needed, radius, angles[0], max_depth * (j / rows) ** 1.5)
-    for i in range(count - 1):
-        low, high = angles[i], angles[i + 1]
-        if i == count - 2:  # period doublings shall lie inside cells, not on their edges
-            high += 0.37 * (high - low)
-        for j in range(rows + 1):
-            right[j] = quick_value(coefficients, needed, radius, high, max_depth * (j / rows) ** 1.5)
-        for j in range(rows):
-            bottom, top = max_depth * (j / rows) ** 1.5, max_depth * ((j + 1) / rows) ** 1.5
-            _put(stack, corners, 0, low, high, bottom, top, 0.0, left[j], right[j], right[j + 1], left[j + 1])
-            filled = _search(coefficients, needed, radius, stack, corners, found, filled)
-        left, right = right, left
+    lanes = count + DOUBLINGS
+    filled = 0
+    stack, corners = np.empty((256, 5)), np.empty((256, 4), dtype=np.complex128)
+    work = workspace(series.shape[2], lanes)
+    small = workspace(series.shape[2], 5)
+    theta, depth = np.full(lanes, math.pi), np.zeros(lanes)
+    below, above = np.empty(lanes, dtype=np.complex128), np.empty(lanes, dtype=np.complex128)
+    theta[:count] = angles
+    # period doublings shall lie inside cells, not on their edges
+    theta[count - 1] += 0.37 * (theta[count - 1] - theta[count - 2])
+    values(series, needed, radius, theta, depth, lanes, work, below)
+    for j in range(rows):
+        bottom, top = max_depth * (j / rows) ** 1.5, max_depth * ((j + 1) / rows) ** 1.5
+        for k in range(lanes):
+            depth[k] = top if k < count else bottom + (top - bottom) * (k - count + 1) / DOUBLINGS
+        values(series, needed, radius, theta, depth, lanes, work, above)
+        if (above == 0).any():
+            return -1
+        before, step = below[lanes - 1].real, (top - bottom) / DOUBLINGS
+        for k in range(count, lanes):
+            here = above[k].real
+            if before * here < 0.0 and filled < len(found):
+                found[filled, 0] = math.pi
+                found[filled, 1], found[filled, 2] = _period_doubling(
+                    series, needed, radius, depth[k] - step, depth[k], before, here
+                )
+                filled += 1
+            before = here
+        for i in range(count - 1):
+            f00, f10, f11, f01 = below[i], below[i + 1], above[i + 1], above[i]
+            if _clear(f00, f10) and _clear(f10, f11) and _clear(f11, f01) and _clear(f01, f00):
+                continue
+            _put(stack, corners, 0, theta[i], theta[i + 1], bottom, top, 0.0, f00, f10, f11, f01)
+            filled = _search(series, needed, radius, stack, corners, small, found, filled)
+        if lowest and filled and found[:filled, 1].min() <= top:
+            break
+        below, above = above, below
     return filled
 
 
 @compiled
 def _search(
-    coefficients: Real, needed: Index, radius: float, stack: Real, corners: Complex, found: Real, filled: int
+    series: Real,
+    needed: Index,
+    radius: float,
+    stack: Real,
+    corners: Complex,
+    work: Real,
+    found: Real,
+    filled: int,
 ) -> int:
     """Work off a stack of cells that holds one to begin with."""
+    theta, depth, out = np.empty(5), np.empty(5), np.empty(5, dtype=np.complex128)
     depth_of_stack = 1
     while depth_of_stack:
         depth_of_stack -= 1
@@ -227,23 +170,18 @@ def _search(
         winding = round((one + two + three + four) / (2 * math.pi))
         middle, height = (low + high) / 2, (bottom + top) / 2
         if level >= 2 and abs(winding) == 1:
-            good, theta, depth, growth = newton(
-                coefficients, radius, middle, height, 0.6 * (high - low), 0.6 * (top - bottom)
+            good, root_theta, root_depth, growth = newton(
+                series, radius, middle, height, 0.6 * (high - low), 0.6 * (top - bottom)
             )
             if good:
-                filled = _keep(found, filled, theta, depth, growth, radius)
+                filled = _keep(found, filled, root_theta, root_depth, growth, radius)
                 continue
         if level >= 12 or (winding == 0 and level >= 6) or depth_of_stack + 4 > len(stack):
             continue
-        centre = quick_value(coefficients, needed, radius, middle, height)
-        south, north = (
-            quick_value(coefficients, needed, radius, middle, bottom),
-            quick_value(coefficients, needed, radius, middle, top),
-        )
-        west, east = (
-            quick_value(coefficients, needed, radius, low, height),
-            quick_value(coefficients, needed, radius, high, height),
-        )
+        theta[0], theta[1], theta[2], theta[3], theta[4] = middle, middle, middle, low, high
+        depth[0], depth[1], depth[2], depth[3], depth[4] = height, bottom, top, height, height
+        values(series, needed, radius, theta, depth, 5, work, out)
+        centre, south, north, west, east = out[0], out[1], out[2], out[3], out[4]
         deeper = level + 1.0
         _put(stack, corners, at, low, middle, bottom, height, deeper, f00, south, centre, west)
         _put(stack, corners, at + 1, middle, high, bottom, height, deeper, south, f10, east, centre)
@@ -267,10 +205,49 @@ def _keep(found: Real, filled: int, theta: float, depth: float, growth: float, r
 
 @compiled
 def all_roots(
-    coefficients: Real, needed: Index, radius: float, max_depth: float, angles: Real, rows: int, found: Real
+    series: Real,
+    finer: Real,
+    needed: Index,
+    radius: float,
+    max_depth: float,
+    angles: Real,
+    rows: int,
+    lowest: bool,
+    found: Real,
 ) -> Index:
-    """Roots at every speed: :func:`roots` for each row of ``coefficients``, ``needed``, ``angles`` and ``found``."""
-    counts = np.zeros(len(coefficients), dtype=np.int64)
-    for k in range(len(coefficients)):
-        counts[k] = roots(coefficients[k], needed[k], radius, max_depth, angles[k], rows, found[k])
+    """Roots at every speed, refined on series with more nodes: (theta, depth, growth, error), lowest first.
+
+    Parameters
+    ----------
+    series, needed, angles
+        One row a speed, otherwise as for :func:`roots`.
+    finer
+        As ``series``; what it changes is the error.
+    found : (n_speeds, most, 4)
+        Receives the roots; all of them, or the lowest alone.
+
+    Returns
+    -------
+    (n_speeds,)
+        How many; -1 where the characteristic function is lost in rounding.
+    """
+    counts = np.zeros(len(series), dtype=np.int64)
+    for s in range(len(series)):
+        first = np.empty((found.shape[1], 3))
+        count = roots(series[s], needed[s], radius, max_depth, angles[s], rows, lowest, first)
+        if count < 0:
+            counts[s] = -1
+            continue
+        order = np.argsort(first[:count, 1])
+        if lowest:
+            order = order[:1]
+        for row, k in enumerate(order):
+            theta, depth, growth = first[k, 0], first[k, 1], first[k, 2]
+            good, moved, final, growth_there = newton(finer[s], radius, theta, depth, 0.1, 0.1 * depth)
+            if good:
+                found[s, row, 0], found[s, row, 1], found[s, row, 2] = moved, final, growth_there
+                found[s, row, 3] = abs(final - depth) + 1e-9 * final
+            else:
+                found[s, row, 0], found[s, row, 1], found[s, row, 2], found[s, row, 3] = theta, depth, growth, depth
+        counts[s] = len(order)
     return counts

@@ -1,53 +1,113 @@
-"""Crossings of the unit circle of a discretised tooth period: by power series, or by eigenvalues where these cancel."""
+"""Crossings of the unit circle of a discretised tooth period: by power series, or by eigenvalues where these fail."""
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .characteristic import Characteristic, characteristic
 from .characteristic_roots import all_roots
+from .chatter_frequency import strongest_lines
+from .critical_lines import critical_lines
 from .crossings import Crossings, find_crossings
+from .delay_system import DelaySystem
 from .loop_gain import LoopGain
-from .period_operator import PeriodOperator
+from .period_operator import period_operator, piece_nodes
 from .polish import polished
+from .transition_series import series_windows, transition_series
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
+MOST_ROOTS = 256
+"""At one speed."""
+
 
 def circle_crossings(
-    operator: PeriodOperator, finer: PeriodOperator, poles: Complex, max_depth: float
-) -> tuple[Crossings, Real]:
-    """All crossings up to ``max_depth`` (m) at the operator's speeds, and the error of their depths.
+    system: DelaySystem, periods: Real, max_depth: float, *, lowest: bool = False
+) -> tuple[Crossings, Real, Real]:
+    """All crossings up to ``max_depth`` (m) at several tooth periods, with frequency and error.
 
     Parameters
     ----------
-    operator
-        One tooth period at several speeds.
-    finer
-        The same with more nodes; the crossings are refined on it, and what that changes is their error.
-    poles : (n_modes,), rad/s
-        Of the structure: where along the circle to look closely.
+    system
+        Structure and process.
+    periods : (n_speeds,), s
+        They share their nodes, so they should not differ by much.
     max_depth
         m.
+    lowest
+        The lowest crossing at each speed will do.
 
     Returns
     -------
     crossings
+    frequency : (n_crossings,), Hz
+        Of the strongest line of the tool's motion.
     error : (n_crossings,), m
+        What more nodes change.
     """
-    angles = first_angles(poles, operator.periods)
-    series = characteristic(operator, max_depth)
-    if series.usable:
-        found, settled = polished(operator, _by_series(series, angles, max_depth))
-        final, settled_again = polished(finer, found)
-        if settled.all() and settled_again.all() and _complete(operator, final, max_depth):
-            return final, np.abs(final.depth - found.depth) + 1e-9 * final.depth
+    if system.upper.any() or _many_modes(system, periods):
+        return _by_eigenvalues(system, periods, max_depth)
+    (found, frequency, error), lost = _by_series(system, periods, max_depth, lowest)
+    if not lost.any():
+        return found, frequency, error
+    rest, rest_frequency, rest_error = _by_eigenvalues(system, periods[lost], max_depth)
+    rest = replace(rest, speed=np.flatnonzero(lost)[rest.speed])
+    order = np.lexsort([np.concatenate([found.depth, rest.depth]), np.concatenate([found.speed, rest.speed])])
+    columns = (
+        np.concatenate([getattr(found, name), getattr(rest, name)])[order]
+        for name in ("speed", "depth", "theta", "outward")
+    )
+    return (
+        Crossings(*columns),
+        np.concatenate([frequency, rest_frequency])[order],
+        np.concatenate([error, rest_error])[order],
+    )
+
+
+def _many_modes(system: DelaySystem, periods: Real) -> bool:
+    """Whether eigenvalues are quicker: their size is that of the chip's nodes, that of the series twice the modes.
+
+    Measured: at 24 rows of cells both take equally long where the former is about as large as the latter.
+    """
+    nodes = sum(count * len(piece.immersions) for piece, count in piece_nodes(system, periods))
+    return nodes < 2 * len(system.poles)
+
+
+def _by_series(
+    system: DelaySystem, periods: Real, max_depth: float, lowest: bool
+) -> tuple[tuple[Crossings, Real, Real], NDArray[np.bool_]]:
+    """Crossings, and at which speeds rounding leaves too little of the series."""
+    windows = series_windows(system, float(periods.max()), max_depth)
+    series = transition_series(system, periods, windows)
+    finer = transition_series(system, periods, windows, extra=4, chips=True)
+    rows = max(12 if lowest else 24, int(np.ceil(0.8 * windows.total_growth)))
+    angles = first_angles(system.poles, periods, count=max(24, rows))
+    table = np.empty((len(periods), MOST_ROOTS, 4))
+    counts = all_roots(
+        series.coefficients, finer.coefficients, series.needed, series.radius, max_depth, angles, rows, lowest, table
+    )
+    lost = (counts < 0) | (not (series.complete and finer.complete))
+    counts = np.where(lost, 0, counts)
+    together = np.concatenate([rows[:count] for rows, count in zip(table, counts, strict=True)])
+    speed = np.repeat(np.arange(len(periods)), counts)
+    order = np.lexsort([together[:, 1], speed])
+    theta, depth, growth, error = together[order].T.copy()
+    found = Crossings(speed[order], depth, theta, growth > 0)
+    return (found, critical_lines(system, finer, found), error), lost
+
+
+def _by_eigenvalues(system: DelaySystem, periods: Real, max_depth: float) -> tuple[Crossings, Real, Real]:
+    operator = period_operator(system, periods)
+    finer = period_operator(system, periods, extra=5)
+    angles = first_angles(system.poles, periods)
     found = find_crossings(LoopGain(operator).eigenvalues, angles, max_depth)
     final, settled = polished(finer, found)
     depth = np.where(settled, final.depth, found.depth)
     theta = np.where(settled, final.theta, found.theta)
     error = np.where(settled, np.abs(final.depth - found.depth) + 1e-9 * final.depth, found.depth)
-    return Crossings(found.speed, depth, theta, found.outward), error
+    crossings = Crossings(found.speed, depth, theta, found.outward)
+    return crossings, strongest_lines(system, finer, crossings), error
 
 
 def first_angles(poles: Complex, periods: Real, *, count: int = 24) -> Real:
@@ -64,39 +124,3 @@ def first_angles(poles: Complex, periods: Real, *, count: int = 24) -> Real:
     folded = np.abs(np.mod(near + np.pi, 2 * np.pi) - np.pi).reshape(len(periods), -1)
     together = [np.broadcast_to(even, (len(periods), count)), np.clip(folded, 1e-3, np.pi - 1e-3)]
     return np.asarray(np.sort(np.concatenate(together, axis=1), axis=1))
-
-
-def _complete(operator: PeriodOperator, found: Crossings, max_depth: float) -> bool:
-    """Whether the crossings account for the unstable multipliers that two depths really have at every speed.
-
-    Cells too coarse for a function that turns fast miss crossings, and cannot know it themselves.
-    """
-    change = np.where(found.outward, 1, -1) * np.where(found.theta == np.pi, 1, 2)
-    n_speeds, n_nodes, size = operator.motion.shape
-    for depth in (0.4 * max_depth, max_depth):
-        near = np.abs(found.depth - depth) < 1e-6 * depth
-        expected = np.zeros(n_speeds, dtype=np.int64)
-        np.add.at(expected, found.speed, np.where(found.depth < depth, change, 0))
-        within = depth * operator.within
-        drive = np.concatenate([operator.motion, -within], axis=2)
-        chip = np.linalg.solve(np.eye(n_nodes) - within, drive)
-        regained = chip.copy()
-        regained[:, :, size:] -= np.eye(n_nodes)
-        state = depth * operator.impulse @ regained
-        state[:, :, :size] += operator.free
-        unstable = np.abs(np.linalg.eigvals(np.concatenate([state, chip], axis=1))) > 1
-        wrong = unstable.sum(axis=1) != expected
-        wrong[found.speed[near]] = False
-        if wrong.any():
-            return False
-    return True
-
-
-def _by_series(series: Characteristic, angles: Real, max_depth: float) -> Crossings:
-    found = np.empty((len(angles), 128, 3))
-    counts = all_roots(series.coefficients, series.needed_powers(), series.radius, max_depth, angles, 24, found)
-    together = np.concatenate(
-        [rows[:count][np.argsort(rows[:count, 1])] for rows, count in zip(found, counts, strict=True)]
-    )
-    speed = np.repeat(np.arange(len(angles)), counts)
-    return Crossings(speed, together[:, 1].copy(), together[:, 0].copy(), together[:, 2] > 0)

@@ -10,10 +10,8 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .chatter_frequency import strongest_lines
 from .circle_crossings import circle_crossings
 from .delay_system import DelaySystem, delay_system
-from .period_operator import period_operator
 from .stability_limits import StabilityLimits
 from .stability_lobes import StabilityLobes
 from .varied_limits import varied_limits
@@ -44,7 +42,7 @@ def collocation(
     InputError
         As :func:`collocation_limits`.
     """
-    return collocation_limits(structure, process, spindle_speeds, max_depth).lowest()
+    return lowest_limits(structure, process, spindle_speeds, max_depth).lowest()
 
 
 def collocation_limits(
@@ -76,18 +74,80 @@ def collocation_limits(
     InputError
         Speeds or depth not positive, an FRF (fit it, or take ``multi_frequency``), or a structure that cannot be used.
     """
-    if isinstance(structure, Frf):
-        raise InputError("collocation needs a modal model, this is an FRF; fit it first, or use multi-frequency")
-    speeds = checked_speeds(spindle_speeds, max_depth)
-    system = delay_system(structure, process)
+    speeds, system = _checked(structure, process, spindle_speeds, max_depth)
     if not process.is_plain:
         return varied_limits(system, speeds, float(max_depth))
-    chunks = _chunks(speeds)
+    parts = _in_parallel(system, speeds, [(chunk, max_depth) for chunk in _chunks(speeds)], False, threads)
+    return _together(system, speeds, max_depth, parts)
+
+
+def lowest_limits(
+    structure: Frf | ModalModel,
+    process: MillingProcess,
+    spindle_speeds: Real,
+    max_depth: float,
+    *,
+    expected: Real | None = None,
+    threads: int = 1,
+) -> StabilityLimits:
+    """The lowest limit alone at each speed, several times faster than :func:`collocation_limits`.
+
+    Depths are searched from zero up; at or just above an expected limit the search ends, and only where nothing has
+    been found it goes on up to ``max_depth``. Islands below the limit are seen.
+
+    Parameters
+    ----------
+    structure, process, spindle_speeds, max_depth, threads
+        As :func:`collocation_limits`.
+    expected : (n_speeds,), m
+        Limits at speeds nearby, infinite where not known.
+
+    Raises
+    ------
+    InputError
+        As :func:`collocation_limits`.
+    """
+    speeds, system = _checked(structure, process, spindle_speeds, max_depth)
+    if not process.is_plain:
+        return varied_limits(system, speeds, float(max_depth))
+    first = np.full(len(speeds), np.inf) if expected is None else np.asarray(expected, dtype=float)
+    caps = np.minimum(1.2 * first, max_depth)
+    jobs = [(chunk, float(caps[chunk].max())) for chunk in _chunks(speeds, caps)]
+    parts = _in_parallel(system, speeds, jobs, True, threads)
+    seen = np.zeros(len(speeds), dtype=bool)
+    for part, (chunk, cap) in zip(parts, jobs, strict=True):
+        seen[part[0]] = True
+        seen[chunk] |= cap >= max_depth
+    if not seen.all():
+        rest = np.flatnonzero(~seen)
+        parts += _in_parallel(system, speeds, [(rest[k], max_depth) for k in _chunks(speeds[rest])], True, threads)
+    return _together(system, speeds, max_depth, parts)
+
+
+_Part = tuple[Index, Real, Real, NDArray[np.bool_], Index, Real]
+"""Index of the speed, depth, frequency, whether at pi, change and error of some crossings."""
+
+
+def _checked(
+    structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
+) -> tuple[Real, DelaySystem]:
+    if isinstance(structure, Frf):
+        raise InputError("collocation needs a modal model, this is an FRF; fit it first, or use multi-frequency")
+    return checked_speeds(spindle_speeds, max_depth), delay_system(structure, process)
+
+
+def _in_parallel(
+    system: DelaySystem, speeds: Real, jobs: list[tuple[Index, float]], lowest: bool, threads: int
+) -> list[_Part]:
+    """Solve for chunks of speeds, each up to its depth."""
     with ThreadPoolExecutor(max(1, threads)) as pool:
-        parts = list(pool.map(lambda chunk: _limits_of(system, speeds, chunk, max_depth), chunks))
+        return list(pool.map(lambda job: _limits_of(system, speeds, job[0], job[1], lowest), jobs))
+
+
+def _together(system: DelaySystem, speeds: Real, max_depth: float, parts: list[_Part]) -> StabilityLimits:
     speed, depth, frequency, at_pi, change, error = (np.concatenate(column) for column in zip(*parts, strict=True))
     order = np.lexsort([depth, speed])
-    kinds = tuple("period-doubling" if doubling else "hopf" for doubling in at_pi[order])
+    kinds = tuple(np.where(at_pi[order], "period-doubling", "hopf").tolist())
     return StabilityLimits(
         speeds,
         float(max_depth),
@@ -102,21 +162,22 @@ def collocation_limits(
     )
 
 
-def _chunks(speeds: Real) -> list[Index]:
-    """Indices of speeds whose tooth periods differ by less than two fifths: they share their nodes."""
-    order = np.argsort(speeds)
-    octave = np.floor(np.log(speeds[order] / speeds[order][0]) / np.log(1.4)).astype(int)
-    groups = np.split(order, np.flatnonzero(np.diff(octave)) + 1)
+def _chunks(speeds: Real, depths: Real | None = None) -> list[Index]:
+    """Indices of speeds, up to 32 together, that can share nodes.
+
+    Their tooth periods differ by less than two fifths, and the depths of interest by less than a factor of 2.
+    """
+    octave = np.floor(np.log(speeds / speeds.min()) / np.log(1.4)).astype(int)
+    if depths is not None:
+        octave = 64 * octave + np.minimum(np.log2(depths.max() / depths), 63).astype(int)
+    order = np.lexsort([speeds, octave])
+    groups = np.split(order, np.flatnonzero(np.diff(octave[order])) + 1)
     return [part for group in groups for part in np.array_split(group, max(1, len(group) // 32))]
 
 
-def _limits_of(
-    system: DelaySystem, speeds: Real, chunk: Index, max_depth: float
-) -> tuple[Index, Real, Real, NDArray[np.bool_], Index, Real]:
+def _limits_of(system: DelaySystem, speeds: Real, chunk: Index, max_depth: float, lowest: bool) -> _Part:
     periods = 2 * np.pi / (system.process.teeth * speeds[chunk])
-    operator = period_operator(system, periods)
-    finer = period_operator(system, periods, extra=5)
-    found, error = circle_crossings(operator, finer, system.poles, max_depth)
+    found, frequency, error = circle_crossings(system, periods, max_depth, lowest=lowest)
     at_pi = found.theta == np.pi
     change = np.where(found.outward, 1, -1) * np.where(at_pi, 1, 2)
-    return chunk[found.speed], found.depth, strongest_lines(system, operator, found), at_pi, change, error
+    return chunk[found.speed], found.depth, frequency, at_pi, change, error

@@ -5,7 +5,7 @@ import pytest
 
 from cutting import MillingProcess
 from modal_fit import ModalModel
-from stability import collocation_limits, multipliers
+from stability import collocation, collocation_limits, multipliers
 
 LABELS = ("T:+X", "T:+Y", "T:+Z")
 
@@ -41,3 +41,6 @@ def test_counts_of_unstable_multipliers_follow_from_the_crossings(seed: int) -> 
                 continue
             here = multipliers(model, process, float(speed), float(depth)).values
             assert (np.abs(here) > 1).sum() == count, (speed, depth)
+    lowest = collocation(model, process, speeds, 4e-3).depth_limits
+    first = [limits.depth[limits.speed == k].min(initial=np.inf) for k in range(len(speeds))]
+    np.testing.assert_allclose(lowest, first, rtol=1e-5)

@@ -17,7 +17,7 @@ from cutting import MillingProcess
 from foundation import InputError
 from modal_fit import ModalModel, Residuals
 from replay_data import table_one_model
-from stability import collocation, collocation_limits, multipliers
+from stability import collocation, collocation_limits, lowest_limits, multipliers
 
 
 @pytest.mark.parametrize("cut", CONVERGED_MM)
@@ -188,3 +188,40 @@ def test_a_negative_depth_and_a_standing_spindle_are_refused() -> None:
         multipliers(table_one_model(), HALF_DOWN, 80.0, -1e-3)
     with pytest.raises(InputError, match=r"spindle speed 0.0"):
         multipliers(table_one_model(), HALF_DOWN, 0.0, 1e-3)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.99, 3.0])
+def test_the_lowest_limit_alone_is_the_lowest_of_all(share: float) -> None:
+    """Whatever was expected, in a slot and where islands lie above."""
+    speeds = np.linspace(5000, 25000, 41) * RPM
+    for cut in (benchmark_cut(1.0, "slot"), benchmark_cut(0.05, "down")):
+        wanted = collocation_limits(one_degree_of_freedom(), cut, speeds, 0.012).lowest()
+        expected = share * wanted.depth_limits
+        found = lowest_limits(one_degree_of_freedom(), cut, speeds, 0.012, expected=expected, threads=2).lowest()
+        np.testing.assert_allclose(found.depth_limits, wanted.depth_limits, rtol=1e-8)
+        np.testing.assert_allclose(found.chatter_frequencies, wanted.chatter_frequencies, rtol=1e-8)
+        assert found.bifurcations == wanted.bifurcations
+
+
+def test_the_slot_has_the_limits_that_eigenvalues_say() -> None:
+    """Deep in a slow slot the series over a whole period would cancel; multipliers know nothing of series."""
+    cut, depths = benchmark_cut(1.0, "slot"), np.linspace(2e-4, 5e-3, 14)
+    for rpm in (3000.0, 5200.0, 9000.0):
+        limits = collocation_limits(one_degree_of_freedom(), cut, np.array([rpm * RPM]), 5e-3)
+        counted = limits.unstable_multipliers(depths)[0]
+        for depth, count in zip(depths, counted, strict=True):
+            values = multipliers(one_degree_of_freedom(), cut, rpm * RPM, depth, extra_nodes=10).values
+            assert (np.abs(values) > 1).sum() == count
+        assert (limits.error < 1e-6 * limits.depth).all()
+
+
+def test_where_rounding_leaves_nothing_of_the_series_eigenvalues_are_taken() -> None:
+    """3000 rpm, 12 mm: some 18 times the limit, multipliers up to 4e4."""
+    cut, depths = benchmark_cut(1.0, "slot"), np.linspace(5e-4, 12e-3, 12)
+    limits = collocation_limits(one_degree_of_freedom(), cut, np.array([3000.0, 9000.0]) * RPM, 12e-3)
+    counted = limits.unstable_multipliers(depths)
+    for row, rpm in enumerate((3000.0, 9000.0)):
+        for depth, count in zip(depths, counted[row], strict=True):
+            values = multipliers(one_degree_of_freedom(), cut, rpm * RPM, depth, extra_nodes=15).values
+            near = np.abs(limits.depth[limits.speed == row] / depth - 1).min() < 0.02
+            assert near or (np.abs(values) > 1).sum() == count
