@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
-from .chain_screening import screen_chains
+from .chain_screening import ScreenedChain, screen_chains
 from .diagnosis import AcceptedCause, Candidate, Diagnosis
 from .explanation import Cause, Explanation
 from .fitting import Fit, fit
@@ -18,7 +18,7 @@ from .joint_direction import find_direction
 from .joint_screening import screen_joints
 from .leftover import Leftover, leftover
 from .linear_floor import Floor, linear_floor, noise_floor
-from .missing_mode import find_mode
+from .missing_mode import SightedMode, find_mode
 from .physics import ChainPhysics, JointPhysics, Physics, library
 from .plain_faults import Clipping, Tone, find_clipping, find_tone, unclipped, without_tone
 from .reporting_numbers import accepted_cause, accepted_mode, modal_deviation
@@ -32,6 +32,9 @@ Progress = Callable[[str], None]
 MOST_CAUSES = 3
 LEAST_EVIDENCE = 20.0
 """Gain in score below which nothing is accepted: odds of some twenty thousand to one."""
+
+MOST_CHAINS = 3
+"""Linear causes that are fitted in a round."""
 
 MOST_LAWS = 4
 """Joint laws that are fitted to the motion seen; the two best are then simulated freely."""
@@ -213,11 +216,24 @@ def _options(
     weighed = [Candidate(one.cause.physics.name, one.gain, "screened", _place(one.cause)) for one in chains]
     mode = find_mode(own_noise, current.explanation)
     weighed.append(Candidate("missing_mode", mode.gain, "screened"))
-    joint_options, joint_weighed = _joints(lines, current, linear_floor(current, lines), causes)
-    weighed += joint_weighed
-    options += joint_options
+    options += _linear_options(lines, current, chains, mode, cost)
+    best = min(options, key=lambda option: option.fitted.score, default=None)
+    if best is None or leftover(best.fitted.explanation, lines).share > NOISE_LIKE:
+        joint_options, joint_weighed = _joints(lines, current, linear_floor(current, lines), causes)
+        weighed += joint_weighed
+        options += joint_options
+    for option in options:
+        weighed.append(Candidate(option.name, current.score - option.fitted.score, "fitted", option.location))
+    return options, weighed
+
+
+def _linear_options(
+    lines: list[WindowedLines], current: Fit, chains: list[ScreenedChain], mode: SightedMode, cost: float
+) -> list[_Option]:
+    """Fit the linear causes that promise most: of the chain, and a further mode."""
+    options = []
     largest = max([one.gain for one in chains] + [mode.gain, 0.0])
-    for one in chains[:4]:
+    for one in chains[:MOST_CHAINS]:
         if one.gain > max(one.cause.size * cost, 0.03 * largest):
             start = replace(current.explanation, causes=(*current.explanation.causes, one.cause))
             options.append(_Option(one.cause.physics.name, _place(one.cause), fit(lines, start, current.noises)))
@@ -226,9 +242,7 @@ def _options(
         shape = current.explanation.shape.with_mode(mode.pole, mode.right, mode.left)
         start = Explanation(shape, np.concatenate([current.explanation.u, np.zeros(shape.per_mode)]))
         options.append(_Option("missing_mode", {}, fit(lines, start, current.noises, iterations=12)))
-    for option in options:
-        weighed.append(Candidate(option.name, current.score - option.fitted.score, "fitted", option.location))
-    return options, weighed
+    return options
 
 
 def _joints(

@@ -78,8 +78,23 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
         if any(_force_contrast(one, frequency) > 12.0 for one in lines):
             continue
         shown = [np.interp(frequency, one.frequencies, c) for one, c in zip(lines, contrasts, strict=True)]
-        return Tone(frequency, _amplitudes(fitted, lines, frequency), 2 * float(np.sum(shown)))
+        exact = _exact_frequency(fitted, lines, frequency)
+        return Tone(exact, _amplitudes(fitted, lines, exact), 2 * float(np.sum(shown)))
     return None
+
+
+def _exact_frequency(fitted: Fit, lines: list[WindowedLines], frequency: float) -> float:
+    """Peak of the residuals' spectra near a line, padded tenfold, all recordings together."""
+    step = max(_step(one) for one in lines)
+    tries = frequency + step * np.linspace(-2, 2, 161)
+    power = np.zeros(len(tries))
+    for one in lines:
+        rest = one.trial.response - _signal(fitted, one)
+        kept = rest[one.start : one.start + len(one.window)] * one.window[:, None]
+        time = np.arange(len(kept)) / one.trial.rate
+        waves = np.exp(-2j * np.pi * tries[:, None] * time)
+        power += np.sum(np.abs(waves @ kept) ** 2, axis=1)
+    return float(tries[np.argmax(power)])
 
 
 def without_tone(lines: WindowedLines, tone: Tone) -> WindowedLines:
