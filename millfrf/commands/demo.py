@@ -1,4 +1,4 @@
-"""`millfrf demo`: the whole chain on the simulated cell."""
+"""`millfrf demo`: the whole chain on the simulated cell; `--conceal`: a blind diagnosis there."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,14 +9,31 @@ import typer
 def demo(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for all results.")] = Path("millfrf-demo"),
     noise: Annotated[float, typer.Option("--noise", help="Noise of every sensor, as a share of its signal.")] = 0.01,
-    seed: Annotated[int, typer.Option("--seed", help="Of noise and taps.")] = 0,
+    seed: Annotated[int | None, typer.Option("--seed", help="Of noise and taps.  [default: 0; --conceal: any]")] = None,
+    conceal: Annotated[
+        bool, typer.Option("--conceal", help="Hide one effect, drawn and sealed; diagnose; open the seal.")
+    ] = False,
 ) -> None:
     """Mill, record, estimate, fit, calibrate, draw the lobes and report, without hardware, in under a minute."""
+    if conceal:
+        _concealed(out, noise, seed)
+        return
     from ..demonstration import DemoOptions, comparison_tables, run_demo
     from ..progress import bar
     from ..tables import show
 
-    result = run_demo(DemoOptions(out, noise, seed), bar, typer.echo)
+    result = run_demo(DemoOptions(out, noise, 0 if seed is None else seed), bar, typer.echo)
     for table in comparison_tables(result):
         show(table)
     typer.echo(f"report: {result.report.resolve()}")
+
+
+def _concealed(out: Path, noise: float, seed: int | None) -> None:
+    from ..concealment import ConcealOptions, run_concealed
+    from ..concealment_table import concealment_table
+    from ..progress import bar
+    from ..tables import show
+
+    result = run_concealed(ConcealOptions(out, noise, seed), bar, typer.echo)
+    show(concealment_table(result))
+    typer.echo(f"the diagnosis: {(out / 'diagnosis').resolve()}; {result.seconds:.0f} s in all")
