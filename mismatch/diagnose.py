@@ -45,6 +45,9 @@ NOISE_LIKE = 0.06
 EXPLAINED = 0.9
 """Share of what moved with the signal that causes must have taken away, if what is left is not noise-like."""
 
+CLEAR = 4.0
+"""Standard errors by which a cause's number must differ from none."""
+
 SMALL = 0.01
 """Evidence of a further cause, as a share of what the first ones had, below which it may mend the form of their law."""
 
@@ -112,24 +115,8 @@ def diagnose(
     base = fit(lines, nominal)
     tell("tones and clipping")
     lines, base, faults = _plain_faults(lines, base, decay)
-    current, accepted = base, list(faults)
-    candidates: list[Candidate] = []
-    equivalents: tuple[str, ...] = ()
-    while len(accepted) < MOST_CAUSES:
-        tell(f"causes, round {len(accepted) + 1}")
-        options, weighed = _options(lines, current, causes)
-        candidates += weighed
-        best = min(options, key=lambda option: option.fitted.score, default=None)
-        if best is None or not _worth_it(best, current, base):
-            break
-        rivals = [
-            option.name
-            for option in options
-            if option.name != best.name and option.fitted.score < best.fitted.score + LEAST_EVIDENCE / 2
-        ]
-        equivalents = equivalents or tuple(rivals)
-        accepted.append(_describe(best, current))
-        current = best.fitted
+    search = _search(lines, base, faults, causes, tell)
+    current, accepted, candidates = search.current, search.accepted, search.candidates
     tell("what is left")
     deviation = modal_deviation(current)
     if deviation is not None:
@@ -144,8 +131,44 @@ def diagnose(
     verdict = "unexplained" if unexplained else "explained" if accepted else "none"
     ranked = tuple(sorted(candidates, key=lambda one: -one.evidence))
     return Diagnosis(
-        verdict, tuple(accepted), ranked, equivalents, improvement, left.share, base, current, tuple(lines)
+        verdict, tuple(accepted), ranked, search.equivalents, improvement, left.share, base, current, tuple(lines)
     )
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Where the search for causes ended."""
+
+    current: Fit
+    accepted: list[AcceptedCause]
+    candidates: list[Candidate]
+    equivalents: tuple[str, ...]
+
+
+def _search(
+    lines: list[WindowedLines], base: Fit, faults: list[AcceptedCause], causes: dict[str, Physics], tell: Progress
+) -> _Search:
+    """One cause after the other, while each is worth it."""
+    current, accepted = base, list(faults)
+    candidates: list[Candidate] = []
+    equivalents: tuple[str, ...] = ()
+    while len(accepted) < MOST_CAUSES:
+        tell(f"causes, round {len(accepted) + 1}")
+        options, weighed = _options(lines, current, causes)
+        candidates += weighed
+        best = min(options, key=lambda option: option.fitted.score, default=None)
+        if best is None or best.fitted.score > current.score - LEAST_EVIDENCE:
+            break
+        # evidence counts from where a fit has settled; a next cause must not live on what this one left undone
+        best = replace(best, fitted=fit(lines, best.fitted.explanation, best.fitted.noises, iterations=20))
+        if not _worth_it(best, current, base):
+            break
+        line = best.fitted.score + LEAST_EVIDENCE / 2
+        rivals = [option.name for option in options if option.name != best.name and option.fitted.score < line]
+        equivalents = equivalents or tuple(dict.fromkeys(rivals))
+        accepted.append(_describe(best, current))
+        current = best.fitted
+    return _Search(current, accepted, candidates, equivalents)
 
 
 def _plain_faults(
@@ -298,6 +321,8 @@ def _unexplained(left: Leftover, before: Leftover) -> bool:
 def _worth_it(option: _Option, current: Fit, base: Fit) -> bool:
     """Enough evidence; and if it lies in the lab's belief alone, most of what the belief found odd."""
     gain = current.score - option.fitted.score
+    if option.name != "missing_mode" and not _measured(option.fitted):
+        return False
     if gain < max(LEAST_EVIDENCE, _mending(option, current) * (base.score - current.score)):
         return False
     if current.misfit - option.fitted.misfit > LEAST_EVIDENCE:
@@ -305,6 +330,22 @@ def _worth_it(option: _Option, current: Fit, base: Fit) -> bool:
     size = current.explanation.shape.size
     odd = max(current.deviation - size, 1.0)
     return current.deviation - option.fitted.deviation > 0.6 * odd
+
+
+def _measured(fitted: Fit) -> bool:
+    """Whether any number of the last cause stands out of its own error: else the gain came from elsewhere."""
+    cause = fitted.explanation.causes[-1]
+    first = fitted.explanation.size - cause.size
+    spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[first : first + len(cause.values)], 0.0))
+    absent = cause.physics.start(fitted.explanation.shape.nominal) if isinstance(cause.physics, ChainPhysics) else None
+    clear = []
+    for k, (parameter, error) in enumerate(zip(cause.physics.parameters, spread, strict=True)):
+        if parameter.logarithmic:
+            clear.append(error * parameter.unit_step < 1 / CLEAR)
+        else:
+            zero = 0.0 if absent is None else float(absent[k])
+            clear.append(abs(float(cause.values[k]) - zero) > CLEAR * error * parameter.unit_step)
+    return any(clear) if isinstance(cause.physics, ChainPhysics) else clear[0]
 
 
 def _mending(option: _Option, current: Fit) -> float:

@@ -84,12 +84,12 @@ def fit(
     explanation = start
     with ThreadPoolExecutor(THREADS) as pool:
         current = list(noises) if noises is not None else [None] * len(lines)
-        seen = list(pool.map(_assess, lines, [explanation] * len(lines), current))
-        cost = _cost(seen, explanation)
+        seen = list(pool.map(_with_noise, lines, [explanation] * len(lines), current))
         matrix, gradient = _normal_equations(pool, lines, explanation, seen)
-        damping = 0.0
+        damping, idle = 0.0, 0
         for _ in range(iterations):
-            step = np.asarray(np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), gradient), dtype=float)
+            cost = _cost(seen, explanation)
+            step = _solved(matrix + damping * np.diag(np.diag(matrix)), gradient)
             for _ in range(4):
                 trial = _moved(explanation, step)
                 again = list(pool.map(_assess, lines, [trial] * len(lines), [one.noise for one in seen]))
@@ -103,12 +103,14 @@ def fit(
                 damping = max(10 * damping, 0.1)
                 continue
             damping /= 10
-            gain = cost - trial_cost
-            explanation, seen, cost = trial, again, trial_cost
-            if gain < tolerance:
+            explanation = trial
+            seen = list(pool.map(_with_noise, lines, [trial] * len(lines), [one.noise for one in again], again))
+            # the noise may still be settling when a step gains nothing
+            idle = idle + 1 if cost - _cost(seen, explanation) < tolerance else 0
+            if idle == 2:
                 break
             matrix, gradient = _normal_equations(pool, lines, explanation, seen)
-        cold = list(pool.map(_assess, lines, [explanation] * len(lines), [None] * len(lines)))
+        cold = list(pool.map(_with_noise, lines, [explanation] * len(lines), [None] * len(lines), seen))
     # a noise that crept along from a bad beginning may have stopped short: of two searches the better counts
     seen = [min(pair, key=lambda one: one.misfit) for pair in zip(seen, cold, strict=True)]
     misfit = sum(one.misfit for one in seen)
@@ -123,7 +125,7 @@ def fit(
         misfit,
         deviation,
         misfit + deviation + numbers * float(np.log(count)),
-        np.asarray(np.linalg.inv(matrix), dtype=float),
+        np.asarray(np.linalg.pinv(matrix, hermitian=True), dtype=float),
     )
 
 
@@ -182,18 +184,45 @@ def jacobian(explanation: Explanation, lines: WindowedLines, predicted: Predicte
     return np.concatenate(columns, axis=2)
 
 
-def _assess(lines: WindowedLines, explanation: Explanation, noise: NoiseModel | None) -> _Assessed:
-    predicted = predict_lines(explanation, lines)
-    rest = lines.measured - predicted.response
+def _assess(lines: WindowedLines, explanation: Explanation, noise: NoiseModel) -> _Assessed:
+    """Misfit under a given noise; infinite where a prediction is not finite or cannot be made."""
+    try:
+        predicted = predict_lines(explanation, lines)
+        rest = lines.measured - predicted.response
+        return _misfit(lines, explanation, predicted, rest, noise)
+    except np.linalg.LinAlgError:
+        nothing = np.zeros((0, 0), dtype=complex)
+        return _Assessed(Predicted(nothing, nothing, nothing), nothing, nothing, np.inf, noise)
+
+
+def _misfit(
+    lines: WindowedLines, explanation: Explanation, predicted: Predicted, rest: Complex, noise: NoiseModel
+) -> _Assessed:
     if not np.isfinite(rest).all():
-        return _Assessed(predicted, np.zeros(0, dtype=complex), rest, np.inf, noise or NoiseModel(*(np.zeros(0),) * 3))
-    through = through_structure(explanation, lines)
-    noise = fit_noise(lines.frequencies, rest, through, levels(lines), noise)
-    covariance = noise.covariance(lines.frequencies, through)
+        return _Assessed(predicted, rest, rest, np.inf, noise)
+    covariance = noise.covariance(lines.frequencies, through_structure(explanation, lines))
     white = whitening(covariance)
     small = np.einsum("kij,kj->ki", white, rest)
     misfit = 2 * float(np.sum(np.linalg.slogdet(covariance)[1]) + np.sum(np.abs(small) ** 2))
-    return _Assessed(predicted, white, rest, misfit, noise)
+    return _Assessed(predicted, white, rest, misfit if np.isfinite(misfit) else np.inf, noise)
+
+
+def _with_noise(
+    lines: WindowedLines, explanation: Explanation, noise: NoiseModel | None, seen: _Assessed | None = None
+) -> _Assessed:
+    """Misfit under the noise that fits the residual best."""
+    predicted = seen.predicted if seen is not None else predict_lines(explanation, lines)
+    rest = lines.measured - predicted.response
+    through = through_structure(explanation, lines)
+    found = fit_noise(lines.frequencies, rest, through, levels(lines), noise)
+    return _misfit(lines, explanation, predicted, rest, found)
+
+
+def _solved(matrix: Real, gradient: Real) -> Real:
+    try:
+        return np.asarray(np.linalg.solve(matrix, gradient), dtype=float)
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0], dtype=float)
 
 
 def _normal_of(lines: WindowedLines, explanation: Explanation, seen: _Assessed) -> tuple[Real, Real]:

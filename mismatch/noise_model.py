@@ -45,7 +45,7 @@ class NoiseModel:
         passed = through * np.exp(0.5 * self.forces)
         result = passed @ passed.conj().swapaxes(1, 2)
         diagonal = np.arange(own.shape[1])
-        result[:, diagonal, diagonal] += own
+        result[:, diagonal, diagonal] += own + 1e-12 * np.trace(result, axis1=1, axis2=2).real[:, None]
         return np.asarray(result)
 
     def response_level(self) -> Real:
@@ -139,7 +139,7 @@ def _cost(x: Real, lumps: _Lumps, n: int, m: int, levels: tuple[Real, Real]) -> 
     pushed = np.exp(np.clip(forces, -80, 80))
     covariance = np.einsum("q,bqij->bij", pushed, lumps.through)
     diagonal = np.arange(n)
-    covariance[:, diagonal, diagonal] += own
+    covariance[:, diagonal, diagonal] += own + 1e-12 * np.trace(covariance, axis1=1, axis2=2).real[:, None]
     inverse = np.linalg.inv(covariance)
     weighed = inverse @ lumps.covariance
     cost = np.sum(lumps.counts * (np.linalg.slogdet(covariance)[1] + np.trace(weighed, axis1=1, axis2=2).real))

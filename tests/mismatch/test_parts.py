@@ -1,0 +1,161 @@
+"""The diagnosis' parts: derivatives, noise, time loop, library."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mismatch import Explanation, JointLaw, LabError, ModelShape, Trial, band_of, windowed_lines
+from mismatch import physics as physics_folder
+from mismatch.joint_law import POINTS
+from mismatch.joint_simulation import driven_force, joint_force
+from mismatch.noise_model import _cost, fit_noise, whitening
+from mismatch.windowed_lines import WindowedLines, receptance_at
+from modal_fit import ModalModel
+
+
+@pytest.fixture(scope="module")
+def lines(model: ModalModel, linear_trials: list[Trial]) -> WindowedLines:
+    return windowed_lines(linear_trials[1], band_of(model, 256.0), float((-model.poles.real).min()))
+
+
+def test_derivatives_of_the_modal_model_are_those_of_finite_differences(model: ModalModel) -> None:
+    shape = ModelShape(model, LabError())
+    rng = np.random.default_rng(0)
+    u, frequencies = rng.normal(size=shape.size), np.linspace(3, 40, 25)
+    force = rng.normal(size=(25, 2)) + 1j * rng.normal(size=(25, 2))
+    slope = shape.jacobian(u, frequencies, force)
+    for k in range(shape.size):
+        aside = np.zeros(shape.size)
+        aside[k] = 1e-5
+        two = [np.einsum("kpq,kq->kp", shape.model(v).receptance(frequencies), force) for v in (u + aside, u - aside)]
+        expected = (two[0] - two[1]) / 2e-5
+        np.testing.assert_allclose(slope[:, :, k], expected, atol=1e-6 * np.abs(expected).max() + 1e-14)
+
+
+def test_a_linear_recording_is_predicted_down_to_its_noise(model: ModalModel, lines: WindowedLines) -> None:
+    rest = lines.measured - lines.from_force(receptance_at(model, lines.padded_frequencies), lines.force_lines)
+    share = np.sqrt(np.sum(np.abs(rest) ** 2) / np.sum(np.abs(lines.measured) ** 2))
+    assert share < 0.02
+
+
+@pytest.mark.parametrize("colour", [0.0, 1.0])
+def test_noise_of_responses_and_forces_is_told_apart(model: ModalModel, lines: WindowedLines, colour: float) -> None:
+    """Variances known, coloured as 1 / f^colour: recovered within a fifth where they matter."""
+    rng = np.random.default_rng(1)
+    frequencies = np.linspace(3, 40, 4000)
+    through = model.receptance(frequencies) * (2j * np.pi * frequencies[:, None, None]) ** 2
+    own = (frequencies / 10) ** -colour
+    force_variance = np.array([40.0, 90.0])
+
+    def draw(n: int) -> np.ndarray:
+        return (rng.normal(size=(4000, n)) + 1j * rng.normal(size=(4000, n))) / np.sqrt(2)
+
+    rest = draw(2) * np.sqrt(own)[:, None] + np.einsum("kpq,kq->kp", through, draw(2) * np.sqrt(force_variance))
+    found = fit_noise(frequencies, rest, through, (np.full(2, 50.0), np.full(2, 300.0)))
+    np.testing.assert_allclose(np.exp(found.forces), force_variance, rtol=0.2)
+    middle = (frequencies > 5) & (frequencies < 35)
+    covariance = found.covariance(frequencies, 0 * through)[middle]
+    np.testing.assert_allclose(np.real(covariance[:, 0, 0]), own[middle], rtol=0.35)
+    white = np.einsum("kij,kj->ki", whitening(found.covariance(frequencies, through)), rest)
+    assert np.mean(np.abs(white) ** 2) == pytest.approx(1.0, abs=0.03)
+
+
+def test_gradient_of_the_noise_likelihood(model: ModalModel) -> None:
+    from mismatch.noise_model import _bands, _lumped
+
+    rng = np.random.default_rng(2)
+    frequencies = np.linspace(3, 40, 300)
+    through = model.receptance(frequencies) * 1e4
+    rest = rng.normal(size=(300, 2)) + 1j * rng.normal(size=(300, 2))
+    lumps = _lumped(frequencies, rest, through, np.ones(300), _bands(300), np.linspace(np.log(3), np.log(40), 4))
+    levels = (np.full(2, 10.0), np.full(2, 10.0))
+    x = rng.normal(size=10)
+    _, gradient = _cost(x, lumps, 2, 2, levels)
+    for k in range(10):
+        aside = np.zeros(10)
+        aside[k] = 1e-5
+        slope = (_cost(x + aside, lumps, 2, 2, levels)[0] - _cost(x - aside, lumps, 2, 2, levels)[0]) / 2e-5
+        assert gradient[k] == pytest.approx(slope, rel=1e-5, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["spring", "damper", "elements"])
+def test_free_simulation_of_a_linear_joint_is_its_closed_form(
+    model: ModalModel, lines: WindowedLines, kind: str
+) -> None:
+    """A spring, a damper, and elastic elements that never yield: ``g = k x_free / (1 + k h)``."""
+    s = 2j * np.pi * lines.padded_frequencies
+    direction = np.array([0.6, 0.8])
+    k = 2e4
+    law = {
+        "spring": JointLaw(reach=0.1, stiffness=k * np.linspace(-0.1, 0.1, POINTS)),
+        "damper": JointLaw(speed=5.0, damping=400 * np.linspace(-5, 5, POINTS)),
+        "elements": JointLaw(springs=np.array([k / 4, 3 * k / 4]), yields=np.array([1.0, 2.0])),
+    }[kind]
+    found = joint_force(model, lines, lines.force_lines, direction, law)
+    receptance = receptance_at(model, lines.padded_frequencies)
+    free = np.einsum("p,kpq,kq->k", direction, receptance, lines.force_lines)
+    own = np.einsum("p,kpq,q->k", direction, receptance, direction)
+    factor = 400 * s if kind == "damper" else k
+    expected = factor * free / (1 + factor * own)
+    assert np.abs(found - expected).max() < 2e-3 * np.abs(expected).max()
+
+
+def test_an_elastic_plastic_element_follows_its_loop(lines: WindowedLines) -> None:
+    """Up to the yield, down to the other: the corners of Iwan's parallelogram."""
+    x = np.concatenate([np.linspace(0, 3, 60), np.linspace(3, -3, 120), np.linspace(-3, 0, 60)])
+    force = driven_force(lines, x, 0 * x, JointLaw(springs=np.array([10.0]), yields=np.array([1.0])))
+    assert force[59] == pytest.approx(10.0)
+    assert force[0] == 0
+    assert force[179] == pytest.approx(-10.0)
+    assert force[60:110].min() == pytest.approx(-10.0)
+    assert force[62] == pytest.approx(10 - 10 * (3 - x[62]), abs=1e-9)
+
+
+def test_every_cause_is_a_short_file_with_its_source() -> None:
+    folder = Path(physics_folder.__file__).parent
+    for name, cause in physics_folder.library().items():
+        assert len((folder / f"{name}.py").read_text().splitlines()) < 150
+        assert cause.equation
+        assert cause.source
+        assert all(other in physics_folder.library() or other == "modal_parameters" for other in cause.confusable_with)
+
+
+TOY = """
+import numpy as np
+from mismatch.joint_law import JointLaw
+from mismatch.physics import Parameter
+
+
+class Toy:
+    name = "toy_square_root"
+    equation = "g = c sign(v) sqrt|v|"
+    source = "this test"
+    parameters = (Parameter("c", "", 0.1, 0.0, 1e9, logarithmic=True),)
+    confusable_with = ()
+
+    def starts(self, motion):
+        return (np.array([1.0]),)
+
+    def law(self, values, motion):
+        v = motion.velocities
+        return JointLaw(speed=motion.speed, damping=values[0] * np.sign(v) * np.sqrt(np.abs(v)))
+
+
+PHYSICS = Toy()
+"""
+
+
+def test_a_new_cause_is_one_file_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "toy_square_root.py").write_text(TOY)
+    monkeypatch.setattr(physics_folder, "__path__", [*physics_folder.__path__, str(tmp_path)])
+    toy = physics_folder.library()["toy_square_root"]
+    assert isinstance(toy, physics_folder.JointPhysics)
+
+
+def test_explanation_without_causes_is_the_nominal_model(model: ModalModel) -> None:
+    shape = ModelShape(model, LabError())
+    same = Explanation(shape, np.zeros(shape.size)).model
+    np.testing.assert_allclose(same.poles, model.poles)
+    np.testing.assert_allclose(same.right, replace(model).right)
