@@ -17,7 +17,7 @@ from .windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
 
-BINS = 17
+BINS = 21
 LEAST_SAMPLES = 80
 BLOCK = 1.0
 """Length of a piece of the record that counts as one independent sample of the scatter, s."""
@@ -30,7 +30,7 @@ class BinnedForce:
     Parameters
     ----------
     at : (n,)
-        Middle of each bin: m, or m/s.
+        Mean of each bin: m, or m/s.
     force, error : (n,), N
         Mean and its standard error from the scatter between pieces of the records.
     law : (n,), N
@@ -91,7 +91,7 @@ def free_form_law(diagnosis: Diagnosis) -> FreeFormLaw | None:
     bare = replace(final, causes=tuple(one for one in final.causes if one is not cause))
     samples = _joined([_seen(diagnosis.final, bare, cause, k, one) for k, one in enumerate(diagnosis.lines)])
     up = samples.v > 0
-    ends = _even(samples.x)
+    ends = _edges(samples.x)
     elastic = _mean_at(samples.x, samples.force, ends), _mean_at(samples.x, samples.law, ends)
     rest = replace(samples, force=samples.force - elastic[0], law=samples.law - elastic[1])
     share = 1 - float(np.mean((samples.force - samples.law) ** 2) / np.mean(samples.force**2))
@@ -100,7 +100,7 @@ def free_form_law(diagnosis: Diagnosis) -> FreeFormLaw | None:
         cause.direction,
         _binned(samples, samples.x, ends, up),
         _binned(samples, samples.x, ends, ~up),
-        _binned(rest, samples.v, _even(samples.v), np.ones(len(up), dtype=bool)),
+        _binned(rest, samples.v, _edges(samples.v), np.ones(len(up), dtype=bool)),
         share,
     )
 
@@ -135,10 +135,11 @@ def _joined(parts: list[_Sample]) -> _Sample:
     return _Sample(x, v, force, law, np.concatenate(pieces))
 
 
-def _even(values: Real) -> Real:
-    """Edges of the bins: even over where all but one in 500 samples lie."""
-    low, high = np.quantile(values, [0.001, 0.999])
-    return np.linspace(low, high, BINS + 1)
+def _edges(values: Real) -> Real:
+    """Edges of the bins where all but one in 500 samples lie: halfway between evenly wide and evenly filled."""
+    shares = np.linspace(0.001, 0.999, BINS + 1)
+    filled = np.quantile(values, shares)
+    return np.asarray(0.5 * (filled + np.linspace(filled[0], filled[-1], BINS + 1)))
 
 
 def _mean_at(values: Real, force: Real, edges: Real) -> Real:
@@ -163,5 +164,5 @@ def _binned(samples: _Sample, values: Real, edges: Real, chosen: NDArray[np.bool
     left = (all_sums - sums) / np.maximum(total - held, 1)
     error = np.sqrt((count - 1) / count * np.sum((left - left.mean(axis=0)) ** 2, axis=0))
     law = np.bincount(place, samples.law[inside], BINS) / np.maximum(total, 1)
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    return BinnedForce(middle[good], (all_sums / np.maximum(total, 1))[good], error[good], law[good])
+    at = np.bincount(place, values[inside], BINS) / np.maximum(total, 1)
+    return BinnedForce(at[good], (all_sums / np.maximum(total, 1))[good], error[good], law[good])

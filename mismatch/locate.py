@@ -116,11 +116,13 @@ def _bands(edges: Real, tables: Tables, p_value: Real) -> list[dict[str, Any]]:
     found = []
     for start, stop in _runs(p_value < FAMILY_WISE):
         part = slice(start, stop)
+        peak = start + int(np.argmax(excess[part]))
         weights = np.maximum(before[1][part], 1e-9), np.maximum(after[1][part], 1e-9)
         found.append(
             {
                 "low_hz": _plain(edges[start]),
                 "high_hz": _plain(edges[stop]),
+                "peak_hz": _plain(float(np.sqrt(edges[peak] * edges[peak + 1]))),
                 "before": _plain(float(np.average(before[0][part], weights=weights[0]))),
                 "after": _plain(float(np.average(after[0][part], weights=weights[1]))),
                 "share": _plain(float(excess[part].sum() / max(excess.sum(), 1e-300))),
