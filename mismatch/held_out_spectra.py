@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from .diagnosis import Diagnosis
 from .explanation import Explanation, predict_lines
 from .fitting import fit, through_structure
+from .noise_model import NoiseModel
 from .residual_maps import band_edges
 from .windowed_lines import WindowedLines
 
@@ -53,7 +54,8 @@ def held_out_spectra(diagnosis: Diagnosis) -> HeldOutSpectra:
     others = [k for k in range(len(lines)) if k != kept] or [kept]
     here, final = lines[kept], diagnosis.final
     before, after = (
-        _refitted([lines[k] for k in others], start.explanation) for start in (diagnosis.base, diagnosis.final)
+        _refitted([lines[k] for k in others], start.explanation, tuple(start.noises[k] for k in others))
+        for start in (diagnosis.base, diagnosis.final)
     )
     shown = predict_lines(after, here).response
     covariance = final.noises[kept].covariance(here.frequencies, through_structure(final.explanation, here))
@@ -71,8 +73,8 @@ def held_out_spectra(diagnosis: Diagnosis) -> HeldOutSpectra:
     return HeldOutSpectra(here.trial.name, middle, channels, here.trial.powers, *densities)
 
 
-def _refitted(lines: list[WindowedLines], start: Explanation) -> Explanation:
-    return fit(lines, start, iterations=3).explanation
+def _refitted(lines: list[WindowedLines], start: Explanation, noises: tuple[NoiseModel, ...]) -> Explanation:
+    return fit(lines, start, noises, iterations=2, tolerance=10.0).explanation
 
 
 def _density(power: Real, lines: WindowedLines, edges: Real) -> Real:

@@ -41,7 +41,7 @@ def number(value: float, error: float | None = None) -> str:
     Examples
     --------
     >>> number(0.00024987, 0.0000012), number(3.0)
-    ('0.00024987 ± 1.2e-06', '3')
+    ('0.0002499 ± 1.2e-06', '3')
     """
     if error is None or not np.isfinite(error) or error <= 0:
         return f"{value:.4g}"
