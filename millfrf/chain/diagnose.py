@@ -8,9 +8,11 @@ from pathlib import Path
 from foundation import InputError
 from mismatch import Diagnosis, Settings, diagnose, read_trials
 from mismatch.diagnosis_file import improved_model_of, write_diagnosis
+from mismatch.spindle_orders import SpindleSpeed, spindle_speed
 from modal_fit import read_modal_model, write_modal_model
 
 from ..progress import Watch, silent
+from ..report.diagnosis_page import with_location, write_diagnosis_report
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ def diagnose_files(
     stream: str | None = None,
     watch: Watch = silent,
 ) -> DiagnosisFiles:
-    """Diagnose and write ``diagnosis.json`` and ``improved_model.json`` into a folder, made if need be.
+    """Diagnose and write diagnosis, improved model and report into a folder, made if need be.
 
     Raises
     ------
@@ -45,11 +47,21 @@ def diagnose_files(
     trials = read_trials(recordings, model, stream=stream)
     with watch("diagnosing"):
         diagnosis = diagnose(model, trials, settings)
+    with watch("locating"):
+        diagnosis, view = with_location(diagnosis, trials, _speeds(recordings))
     folder.mkdir(parents=True, exist_ok=True)
-    paths = (folder / "diagnosis.json", folder / "improved_model.json")
+    paths = (folder / "diagnosis.json", folder / "improved_model.json", folder / "report.html")
     write_diagnosis(paths[0], diagnosis)
     write_modal_model(paths[1], improved_model_of(diagnosis))
+    with watch("writing the report"):
+        write_diagnosis_report(paths[2], view, Path(model_path).name)
     return DiagnosisFiles(diagnosis, paths, tuple(summary(diagnosis)))
+
+
+def _speeds(recordings: Sequence[str | os.PathLike[str]]) -> dict[str, SpindleSpeed]:
+    """Spindle speed by recording's name, where it is stated."""
+    stated = {Path(path).stem: spindle_speed(path) for path in recordings}
+    return {name: speed for name, speed in stated.items() if speed is not None}
 
 
 def summary(diagnosis: Diagnosis) -> list[str]:

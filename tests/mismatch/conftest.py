@@ -1,13 +1,17 @@
-"""Fixtures of the diagnosis' tests: a small structure and recordings of it."""
+"""Fixtures of the diagnosis' tests: small structures, recordings of them, and diagnoses whose residual is known."""
 
 import importlib.util
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from mismatch import Trial
+from mismatch import Diagnosis, Explanation, LabError, ModelShape, Trial, band_of, predict_lines, windowed_lines
+from mismatch.diagnosis import Improvement
+from mismatch.fitting import Fit
+from mismatch.noise_model import KNOTS, NoiseModel
 from modal_fit import ModalModel
 
 _PATH = Path(__file__).with_name("concealed_recordings.py")
@@ -32,3 +36,61 @@ def linear_trials() -> list[Trial]:
         force = _MODULE.forces(rng, level, 24.0)
         made.append(_MODULE.trial(name, force, _MODULE.linear_acceleration(_MODULE.structure(), force), rng))
     return made
+
+
+RATE, NOISE = 128.0, 0.02
+
+
+@pytest.fixture(scope="package")
+def small_model() -> ModalModel:
+    """Two modes at 6 and 14 Hz seen in x and y."""
+    omega, zeta = 2 * np.pi * np.array([6.0, 14.0]), np.array([0.03, 0.02])
+    poles = omega * (-zeta + 1j * np.sqrt(1 - zeta**2))
+    shapes = np.array([[1.0, 0.4], [-0.3, 1.0]])
+    left = shapes / (2j * omega[:, None] * 40.0)
+    return ModalModel(
+        quantity="receptance",
+        unit="m/N",
+        responses=("TCP:+X", "TCP:+Y"),
+        excitations=("TCP:+X", "TCP:+Y"),
+        poles=poles,
+        right=shapes.astype(complex),
+        left=left,
+    )
+
+
+@pytest.fixture(scope="package")
+def trial_of() -> Callable[[ModalModel, str, float, int], Trial]:
+    """Makes trials."""
+    return _trial
+
+
+@pytest.fixture(scope="package")
+def hand_made() -> Callable[[ModalModel, list[Trial]], Diagnosis]:
+    """Makes diagnoses without diagnosing."""
+    return _hand_made
+
+
+def _trial(model: ModalModel, name: str, level: float, seed: int) -> Trial:
+    """Broadband forces through the model, plus white noise on the accelerations."""
+    rng = np.random.default_rng(seed)
+    n = int(40 * RATE)
+    channels = ("fx", "fy", "ax", "ay")
+    force = level * rng.normal(size=(n, 2))
+    empty = Trial(name, RATE, force, np.zeros((n, 2)), np.array([2, 2]), channels)
+    lines = windowed_lines(empty, band_of(model, RATE), 1.0)
+    shape = ModelShape(model, LabError())
+    response = lines.signal(predict_lines(Explanation(shape, np.zeros(shape.size)), lines).spectrum)
+    return Trial(name, RATE, force, response + NOISE * rng.normal(size=(n, 2)), np.array([2, 2]), channels)
+
+
+def _hand_made(model: ModalModel, trials: list[Trial]) -> Diagnosis:
+    """A diagnosis whose two fits are the true linear model with the true noise."""
+    lines = tuple(windowed_lines(trial, band_of(model, RATE), 1.0) for trial in trials)
+    shape = ModelShape(model, LabError())
+    knots = np.log(np.geomspace(lines[0].frequencies[0], lines[0].frequencies[-1], KNOTS))
+    noise = NoiseModel(knots, np.full((2, KNOTS), np.log(NOISE**2)), np.full(2, -60.0))
+    explanation = Explanation(shape, np.zeros(shape.size))
+    fitted = Fit(explanation, (noise,) * len(lines), 0.0, 0.0, 0.0, 1e-6 * np.eye(shape.size))
+    gain = Improvement(trials[len(trials) // 2].name, 0.3, 0.2, 0.1, 0.09, 0.01, (0.2, 0.4))
+    return Diagnosis("none", (), (), (), gain, 0.0, fitted, fitted, lines)

@@ -1,0 +1,61 @@
+"""The measured restoring force of a joint, no law assumed, beside the law that was accepted."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from mismatch.free_form_law import BinnedForce, FreeFormLaw
+
+from .style import COLOURS, SHADE, house_style, legend_above, new_figure, panel_letter
+
+
+def law_figure(found: FreeFormLaw) -> Figure:
+    """Force against deflection, moving forth and back, and against velocity with what depends on deflection taken off.
+
+    Symbols are means in bins with bands of two standard errors; lines are the accepted law driven by the same motion
+    and averaged alike.
+    """
+    law = found.name.replace("_", " ")
+    with house_style():
+        figure = new_figure(82.0)
+        left, right = figure.subplots(1, 2)
+        _draw(left, found.forward, ("o", COLOURS[0]), "Measured, deflection rising", (f"Law ({law}), rising", "-"), 1e6)
+        _draw(left, found.backward, ("v", COLOURS[2]), "Measured, falling", ("Law, falling", (0, (5, 1.5))), 1e6)
+        _draw(right, found.damping, ("o", COLOURS[0]), "", ("", "-"), 1e3)
+        left.set_xlabel("Deflection along the joint (µm)")
+        right.set_xlabel("Velocity along the joint (mm/s)")
+        left.set_ylabel("Force beyond the linear model (N)")
+        right.set_ylabel("Force less its mean at that deflection (N)")
+        _same_scale(left, right, (found.forward, found.backward, found.damping))
+        for number, axes in enumerate((left, right)):
+            axes.axhline(0, color="#999999", linewidth=0.5, zorder=1)
+            axes.axvline(0, color="#999999", linewidth=0.5, zorder=1)
+            axes.locator_params(axis="x", nbins=6)
+            panel_letter(axes, number)
+        legend_above(figure, left, columns=4)
+    return figure
+
+
+def _draw(
+    axes: Axes,
+    bins: BinnedForce,
+    marks: tuple[str, str],
+    label: str,
+    law: tuple[str, str | tuple[int, tuple[float, ...]]],
+    scale: float,
+) -> None:
+    at = scale * bins.at
+    axes.fill_between(at, bins.force - 2 * bins.error, bins.force + 2 * bins.error, color=SHADE, linewidth=0, zorder=1)
+    axes.plot(at, bins.law, color=marks[1], linestyle=law[1], linewidth=1.0, label=law[0] or None)
+    filled = "white" if marks[0] == "o" else marks[1]
+    axes.plot(
+        at, bins.force, marks[0], color=marks[1], markerfacecolor=filled, markersize=3.8, label=label or None, zorder=3
+    )
+
+
+def _same_scale(left: Axes, right: Axes, all_bins: tuple[BinnedForce, ...]) -> None:
+    values: NDArray[np.float64] = np.concatenate([np.abs(one.force) + 2 * one.error for one in all_bins])
+    top = 1.1 * float(np.max(values))
+    left.set_ylim(-top, top)
+    right.set_ylim(-top, top)

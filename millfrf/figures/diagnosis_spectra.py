@@ -1,0 +1,42 @@
+"""Measured and predicted spectra of the recording that was held out, and what each model leaves."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from mismatch.held_out_spectra import HeldOutSpectra
+
+from .style import COLOURS, WIDTH_MM, house_style, new_figure
+
+UNITS = ("m", "m/s", "m/s²")
+MOST_CHANNELS = 6
+
+
+def spectra_figure(spectra: HeldOutSpectra) -> Figure:
+    """A row a response, the first six: amplitude spectral densities over frequency."""
+    count = min(len(spectra.channels), MOST_CHANNELS)
+    with house_style():
+        height = 18.0 + 46.0 * count
+        figure = new_figure(height, None)
+        room = {"left": 17 / WIDTH_MM, "right": 1 - 2 / WIDTH_MM, "top": 1 - 7 / height, "bottom": 11 / height}
+        panels = figure.add_gridspec(count, 1, hspace=0.06, **room).subplots(squeeze=False, sharex=True)[:, 0]
+        for p, axes in enumerate(panels):
+            x = spectra.frequencies
+            axes.fill_between(x, 1e-30, spectra.noise[:, p], color="#dddddd", linewidth=0, label="Noise")
+            axes.plot(x, spectra.measured[:, p], color=COLOURS[0], linewidth=1.8, label="Measured")
+            axes.plot(x, spectra.predicted[:, p], color=COLOURS[5], linewidth=0.9, linestyle="--", label="Final model")
+            axes.plot(x, spectra.before[:, p], color=COLOURS[1], linestyle=":", label="Left by nominal, refitted")
+            axes.plot(x, spectra.after[:, p], color=COLOURS[2], linewidth=1.0, label="Left by final model")
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            shown = [spectra.measured[:, p], spectra.after[:, p], spectra.noise[:, p]]
+            axes.set_ylim(0.4 * float(np.nanmin(shown)), 2.0 * float(np.nanmax(shown)))
+            axes.set_xlim(x[0], x[-1])
+            axes.set_ylabel(f"{spectra.channels[p]} ({UNITS[int(spectra.powers[p])]}/√Hz)")
+        ticks = np.array([k * 10.0**d for d in range(-3, 6) for k in (1, 2, 5)])
+        inside = ticks[(ticks >= spectra.frequencies[0]) & (ticks <= spectra.frequencies[-1])]
+        panels[-1].set_xticks(inside, [f"{tick:g}" for tick in inside])
+        panels[-1].set_xticks([], minor=True)
+        panels[-1].set_xlabel("Frequency (Hz)")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="upper center", ncols=len(labels), borderaxespad=0.2)
+    return figure

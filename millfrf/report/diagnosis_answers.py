@@ -1,0 +1,236 @@
+"""A diagnosis in sentences: where, what, how sure, what else it could be, which test would tell."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from foundation import DegreeOfFreedom
+from mismatch import AcceptedCause, Diagnosis
+from mismatch.physics import library
+
+from .next_tests import next_test
+
+
+def words(name: str) -> str:
+    """Name of a physics as it is said.
+
+    Examples
+    --------
+    >>> words("coulomb_friction")
+    'Coulomb friction'
+    """
+    return name.replace("_", " ").replace("coulomb", "Coulomb").replace("ac coupling", "AC coupling")
+
+
+def first_word(name: str) -> str:
+    """The same at the beginning of a sentence.
+
+    Examples
+    --------
+    >>> first_word("ac_coupling"), first_word("missing_mode")
+    ('AC coupling', 'Missing mode')
+    """
+    said = words(name)
+    return said[:1].upper() + said[1:]
+
+
+def number(value: float, error: float | None = None) -> str:
+    """A value with its standard error.
+
+    Examples
+    --------
+    >>> number(0.00024987, 0.0000012), number(3.0)
+    ('0.0002499 ± 1.2e-06', '3')
+    """
+    if error is None or not np.isfinite(error) or error <= 0:
+        return f"{value:.4g}"
+    digits = int(np.clip(np.floor(np.log10(max(abs(value), error))) - np.floor(np.log10(error)) + 2, 2, 9))
+    return f"{value:.{digits}g} ± {error:.2g}"
+
+
+def verdict_sentence(diagnosis: Diagnosis) -> str:
+    """The whole result in one sentence."""
+    gain = diagnosis.improvement
+    found = " and ".join(f"{words(cause.name)} ({next_test(cause.name).meaning})" for cause in diagnosis.physics)
+    if diagnosis.verdict == "none":
+        return f"Nothing is missing: {next_test('none').meaning}."
+    if diagnosis.verdict == "unexplained":
+        part = f" beside {found}" if found else ""
+        return f"Unexplained: {next_test('unexplained').meaning}{part}; no physics is named for it."
+    fall = (
+        f"; with {'it' if len(diagnosis.physics) == 1 else 'them'}, the error on the held-out recording falls from "
+        f"{100 * gain.before:.3g} % to {100 * gain.after:.3g} %, noise being {100 * gain.noise_floor:.3g} %"
+    )
+    fall = fall if gain.after < gain.before else ""
+    return f"The model leaves out {found}{fall}."
+
+
+def answers(diagnosis: Diagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Question and sentences, in the order in which an engineer asks."""
+    return (
+        ("Where?", where(diagnosis)),
+        ("What?", what(diagnosis)),
+        ("How sure?", how_sure(diagnosis)),
+        ("What else?", what_else(diagnosis)),
+        ("Which test tells?", which_test(diagnosis)),
+    )
+
+
+def where(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Place of each cause, then what the maps located."""
+    said = [f"{first_word(cause.name)}: {place(diagnosis, cause)}." for cause in diagnosis.physics]
+    located = diagnosis.located
+    bands = located.get("frequency_bands", [])
+    if not bands:
+        return (*said, "No band, channel, time or level has more residual than noise would leave.")
+    large = [band for band in bands if band["share"] >= 0.005] or bands[:1]
+    shown = "; ".join(
+        f"{band['low_hz']:.3g} to {band['high_hz']:.3g} Hz ({100 * band['share']:.0f} %, strongest near "
+        f"{band['peak_hz']:.3g} Hz)"
+        for band in large[:3]
+    )
+    channels = ", ".join(
+        f"{row['channel']} {100 * row['share']:.0f} %"
+        for row in sorted(located["channels"], key=lambda row: -row["share"])
+        if row["significant"]
+    )
+    said.append(f"Residual above noise lies at {shown}" + (f"; in {channels}." if channels else "."))
+    said += _times(diagnosis) + _orders(located)
+    return tuple(said)
+
+
+def place(diagnosis: Diagnosis, cause: AcceptedCause) -> str:
+    """Location of a cause in words."""
+    location = cause.location
+    if "direction" in location:
+        model = diagnosis.final.explanation.model
+        parts = [DegreeOfFreedom.parse(label) for label in model.excitations][: len(location["direction"])]
+        axes = ", ".join(f"{value:+.3f} {part.axis}" for value, part in zip(location["direction"], parts, strict=False))
+        return f"in a joint that acts along {axes} at {parts[0].node}"
+    if "channel" in location:
+        return f"in the {location.get('role', 'response')} channel {location['channel']}"
+    if "channels" in location:
+        return f"in {', '.join(location['channels'])}"
+    if "modes" in location:
+        return "modes " + ", ".join(str(mode) for mode in location["modes"])
+    if "shape" in location:
+        return "shape " + ", ".join(f"{label} {value:.2f}" for label, value in location["shape"].items())
+    return "in the whole measuring chain or structure"
+
+
+def _times(diagnosis: Diagnosis) -> list[str]:
+    """Said only where a recording is not affected as a whole."""
+    said = []
+    for one in diagnosis.lines:
+        stretches = [row for row in diagnosis.located["times"] if row["recording"] == one.trial.name]
+        held = sum(row["end_s"] - row["start_s"] for row in stretches)
+        if stretches and held < 0.8 * (one.trial.duration - one.start / one.trial.rate):
+            spans = ", ".join(f"{row['start_s']:.3g} to {row['end_s']:.3g} s" for row in stretches[:6])
+            said.append(f"In {one.trial.name} it is seen at {spans}{' and later' if len(stretches) > 6 else ''}.")
+    return said
+
+
+def _orders(located: Mapping[str, Any]) -> list[str]:
+    orders = sorted({row["order"] for row in located["spindle_orders"]})
+    if orders:
+        return [f"It sits at the spindle's orders {', '.join(str(order) for order in orders)}."]
+    note = located["spindle_orders_note"]
+    return [f"Spindle orders: {note}."] if note else []
+
+
+def what(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Equation and source of each cause, and how the residual grows with the level."""
+    known = library()
+    said = []
+    for cause in diagnosis.physics:
+        physics = known.get(cause.name)
+        equation = f": {physics.equation} ({physics.source})" if physics is not None else ""
+        said.append(f"{first_word(cause.name)}{equation}.")
+    growth = diagnosis.located.get("growth", {})
+    found = growth.get("effect") or growth.get("residual")
+    if found and found["exponent"] is not None:
+        said.append(
+            f"It grows as the force to the power {number(found['exponent'], found['exponent_standard_error'])} "
+            "(a linear omission: 1, a cubic stiffness: 3, dry friction: 0)."
+        )
+    return tuple(said) or ("Nothing beyond the refitted modal parameters.",)
+
+
+def how_sure(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Evidence, and what it is worth on data that was held out."""
+    gain = diagnosis.improvement
+    said = [
+        f"{first_word(cause.name)}: evidence {cause.evidence:.0f} (twice the logarithm of the odds; 20 is the "
+        "least that is accepted)."
+        for cause in diagnosis.physics
+    ]
+    said.append(
+        f"On {gain.held_out}, which the fit did not see, the error is {100 * gain.before:.3g} % of the response for "
+        f"the nominal model, {100 * gain.refitted:.3g} % refitted, {100 * gain.after:.3g} % for the final one; noise "
+        f"is {100 * gain.noise_floor:.3g} %. Final over nominal: {gain.interval[0]:.3g} to {gain.interval[1]:.3g} "
+        f"(95 % interval); that the causes do not help has p = {gain.p_value:.2g}."
+    )
+    said.append(f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal.")
+    return tuple(said)
+
+
+def rivals(diagnosis: Diagnosis) -> list[tuple[str, float]]:
+    """Other causes that were fitted with their best evidence, best first."""
+    accepted = {cause.name for cause in diagnosis.physics}
+    best: dict[str, float] = {}
+    for one in diagnosis.candidates:
+        if one.stage == "fitted" and one.name not in accepted:
+            best[one.name] = max(best.get(one.name, -np.inf), one.evidence)
+    return sorted(best.items(), key=lambda item: -item[1])
+
+
+def what_else(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """Causes that the data cannot separate, then the nearest ones that it can."""
+    said = []
+    if diagnosis.equivalents:
+        names = ", ".join(words(name) for name in diagnosis.equivalents)
+        said.append(f"The recordings cannot tell it from {names}.")
+    others = [rival for rival in rivals(diagnosis) if rival[0] not in diagnosis.equivalents and rival[1] > 0]
+    if diagnosis.physics and others:
+        name, evidence = others[0]
+        top = max(cause.evidence for cause in diagnosis.physics)
+        ending = f"less by {top - evidence:.0f}" if evidence < top else "but it was the weaker answer in its round"
+        said.append(f"The nearest rival that was fitted is {words(name)} with evidence {evidence:.0f}, {ending}.")
+    elif others:
+        said.append(f"Nearest, but not accepted: {words(others[0][0])} with evidence {others[0][1]:.0f}.")
+    known = library()
+    for cause in diagnosis.physics[:1]:
+        if cause.name in known and known[cause.name].confusable_with:
+            names = ", ".join(words(name) for name in known[cause.name].confusable_with)
+            said.append(f"In general it is easily taken for {names}.")
+    return tuple(said) or ("No other cause of the library came near.",)
+
+
+def which_test(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """The next test for each accepted cause, for its equivalents, or for the verdict."""
+    names = [cause.name for cause in diagnosis.physics] + list(diagnosis.equivalents)
+    if diagnosis.verdict != "explained":
+        names = [diagnosis.verdict, *names]
+    several = len(names) > 1
+    return tuple((f"{first_word(name)}: " if several else "") + next_test(name).test for name in dict.fromkeys(names))
+
+
+def warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """What should make a reader careful."""
+    gain, said = diagnosis.improvement, []
+    final = diagnosis.final.explanation
+    improved = final.causes or final.shape.added
+    if len(diagnosis.lines) < 2:
+        said.append("There is a single recording: nothing could be held out, and errors are those of the fit.")
+    elif len(diagnosis.lines) < 3:
+        said.append("There are two recordings only: how the residual grows with the level is known from two points.")
+    if improved and gain.p_value > 0.01:
+        said.append(f"On the held-out recording the improvement is not significant (p = {gain.p_value:.2g}).")
+    if gain.after > 1.5 * gain.noise_floor:
+        said.append(
+            f"On the held-out recording the final model's error is {gain.after / gain.noise_floor:.2g} times the noise."
+        )
+    if diagnosis.verdict == "explained" and diagnosis.leftover > 0.1:
+        said.append(f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal.")
+    return tuple(said)

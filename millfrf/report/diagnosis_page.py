@@ -1,0 +1,94 @@
+"""The page that an engineer reads after a diagnosis."""
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from importlib.resources import files
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from foundation import writing_whole_file
+from mismatch import Diagnosis, Trial
+from mismatch.locate import located
+from mismatch.residual_view import ResidualView, residual_view
+from mismatch.spindle_orders import SpindleSpeed
+
+from ..provenance import versions
+from .diagnosis_answers import answers, verdict_sentence, warnings
+from .diagnosis_sections import (
+    candidate_section,
+    growth_section,
+    held_out_section,
+    if_possible,
+    law_section,
+    location_section,
+    number_section,
+)
+
+
+def with_location(
+    diagnosis: Diagnosis, trials: Sequence[Trial], speeds: Mapping[str, SpindleSpeed]
+) -> tuple[Diagnosis, ResidualView]:
+    """The diagnosis with its ``located`` filled in, and the maps for the page.
+
+    Parameters
+    ----------
+    diagnosis
+        As found.
+    trials
+        Recordings as read.
+    speeds
+        Spindle speed by recording's name, where known.
+    """
+    view = residual_view(diagnosis, trials)
+    full = replace(diagnosis, located=located(view, speeds))
+    return full, replace(view, diagnosis=full)
+
+
+def write_diagnosis_report(path: str | os.PathLike[str], view: ResidualView, model_name: str = "") -> None:
+    """Write one HTML page, figures inside, that needs no other file and no network.
+
+    Parameters
+    ----------
+    path
+        Of the page.
+    view
+        Of a located diagnosis (:func:`with_location`).
+    model_name
+        Of the nominal model, for the title.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+    """
+    text = report_text(view, model_name)
+    with writing_whole_file(path) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8")
+
+
+def report_text(view: ResidualView, model_name: str = "") -> str:
+    """The page as text."""
+    diagnosis = view.diagnosis
+    sections = (
+        number_section(diagnosis),
+        if_possible(lambda: law_section(diagnosis), "The measured force of the joint"),
+        if_possible(lambda: held_out_section(diagnosis), "On data that was not fitted"),
+        location_section(view),
+        growth_section(diagnosis),
+        candidate_section(diagnosis),
+    )
+    names = ", ".join(one.trial.name for one in diagnosis.lines)
+    environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
+    return environment.get_template("diagnosis.html.j2").render(
+        title=f"{model_name or 'Nominal model'} against {names}",
+        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
+        verdict=verdict_sentence(diagnosis),
+        answers=answers(diagnosis),
+        warnings=warnings(diagnosis),
+        sections=[section for section in sections if not section.empty],
+        versions=versions(),
+    )

@@ -1,0 +1,153 @@
+"""Tables and figures of a diagnosis."""
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from foundation import InputError
+from mismatch import Candidate, Diagnosis
+from mismatch.free_form_law import free_form_law
+from mismatch.held_out_spectra import held_out_spectra
+from mismatch.locate import significant_cells
+from mismatch.residual_view import ResidualView
+
+from ..figures.diagnosis_growth import growth_figure
+from ..figures.diagnosis_law import law_figure
+from ..figures.diagnosis_maps import channel_map_figure, time_map_figure
+from ..figures.diagnosis_spectra import spectra_figure
+from ..figures.embed import as_data_uri
+from ..tables import Table
+from .diagnosis_answers import number, place, words
+from .section import Picture, Section
+
+MOST_CANDIDATES = 15
+
+
+def location_section(view: ResidualView) -> Section:
+    """Maps of the residual, and a table by recording."""
+    diagnosis = view.diagnosis
+    located = diagnosis.located
+    level = 100 * located["family_wise_level"]
+    rows = tuple(
+        (row["recording"], f"{row['force_rms_n']:.4g}", f"{row['before']:.3g}", f"{row['after']:.3g}")
+        for row in located["levels"]
+    )
+    columns = ("recording", "force, rms (N)", "nominal model, refitted", "final model")
+    table = Table("Residual power over noise power (1: only noise is left)", columns, rows)
+    mask = significant_cells(located, view.before.ratio.shape)
+    maps = _picture(
+        channel_map_figure(view, mask),
+        "Residual power over noise power by frequency and channel, a column a recording. Dots: more than noise "
+        f"leaves, at {level:.0f} % for all {located['tests']} cells of all maps together (F tests, Holm).",
+        "Residual by frequency and channel",
+    )
+    times = _picture(
+        time_map_figure(view), "The same over time and frequency, all channels together.", "Residual by time"
+    )
+    return Section("Where the residual sits", (), (table,), (maps, times))
+
+
+def growth_section(diagnosis: Diagnosis) -> Section:
+    """How the residual grows with the level."""
+    growth = diagnosis.located["growth"]
+    if "residual" not in growth or len(diagnosis.lines) < 2:
+        return Section("Growth with the level")
+    caption = (
+        "Residual with the power of the noise taken off, relative to the response averaged over all recordings, "
+        "against force; bars are two standard errors. Thin lines: slopes of typical omissions."
+    )
+    return Section(
+        "Growth with the level", (), (), (_picture(growth_figure(growth), caption, "Growth of the residual"),)
+    )
+
+
+def law_section(diagnosis: Diagnosis) -> Section:
+    """The measured force of the joint."""
+    title = "The measured force of the joint"
+    found = free_form_law(diagnosis)
+    if found is None:
+        return Section(title)
+    sentence = (
+        "The force that the linear model lacks along the found direction, from the recordings alone and with no law "
+        f"assumed; {words(found.name)} gives {100 * found.explained:.1f} % of its power."
+    )
+    caption = (
+        "Force that the joint takes beyond the linear model, in bins over all recordings, with bands of two standard "
+        "errors; (a) against deflection, rising and falling; (b) against velocity. Lines: the accepted law, driven by "
+        "the same motion and averaged alike."
+    )
+    return Section(title, (sentence,), (), (_picture(law_figure(found), caption, "Force of the joint"),))
+
+
+def held_out_section(diagnosis: Diagnosis) -> Section:
+    """Errors and spectra on the recording that was held out."""
+    gain = diagnosis.improvement
+    rows = (
+        ("nominal", f"{100 * gain.before:.3g}", f"{gain.before / gain.noise_floor:.3g}"),
+        ("nominal, refitted", f"{100 * gain.refitted:.3g}", f"{gain.refitted / gain.noise_floor:.3g}"),
+        ("final", f"{100 * gain.after:.3g}", f"{gain.after / gain.noise_floor:.3g}"),
+        ("noise", f"{100 * gain.noise_floor:.3g}", "1"),
+    )
+    table = Table(
+        f"Error on {gain.held_out}, all channels together", ("model", "error (% of response)", "over noise"), rows
+    )
+    spectra = held_out_spectra(diagnosis)
+    caption = (
+        f"{spectra.recording}: measured and predicted response, and what each model leaves of it, fitted to the other "
+        "recordings only. Grey: noise, with what the noise of the forces becomes in the structure."
+    )
+    picture = _picture(spectra_figure(spectra), caption, "Spectra of the held-out recording")
+    return Section("On data that was not fitted", (), (table,), (picture,))
+
+
+def number_section(diagnosis: Diagnosis) -> Section:
+    """Parameters of each accepted cause with standard errors."""
+    rows = []
+    for cause in diagnosis.physics:
+        for name, value in cause.parameters.items():
+            shown = number(value, cause.standard_errors.get(name))
+            rows.append((words(cause.name), name, shown, place(diagnosis, cause)))
+    columns = ("cause", "parameter", "value ± standard error", "place")
+    return Section(
+        "Numbers", (), (Table("Parameters of the accepted causes (SI units)", columns, tuple(rows)),) if rows else ()
+    )
+
+
+def candidate_section(diagnosis: Diagnosis) -> Section:
+    """What was weighed."""
+    accepted = {cause.name for cause in diagnosis.physics}
+    rows, seen = [], set()
+    for one in sorted(diagnosis.candidates, key=lambda one: (one.stage != "fitted", -one.evidence)):
+        key = (one.name, one.stage, str(one.location) if "channel" in one.location else "")
+        if key in seen or not np.isfinite(one.evidence):
+            continue
+        seen.add(key)
+        status = "accepted" if one.name in accepted and one.stage == "fitted" else ""
+        rows.append((words(one.name), one.stage, f"{one.evidence:.0f}", _short_place(one), status))
+    sentence = (
+        "Screened: gain in misfit to first order, before a fit. Fitted: gain in evidence after all numbers were fitted "
+        "anew and the joint simulated freely; the larger, the better. Of each cause the best round is shown."
+    )
+    table = Table(
+        "Causes that were weighed", ("cause", "stage", "evidence", "place", ""), tuple(rows[:MOST_CANDIDATES])
+    )
+    return Section("What was weighed", (sentence,), (table,) if rows else ())
+
+
+def _short_place(one: Candidate) -> str:
+    if "direction" in one.location:
+        return "(" + ", ".join(f"{value:.2f}" for value in one.location["direction"]) + ")"
+    return str(one.location.get("channel", ""))
+
+
+def _picture(figure: Figure, caption: str, alternative: str) -> Picture:
+    return Picture(as_data_uri(figure), caption, alternative)
+
+
+def if_possible(make: Callable[[], Section], title: str) -> Section:
+    """A section, or the reason why it is missing: one figure must not cost a report."""
+    try:
+        return make()
+    except (InputError, np.linalg.LinAlgError) as error:
+        return Section(title, (f"Not shown: {error}",))

@@ -1,0 +1,68 @@
+"""Significance of many residual cells at once, the noise level itself being known only so well."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.special import polygamma
+from scipy.stats import f as fisher
+
+Real = NDArray[np.float64]
+
+FAMILY_WISE = 0.01
+"""Probability that any cell of a diagnosis is called significant where only noise is left."""
+
+LEAST_SPREAD = 0.02
+"""Of the noise level: nobody knows it better than to two per cent."""
+
+
+@dataclass(frozen=True)
+class NoiseSpread:
+    """How well the noise model hits the level of single cells.
+
+    Parameters
+    ----------
+    level
+        Typical ratio of residual power to noise power where the model is at its best, at least 1.
+    spread
+        Standard deviation of the ratio's logarithm beyond chance.
+    """
+
+    level: float
+    spread: float
+
+    def chance(self, ratio: ArrayLike, count: ArrayLike) -> Real:
+        """Probability of a larger ratio in a cell of ``count`` independent complex lines of noise (F test)."""
+        numerator = np.maximum(2 * np.asarray(count, dtype=float), 1e-9)
+        return np.asarray(fisher.sf(np.asarray(ratio) / self.level, numerator, 2 / self.spread**2))
+
+
+def noise_spread(ratio: Real, count: Real) -> NoiseSpread:
+    """Level and spread of the cells that the final model leaves, by median and median deviation.
+
+    Parameters
+    ----------
+    ratio, count
+        Of the cells, same shape: residual power over noise power, independent complex lines.
+    """
+    logs = np.log(np.maximum(ratio, 1e-12)).ravel()
+    middle = float(np.median(logs))
+    scatter = (1.4826 * float(np.median(np.abs(logs - middle)))) ** 2
+    chance = float(np.median(polygamma(1, np.maximum(count, 0.5).ravel())))
+    return NoiseSpread(max(1.0, float(np.exp(middle))), float(np.sqrt(max(scatter - chance, LEAST_SPREAD**2))))
+
+
+def holm(chances: Real) -> Real:
+    """Adjusted p-values that control the family-wise error (Holm 1979, Scand. J. Statistics 6).
+
+    Examples
+    --------
+    >>> [round(float(p), 3) for p in holm(np.array([0.01, 0.04, 0.03]))]
+    [0.03, 0.06, 0.06]
+    """
+    flat = np.asarray(chances, dtype=float).ravel()
+    order = np.argsort(flat)
+    raised = np.maximum.accumulate(flat[order] * np.arange(len(flat), 0, -1))
+    adjusted = np.empty(len(flat))
+    adjusted[order] = np.minimum(raised, 1.0)
+    return adjusted.reshape(np.shape(chances))

@@ -1,0 +1,98 @@
+"""Location: the band, the channel, the time, the order and the growth of a residual that was put there."""
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfilt
+
+from mismatch import Diagnosis, Trial
+from mismatch.family_wise import holm
+from mismatch.locate import locate
+from mismatch.spindle_orders import SpindleSpeed
+from modal_fit import ModalModel
+
+RATE, NOISE = 128.0, 0.02
+LEVELS = (1.0, 2.0, 4.0)
+
+MakeTrial = Callable[[ModalModel, str, float, int], Trial]
+MakeDiagnosis = Callable[[ModalModel, list[Trial]], Diagnosis]
+
+
+def with_residual(trial: Trial, channel: int, extra: np.ndarray) -> Trial:
+    response = trial.response.copy()
+    response[:, channel] += extra
+    return replace(trial, response=response)
+
+
+@pytest.fixture(scope="module")
+def quiet(small_model: ModalModel, trial_of: MakeTrial) -> list[Trial]:
+    return [trial_of(small_model, f"level{k}", level, k) for k, level in enumerate(LEVELS)]
+
+
+def band_noise(trial: Trial, seed: int, low: float = 9.0, high: float = 11.0) -> np.ndarray:
+    white = np.random.default_rng(seed).normal(size=len(trial.force))
+    shaped = sosfilt(butter(4, (low, high), "bandpass", fs=RATE, output="sos"), white)
+    return np.asarray(shaped / np.std(shaped))
+
+
+def grown(quiet: list[Trial], exponent: float) -> list[Trial]:
+    sizes = [NOISE * (trial.level / quiet[0].level) ** exponent for trial in quiet]
+    return [
+        with_residual(trial, 1, size * band_noise(trial, 50 + k))
+        for k, (trial, size) in enumerate(zip(quiet, sizes, strict=True))
+    ]
+
+
+@pytest.mark.parametrize("exponent", [0.0, 1.0, 3.0])
+def test_band_channel_and_growth(
+    small_model: ModalModel, quiet: list[Trial], hand_made: MakeDiagnosis, exponent: float
+) -> None:
+    found = locate(hand_made(small_model, grown(quiet, exponent)))
+    first = found["frequency_bands"][0]
+    assert first["share"] > 0.7
+    assert first["low_hz"] < 10 < first["high_hz"]
+    assert first["low_hz"] > 6
+    assert first["high_hz"] < 16
+    assert [row["channel"] for row in found["channels"] if row["significant"]] == ["ay"]
+    growth = found["growth"]["residual"]
+    assert growth["exponent"] == pytest.approx(exponent, abs=max(3 * growth["exponent_standard_error"], 0.05))
+    assert growth["exponent_standard_error"] < 0.3
+    json.dumps(found, allow_nan=False)
+
+
+def test_nothing_is_located_in_noise(small_model: ModalModel, quiet: list[Trial], hand_made: MakeDiagnosis) -> None:
+    found = locate(hand_made(small_model, quiet))
+    assert found["frequency_bands"] == []
+    assert found["times"] == []
+    assert found["cells"] == []
+    assert not any(row["significant"] for row in found["channels"] + found["levels"])
+    assert "note" in found["growth"]
+
+
+def test_time_of_a_burst(small_model: ModalModel, quiet: list[Trial], hand_made: MakeDiagnosis) -> None:
+    time = np.arange(len(quiet[0].force)) / RATE
+    burst = 4 * NOISE * band_noise(quiet[0], 7) * ((time > 20) & (time < 26))
+    found = locate(hand_made(small_model, [with_residual(quiet[0], 0, burst), *quiet[1:]]))
+    [stretch] = found["times"]
+    assert stretch["recording"] == "level0"
+    assert 17 < stretch["start_s"] < 21
+    assert 25 < stretch["end_s"] < 29
+
+
+def test_order_of_the_spindle(small_model: ModalModel, quiet: list[Trial], hand_made: MakeDiagnosis) -> None:
+    time = np.arange(len(quiet[0].force)) / RATE
+    runout = 2 * NOISE * np.sin(2 * np.pi * 3 * 4.0 * time)
+    diagnosis = hand_made(small_model, [with_residual(trial, 0, runout) for trial in quiet])
+    speeds = {trial.name: SpindleSpeed(np.zeros(1), np.array([240.0])) for trial in quiet}
+    assert {row["order"] for row in locate(diagnosis, None, speeds)["spindle_orders"]} == {3}
+    assert locate(diagnosis)["spindle_orders_note"]
+
+
+def test_holm_is_monotone_and_no_smaller() -> None:
+    chances = np.random.default_rng(0).uniform(size=50)
+    adjusted = holm(chances)
+    assert (adjusted >= chances).all()
+    assert (np.diff(adjusted[np.argsort(chances)]) >= 0).all()
