@@ -15,7 +15,7 @@ Run it: `python examples/robot_drive_diagnosis.py FOLDER [PICTURE.png]`; FOLDER 
 """
 
 import sys
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +27,7 @@ from scipy.signal import butter, filtfilt, resample_poly
 
 from cutting.compiled import compiled
 from millfrf.figures.style import COLOURS, house_style, new_figure
-from mismatch import Diagnosis, Trial, diagnose, linear_floor, seen_motion
+from mismatch import Diagnosis, Trial, diagnose
 from mismatch.physics_terms import improved_model
 from mismatch.prediction import predict
 from modal_fit import ModalModel
@@ -219,27 +219,25 @@ def errors(drive: Drive, record: Record) -> dict[str, float]:
     }
 
 
-def picture(found: Diagnosis, drives: dict[str, Drive], test: Record) -> Figure:
-    """Force that the residual asks for over velocity, and the closed loop's force on the test record."""
+def picture(drives: dict[str, Drive], train: Record, test: Record) -> Figure:
+    """Force that the rigid mass leaves over velocity, and the closed loop's error of force on the test record."""
     figure = new_figure(85)
     law, force = figure.subplots(1, 2, width_ratios=(2, 3))
-    linear = replace(found.final, explanation=replace(found.final.explanation, causes=()))
-    floor = linear_floor(linear, list(found.lines))
-    seen = [seen_motion(record, linear.explanation, np.ones(1)) for record in floor.records]
-    kept = [slice(record.lines.start, -50) for record in floor.records]
-    v = np.concatenate([one.velocity[cut] for one, cut in zip(seen, kept, strict=True)])
-    g = np.concatenate([one.force[cut] for one, cut in zip(seen, kept, strict=True)])
-    law.plot(1e3 * v, g, ".", ms=2, color="#999999", label="asked for by the residual, 0.7-6 Hz")
-    named, line = drives["named cause"], np.linspace(v.min(), v.max(), 600)
+    named = drives["named cause"]
+    velocity, acceleration, motor = (one[200:-200:20] for one in motion(train))
+    left = motor - named.mass * acceleration - named.viscous * velocity - named.offset
+    law.plot(1e3 * velocity, left, ".", ms=2, color="#999999", label="measured, training record")
+    line = np.linspace(velocity.min(), velocity.max(), 600)
     law.plot(1e3 * line, named.friction * np.tanh(line / named.smooth), color=COLOURS[1], label="named law")
-    law.set(xlabel="velocity, mm/s", ylabel="force, N", title="what the rigid mass leaves out")
+    law.set(xlabel="velocity, mm/s", ylabel="force, N", title="what the rigid mass leaves out", ylim=(-35, 45))
     filters, part = butter(4, 2 * 20.0 * STEP), slice(1500, 11000)
     time = np.arange(len(test.force)) * STEP
     measured = filtfilt(*filters, test.force)
     for name, colour in (("rigid mass", COLOURS[2]), ("named cause", COLOURS[1])):
         rest = filtfilt(*filters, closed_loop(drives[name], test)[1]) - measured
         force.plot(time[part], rest[part], color=colour, lw=0.7, label=f"error, {name}")
-    force.set(xlabel="s", ylabel="motor force, N", title="test record, closed loop simulated from the reference")
+    title = "test record, closed loop simulated from the reference"
+    force.set(xlabel="s", ylabel="motor force, N", title=title, ylim=(-26, 34))
     for axes in (law, force):
         axes.legend(loc="upper left", fontsize=7)
     return figure
@@ -284,7 +282,7 @@ def main(folder: Path, target: Path | None) -> None:
             print(f"    {label}: " + ", ".join(f"{key} {value:.2f}" for key, value in errors(drive, record).items()))
     if target is not None:
         with house_style():
-            picture(found, drives, test).savefig(target, dpi=150)
+            picture(drives, train, test).savefig(target, dpi=150)
 
 
 if __name__ == "__main__":

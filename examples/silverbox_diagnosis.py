@@ -128,7 +128,8 @@ def picture(signals: Signals, nominal: ModalModel, found: Diagnosis) -> Figure:
     linear = replace(found.final, explanation=replace(found.final.explanation, causes=()))
     floor = linear_floor(linear, list(found.lines))
     seen = [seen_motion(record, linear.explanation, cause.direction) for record in floor.records]
-    x, g = (np.concatenate(parts) for parts in zip(*((s.deflection, s.force) for s in seen), strict=True))
+    kept = slice(found.lines[0].start, -int(2 * RATE))
+    x, g = (np.concatenate([getattr(one, name)[kept] for one in seen]) for name in ("deflection", "force"))
     law.plot(1e3 * x[::7], 1e3 * g[::7], ".", ms=1, color="#999999", label="asked for by the residual")
     line = np.linspace(x.min(), x.max(), 400)
     force = cause.law()
