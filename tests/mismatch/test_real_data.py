@@ -1,0 +1,63 @@
+"""Measured systems of other laboratories: from a linear model to the named cause, and what that does to test parts."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+pytestmark = pytest.mark.shared_data
+
+
+def example(name: str) -> ModuleType:
+    """A script of the examples' folder as a module."""
+    path = Path(__file__).resolve().parents[2] / "examples" / f"{name}.py"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses look their module up
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_silverbox_is_a_hardening_spring_and_its_arrowhead_is_simulated_freely(shared_data: Path) -> None:
+    """A Duffing circuit (Wigren & Schoukens 2013): exponent three; the free run's error falls to less than a tenth."""
+    silverbox = example("silverbox_diagnosis")
+    signals, nominal, found = silverbox.study(shared_data / "silverbox")
+    strongest = max(found.physics, key=lambda cause: cause.evidence)
+    assert strongest.name == "stiffness_hardening"
+    assert strongest.parameters["exponent"] == pytest.approx(3.0, abs=0.05)
+    before = silverbox.free_run_errors(nominal, signals)
+    after = silverbox.free_run_errors(silverbox.improved_model(found.final.explanation), signals)
+    assert all(after[part] < 0.1 * before[part] for part in before)
+    assert after["arrowhead"] < 1.0  # mV; a neural state-space encoder is given as about 6
+
+
+def test_robot_drive_has_dry_friction_of_the_published_size(shared_data: Path) -> None:
+    """EMPS: inverse dynamics of its authors give 20.39 N; the closed loop's force error falls to theirs."""
+    drive = example("robot_drive_diagnosis")
+    folder = shared_data / "emps-robot-drive"
+    found, drives, predicted = drive.study(folder)
+    assert [cause.name for cause in found.physics] == ["coulomb_friction"]
+    assert found.verdict == "explained"
+    assert found.physics[0].parameters["friction_n"] == pytest.approx(20.39, rel=0.1)
+    assert predicted["named cause"] < 0.25 * predicted["rigid mass"]
+    test = drive.read_record(folder / "DATA_EMPS_PULSES.mat")
+    force = {name: drive.errors(one, test)["closed loop force, %"] for name, one in drives.items()}
+    assert force["named cause"] < 0.33 * force["rigid mass"]
+    assert force["named cause"] < 1.15 * force["published"]
+
+
+def test_pulses_of_the_robot_drive_are_part_of_the_recorded_command(shared_data: Path) -> None:
+    """Command minus the drive's own controller is zero in one record and the pulses in the other."""
+    drive = example("robot_drive_diagnosis")
+    for name, size in (("DATA_EMPS.mat", 0.0), ("DATA_EMPS_PULSES.mat", 1.0)):
+        record = drive.read_record(shared_data / "emps-robot-drive" / name)
+        speed = (record.position[2:] - record.position[:-2]) / (2 * drive.STEP)
+        asked = record.derivative * (record.proportional * (record.reference - record.position)[2:] - speed)
+        rest = record.force[2:] / record.drive - asked - record.pulses[2:]
+        assert np.std(rest[20:]) < 0.01  # V; the command's standard deviation is 1.5 V
+        assert np.std(record.pulses) == pytest.approx(size * 2.535, rel=0.01)
