@@ -122,7 +122,7 @@ def diagnose(
     if deviation is not None:
         accepted.append(deviation)
     left = leftover(current.explanation, lines)
-    unexplained = _unexplained(left, leftover(base.explanation, lines))
+    unexplained = _unexplained(left, search.before)
     if unexplained:
         candidates += [Candidate(one.name, one.evidence, "rejected", one.location) for one in accepted]
         accepted = []
@@ -143,6 +143,7 @@ class _Search:
     accepted: list[AcceptedCause]
     candidates: list[Candidate]
     equivalents: tuple[str, ...]
+    before: Leftover
 
 
 def _search(
@@ -152,9 +153,10 @@ def _search(
     current, accepted = base, list(faults)
     candidates: list[Candidate] = []
     equivalents: tuple[str, ...] = ()
+    before = leftover(base.explanation, lines)
     while len(accepted) < MOST_CAUSES:
         tell(f"causes, round {len(accepted) + 1}")
-        options, weighed = _options(lines, current, causes)
+        options, weighed = _options(lines, current, causes, before)
         candidates += weighed
         best = min(options, key=lambda option: option.fitted.score, default=None)
         if best is None or best.fitted.score > current.score - LEAST_EVIDENCE:
@@ -168,7 +170,7 @@ def _search(
         equivalents = equivalents or tuple(dict.fromkeys(rivals))
         accepted.append(_describe(best, current))
         current = best.fitted
-    return _Search(current, accepted, candidates, equivalents)
+    return _Search(current, accepted, candidates, equivalents, before)
 
 
 def _plain_faults(
@@ -222,7 +224,7 @@ def _clipping_cause(clipping: Clipping, lines: WindowedLines) -> AcceptedCause:
 
 
 def _options(
-    lines: list[WindowedLines], current: Fit, causes: dict[str, Physics]
+    lines: list[WindowedLines], current: Fit, causes: dict[str, Physics], before: Leftover
 ) -> tuple[list[_Option], list[Candidate]]:
     """Screen everything, fit what promises most."""
     own_noise = noise_floor(current, lines)
@@ -241,7 +243,9 @@ def _options(
     weighed.append(Candidate("missing_mode", mode.gain, "screened"))
     options += _linear_options(lines, current, chains, mode, cost)
     best = min(options, key=lambda option: option.fitted.score, default=None)
-    if best is None or leftover(best.fitted.explanation, lines).share > NOISE_LIKE:
+    left = leftover((best.fitted if best else current).explanation, lines)
+    first = best is None and not current.explanation.causes
+    if first or (left.share > NOISE_LIKE and left.power > SMALL * before.power):
         joint_options, joint_weighed = _joints(lines, current, linear_floor(current, lines), causes)
         weighed += joint_weighed
         options += joint_options

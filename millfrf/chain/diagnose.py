@@ -13,6 +13,7 @@ from modal_fit import read_modal_model, write_modal_model
 
 from ..progress import Watch, silent
 from ..report.diagnosis_page import with_location, write_diagnosis_report
+from .fit import SUBSPACE, FitOptions, fit_recordings
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,28 @@ def diagnose_files(
     with watch("writing the report"):
         write_diagnosis_report(paths[2], view, Path(model_path).name)
     return DiagnosisFiles(diagnosis, paths, tuple(summary(diagnosis)))
+
+
+def nominal_from_simulation(
+    simulated: str | os.PathLike[str],
+    band: tuple[float, float],
+    out: str | os.PathLike[str],
+    *,
+    stream: str | None = None,
+    watch: Watch = silent,
+) -> Path:
+    """Fit the nominal model to a simulated recording, by the subspace method; write it as ``nominal.json``.
+
+    Raises
+    ------
+    InputError
+        A recording that cannot be fitted in that band.
+    """
+    fitted = fit_recordings([simulated], FitOptions(band, SUBSPACE, stream=stream), watch)
+    Path(out).mkdir(parents=True, exist_ok=True)
+    path = Path(out) / "nominal.json"
+    write_modal_model(path, fitted.model)
+    return path
 
 
 def _speeds(recordings: Sequence[str | os.PathLike[str]]) -> dict[str, SpindleSpeed]:

@@ -5,11 +5,22 @@ from typing import Annotated
 
 import typer
 
+from foundation import InputError
+
 
 def diagnose(
-    model: Annotated[Path, typer.Argument(metavar="MODEL.json", help="Nominal model at the measured places.")],
-    recordings: Annotated[list[Path], typer.Argument(metavar="REC...", help="Recordings, best at several levels.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="MODEL.json REC...", help="Nominal model, then recordings, best at several levels."),
+    ],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for diagnosis.json, model and report.")],
+    simulated: Annotated[
+        Path | None,
+        typer.Option("--simulated", metavar="SIM.h5", help="Simulated recording to fit the nominal model from."),
+    ] = None,
+    band: Annotated[
+        tuple[float, float] | None, typer.Option("--band", metavar="LO HI", help="Hz, of that fit.")
+    ] = None,
     lab_error: Annotated[
         tuple[float, float, float],
         typer.Option("--lab-error", help="What a lab's own fit is off: frequency, damping, shapes, as shares."),
@@ -19,9 +30,18 @@ def diagnose(
     """Locate where a model and recordings disagree, name the physics left out, model it, show that the fit improves."""
     from mismatch import LabError, Settings
 
-    from ..chain.diagnose import diagnose_files
+    from ..chain.diagnose import diagnose_files, nominal_from_simulation
     from ..progress import bar
 
+    if min(lab_error) <= 0:
+        raise InputError(f"--lab-error {lab_error} must be three positive shares, for example 0.01 0.12 0.03")
+    model, recordings = (files[0], files[1:]) if simulated is None else (simulated, files)
+    if not recordings:
+        raise InputError("no recording given; name the nominal model and then one or more recordings")
+    if simulated is not None:
+        if band is None:
+            raise InputError("--simulated needs --band LO HI, the band in which the nominal model is fitted")
+        model = nominal_from_simulation(simulated, band, out, stream=stream, watch=bar)
     result = diagnose_files(model, recordings, out, Settings(LabError(*lab_error)), stream=stream, watch=bar)
     for line in result.summary:
         typer.echo(line)

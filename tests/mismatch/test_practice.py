@@ -1,0 +1,31 @@
+"""The practice cases of the shared folder: every verdict, and the error on the recording that no fit has seen."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from mismatch import diagnose, read_trial, read_trials
+from mismatch.diagnosis_file import improved_model_of
+from mismatch.prediction import predict
+from modal_fit import read_modal_model
+
+
+@pytest.mark.slow
+@pytest.mark.shared_data
+@pytest.mark.parametrize("number", range(18))
+def test_practice_case(shared_data: Path, number: int) -> None:
+    """Truth is opened after the diagnosis; the improved model must lower the error wherever there is an effect."""
+    folder = shared_data.parent / "practice" / f"case_{number:02d}"
+    model = read_modal_model(folder / "nominal.json")
+    found = diagnose(model, read_trials([folder / f"{level}.h5" for level in ("low", "mid", "high")], model))
+    truth = json.loads((folder.parent / "truth.json").read_text())[folder.name]["effect"]
+    if truth in ("none", "unexplained"):
+        assert found.verdict == truth
+        assert found.physics == ()
+        return
+    assert found.verdict == "explained"
+    assert [cause.name for cause in found.physics] == [truth]
+    unseen = read_trial(folder / "unseen.h5", model)
+    before, after = predict(model, unseen), predict(improved_model_of(found), unseen)
+    assert after.total_error < before.total_error
