@@ -80,13 +80,15 @@ class _Sample:
     piece: NDArray[np.int64]
 
 
-def free_form_law(diagnosis: Diagnosis) -> FreeFormLaw | None:
-    """Measured force of the last accepted joint cause, all other causes in place; None where there is no joint."""
+def free_form_laws(diagnosis: Diagnosis) -> tuple[FreeFormLaw, ...]:
+    """Measured force of each accepted joint cause, all other causes in place."""
+    return tuple(
+        _measured(diagnosis, cause) for cause in diagnosis.final.explanation.causes if cause.direction is not None
+    )
+
+
+def _measured(diagnosis: Diagnosis, cause: Cause) -> FreeFormLaw:
     final = diagnosis.final.explanation
-    joints = [cause for cause in final.causes if cause.direction is not None]
-    if not joints:
-        return None
-    cause = joints[-1]
     assert cause.direction is not None
     bare = replace(final, causes=tuple(one for one in final.causes if one is not cause))
     samples = _joined([_seen(diagnosis.final, bare, cause, k, one) for k, one in enumerate(diagnosis.lines)])

@@ -70,9 +70,7 @@ def growth(
     rows = []
     for number, one in enumerate(lines):
         single, _, variance = normalised(explanation, reference, number, one)
-        inside = np.zeros(len(one.frequencies), dtype=bool)
-        for low, high in bands or [(0.0, np.inf)]:
-            inside |= (one.frequencies >= low) & (one.frequencies <= high)
+        inside = _inside(one.frequencies, bands)
         floor = variance[inside] / unit**2
         power = np.abs(single[inside]) ** 2 * floor
         excess = float(power.sum() - floor.sum())
@@ -85,6 +83,13 @@ def growth(
     seen = excess_ > SEEN * error_
     exponent, exponent_error = _slope(force[seen], amplitude[seen], spreads[seen] / amplitude[seen])
     return Growth(force, amplitude, spreads, np.sqrt(noise), exponent, exponent_error)
+
+
+def _inside(frequencies: Real, bands: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
+    inside = np.zeros(len(frequencies), dtype=bool)
+    for low, high in bands or [(0.0, np.inf)]:
+        inside |= (frequencies >= low) & (frequencies <= high)
+    return inside
 
 
 def _slope(force: Real, amplitude: Real, relative: Real) -> tuple[float, float]:

@@ -15,6 +15,9 @@ from .time_maps import BlockResidual, block_residual
 from .trial import Trial
 from .windowed_lines import WindowedLines, windowed_lines
 
+QUIET = NoiseSpread(1.25, 0.5)
+"""Of a noise level read from the quietest bands: they lie below the mean by chance, and its colour is not known."""
+
 
 @dataclass(frozen=True)
 class ResidualView:
@@ -61,7 +64,8 @@ def residual_view(diagnosis: Diagnosis, trials: Sequence[Trial] | None = None) -
     measured = tuple(_as_measured(one, trials or ()) for one in mended)
     edges = band_edges(measured)
     base, final = diagnosis.base.explanation, diagnosis.final
-    if diagnosis.verdict == "unexplained":
+    unexplained = diagnosis.verdict == "unexplained"
+    if unexplained:
         final = replace(final, noises=tuple(_quiet(final, k, one) for k, one in enumerate(mended)))
     after = residual_map(final.explanation, final, mended, edges)
     return ResidualView(
@@ -72,7 +76,9 @@ def residual_view(diagnosis: Diagnosis, trials: Sequence[Trial] | None = None) -
         tuple(block_residual(base, final, k, one) for k, one in enumerate(measured)),
         tuple(block_residual(final.explanation, final, k, one) for k, one in enumerate(mended)),
         final,
-        noise_spread(after.ratio, np.broadcast_to(after.count[:, :, None], after.ratio.shape)),
+        QUIET
+        if unexplained
+        else noise_spread(after.ratio, np.broadcast_to(after.count[:, :, None], after.ratio.shape)),
     )
 
 

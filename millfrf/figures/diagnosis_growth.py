@@ -49,7 +49,7 @@ def _draw(axes: Axes, label: str, found: Mapping[str, Any], number: int) -> None
     force, amplitude, error = (np.array(found[key]) for key in ("force_rms_n", "amplitude", "standard_error"))
     seen = amplitude > 0
     if found["exponent"] is not None:
-        label += f": exponent {found['exponent']:.2f} ± {found['exponent_standard_error']:.2f}"
+        label += f": exponent {round(found['exponent'], 2) + 0.0:.2f} ± {found['exponent_standard_error']:.2f}"
     axes.errorbar(
         force[seen],
         amplitude[seen],

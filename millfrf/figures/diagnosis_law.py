@@ -55,7 +55,9 @@ def _draw(
 
 
 def _same_scale(left: Axes, right: Axes, all_bins: tuple[BinnedForce, ...]) -> None:
-    values: NDArray[np.float64] = np.concatenate([np.abs(one.force) + 2 * one.error for one in all_bins])
+    values: NDArray[np.float64] = np.concatenate(
+        [np.maximum(np.abs(one.force) + 2 * one.error, np.abs(one.law)) for one in all_bins]
+    )
     top = 1.1 * float(np.max(values))
     left.set_ylim(-top, top)
     right.set_ylim(-top, top)

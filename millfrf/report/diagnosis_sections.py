@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from foundation import InputError
 from mismatch import Candidate, Diagnosis
-from mismatch.free_form_law import free_form_law
+from mismatch.free_form_law import free_form_laws
 from mismatch.held_out_spectra import held_out_spectra
 from mismatch.locate import significant_cells
 from mismatch.residual_view import ResidualView
@@ -65,19 +65,19 @@ def growth_section(diagnosis: Diagnosis) -> Section:
 def law_section(diagnosis: Diagnosis) -> Section:
     """The measured force of the joint."""
     title = "The measured force of the joint"
-    found = free_form_law(diagnosis)
-    if found is None:
-        return Section(title)
-    sentence = (
+    laws = free_form_laws(diagnosis)
+    sentences = tuple(
         "The force that the linear model lacks along the found direction, from the recordings alone and with no law "
         f"assumed; {words(found.name)} gives {100 * found.explained:.1f} % of its power."
+        for found in laws
     )
     caption = (
         "Force that the joint takes beyond the linear model, in bins over all recordings, with bands of two standard "
         "errors; (a) against deflection, rising and falling; (b) against velocity. Lines: the accepted law, driven by "
         "the same motion and averaged alike."
     )
-    return Section(title, (sentence,), (), (_picture(law_figure(found), caption, "Force of the joint"),))
+    pictures = tuple(_picture(law_figure(found), caption, f"Force of the joint: {words(found.name)}") for found in laws)
+    return Section(title, sentences, (), pictures)
 
 
 def held_out_section(diagnosis: Diagnosis) -> Section:

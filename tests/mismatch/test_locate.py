@@ -96,3 +96,14 @@ def test_holm_is_monotone_and_no_smaller() -> None:
     adjusted = holm(chances)
     assert (adjusted >= chances).all()
     assert (np.diff(adjusted[np.argsort(chances)]) >= 0).all()
+
+
+def test_noise_is_not_believed_where_something_stayed_unexplained(
+    small_model: ModalModel, quiet: list[Trial], hand_made: MakeDiagnosis
+) -> None:
+    honest = hand_made(small_model, grown(quiet, 1.0))
+    noises = tuple(replace(one, responses=one.responses + np.log(100.0)) for one in honest.final.noises)
+    fooled = replace(honest, final=replace(honest.final, noises=noises))
+    assert locate(fooled)["frequency_bands"] == []
+    first = locate(replace(fooled, verdict="unexplained"))["frequency_bands"][0]
+    assert first["low_hz"] < 10 < first["high_hz"]
