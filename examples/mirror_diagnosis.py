@@ -77,12 +77,12 @@ def left_over(folder: Path, frf: Complex, level: int) -> float:
     return float(np.sum(np.abs(y - frf @ u) ** 2) / np.sum(np.abs(y) ** 2))
 
 
-def growth(one: Complex, two: Complex, three: Complex) -> tuple[float, float, float]:
-    """Relative change of the FRF from level one to two and to three, and n of a change that goes as level^n.
+def growth(frequencies: list[Real]) -> tuple[float, float, float]:
+    """Median relative fall of the modes' frequencies to levels two and three, and n of a fall that goes as level^n.
 
     A force that goes as ``x^(n + 1)`` does so: n = 1 for Rayleigh's hysteresis, 2 for a cubic law.
     """
-    second, third = (float(np.linalg.norm(other - one) / np.linalg.norm(one)) for other in (two, three))
+    second, third = (float(np.median(1 - other / frequencies[0])) for other in frequencies[1:])
     return second, third, float(brentq(lambda n: (3**n - 1) / (2**n - 1) - third / second, 0.05, 6))
 
 
@@ -108,6 +108,10 @@ def ask_library(folder: Path, fitted: ModalModel) -> None:
     lines = [windowed_lines(trial(folder, level, fitted.delay), MODEL_BAND, decay) for level in LEVELS]
     shape = ModelShape(model, LabError())
     nominal = Explanation(shape, np.zeros(shape.size))
+    own = [fit([each], nominal, iterations=5).explanation for each in lines]
+    print("refit for each level: " + ", ".join(f"{error(*pair):.3f}" for pair in zip(own, lines, strict=True)))
+    second, third, exponent = growth([one.model.natural_frequencies for one in own])
+    print(f"modes fall by {100 * second:.2f} % to 200 mV and {100 * third:.2f} % to 300 mV: level^{exponent:.2f}")
     base = fit(lines, nominal, iterations=5)
     for name, one in (("100 mV's model", nominal), ("one refit for all", base.explanation)):
         print(f"{name}: " + ", ".join(f"{error(one, each):.3f} at {each.trial.name}" for each in lines))
@@ -129,8 +133,6 @@ def main(folder: Path, model: Path | None) -> None:
     for level, (frf, noise, distortion) in found.items():
         print(f"{level} mV: noise {100 * noise:.4f} %, distortion {100 * distortion:.4f} % of the power; test ", end="")
         print(", ".join(f"{100 * left_over(folder, frf, other):.2f} % at {other} mV" for other in LEVELS))
-    second, third, exponent = growth(*(found[level][0] for level in LEVELS))
-    print(f"FRF changes by {100 * second:.1f} % to 200 mV and {100 * third:.1f} % to 300 mV: level^{exponent:.2f}")
     if model is not None:
         ask_library(folder, read_modal_model(model))
 

@@ -11,7 +11,7 @@ and the model is a mode at 2 Hz, with 70 % damping, whose missing force g is the
 training record only. The record with force pulses is then simulated with the nominal and the improved model.
 
 Run it: `python examples/robot_drive_diagnosis.py FOLDER [PICTURE.png]`; FOLDER holds `DATA_EMPS.mat` and
-`DATA_EMPS_PULSES.mat`.
+`DATA_EMPS_PULSES.mat`. `... FOLDER loops` repeats the diagnosis with other springs and dampers.
 """
 
 import sys
@@ -40,8 +40,8 @@ STEP = 1e-3
 KEPT = 20
 """The diagnosis reads every so many samples (50 Hz)."""
 
-VIRTUAL_HZ, VIRTUAL_DAMPING = 2.0, 0.7
-"""Mode that the known spring and damper make of the nominal mass."""
+VIRTUAL = (2.0, 0.7)
+"""Frequency (Hz) and damping ratio of the mode that the known spring and damper make of the nominal mass."""
 
 PULSE_V = 1.0139
 """Motor command for each unit of ``pulses_N``: command minus controller follows the pulses with a correlation of
@@ -112,15 +112,15 @@ def by_inverse_dynamics(record: Record, friction: float = 0.0, smooth: float = 1
     return Drive(float(mass), float(viscous), friction, smooth, float(offset))
 
 
-def known_loop(drive: Drive) -> tuple[float, float]:
+def known_loop(drive: Drive, mode: tuple[float, float] = VIRTUAL) -> tuple[float, float]:
     """Spring (N/m) and damper (N s/m) that make the nominal mass the virtual mode."""
-    omega = 2 * np.pi * VIRTUAL_HZ
-    return drive.mass * omega**2, 2 * VIRTUAL_DAMPING * omega * drive.mass - drive.viscous
+    omega = 2 * np.pi * mode[0]
+    return drive.mass * omega**2, 2 * mode[1] * omega * drive.mass - drive.viscous
 
 
-def modal_model(drive: Drive) -> ModalModel:
+def modal_model(drive: Drive, mode: tuple[float, float] = VIRTUAL) -> ModalModel:
     """The nominal mass in the known loop, as a mode."""
-    pole = 2 * np.pi * VIRTUAL_HZ * complex(-VIRTUAL_DAMPING, np.sqrt(1 - VIRTUAL_DAMPING**2))
+    pole = 2 * np.pi * mode[0] * complex(-mode[1], np.sqrt(1 - mode[1] ** 2))
     left = np.array([[1 / (drive.mass * 2j * pole.imag)]])
     return ModalModel(np.array([pole]), np.ones((1, 1), dtype=complex), left, ("TCP:+X",), ("TCP:+X",))
 
@@ -285,5 +285,20 @@ def main(folder: Path, target: Path | None) -> None:
             picture(drives, train, test).savefig(target, dpi=150)
 
 
+def other_loops(folder: Path) -> None:
+    """What the diagnosis says with other springs and dampers around the same drive: an honest one would not matter."""
+    train = read_record(folder / "DATA_EMPS.mat")
+    rigid = by_inverse_dynamics(train)
+    for mode in ((f, zeta) for f in (1.5, 2.0, 2.5, 3.0, 4.0) for zeta in (0.5, 0.7)):
+        trials = halves(as_trial("train", train, known_loop(rigid, mode)))
+        found = diagnose(modal_model(rigid, mode), trials)
+        causes = ", ".join(f"{cause.name} {next(iter(cause.parameters.values())):.4g}" for cause in found.physics)
+        errors = f"{found.improvement.before:.3f} -> {found.improvement.after:.3f}"
+        print(f"{mode[0]:g} Hz, {mode[1]:g}: {found.verdict}: {causes or 'nothing'}; held-out error {errors}")
+
+
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]) if len(sys.argv) > 2 else None)
+    if sys.argv[2:] == ["loops"]:
+        other_loops(Path(sys.argv[1]))
+    else:
+        main(Path(sys.argv[1]), Path(sys.argv[2]) if len(sys.argv) > 2 else None)

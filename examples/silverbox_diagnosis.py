@@ -71,7 +71,7 @@ def linear_model(signals: Signals) -> tuple[ModalModel, float]:
 
     def misfit(p: Real) -> Real:
         rest = (p[2] / (s**2 + 2 * p[1] * p[0] * s + p[0] ** 2) - measured) * weight
-        return np.concatenate([rest.real, rest.imag]) / weight.max()
+        return np.asarray(np.concatenate([rest.real, rest.imag]) / weight.max())
 
     omega, zeta, gain = least_squares(misfit, [2 * np.pi * 68, 0.05, 2e5], x_scale=[400, 0.05, 2e5]).x
     pole = omega * complex(-zeta, np.sqrt(1 - zeta**2))

@@ -61,3 +61,14 @@ def test_pulses_of_the_robot_drive_are_part_of_the_recorded_command(shared_data:
         rest = record.force[2:] / record.drive - asked - record.pulses[2:]
         assert np.std(rest[20:]) < 0.01  # V; the command's standard deviation is 1.5 V
         assert np.std(record.pulses) == pytest.approx(size * 2.535, rel=0.01)
+
+
+def test_linear_model_of_the_mirror_holds_at_its_own_amplitude_only(shared_data: Path) -> None:
+    """Shares of power: thousandths at its own level, far above the noise; a tenth from the weakest to the strongest."""
+    mirror = example("mirror_diagnosis")
+    folder = shared_data / "fsm-cubespec-mimo"
+    frf, noise, distortion = mirror.linear_frf(folder, 300)
+    assert mirror.left_over(folder, frf, 300) < 0.003
+    assert mirror.left_over(folder, frf, 100) > 0.1
+    assert noise < 3e-5
+    assert distortion > 30 * noise
