@@ -36,6 +36,9 @@ LEAST_EVIDENCE = 20.0
 MOST_CHAINS = 3
 """Linear causes that are fitted in a round."""
 
+PROMISING = 0.1
+"""Screened gain, as a share of the best law's, from which a law is fitted."""
+
 MOST_LAWS = 4
 """Joint laws that are fitted to the motion seen; the two best are then simulated freely."""
 
@@ -180,7 +183,7 @@ def _plain_faults(
     found: list[AcceptedCause] = []
     for _ in range(4):
         tone = find_tone(base, lines)
-        if tone is None:
+        if tone is None or tone.gain < LEAST_EVIDENCE:
             break
         lines = [without_tone(one, tone) for one in lines]
         base = fit(lines, base.explanation, iterations=4)
@@ -245,7 +248,7 @@ def _options(
     best = min(options, key=lambda option: option.fitted.score, default=None)
     left = leftover((best.fitted if best else current).explanation, lines)
     first = best is None and not current.explanation.causes
-    if first or (left.share > NOISE_LIKE and left.power > SMALL * before.power):
+    if first or (left.share > NOISE_LIKE and left.power > 3 * SMALL * before.power):
         joint_options, joint_weighed = _joints(lines, current, linear_floor(current, lines), causes)
         weighed += joint_weighed
         options += joint_options
@@ -284,7 +287,7 @@ def _joints(
     location = {"direction": [round(float(x), 6) for x in sighting.direction]}
     screened = screen_joints(floor, current.explanation, sighting.direction, laws)
     weighed = [Candidate(one.causes[0].physics.name, one.gain, "screened", location) for one in screened]
-    promising = [one for one in screened if one.gain > max(60.0, 0.01 * screened[0].gain)][:MOST_LAWS]
+    promising = [one for one in screened if one.gain > max(60.0, PROMISING * screened[0].gain)][:MOST_LAWS]
     driven = []
     for one in promising:
         starts = [
@@ -296,7 +299,7 @@ def _joints(
     options = []
     for k, near in enumerate(driven):
         gain = current.score - near.score
-        if k > 1 or gain < max(LEAST_EVIDENCE / 2, 0.4 * (current.score - driven[0].score)):
+        if k > 1 or gain < max(LEAST_EVIDENCE / 2, 0.6 * (current.score - driven[0].score)):
             continue
         last = near.explanation.causes[-1]
         free = replace(near.explanation, causes=(*near.explanation.causes[:-1], replace(last, seen=None)))

@@ -61,7 +61,7 @@ def fit(
     noises: tuple[NoiseModel, ...] | None = None,
     *,
     iterations: int = 8,
-    tolerance: float = 1.0,
+    tolerance: float = 3.0,
 ) -> Fit:
     """Fit an explanation to recordings.
 

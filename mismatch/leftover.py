@@ -63,7 +63,7 @@ def leftover(explanation: Explanation, lines: list[WindowedLines]) -> Leftover:
             r, s = _powers(rest[:, p], one), _powers(shown[:, p], one)
             own = _moving(r, s)
             chance = np.median([_moving(r, np.roll(s, shift, axis=1)) for shift in _shifts(s.shape[1])])
-            moving = max(own - float(chance), 0.0)
+            moving = min(max(own - float(chance), 0.0), float(np.sum(r)))
             shares.append(moving / float(np.sum(r)))
             powers.append(moving / float(np.sum(s)))
     return Leftover(float(np.mean(shares)), float(np.mean(powers)))

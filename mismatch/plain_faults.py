@@ -21,6 +21,10 @@ NEAR = 41
 """Lines of a neighbourhood."""
 
 
+REACH = 10
+"""Lines on each side that a tone reaches through the window."""
+
+
 @dataclass(frozen=True)
 class Tone:
     """A steady tone that the forces do not know.
@@ -75,7 +79,7 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
         if together[k] < TONE_CONTRAST:
             return None
         frequency = float(axis[k])
-        if any(_force_contrast(one, frequency) > 12.0 for one in lines):
+        if any(_force_contrast(one, frequency) > 12.0 for one in lines) or _too_few_left(lines, frequency):
             continue
         shown = [np.interp(frequency, one.frequencies, c) for one, c in zip(lines, contrasts, strict=True)]
         exact = _exact_frequency(fitted, lines, frequency)
@@ -99,7 +103,7 @@ def _exact_frequency(fitted: Fit, lines: list[WindowedLines], frequency: float) 
 
 def without_tone(lines: WindowedLines, tone: Tone) -> WindowedLines:
     """The same recording without the lines that the tone reaches."""
-    width = 10 * _step(lines)
+    width = REACH * _step(lines)
     kept = np.abs(lines.frequencies - tone.frequency) > width
     return replace(
         lines,
@@ -159,6 +163,12 @@ def _contrast(fitted: Fit, lines: WindowedLines, noise: NoiseModel) -> Real:
     white = whitening(own)
     power = np.sum(np.abs(np.einsum("kij,kj->ki", white, rest)) ** 2, axis=1) / rest.shape[1]
     return np.asarray(power / np.maximum(median_filter(power, NEAR, mode="nearest"), 1e-3 * power.mean() + 1e-300))
+
+
+def _too_few_left(lines: list[WindowedLines], frequency: float) -> bool:
+    """Whether taking the tone out would leave less than three quarters of any recording's lines."""
+    reach = [np.abs(one.frequencies - frequency) <= REACH * _step(one) for one in lines]
+    return any(near.sum() > 0.25 * len(near) for near in reach)
 
 
 def _force_contrast(lines: WindowedLines, frequency: float) -> float:
