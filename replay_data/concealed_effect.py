@@ -125,11 +125,11 @@ def _hysteresis(g: np.random.Generator, s: JointScale) -> dict[str, Any]:
 
 def _clipping(g: np.random.Generator, s: JointScale) -> dict[str, Any]:
     place = int(g.integers(3))
-    return {"channel": CHANNELS[3 + place], "limit_m_per_s2": g.uniform(2.2, 3.2) * s.channels[place]}
+    return {"channel": CHANNELS[3 + place], "limit_m_per_s2": g.uniform(1.8, 2.6) * s.channels[place]}
 
 
 JOINT_EFFECTS: dict[str, Draw] = {
-    "stiffness_hardening": lambda g, s: {"k3_n_per_m3": g.uniform(0.15, 0.5) * s.stiffness / (3 * s.deflection) ** 2},
+    "stiffness_hardening": lambda g, s: {"k3_n_per_m3": g.uniform(0.1, 0.3) * s.stiffness / (3 * s.deflection) ** 2},
     "stiffness_softening": lambda g, s: {
         "stiffness_loss_n_per_m": g.uniform(0.3, 0.6) * s.stiffness,
         "knee_m": g.uniform(0.6, 1.5) * s.deflection,
@@ -163,7 +163,7 @@ EFFECTS: dict[str, Draw] = {
         "damping_ratio": g.uniform(0.02, 0.05),
         "shape": _vector(g, g.uniform(0.03, 0.05)),
     },
-    "gyroscopic_coupling": lambda g, s: {"coupling_ns_per_m": _vector(g, g.uniform(0.1, 0.3) * s.stiffness / 100.0)},
+    "gyroscopic_coupling": lambda g, s: {"coupling_ns_per_m": _vector(g, g.uniform(0.3, 0.6) * s.stiffness / 100.0)},
     "dynamometer_dynamics": lambda g, s: {
         "frequency_hz": g.uniform(60.0, 110.0),
         "damping_ratio": g.uniform(0.02, 0.05),
