@@ -55,7 +55,10 @@ SMALL = 0.01
 """Evidence of a further cause, as a share of what the first ones had, below which it may mend the form of their law."""
 
 SAME_JOINT = 0.9
-"""Cosine between the directions of two laws of one joint; the second must then bring three times SMALL."""
+"""Cosine between the directions of two laws of one joint."""
+
+AFTER_A_LAW = 0.06
+"""The same share once a joint's law was accepted: its form is never quite the true one. Half of it for another joint."""
 
 
 @dataclass(frozen=True)
@@ -357,13 +360,12 @@ def _measured(fitted: Fit) -> bool:
 
 def _mending(option: _Option, current: Fit) -> float:
     """Share of the evidence so far that a further cause needs."""
-    last = option.fitted.explanation.causes[-1:] if option.name != "missing_mode" else ()
-    for new in last:
-        for old in current.explanation.causes:
-            if new.direction is not None and old.direction is not None:
-                along = abs(float(new.direction @ old.direction))
-                return 3 * SMALL if along > SAME_JOINT else SMALL
-    return SMALL
+    laws = [cause.direction for cause in current.explanation.causes if cause.direction is not None]
+    if not laws:
+        return SMALL
+    new = None if option.name == "missing_mode" else option.fitted.explanation.causes[-1].direction
+    apart = new is not None and all(abs(float(new @ old)) < SAME_JOINT for old in laws)
+    return AFTER_A_LAW / 2 if apart else AFTER_A_LAW
 
 
 def _describe(option: _Option, current: Fit) -> AcceptedCause:
