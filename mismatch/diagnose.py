@@ -58,7 +58,7 @@ SAME_JOINT = 0.9
 """Cosine between the directions of two laws of one joint."""
 
 AFTER_A_LAW = 0.06
-"""The same share once a joint's law was accepted: its form is never quite the true one. Half of it for another joint."""
+"""The same once a joint's law was accepted, whose form is never quite the true one; half of it for another joint."""
 
 
 @dataclass(frozen=True)

@@ -132,9 +132,21 @@ def find_clipping(fitted: Fit, lines: list[WindowedLines]) -> Clipping | None:
             # a limit holds: where much more was due, no more than the limit and some noise is shown
             pile = np.abs(measured[beyond])
             held = float(np.quantile(pile, 0.98)) < 1.12 * limit and float(np.median(pile)) > 0.88 * limit
-            if held and gain > 60 and (best is None or gain > best.gain):
+            if (
+                held
+                and _piles_up(measured, float(np.median(pile)))
+                and gain > 60
+                and (best is None or gain > best.gain)
+            ):
                 best = Clipping(p, float(np.median(pile)), gain)
     return best
+
+
+def _piles_up(measured: Real, limit: float) -> bool:
+    """Whether a signal crowds at a limit and hardly passes it; a vibration that was predicted too large does not."""
+    size = np.abs(measured) / limit
+    at, below = np.sum((size > 0.94) & (size < 1.06)), np.sum((size > 0.76) & (size < 0.88))
+    return bool(at > 1.3 * below and np.quantile(size, 0.9995) < 1.2)
 
 
 def unclipped(fitted: Fit, lines: WindowedLines, clipping: Clipping, original: Real) -> Real:

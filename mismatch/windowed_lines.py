@@ -1,6 +1,6 @@
 """Spectra of one trial on the lines that count, and a linear model's prediction cut in exactly the same way."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,7 +118,15 @@ def windowed_lines(trial: Trial, band: tuple[float, float], decay: float) -> Win
 
 
 def receptance_at(model: ModalModel, frequencies: Real) -> Complex:
-    """Receptance (n, n_responses, n_excitations) at lines that may hold 0 Hz."""
-    if model.residuals is not None and model.residuals.lower.any():
-        frequencies = np.maximum(frequencies, frequencies[1] if len(frequencies) > 1 else 1e-3)
-    return model.receptance(frequencies)
+    """Receptance (n, n_responses, n_excitations) at lines from 0 Hz on.
+
+    A residual inertia stands for modes below the band and says nothing below it: there, a third of the lowest mode, it is
+    left out, or the mean cutting force would carry the tool away.
+    """
+    if model.residuals is None or not model.residuals.lower.any():
+        return model.receptance(frequencies)
+    plain = replace(model, residuals=replace(model.residuals, lower=np.zeros_like(model.residuals.lower)))
+    values = plain.receptance(frequencies)
+    inside = frequencies >= model.natural_frequencies.min() / 3
+    values[inside] -= model.residuals.lower / (2 * np.pi * frequencies[inside, None, None]) ** 2
+    return values

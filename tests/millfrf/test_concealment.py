@@ -92,17 +92,18 @@ def test_impossible_options_are_refused(tmp_path: Path, options: dict[str, Any],
 
 
 @pytest.mark.slow
-def test_hidden_friction_is_found(tmp_path: Path) -> None:
+def test_a_hidden_drift_is_found(tmp_path: Path) -> None:
     said: list[str] = []
-    result = run_concealed(ConcealOptions(tmp_path, seed=4, effect="coulomb_friction"), say=said.append)
-    assert result.hidden.name == "coulomb_friction"
-    assert judgement("coulomb_friction", result.diagnosis) == "right"
+    result = run_concealed(ConcealOptions(tmp_path, seed=9, effect="pose_drift"), say=said.append)
+    assert result.hidden.name == "pose_drift"
+    assert judgement("pose_drift", result.diagnosis) == "right"
     angle = direction_error(result.hidden, result.diagnosis)
     assert angle is not None
     assert angle < 2.0
     (cause,) = result.diagnosis["physics"]
-    assert cause["parameters"]["friction_n"] == pytest.approx(result.hidden.parameters["friction_n"], rel=0.05)
+    change = result.hidden.parameters["stiffness_change_n_per_m"]
+    assert cause["parameters"]["stiffness_change_n_per_m"] == pytest.approx(change, rel=0.05)
     fingerprint = next(number for number, line in enumerate(said) if result.fingerprint in line)
     assert fingerprint < next(number for number, line in enumerate(said) if line.strip().startswith("verdict"))
     assert json.loads((tmp_path / "nominal.json").read_text())["quantity"] == "receptance"
-    assert "coulomb_friction" in str(concealment_table(result).rows)
+    assert "pose_drift" in str(concealment_table(result).rows)
