@@ -120,8 +120,8 @@ def windowed_lines(trial: Trial, band: tuple[float, float], decay: float) -> Win
 def receptance_at(model: ModalModel, frequencies: Real) -> Complex:
     """Receptance (n, n_responses, n_excitations) at lines from 0 Hz on.
 
-    A residual inertia stands for modes below the band and says nothing below it: there, a third of the lowest mode, it is
-    left out, or the mean cutting force would carry the tool away.
+    A residual inertia stands for modes below the band and says nothing below it: under a third of the lowest mode it
+    is left out, or the mean cutting force would carry the tool away.
     """
     if model.residuals is None or not model.residuals.lower.any():
         return model.receptance(frequencies)
