@@ -13,7 +13,7 @@ from millfrf.concealment import ConcealOptions, run_concealed
 from millfrf.figures.diagnosis_law import law_figure
 from millfrf.figures.diagnosis_spectra import spectra_figure
 from mismatch import diagnose, read_trials
-from mismatch.free_form_law import free_form_law
+from mismatch.free_form_law import free_form_laws
 from mismatch.held_out_spectra import held_out_spectra
 from modal_fit import read_modal_model
 
@@ -26,10 +26,10 @@ def main(folder: Path, effect: str = "coulomb_friction", seed: int = 4) -> dict[
         result = run_concealed(ConcealOptions(Path(scratch), seed=seed, effect=effect), say=print)
         print(result.hidden, result.diagnosis["verdict"], result.diagnosis["physics"], sep="\n")
         recordings = Path(scratch) / "recordings"
-        model = read_modal_model(recordings / "nominal.json")
+        model = read_modal_model(Path(scratch) / "nominal.json")
         trials = read_trials([recordings / f"{level}.h5" for level in ("low", "mid", "high")], model)
         found = diagnose(model, trials)
-    law_figure(free_form_law(found)).savefig(folder / "idle_against_milling_law.png", dpi=150)
+    law_figure(free_form_laws(found)[0]).savefig(folder / "idle_against_milling_law.png", dpi=150)
     spectra_figure(held_out_spectra(found)).savefig(folder / "idle_against_milling_spectra.png", dpi=150)
     return result.diagnosis
 

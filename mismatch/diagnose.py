@@ -131,7 +131,7 @@ def diagnose(
     unexplained = _unexplained(left, search.before)
     if unexplained:
         candidates += [Candidate(one.name, one.evidence, "rejected", one.location) for one in accepted]
-        accepted = []
+        accepted, current, left = [], base, search.before
     tell("held-out recording")
     improvement = held_out_improvement(lines, current.explanation, current.noises)
     verdict = "unexplained" if unexplained else "explained" if accepted else "none"
