@@ -249,6 +249,8 @@ def _options(
     weighed.append(Candidate("missing_mode", mode.gain, "screened"))
     options += _linear_options(lines, current, chains, mode, cost)
     best = min(options, key=lambda option: option.fitted.score, default=None)
+    if best is not None and best.fitted.score > current.score - LEAST_EVIDENCE:
+        best = None
     left = leftover((best.fitted if best else current).explanation, lines)
     first = best is None and not current.explanation.causes
     if first or (left.share > NOISE_LIKE and left.power > 3 * SMALL * before.power):
@@ -285,7 +287,8 @@ def _joints(
     laws = [p for p in causes.values() if isinstance(p, JointPhysics)]
     laws = [p for p in laws if p.name not in {cause.physics.name for cause in current.explanation.causes}]
     sighting = find_direction(floor, current.explanation)
-    if not laws or sighting.gain < 50 * len(lines):
+    # along a single axis there is no direction to stand out, and a broad force looks like a higher floor
+    if not laws or (len(sighting.direction) > 1 and sighting.gain < 50 * len(lines)):
         return [], []
     location = {"direction": [round(float(x), 6) for x in sighting.direction]}
     screened = screen_joints(floor, current.explanation, sighting.direction, laws)
