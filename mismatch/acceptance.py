@@ -1,0 +1,85 @@
+"""When a fitted cause is worth accepting, and when so much is left that none is named."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from .fitting import Fit
+from .leftover import Leftover
+from .physics import ChainPhysics
+
+LEAST_EVIDENCE = 20.0
+"""Gain in score below which nothing is accepted: odds of some twenty thousand to one."""
+
+NOISE_LIKE = 0.06
+"""Share of a residual that may seem to move with the signal by chance, hum or force noise."""
+
+EXPLAINED = 0.9
+"""Share of what moved with the signal that causes must have taken away, if what is left is not noise-like."""
+
+CLEAR = 4.0
+"""Standard errors by which a cause's number must differ from none."""
+
+SMALL = 0.01
+"""Evidence of a further cause, as a share of what the first ones had, below which it may mend the form of their law."""
+
+SAME_JOINT = 0.9
+"""Cosine between the directions of two laws of one joint."""
+
+AFTER_A_LAW = 0.06
+"""The same once a joint's law was accepted, whose form is never quite the true one; half of it for another joint."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """A fitted candidate."""
+
+    name: str
+    location: dict[str, Any]
+    fitted: Fit
+
+
+def unexplained(left: Leftover, before: Leftover) -> bool:
+    """Whether too much still moves with the signal for the causes found, if any."""
+    return left.share > NOISE_LIKE and left.power > (1 - EXPLAINED) * before.power
+
+
+def worth_it(option: Option, current: Fit, base: Fit) -> bool:
+    """Enough evidence; and if it lies in the lab's belief alone, most of what the belief found odd."""
+    gain = current.score - option.fitted.score
+    if option.name != "missing_mode" and not _measured(option.fitted):
+        return False
+    if gain < max(LEAST_EVIDENCE, _mending(option, current) * (base.score - current.score)):
+        return False
+    if current.misfit - option.fitted.misfit > LEAST_EVIDENCE:
+        return True
+    size = current.explanation.shape.size
+    odd = max(current.deviation - size, 1.0)
+    return current.deviation - option.fitted.deviation > 0.6 * odd
+
+
+def _measured(fitted: Fit) -> bool:
+    """Whether any number of the last cause stands out of its own error: else the gain came from elsewhere."""
+    cause = fitted.explanation.causes[-1]
+    first = fitted.explanation.size - cause.size
+    spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[first : first + len(cause.values)], 0.0))
+    absent = cause.physics.start(fitted.explanation.shape.nominal) if isinstance(cause.physics, ChainPhysics) else None
+    clear = []
+    for k, (parameter, error) in enumerate(zip(cause.physics.parameters, spread, strict=True)):
+        if parameter.logarithmic:
+            clear.append(error * parameter.unit_step < 1 / CLEAR)
+        else:
+            zero = 0.0 if absent is None else float(absent[k])
+            clear.append(abs(float(cause.values[k]) - zero) > CLEAR * error * parameter.unit_step)
+    return any(clear) if isinstance(cause.physics, ChainPhysics) else clear[0]
+
+
+def _mending(option: Option, current: Fit) -> float:
+    """Share of the evidence so far that a further cause needs."""
+    laws = [cause.direction for cause in current.explanation.causes if cause.direction is not None]
+    if not laws:
+        return SMALL
+    new = None if option.name == "missing_mode" else option.fitted.explanation.causes[-1].direction
+    apart = new is not None and all(abs(float(new @ old)) < SAME_JOINT for old in laws)
+    return AFTER_A_LAW / 2 if apart else AFTER_A_LAW
