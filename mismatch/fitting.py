@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .explanation import Cause, Explanation, Predicted, columns_of, line_response, predict_lines, surround
+from .explanation import Explanation, Predicted, line_response, predict_lines, surround
 from .noise_model import NoiseModel, fit_noise, whitening
 from .windowed_lines import WindowedLines
 
@@ -260,6 +260,3 @@ def _cost(seen: list[_Assessed], explanation: Explanation) -> float:
 
 def _deviation(explanation: Explanation) -> float:
     return float(explanation.shape.belief @ explanation.u**2)
-
-
-__all__ = ["Cause", "Fit", "columns_of", "fit", "jacobian", "levels", "residual", "through_structure"]

@@ -12,7 +12,7 @@ from mismatch.joint_law import POINTS
 from mismatch.joint_simulation import driven_force, joint_force
 from mismatch.noise_model import _cost, fit_noise, whitening
 from mismatch.windowed_lines import WindowedLines, receptance_at
-from modal_fit import ModalModel
+from modal_fit import ModalModel, Residuals
 
 
 @pytest.fixture(scope="module")
@@ -159,3 +159,12 @@ def test_explanation_without_causes_is_the_nominal_model(model: ModalModel) -> N
     same = Explanation(shape, np.zeros(shape.size)).model
     np.testing.assert_allclose(same.poles, model.poles)
     np.testing.assert_allclose(same.right, replace(model).right)
+
+
+def test_a_residual_inertia_says_nothing_below_the_band(model: ModalModel) -> None:
+    """Above a third of the lowest mode it is the model's own; below it, and at 0 Hz, the modes alone remain."""
+    heavy = replace(model, residuals=Residuals(upper=np.zeros((2, 2)), lower=-0.01 * np.eye(2)))
+    frequencies = np.array([0.0, 0.5, 2.9, 3.1, 9.0, 20.0])
+    found = receptance_at(heavy, frequencies)
+    np.testing.assert_allclose(found[:3], model.receptance(frequencies[:3]), rtol=1e-12)
+    np.testing.assert_allclose(found[3:], heavy.receptance(frequencies[3:]), rtol=1e-12)
