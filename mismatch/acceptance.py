@@ -4,10 +4,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .fitting import Fit
 from .leftover import Leftover
 from .physics import ChainPhysics
+
+Real = NDArray[np.float64]
 
 LEAST_EVIDENCE = 20.0
 """Gain in score below which nothing is accepted: odds of some twenty thousand to one."""
@@ -45,12 +48,33 @@ def unexplained(left: Leftover, before: Leftover) -> bool:
     return left.share > NOISE_LIKE and left.power > (1 - EXPLAINED) * before.power
 
 
+def evidence_needed(current: Fit, base: Fit, direction: Real | None = None) -> float:
+    """Gain in score that a further cause needs: a small one may only mend the form of those found.
+
+    Parameters
+    ----------
+    current
+        With the causes found so far.
+    base
+        Without any.
+    direction : (n_axes,)
+        Of a further joint; None: a linear cause.
+    """
+    laws = [cause.direction for cause in current.explanation.causes if cause.direction is not None]
+    share = SMALL
+    if laws:
+        apart = direction is not None and all(abs(float(direction @ old)) < SAME_JOINT for old in laws)
+        share = AFTER_A_LAW / 2 if apart else AFTER_A_LAW
+    return max(LEAST_EVIDENCE, share * (base.score - current.score))
+
+
 def worth_it(option: Option, current: Fit, base: Fit) -> bool:
     """Enough evidence; and if it lies in the lab's belief alone, most of what the belief found odd."""
     gain = current.score - option.fitted.score
     if option.name != "missing_mode" and not _measured(option.fitted):
         return False
-    if gain < max(LEAST_EVIDENCE, _mending(option, current) * (base.score - current.score)):
+    new = None if option.name == "missing_mode" else option.fitted.explanation.causes[-1].direction
+    if gain < evidence_needed(current, base, new):
         return False
     if current.misfit - option.fitted.misfit > LEAST_EVIDENCE:
         return True
@@ -75,11 +99,3 @@ def _measured(fitted: Fit) -> bool:
     return any(clear) if isinstance(cause.physics, ChainPhysics) else clear[0]
 
 
-def _mending(option: Option, current: Fit) -> float:
-    """Share of the evidence so far that a further cause needs."""
-    laws = [cause.direction for cause in current.explanation.causes if cause.direction is not None]
-    if not laws:
-        return SMALL
-    new = None if option.name == "missing_mode" else option.fitted.explanation.causes[-1].direction
-    apart = new is not None and all(abs(float(new @ old)) < SAME_JOINT for old in laws)
-    return AFTER_A_LAW / 2 if apart else AFTER_A_LAW

@@ -120,7 +120,7 @@ def _search(
     before = leftover(base.explanation, lines)
     while len(accepted) < MOST_CAUSES:
         tell(f"causes, round {len(accepted) + 1}")
-        options, weighed = fitted_options(lines, current, causes, before)
+        options, weighed = fitted_options(lines, current, base, causes, before)
         candidates += weighed
         best = min(options, key=lambda option: option.fitted.score, default=None)
         if best is None or best.fitted.score > current.score - LEAST_EVIDENCE:

@@ -10,10 +10,10 @@ from scipy.fft import rfft
 from modal_fit import ModalModel
 
 from .joint_law import JointLaw, JointMotion
-from .joint_simulation import common_axes, driven_force, joint_force
+from .joint_simulation import JointResponse, common_axes, driven_force, joint_response
 from .physics import Chain, ChainPhysics, JointPhysics, Physics
 from .shape_of_model import ModelShape
-from .windowed_lines import WindowedLines, receptance_at
+from .windowed_lines import WindowedLines, displacement_at, receptance_at
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -68,7 +68,7 @@ class Cause:
         )
         if self.direction is None:
             return replace(self, values=values)
-        turned = self.direction + TURN_STEP * _across(self.direction) @ coordinates[count:]
+        turned = self.direction + TURN_STEP * across(self.direction) @ coordinates[count:]
         return replace(self, values=values, direction=turned / np.linalg.norm(turned))
 
     def law(self) -> JointLaw:
@@ -78,7 +78,7 @@ class Cause:
         return self.physics.law(self.values, self.motion)
 
 
-def _across(direction: Real) -> Real:
+def across(direction: Real) -> Real:
     """Orthonormal vectors across a direction, (n, n - 1)."""
     return np.asarray(np.linalg.svd(direction[None, :])[2][1:].T)
 
@@ -176,11 +176,14 @@ class Predicted:
         Of the whole record, ramped and padded.
     joint : (n_padded_lines, n_excitations)
         Forces of the joints on the structure, without sign change.
+    joints
+        Each of them, in the order of the causes.
     """
 
     response: Complex
     spectrum: Complex
     joint: Complex
+    joints: tuple[JointResponse, ...]
 
 
 def predict_lines(explanation: Explanation, lines: WindowedLines) -> Predicted:
@@ -189,18 +192,24 @@ def predict_lines(explanation: Explanation, lines: WindowedLines) -> Predicted:
     around = surround(explanation, frequencies)
     pushed = around.pushed(lines.force_lines)
     joint = np.zeros_like(pushed)
+    joints = []
     for cause in explanation.causes:
         if cause.direction is not None:
-            columns = columns_of(model)
+            _, columns = common_axes(model)
             if cause.seen is not None:
-                g = rfft(driven_force(lines, *cause.seen[lines.trial.name], cause.law()), n=lines.padded)
+                x, v = cause.seen[lines.trial.name]
+                answer = JointResponse(rfft(driven_force(lines, x, v, cause.law()), n=lines.padded), x, v)
             else:
-                g = joint_force(model, lines, pushed - joint, cause.direction, cause.law())
+                answer = joint_response(model, lines, pushed - joint, cause.direction, cause.law())
+            joints.append(answer)
+            g = answer.force
             joint[:, columns] += g[:, None] * cause.direction
-    receptance = around.closed(receptance_at(model, frequencies))
-    displacement = np.einsum("kpq,kq->kp", receptance, pushed - joint)
-    spectrum = around.shown(displacement * lines.kinematic(frequencies))
-    return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint)
+    if around.feedback is None:
+        displacement = displacement_at(model, frequencies, pushed - joint)
+    else:
+        displacement = np.einsum("kpq,kq->kp", around.closed(receptance_at(model, frequencies)), pushed - joint)
+    spectrum = around.shown(displacement * lines.padded_kinematic)
+    return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint, tuple(joints))
 
 
 def line_response(explanation: Explanation, lines: WindowedLines, joint: Complex | None = None) -> Complex:
@@ -219,8 +228,12 @@ def line_response(explanation: Explanation, lines: WindowedLines, joint: Complex
     force = around.pushed(lines.force_here)
     if joint is not None:
         force = force - joint
-    closed = around.closed(explanation.model.receptance(lines.frequencies))
-    return around.shown(np.einsum("kpq,kq->kp", closed, force) * lines.kinematic(lines.frequencies))
+    if around.feedback is None:
+        displacement = displacement_at(explanation.model, lines.frequencies, force)
+    else:
+        closed = around.closed(explanation.model.receptance(lines.frequencies))
+        displacement = np.einsum("kpq,kq->kp", closed, force)
+    return around.shown(displacement * lines.kinematic)
 
 
 def columns_of(model: ModalModel) -> list[int]:

@@ -7,7 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .explanation import Explanation, Predicted, line_response, predict_lines, surround
-from .noise_model import NoiseModel, fit_noise, whitening
+from .joint_tangents import joint_changes
+from .line_loops import whitened_columns
+from .noise_model import NoiseModel, fit_noise, whitening_and_determinant
 from .windowed_lines import WindowedLines
 
 Complex = NDArray[np.complex128]
@@ -79,7 +81,7 @@ def fit(
     iterations
         At most.
     tolerance
-        Of the misfit: a smaller gain ends the fit.
+        Of the misfit: two gains below it end the fit, or a tenth of it expected.
     """
     explanation = start
     with ThreadPoolExecutor(THREADS) as pool:
@@ -90,6 +92,8 @@ def fit(
         for _ in range(iterations):
             cost = _cost(seen, explanation)
             step = _solved(matrix + damping * np.diag(np.diag(matrix)), gradient)
+            if step @ gradient < 0.1 * tolerance:
+                break
             for _ in range(4):
                 trial = _moved(explanation, step)
                 again = list(pool.map(_assess, lines, [trial] * len(lines), [one.noise for one in seen]))
@@ -140,7 +144,7 @@ def through_structure(explanation: Explanation, lines: WindowedLines) -> Complex
     closed = around.closed(explanation.model.receptance(lines.frequencies))
     if around.force is not None:
         closed = closed @ around.force
-    return np.asarray(around.shown(closed * lines.kinematic(lines.frequencies)[:, :, None]))
+    return np.asarray(around.shown(closed * lines.kinematic[:, :, None]))
 
 
 def levels(lines: WindowedLines) -> tuple[Real, Real]:
@@ -155,33 +159,37 @@ def jacobian(explanation: Explanation, lines: WindowedLines, predicted: Predicte
     """Derivative of the response lines by u and the causes' coordinates, (n_lines, n_responses, size)."""
     around = surround(explanation, lines.frequencies)
     force = around.pushed(lines.force_here)
-    if predicted.joint.any():
-        force = force - lines.cut(lines.signal(predicted.joint))
-    closed = None
+    joint = lines.cut(lines.signal(predicted.joint)) if predicted.joints else None
+    if joint is not None:
+        force = force - joint
+    receptance = explanation.model.receptance(lines.frequencies)
+    closed = around.closed(receptance)
     if around.feedback is not None:
-        receptance = explanation.model.receptance(lines.frequencies)
-        displacement = np.einsum("kpq,kq->kp", around.closed(receptance), force)
-        force = force - np.einsum("kqp,kp->kq", around.feedback, displacement)
-        closed = np.linalg.inv(np.eye(receptance.shape[1]) + receptance @ around.feedback)
+        force = force - np.einsum("kqp,kp->kq", around.feedback, np.einsum("kpq,kq->kp", closed, force))
     linear = explanation.shape.jacobian(explanation.u, lines.frequencies, force)
-    if closed is not None:
-        linear = closed @ linear
-    linear = around.shown(linear * lines.kinematic(lines.frequencies)[:, :, None])
-    columns = [linear]
-    here = explanation.coordinates()
-    joint = lines.cut(lines.signal(predicted.joint)) if predicted.joint.any() else None
-    plain = line_response(explanation, lines, joint)
-    free = np.concatenate([np.zeros(0)] + [np.full(c.size, c.direction is not None) for c in explanation.causes])
-    for k in range(len(here)):
+    if around.feedback is not None:
+        linear = np.linalg.solve(np.eye(receptance.shape[1]) + receptance @ around.feedback, linear)
+    result = np.zeros((*linear.shape[:2], explanation.size), dtype=complex)
+    result[:, :, : linear.shape[2]] = linear
+    if predicted.joints:
+        result += closed @ joint_changes(explanation, lines, predicted)
+    result *= lines.kinematic[:, :, None]
+    result = around.shown(result)
+    here, plain = explanation.coordinates(), line_response(explanation, lines, joint)
+    chain = np.concatenate([np.zeros(0)] + [np.full(c.size, c.direction is None) for c in explanation.causes])
+    for k in np.flatnonzero(chain):
         aside = here.copy()
         aside[k] += 0.02
-        moved = explanation.with_causes(aside)
-        if free[k]:
-            change = predict_lines(moved, lines).response - predicted.response
-        else:
-            change = line_response(moved, lines, joint) - plain
-        columns.append((change / 0.02)[:, :, None])
-    return np.concatenate(columns, axis=2)
+        change = line_response(explanation.with_causes(aside), lines, joint) - plain
+        result[:, :, linear.shape[2] + k] += change / 0.02
+    return result
+
+
+def whitened(white: Complex, lines: Complex) -> Real:
+    """Whitened lines (n_lines, n, n_columns) as real columns (2 n_lines n, n_columns), real above imaginary parts."""
+    out = np.empty((2, *lines.shape))
+    whitened_columns(white, np.ascontiguousarray(lines), out)
+    return out.reshape(-1, lines.shape[2])
 
 
 def _assess(lines: WindowedLines, explanation: Explanation, noise: NoiseModel) -> _Assessed:
@@ -192,7 +200,7 @@ def _assess(lines: WindowedLines, explanation: Explanation, noise: NoiseModel) -
         return _misfit(lines, explanation, predicted, rest, noise)
     except np.linalg.LinAlgError:
         nothing = np.zeros((0, 0), dtype=complex)
-        return _Assessed(Predicted(nothing, nothing, nothing), nothing, nothing, np.inf, noise)
+        return _Assessed(Predicted(nothing, nothing, nothing, ()), nothing, nothing, np.inf, noise)
 
 
 def _misfit(
@@ -201,9 +209,9 @@ def _misfit(
     if not np.isfinite(rest).all():
         return _Assessed(predicted, rest, rest, np.inf, noise)
     covariance = noise.covariance(lines.frequencies, through_structure(explanation, lines))
-    white = whitening(covariance)
-    small = np.einsum("kij,kj->ki", white, rest)
-    misfit = 2 * float(np.sum(np.linalg.slogdet(covariance)[1]) + np.sum(np.abs(small) ** 2))
+    white, log_determinant = whitening_and_determinant(covariance)
+    small = whitened(white, rest[:, :, None])
+    misfit = 2 * float(log_determinant + np.vdot(small, small))
     return _Assessed(predicted, white, rest, misfit if np.isfinite(misfit) else np.inf, noise)
 
 
@@ -226,10 +234,9 @@ def _solved(matrix: Real, gradient: Real) -> Real:
 
 
 def _normal_of(lines: WindowedLines, explanation: Explanation, seen: _Assessed) -> tuple[Real, Real]:
-    slope = (seen.white @ jacobian(explanation, lines, seen.predicted)).reshape(seen.rest.size, -1)
-    small = np.einsum("kij,kj->ki", seen.white, seen.rest).ravel()
-    matrix = slope.real.T @ slope.real + slope.imag.T @ slope.imag
-    return 2 * matrix, 2 * (slope.real.T @ small.real + slope.imag.T @ small.imag)
+    slope = whitened(seen.white, jacobian(explanation, lines, seen.predicted))
+    small = whitened(seen.white, seen.rest[:, :, None])[:, 0]
+    return 2 * (slope.T @ slope), 2 * (slope.T @ small)
 
 
 def _normal_equations(

@@ -42,9 +42,9 @@ def free_run(
     spans: tuple[float, float],
     ramp: Real,
     elements: tuple[Real, Real],
-    force: Real,
+    written: tuple[Real, Real, Real],
 ) -> None:
-    """Write the joint's force at every instant, the structure moving under it.
+    """Write the joint's force and motion at every instant, the structure moving under it.
 
     The deflection is ``x = x_driven - (h * g)``, h the structure's impulse response along the joint, exact for a force
     that runs straight between instants; at each instant g is solved for by Newton's method, so that stiff laws
@@ -63,9 +63,10 @@ def free_run(
         Stiffness that changes with time.
     elements
         Springs (N/m) and yields (m) of the elastic-plastic elements.
-    force : (n,), N
-        Receives g.
+    written
+        Receives g (N), deflection (m) and velocity (m/s), each (n,).
     """
+    force, deflection, velocity = written
     turn, early, late, to_x, to_v = dynamics
     springs, yields = elements
     stretch = np.zeros(len(springs))
@@ -98,6 +99,7 @@ def free_run(
                 break
         g = guess
         x = x_free - own_x * g
+        deflection[k], velocity[k] = x, v_free - own_v * g
         for i in range(len(springs)):
             stretch[i] = min(max(stretch[i] + x - before_x, -yields[i]), yields[i])
         before_x = x

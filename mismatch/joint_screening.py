@@ -79,5 +79,5 @@ def _column(record: FloorRecord, explanation: Explanation, seen: SeenMotion, cau
     spectrum = rfft(force, n=lines.padded)
     columns = columns_of(explanation.model)
     receptance = receptance_at(explanation.model, lines.padded_frequencies)[:, :, columns] @ cause.direction
-    response = -receptance * spectrum[:, None] * lines.kinematic(lines.padded_frequencies)
+    response = -receptance * spectrum[:, None] * lines.padded_kinematic
     return record.column(lines.cut(lines.signal(response)))

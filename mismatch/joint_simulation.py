@@ -1,5 +1,7 @@
 """Free simulation of a joint's law on a modal model, recording by recording."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
@@ -9,13 +11,30 @@ from modal_fit import ModalModel
 
 from .joint_law import JointLaw
 from .joint_loop import driven_run, free_run
-from .windowed_lines import WindowedLines, receptance_at
+from .windowed_lines import WindowedLines, displacement_at
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 INSTANTS_PER_PERIOD = 20.0
 """Of the highest mode."""
+
+
+@dataclass(frozen=True)
+class JointResponse:
+    """A joint in a simulation.
+
+    Parameters
+    ----------
+    force : (n_padded_lines,), N
+        Padded spectrum.
+    deflection, velocity : (n_padded,), m and m/s
+        At the recording's samples.
+    """
+
+    force: Complex
+    deflection: Real
+    velocity: Real
 
 
 def common_axes(model: ModalModel) -> tuple[list[int], list[int]]:
@@ -42,8 +61,10 @@ def fineness(model: ModalModel, rate: float) -> int:
     return max(4, int(np.ceil(INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate)))
 
 
-def joint_force(model: ModalModel, lines: WindowedLines, force: Complex, direction: Real, law: JointLaw) -> Complex:
-    """Padded spectrum (n_padded_lines,) of the joint's force, N, the structure simulated freely under both forces.
+def joint_response(
+    model: ModalModel, lines: WindowedLines, force: Complex, direction: Real, law: JointLaw
+) -> JointResponse:
+    """Force and motion of a joint, the structure simulated freely under the outer force and the joint's.
 
     Parameters
     ----------
@@ -58,44 +79,53 @@ def joint_force(model: ModalModel, lines: WindowedLines, force: Complex, directi
     law
         Of the joint.
     """
-    rows, columns = common_axes(model)
+    rows, _ = common_axes(model)
     frequencies = lines.padded_frequencies
-    displacement = np.einsum("kpq,kq->kp", receptance_at(model, frequencies)[:, rows], force) @ direction
+    displacement = displacement_at(model, frequencies, force)[:, rows] @ direction
     fine = fineness(model, lines.trial.rate)
     n = fine * lines.padded
     deflection = fine * irfft(displacement, n=n)
     velocity = fine * irfft(2j * np.pi * frequencies * displacement, n=n)
     step = 1.0 / (fine * lines.trial.rate)
-    result = np.empty(n)
+    written = (np.empty(n), np.empty(n), np.empty(n))
     free_run(
         deflection,
         velocity,
-        _dynamics(model, rows, columns, direction, step),
+        joint_dynamics(model, direction, step),
         law.tables(),
         (law.reach, law.speed),
-        _ramp(law, n, step, lines.trial.duration),
+        stiffness_ramp(law, n, step, lines.trial.duration),
         (law.springs, law.yields),
-        result,
+        written,
     )
-    return np.asarray(rfft(result)[: len(frequencies)] / fine)
+    force_lines = np.asarray(rfft(written[0])[: len(frequencies)] / fine)
+    return JointResponse(force_lines, written[1][::fine].copy(), written[2][::fine].copy())
 
 
 def driven_force(lines: WindowedLines, deflection: Real, velocity: Real, law: JointLaw) -> Real:
     """The joint's force (n,), N, for a motion sampled at the trial's rate."""
     result = np.empty(len(deflection))
-    ramp = _ramp(law, len(deflection), 1 / lines.trial.rate, lines.trial.duration)
+    ramp = stiffness_ramp(law, len(deflection), 1 / lines.trial.rate, lines.trial.duration)
     driven_run(deflection, velocity, law.tables(), (law.reach, law.speed), ramp, (law.springs, law.yields), result)
     return result
 
 
-def _ramp(law: JointLaw, n: int, step: float, duration: float) -> Real:
+def stiffness_ramp(law: JointLaw, n: int, step: float, duration: float) -> Real:
+    """Change of stiffness (n,), N/m, at instants ``step`` s apart."""
     return np.asarray(law.ramp * (np.minimum(np.arange(n) * step / duration, 1.0) - 0.5))
 
 
-def _dynamics(
-    model: ModalModel, rows: list[int], columns: list[int], direction: Real, step: float
+def joint_dynamics(
+    model: ModalModel, direction: Real, step: float
 ) -> tuple[Complex, Complex, Complex, Complex, Complex]:
-    """Exact step of ``q' = p q + left.d g`` for g straight between instants."""
+    """Exact step of ``q' = p q + left.d g`` for g straight between instants.
+
+    Returns
+    -------
+    turn, early, late, to_x, to_v : (n_modes,)
+        As :func:`mismatch.joint_loop.free_run` takes them.
+    """
+    rows, columns = common_axes(model)
     poles = model.poles
     z = poles * step
     turn = np.exp(z)

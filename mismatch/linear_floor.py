@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.stats import gamma
 
 from .explanation import predict_lines
-from .fitting import Fit, jacobian, levels, through_structure
+from .fitting import Fit, jacobian, levels, through_structure, whitened
 from .noise_model import whitening
 from .windowed_lines import WindowedLines
 
@@ -48,8 +48,7 @@ class FloorRecord:
 
     def column(self, response: Complex) -> Real:
         """Whitened response lines as one real column."""
-        small = np.einsum("kij,kj->ki", self.white, response).ravel()
-        return np.concatenate([small.real, small.imag])
+        return whitened(self.white, response[:, :, None])[:, 0]
 
 
 @dataclass(frozen=True)
@@ -129,10 +128,8 @@ def _floor(fitted: Fit, lines: list[WindowedLines], covariance: Callable[[int, C
         rest = one.measured - predicted.response
         through = through_structure(fitted.explanation, one)
         white = whitening(covariance(k, rest, through))
-        slope = (white @ jacobian(fitted.explanation, one, predicted)).reshape(rest.size, -1)
-        stacked = np.concatenate([slope.real, slope.imag])
-        small = np.einsum("kij,kj->ki", white, rest).ravel()
-        record = FloorRecord(one, rest, through, white, stacked, np.concatenate([small.real, small.imag]))
+        stacked = whitened(white, jacobian(fitted.explanation, one, predicted))
+        record = FloorRecord(one, rest, through, white, stacked, whitened(white, rest[:, :, None])[:, 0])
         records.append(record)
         matrix += 2 * stacked.T @ stacked
         gradient += 2 * stacked.T @ record.rest

@@ -107,7 +107,7 @@ def _columns(record: FloorRecord, pole: complex) -> Real:
     force = lines.force_here[::EVERY]
     s = 2j * np.pi * frequencies
     up, down = 1 / (s - pole), 1 / (s - np.conj(pole))
-    kinematic = lines.kinematic(frequencies)
+    kinematic = lines.kinematic[::EVERY]
     white = record.white[::EVERY] * kinematic[:, None, :]
     n, m = record.through.shape[1:]
     result = np.empty((len(s), white.shape[1], 2, n, m), dtype=complex)

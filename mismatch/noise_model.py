@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from .line_loops import noise_likelihood, whiten_lines
+
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
@@ -54,8 +56,23 @@ class NoiseModel:
 
 
 def whitening(covariance: Complex) -> Complex:
-    """W with ``W^H W = V^-1``, so that W r is white, (n_lines, n, n)."""
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
+    """W with ``W^H W = V^-1``, so that W r is white, (n_lines, n, n), lower triangular.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        A line's V is not positive definite.
+    """
+    return whitening_and_determinant(covariance)[0]
+
+
+def whitening_and_determinant(covariance: Complex) -> tuple[Complex, float]:
+    """W of :func:`whitening`, and ``sum ln det V`` over lines."""
+    white = np.array(covariance, dtype=complex, order="C")
+    total = whiten_lines(white)
+    if not np.isfinite(total):
+        raise np.linalg.LinAlgError("the covariance of a line is not positive definite")
+    return white, total
 
 
 def fit_noise(
@@ -137,16 +154,9 @@ def _cost(x: Real, lumps: _Lumps, n: int, m: int, levels: tuple[Real, Real]) -> 
     responses, forces = x[: n * KNOTS].reshape(n, KNOTS), x[n * KNOTS :]
     own = np.exp(np.clip(lumps.hats @ responses.T, -80, 80))
     pushed = np.exp(np.clip(forces, -80, 80))
-    covariance = np.einsum("q,bqij->bij", pushed, lumps.through)
-    diagonal = np.arange(n)
-    covariance[:, diagonal, diagonal] += own + 1e-12 * np.trace(covariance, axis1=1, axis2=2).real[:, None]
-    inverse = np.linalg.inv(covariance)
-    weighed = inverse @ lumps.covariance
-    cost = np.sum(lumps.counts * (np.linalg.slogdet(covariance)[1] + np.trace(weighed, axis1=1, axis2=2).real))
-    slope = lumps.counts[:, None, None] * (inverse - weighed @ inverse)
-    by_own = np.real(slope[:, diagonal, diagonal]) * own
-    gradient_own = np.einsum("bn,bk->nk", by_own, lumps.hats)
-    gradient_force = np.real(np.einsum("bij,bqji->q", slope, lumps.through)) * pushed
+    by_own, gradient_force = np.empty_like(own), np.empty(m)
+    cost = noise_likelihood(lumps.counts, lumps.covariance, lumps.through, own, pushed, by_own, gradient_force)
+    gradient_own = by_own.T @ lumps.hats
     steps = np.diff(responses, axis=1) / STIFFNESS
     cost += 0.5 * np.sum(steps**2)
     gradient_own[:, 1:] += steps / STIFFNESS

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from .acceptance import LEAST_EVIDENCE, NOISE_LIKE, SMALL, Option
+from .acceptance import LEAST_EVIDENCE, NOISE_LIKE, SMALL, Option, evidence_needed
 from .chain_screening import ScreenedChain, screen_chains
 from .diagnosis import Candidate
 from .explanation import Cause, Explanation
@@ -21,6 +21,9 @@ from .windowed_lines import WindowedLines
 MOST_CHAINS = 3
 """Linear causes that are fitted in a round."""
 
+WITHIN_REACH = 0.5
+"""Screened gain of a linear cause, as a share of the evidence it needs, from which it is fitted."""
+
 PROMISING = 0.1
 """Screened gain, as a share of the best law's, from which a law is fitted."""
 
@@ -29,11 +32,10 @@ MOST_LAWS = 4
 
 
 def fitted_options(
-    lines: list[WindowedLines], current: Fit, causes: dict[str, Physics], before: Leftover
+    lines: list[WindowedLines], current: Fit, base: Fit, causes: dict[str, Physics], before: Leftover
 ) -> tuple[list[Option], list[Candidate]]:
     """Screen everything, fit what promises most."""
     own_noise = noise_floor(current, lines)
-    cost = float(np.log(2 * sum(one.measured.size for one in lines)))
     taken = {(cause.physics.name, cause.place) for cause in current.explanation.causes}
     chains = [
         one
@@ -46,7 +48,8 @@ def fitted_options(
     weighed = [Candidate(one.cause.physics.name, one.gain, "screened", _place(one.cause)) for one in chains]
     mode = find_mode(own_noise, current.explanation)
     weighed.append(Candidate("missing_mode", mode.gain, "screened"))
-    options += _linear_options(lines, current, chains, mode, cost)
+    least = WITHIN_REACH * evidence_needed(current, base)
+    options += _linear_options(lines, current, chains, mode, least)
     best = min(options, key=lambda option: option.fitted.score, default=None)
     if best is not None and best.fitted.score > current.score - LEAST_EVIDENCE:
         best = None
@@ -62,17 +65,18 @@ def fitted_options(
 
 
 def _linear_options(
-    lines: list[WindowedLines], current: Fit, chains: list[ScreenedChain], mode: SightedMode, cost: float
+    lines: list[WindowedLines], current: Fit, chains: list[ScreenedChain], mode: SightedMode, least: float
 ) -> list[Option]:
     """Fit the linear causes that promise most: of the chain, and a further mode."""
     options = []
+    cost = float(np.log(2 * sum(one.measured.size for one in lines)))
     largest = max([one.gain for one in chains] + [mode.gain, 0.0])
     for one in chains[:MOST_CHAINS]:
-        if one.gain > max(one.cause.size * cost, 0.03 * largest):
+        if one.gain > max(least, one.cause.size * cost, 0.03 * largest):
             start = replace(current.explanation, causes=(*current.explanation.causes, one.cause))
             options.append(Option(one.cause.physics.name, _place(one.cause), fit(lines, start, current.noises)))
     numbers = current.explanation.shape.per_mode - 2
-    if not current.explanation.causes and mode.gain > max(numbers * cost, 0.03 * largest):
+    if not current.explanation.causes and mode.gain > max(least, numbers * cost, 0.03 * largest):
         shape = current.explanation.shape.with_mode(mode.pole, mode.right, mode.left)
         start = Explanation(shape, np.concatenate([current.explanation.u, np.zeros(shape.per_mode)]))
         options.append(Option("missing_mode", {}, fit(lines, start, current.noises, iterations=12)))

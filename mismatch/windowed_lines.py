@@ -1,6 +1,7 @@
 """Spectra of one trial on the lines that count, and a linear model's prediction cut in exactly the same way."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,7 @@ from scipy.signal.windows import tukey
 
 from modal_fit import ModalModel
 
+from .line_loops import modal_displacement
 from .trial import Trial
 
 Complex = NDArray[np.complex128]
@@ -52,7 +54,7 @@ class WindowedLines:
     force_here: Complex
     measured: Complex
 
-    @property
+    @cached_property
     def padded_frequencies(self) -> Real:
         """Frequencies of ``force_lines``, Hz."""
         return np.asarray(np.arange(self.padded // 2 + 1) * self.trial.rate / self.padded)
@@ -60,19 +62,25 @@ class WindowedLines:
     def cut(self, signal: Real) -> Complex:
         """Windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the record."""
         kept = signal[self.start : self.start + len(self.window)]
-        return np.asarray(rfft(kept * self.window[:, None], axis=0)[self.band])
+        return np.asarray(rfft(kept * self.window[:, None].astype(kept.dtype), axis=0)[self.band])
 
     def signal(self, spectrum: Complex) -> Real:
         """Time signals (n_samples, n) of padded spectra (padded // 2 + 1, n)."""
         return np.asarray(irfft(spectrum, n=self.padded, axis=0)[: len(self.trial.force)])
 
-    def kinematic(self, frequencies: Real) -> Complex:
-        """Factor (n, n_responses) from displacement to each response's quantity."""
-        return np.asarray((2j * np.pi * frequencies[:, None]) ** self.trial.powers)
+    @cached_property
+    def padded_kinematic(self) -> Complex:
+        """Factor (padded // 2 + 1, n_responses) from displacement to each response's quantity."""
+        return np.asarray((2j * np.pi * self.padded_frequencies[:, None]) ** self.trial.powers)
+
+    @cached_property
+    def kinematic(self) -> Complex:
+        """The same at the lines that are compared, (n_lines, n_responses)."""
+        return np.asarray((2j * np.pi * self.frequencies[:, None]) ** self.trial.powers)
 
     def from_force(self, receptance: Complex, force_lines: Complex) -> Complex:
         """Windowed response lines (n_lines, n_responses) of padded force lines through padded receptance lines."""
-        response = np.einsum("kpq,kq->kp", receptance, force_lines) * self.kinematic(self.padded_frequencies)
+        response = np.einsum("kpq,kq->kp", receptance, force_lines) * self.padded_kinematic
         return self.cut(self.signal(response))
 
 
@@ -130,3 +138,22 @@ def receptance_at(model: ModalModel, frequencies: Real) -> Complex:
     inside = frequencies >= model.natural_frequencies.min() / 3
     values[inside] -= model.residuals.lower / (2 * np.pi * frequencies[inside, None, None]) ** 2
     return values
+
+
+def displacement_at(model: ModalModel, frequencies: Real, force: Complex) -> Complex:
+    """``H F`` (n, n_responses) at lines from 0 Hz on, with H as in :func:`receptance_at` but never written out.
+
+    Parameters
+    ----------
+    frequencies : (n,), Hz
+    force : (n, n_excitations), N
+    """
+    s = 2j * np.pi * frequencies
+    out = np.empty((len(s), model.right.shape[1]), dtype=complex)
+    modal_displacement(s, model.poles, model.right, model.left, np.ascontiguousarray(force), out)
+    if model.residuals is not None:
+        plain = replace(model.residuals, lower=np.zeros_like(model.residuals.lower))
+        out += np.einsum("kpq,kq->kp", plain.receptance(s), force)
+        inside = (frequencies >= model.natural_frequencies.min() / 3) & (frequencies > 0)
+        out[inside] += (force[inside] @ model.residuals.lower.T) / s[inside, None] ** 2
+    return out * np.exp(-s * model.delay)[:, None] if model.delay else out

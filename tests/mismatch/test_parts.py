@@ -9,7 +9,7 @@ import pytest
 from mismatch import Explanation, JointLaw, LabError, ModelShape, Trial, band_of, windowed_lines
 from mismatch import physics as physics_folder
 from mismatch.joint_law import POINTS
-from mismatch.joint_simulation import driven_force, joint_force
+from mismatch.joint_simulation import driven_force, joint_response
 from mismatch.noise_model import _cost, fit_noise, whitening
 from mismatch.windowed_lines import WindowedLines, receptance_at
 from modal_fit import ModalModel, Residuals
@@ -93,7 +93,7 @@ def test_free_simulation_of_a_linear_joint_is_its_closed_form(
         "damper": JointLaw(speed=5.0, damping=400 * np.linspace(-5, 5, POINTS)),
         "elements": JointLaw(springs=np.array([k / 4, 3 * k / 4]), yields=np.array([1.0, 2.0])),
     }[kind]
-    found = joint_force(model, lines, lines.force_lines, direction, law)
+    found = joint_response(model, lines, lines.force_lines, direction, law).force
     receptance = receptance_at(model, lines.padded_frequencies)
     free = np.einsum("p,kpq,kq->k", direction, receptance, lines.force_lines)
     own = np.einsum("p,kpq,q->k", direction, receptance, direction)

@@ -1,0 +1,93 @@
+"""How a joint on a modal structure answers many small changes at once: the tangent of its free run. Compiled."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cutting.compiled import compiled
+
+from .joint_loop import look_up
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@compiled
+def tangent_run(
+    motion: tuple[Real, Real],
+    dynamics: tuple[Complex, Complex, Complex, Complex, Complex],
+    tables: tuple[Real, Real],
+    spans: tuple[float, float],
+    ramp: Real,
+    elements: tuple[Real, Real],
+    change: tuple[Real, Real],
+    force: Real,
+) -> None:
+    """Write the change of a joint's force for every column of a change of what drives it.
+
+    Along the motion of :func:`mismatch.joint_loop.free_run`, ``dg = e + g_x dx + g_v dv + memory`` with ``dx = dx_driven
+    - (h * dg)``: linear, but with slopes that change from instant to instant. An element that sticks since an instant
+    ``t_i`` adds ``k_i (dx - dx(t_i))``, one that slips nothing.
+
+    Parameters
+    ----------
+    motion
+        Deflection (m) and velocity (m/s) of the free run, each (n,).
+    dynamics, tables, spans, ramp, elements
+        As for the free run, at this run's step.
+    change
+        Of driven deflection and velocity, each (n, n_columns).
+    force : (n, n_columns)
+        Holds e, the law's own change at this motion; receives dg.
+    """
+    turn, early, late, to_x, to_v = dynamics
+    springs, yields = elements
+    n_modes, n_columns = len(turn), force.shape[1]
+    real, imaginary = np.zeros((n_modes, n_columns), force.dtype), np.zeros((n_modes, n_columns), force.dtype)
+    before, held = np.zeros(n_columns, force.dtype), np.zeros(n_columns, force.dtype)
+    dx, dv = np.zeros(n_columns, force.dtype), np.zeros(n_columns, force.dtype)
+    stuck_at = np.zeros((len(springs), n_columns), force.dtype)
+    sticks = np.ones(len(springs), dtype=np.bool_)
+    stretch = np.zeros(len(springs))
+    own_x, own_v = 0.0, 0.0
+    for r in range(n_modes):
+        own_x += 2.0 * (to_x[r] * late[r]).real
+        own_v += 2.0 * (to_v[r] * late[r]).real
+    before_x = motion[0][0]
+    for k in range(len(force)):
+        x = motion[0][k]
+        slope_x = look_up(tables[0], spans[0], x)[1] + ramp[k]
+        slope_v = look_up(tables[1], spans[1], motion[1][k])[1]
+        for i in range(len(springs)):
+            trial = stretch[i] + x - before_x
+            stretch[i] = min(max(trial, -yields[i]), yields[i])
+            if abs(trial) > yields[i]:
+                if sticks[i]:
+                    held -= springs[i] * stuck_at[i]
+                    sticks[i] = False
+            else:
+                if not sticks[i]:
+                    stuck_at[i] = dx
+                    held += springs[i] * dx
+                    sticks[i] = True
+                slope_x += springs[i]
+        before_x = x
+        dx[:] = change[0][k]
+        dv[:] = change[1][k]
+        for r in range(n_modes):
+            c, s = turn[r].real, turn[r].imag
+            # the end of the last step and the beginning of this one push with the same force
+            push = early[r] + turn[r] * late[r]
+            px, py = push.real, push.imag
+            ax, ay, bx, by = 2.0 * to_x[r].real, 2.0 * to_x[r].imag, 2.0 * to_v[r].real, 2.0 * to_v[r].imag
+            for j in range(n_columns):
+                a = c * real[r, j] - s * imaginary[r, j] - px * before[j]
+                b = s * real[r, j] + c * imaginary[r, j] - py * before[j]
+                real[r, j], imaginary[r, j] = a, b
+                dx[j] += ax * a - ay * b
+                dv[j] += bx * a - by * b
+        whole = 1.0 / max(0.2, 1.0 + own_x * slope_x + own_v * slope_v)
+        for j in range(n_columns):
+            dg = (force[k, j] + slope_x * dx[j] + slope_v * dv[j] - held[j]) * whole
+            force[k, j] = dg
+            before[j] = dg
+            dx[j] -= own_x * dg
