@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .diagnosis import Improvement
 from .fitting import Fit
 from .leftover import Leftover
 from .physics import ChainPhysics
@@ -20,6 +21,9 @@ NOISE_LIKE = 0.06
 
 EXPLAINED = 0.9
 """Share of what moved with the signal that causes must have taken away, if what is left is not noise-like."""
+
+HELD_OUT = 10.0
+"""Gain in misfit on a held-out recording below which a cause that mends the residual is let go again."""
 
 CLEAR = 4.0
 """Standard errors by which a cause's number must differ from none."""
@@ -68,6 +72,15 @@ def evidence_needed(current: Fit, base: Fit, direction: Real | None = None) -> f
     return max(LEAST_EVIDENCE, share * (base.score - current.score))
 
 
+def holds_elsewhere(improvement: Improvement, current: Fit, base: Fit) -> bool:
+    """Whether what causes gained where they were fitted is seen on the held-out recording too.
+
+    Causes that gained little there but stand nearer to the lab's belief than a general refit predict no better, and
+    need not.
+    """
+    return base.misfit - current.misfit < LEAST_EVIDENCE or improvement.evidence > HELD_OUT
+
+
 def worth_it(option: Option, current: Fit, base: Fit) -> bool:
     """Enough evidence; and if it lies in the lab's belief alone, most of what the belief found odd."""
     gain = current.score - option.fitted.score
@@ -97,5 +110,3 @@ def _measured(fitted: Fit) -> bool:
             zero = 0.0 if absent is None else float(absent[k])
             clear.append(abs(float(cause.values[k]) - zero) > CLEAR * error * parameter.unit_step)
     return any(clear) if isinstance(cause.physics, ChainPhysics) else clear[0]
-
-

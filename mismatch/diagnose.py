@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
-from .acceptance import LEAST_EVIDENCE, Option, unexplained, worth_it
-from .diagnosis import AcceptedCause, Candidate, Diagnosis
+from .acceptance import LEAST_EVIDENCE, Option, holds_elsewhere, unexplained, worth_it
+from .diagnosis import AcceptedCause, Candidate, Diagnosis, Improvement
 from .explanation import Explanation
 from .fault_repair import repair_plain_faults
 from .fitting import Fit, fit
@@ -20,7 +20,7 @@ from .physics import Physics, library
 from .reporting_numbers import accepted_cause, accepted_mode, modal_deviation
 from .shape_of_model import LabError, ModelShape
 from .trial import Trial, band_of
-from .windowed_lines import WindowedLines, windowed_lines
+from .windowed_lines import WindowedLines, windowed_lines, without_force_noise
 
 Real = NDArray[np.float64]
 Progress = Callable[[str], None]
@@ -77,10 +77,14 @@ def diagnose(
     tell("modal parameters")
     nominal = Explanation(ModelShape(model, settings.lab), np.zeros(ModelShape(model, settings.lab).size))
     base = fit(lines, nominal)
+    lines = [without_force_noise(one, np.exp(noise.forces)) for one, noise in zip(lines, base.noises, strict=True)]
+    base = fit(lines, base.explanation, base.noises)
     tell("tones and clipping")
     lines, base, faults = repair_plain_faults(lines, base, decay)
     search = _search(lines, base, faults, causes, tell)
-    current, accepted, candidates = search.current, search.accepted, search.candidates
+    tell("held-out recording")
+    search, improvement = _that_hold_elsewhere(search, lines)
+    current, accepted, candidates = search.steps[-1], search.accepted, search.candidates
     tell("what is left")
     deviation = modal_deviation(current)
     if deviation is not None:
@@ -90,8 +94,7 @@ def diagnose(
     if abstains:
         candidates += [Candidate(one.name, one.evidence, "rejected", one.location) for one in accepted]
         accepted, current, left = [], base, search.before
-    tell("held-out recording")
-    improvement = held_out_improvement(lines, current.explanation, current.noises)
+        improvement = held_out_improvement(lines, base.explanation, base.noises)
     verdict = "unexplained" if abstains else "explained" if accepted else "none"
     ranked = tuple(sorted(candidates, key=lambda one: -one.evidence))
     return Diagnosis(
@@ -101,9 +104,9 @@ def diagnose(
 
 @dataclass(frozen=True)
 class _Search:
-    """Where the search for causes ended."""
+    """The search for causes: fits without any, with the first, and so on."""
 
-    current: Fit
+    steps: list[Fit]
     accepted: list[AcceptedCause]
     candidates: list[Candidate]
     equivalents: tuple[str, ...]
@@ -114,7 +117,7 @@ def _search(
     lines: list[WindowedLines], base: Fit, faults: list[AcceptedCause], causes: dict[str, Physics], tell: Progress
 ) -> _Search:
     """One cause after the other, while each is worth it."""
-    current, accepted = base, list(faults)
+    current, accepted, steps = base, list(faults), [base]
     candidates: list[Candidate] = []
     equivalents: tuple[str, ...] = ()
     before = leftover(base.explanation, lines)
@@ -134,7 +137,20 @@ def _search(
         equivalents = equivalents or tuple(dict.fromkeys(rivals))
         accepted.append(_describe(best, current))
         current = best.fitted
-    return _Search(current, accepted, candidates, equivalents, before)
+        steps.append(current)
+    return _Search(steps, accepted, candidates, equivalents, before)
+
+
+def _that_hold_elsewhere(search: _Search, lines: list[WindowedLines]) -> tuple[_Search, Improvement]:
+    """Let go of causes, the last first, until those left are seen on a held-out recording too."""
+    steps, accepted, candidates = list(search.steps), list(search.accepted), list(search.candidates)
+    while True:
+        improvement = held_out_improvement(lines, steps[-1].explanation, steps[-1].noises)
+        if len(steps) == 1 or len(lines) == 1 or holds_elsewhere(improvement, steps[-1], steps[0]):
+            return replace(search, steps=steps, accepted=accepted, candidates=candidates), improvement
+        steps.pop()
+        last = accepted.pop()
+        candidates.append(Candidate(last.name, last.evidence, "rejected", last.location))
 
 
 def _describe(option: Option, current: Fit) -> AcceptedCause:

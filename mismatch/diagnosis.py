@@ -63,6 +63,8 @@ class Improvement:
         That the improved model is no better than the refitted one, from blocks of a few seconds.
     interval
         95 % interval of ``after / before``.
+    evidence
+        Gain in misfit there over the refitted model, by numbers fitted to the other recordings; 0 where there are none.
     """
 
     held_out: str
@@ -72,6 +74,7 @@ class Improvement:
     noise_floor: float
     p_value: float
     interval: tuple[float, float]
+    evidence: float = 0.0
 
 
 @dataclass(frozen=True)

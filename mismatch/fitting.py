@@ -138,13 +138,18 @@ def residual(fitted: Fit, lines: list[WindowedLines]) -> list[Complex]:
     return [one.measured - predict_lines(fitted.explanation, one).response for one in lines]
 
 
+def least_misfit(explanation: Explanation, lines: WindowedLines) -> float:
+    """Misfit of an explanation to one recording under the noise that fits its residual best."""
+    return _with_noise(lines, explanation, None).misfit
+
+
 def through_structure(explanation: Explanation, lines: WindowedLines) -> Complex:
     """From forces to measured responses at the lines, (n_lines, n_responses, n_excitations)."""
     around = surround(explanation, lines.frequencies)
     closed = around.closed(explanation.model.receptance(lines.frequencies))
     if around.force is not None:
         closed = closed @ around.force
-    return np.asarray(around.shown(closed * lines.kinematic[:, :, None]))
+    return np.asarray(around.shown(closed * lines.kinematic[:, :, None]) @ lines.trust)
 
 
 def levels(lines: WindowedLines) -> tuple[Real, Real]:
@@ -158,7 +163,7 @@ def levels(lines: WindowedLines) -> tuple[Real, Real]:
 def jacobian(explanation: Explanation, lines: WindowedLines, predicted: Predicted) -> Complex:
     """Derivative of the response lines by u and the causes' coordinates, (n_lines, n_responses, size)."""
     around = surround(explanation, lines.frequencies)
-    force = around.pushed(lines.force_here)
+    force: Complex = around.pushed(lines.force_here)
     joint = lines.cut(lines.signal(predicted.joint)) if predicted.joints else None
     if joint is not None:
         force = force - joint
@@ -174,15 +179,15 @@ def jacobian(explanation: Explanation, lines: WindowedLines, predicted: Predicte
     if predicted.joints:
         result += closed @ joint_changes(explanation, lines, predicted)
     result *= lines.kinematic[:, :, None]
-    result = around.shown(result)
+    shown: Complex = np.asarray(around.shown(result), dtype=complex)
     here, plain = explanation.coordinates(), line_response(explanation, lines, joint)
     chain = np.concatenate([np.zeros(0)] + [np.full(c.size, c.direction is None) for c in explanation.causes])
     for k in np.flatnonzero(chain):
         aside = here.copy()
         aside[k] += 0.02
         change = line_response(explanation.with_causes(aside), lines, joint) - plain
-        result[:, :, linear.shape[2] + k] += change / 0.02
-    return result
+        shown[:, :, linear.shape[2] + k] += change / 0.02
+    return shown
 
 
 def whitened(white: Complex, lines: Complex) -> Real:

@@ -9,7 +9,7 @@ from scipy.stats import wilcoxon
 
 from .diagnosis import Improvement
 from .explanation import Explanation, predict_lines
-from .fitting import fit, through_structure
+from .fitting import fit, least_misfit, through_structure
 from .noise_model import NoiseModel
 from .shape_of_model import ModelShape
 from .windowed_lines import WindowedLines
@@ -46,9 +46,10 @@ def held_out_improvement(lines: list[WindowedLines], final: Explanation, noises:
     power = float(np.sum(np.abs(here.measured) ** 2))
     errors = [_line_error(explanation, here) for explanation in (nominal, linear, improved)]
     floor = np.trace(noises[kept].covariance(here.frequencies, through_structure(final, here)), axis1=1, axis2=2)
-    p_value = 1.0
+    p_value, evidence = 1.0, 0.0
     if len(lines) > 1 and improved is not linear:
         p_value = float(wilcoxon(blocks[1] - blocks[2], alternative="greater").pvalue)
+        evidence = least_misfit(linear, here) - least_misfit(improved, here)
     return Improvement(
         here.trial.name,
         errors[0],
@@ -57,6 +58,7 @@ def held_out_improvement(lines: list[WindowedLines], final: Explanation, noises:
         float(np.sqrt(np.sum(floor.real) / power)),
         p_value,
         _interval(blocks[0], blocks[2]),
+        evidence,
     )
 
 

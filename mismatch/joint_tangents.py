@@ -51,7 +51,7 @@ def joint_changes(explanation: Explanation, lines: WindowedLines, predicted: Pre
         dg = _force_change(explanation, lines, (cause, own, answer), outer, change)
         angles = slice(own.start + len(cause.values), own.stop)
         turn = TURN_STEP * across(cause.direction)
-        result[:, columns] -= lines.cut(dg)[:, None, :] * cause.direction[:, None]
+        result[:, columns] -= lines.cut(np.asarray(dg))[:, None, :] * cause.direction[:, None]
         result[:, columns, angles] -= lines.cut(irfft(answer.force, n=lines.padded)[:, None])[:, :, None] * turn
         if any(later.direction is not None for later in explanation.causes[place + 1 :]):
             change[:, columns] -= rfft(dg, n=lines.padded, axis=0)[: len(frequencies), None] * cause.direction[:, None]
@@ -83,7 +83,7 @@ def _force_change(
     joint: tuple[Cause, slice, JointResponse],
     force: Complex,
     change: Complex,
-) -> Real:
+) -> NDArray[np.float32]:
     """Derivative of g at the samples, (n, size)."""
     cause, own, answer = joint
     n = len(lines.trial.force)

@@ -15,6 +15,15 @@ def whiten_in_place(matrix: Complex) -> float:
 
     W is the inverse of V's Cholesky factor; infinity says that V is not positive definite.
     """
+    log_determinant = _cholesky_in_place(matrix)
+    if np.isfinite(log_determinant):
+        _invert_in_place(matrix)
+    return log_determinant
+
+
+@compiled
+def _cholesky_in_place(matrix: Complex) -> float:
+    """Lower Cholesky factor over the lower triangle; ln of the determinant, or infinity."""
     n = len(matrix)
     log_determinant = 0.0
     for j in range(n):
@@ -24,24 +33,28 @@ def whiten_in_place(matrix: Complex) -> float:
         if not (0.0 < pivot < np.inf):
             return np.inf
         log_determinant += np.log(pivot)
-        root = np.sqrt(pivot)
-        matrix[j, j] = root
+        matrix[j, j] = np.sqrt(pivot)
         for i in range(j + 1, n):
             value = matrix[i, j]
             for k in range(j):
                 value -= matrix[i, k] * matrix[j, k].conjugate()
-            matrix[i, j] = value / root
+            matrix[i, j] = value / matrix[j, j].real
+    return log_determinant
+
+
+@compiled
+def _invert_in_place(lower: Complex) -> None:
+    """Inverse of a lower triangle, zeros above it."""
+    n = len(lower)
     for j in range(n):
-        matrix[j, j] = 1.0 / matrix[j, j].real
-        for i in range(j):
-            matrix[i, j] = 0.0
+        lower[j, j] = 1.0 / lower[j, j].real
+        lower[:j, j] = 0.0
     for i in range(1, n):
         for j in range(i):
-            value = matrix[i, j] * matrix[j, j].real
+            value = lower[i, j] * lower[j, j].real
             for k in range(j + 1, i):
-                value += matrix[i, k] * matrix[k, j]
-            matrix[i, j] = -value * matrix[i, i].real
-    return log_determinant
+                value += lower[i, k] * lower[k, j]
+            lower[i, j] = -value * lower[i, i].real
 
 
 @compiled
@@ -95,49 +108,64 @@ def noise_likelihood(
     by_force : (n_excitations,)
         Receives the slope by ln pushed.
     """
-    n, m = own.shape[1], len(pushed)
+    n = own.shape[1]
     cost = 0.0
     by_force[:] = 0.0
     v = np.empty((n, n), dtype=np.complex128)
     inverse = np.empty((n, n), dtype=np.complex128)
-    weighed = np.empty((n, n), dtype=np.complex128)
     for b in range(len(counts)):
-        trace = 0.0
-        for i in range(n):
-            for j in range(n):
-                v[i, j] = 0.0
-                for q in range(m):
-                    v[i, j] += pushed[q] * through[b, q, i, j]
-            trace += v[i, i].real
-        for i in range(n):
-            v[i, i] += own[b, i] + 1e-12 * trace
+        _covariance(through[b], own[b], pushed, v)
         log_determinant = whiten_in_place(v)
         if not np.isfinite(log_determinant):
             return np.inf
         _product_of_inverse(v, inverse)
-        misfit = 0.0
-        for i in range(n):
-            for j in range(n):
-                weighed[i, j] = 0.0
-                for k in range(n):
-                    weighed[i, j] += inverse[i, k] * sample[b, k, j]
-            misfit += weighed[i, i].real
+        misfit = _slope(inverse, sample[b], v)
         cost += counts[b] * (log_determinant + misfit)
-        # slope = V^-1 - V^-1 S V^-1; v serves again
-        for i in range(n):
-            for j in range(n):
-                v[i, j] = inverse[i, j]
-                for k in range(n):
-                    v[i, j] -= weighed[i, k] * inverse[k, j]
         for i in range(n):
             by_own[b, i] = counts[b] * v[i, i].real * own[b, i]
-        for q in range(m):
-            total = 0.0
-            for i in range(n):
-                for j in range(n):
-                    total += (v[i, j] * through[b, q, j, i]).real
-            by_force[q] += counts[b] * total * pushed[q]
+        for q in range(len(pushed)):
+            by_force[q] += counts[b] * pushed[q] * _trace_of_product(v, through[b, q])
     return cost
+
+
+@compiled
+def _covariance(through: Complex, own: Real, pushed: Real, out: Complex) -> None:
+    """``diag(own) + sum_q pushed_q T_q``, and a trace of itself that keeps it positive definite."""
+    out[:] = 0.0
+    for q in range(len(pushed)):
+        out += pushed[q] * through[q]
+    ridge = 1e-12 * np.trace(out).real
+    for i in range(len(out)):
+        out[i, i] += own[i] + ridge
+
+
+@compiled
+def _slope(inverse: Complex, sample: Complex, out: Complex) -> float:
+    """Write ``V^-1 - V^-1 S V^-1``; return ``tr V^-1 S``."""
+    n = len(inverse)
+    trace = 0.0
+    for i in range(n):
+        for j in range(n):
+            out[i, j] = inverse[i, j]
+        for k in range(n):
+            weighed = 0.0 + 0.0j
+            for j in range(n):
+                weighed += inverse[i, j] * sample[j, k]
+            if i == k:
+                trace += weighed.real
+            for j in range(n):
+                out[i, j] -= weighed * inverse[k, j]
+    return trace
+
+
+@compiled
+def _trace_of_product(one: Complex, other: Complex) -> float:
+    """Real part of ``tr A B``."""
+    total = 0.0
+    for i in range(len(one)):
+        for j in range(len(one)):
+            total += (one[i, j] * other[j, i]).real
+    return total
 
 
 @compiled

@@ -111,6 +111,7 @@ def without_tone(lines: WindowedLines, tone: Tone) -> WindowedLines:
         frequencies=lines.frequencies[kept],
         force_here=lines.force_here[kept],
         measured=lines.measured[kept],
+        trust=lines.trust[kept],
     )
 
 

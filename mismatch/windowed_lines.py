@@ -6,7 +6,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, prev_fast_len, rfft
-from scipy.signal.windows import tukey
+from scipy.signal import convolve
+from scipy.signal.windows import hann, tukey
 
 from modal_fit import ModalModel
 
@@ -15,6 +16,15 @@ from .trial import Trial
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+
+NEIGHBOURS = 41
+"""Lines over which the spectral matrix of the forces is averaged."""
+
+WIDELY, QUIETEST = 201, 0.05
+"""The same, so wide that chance hardly counts, to find the share of lines whose power bounds the forces' noise."""
+
+LEAST_POWER = 2.0
+"""Power over noise below which a direction of force is taken for noise alone, as chance leaves that much."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +50,9 @@ class WindowedLines:
         Spectrum of the ramped and padded force.
     force_here : (n_lines, n_excitations)
         Spectrum of the windowed force.
+    trust : (n_lines, n_excitations, n_excitations)
+        What the noise of the forces used is multiplied by: less than one where they were replaced by what they say of
+        the true ones.
     measured : (n_lines, n_responses)
         Spectrum of the windowed response, scaled so that white noise of variance v has variance v a line.
     """
@@ -53,13 +66,14 @@ class WindowedLines:
     force_lines: Complex
     force_here: Complex
     measured: Complex
+    trust: Complex
 
     @cached_property
     def padded_frequencies(self) -> Real:
         """Frequencies of ``force_lines``, Hz."""
         return np.asarray(np.arange(self.padded // 2 + 1) * self.trial.rate / self.padded)
 
-    def cut(self, signal: Real) -> Complex:
+    def cut(self, signal: NDArray[np.floating]) -> Complex:
         """Windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the record."""
         kept = signal[self.start : self.start + len(self.window)]
         return np.asarray(rfft(kept * self.window[:, None].astype(kept.dtype), axis=0)[self.band])
@@ -100,29 +114,81 @@ def windowed_lines(trial: Trial, band: tuple[float, float], decay: float) -> Win
     run_in = int(min(7.0 / decay * trial.rate, 0.2 * n))
     padded = next_fast_len(n + run_in, real=True)
     padded += padded % 2
-    ramp = np.ones(n)
-    rising = min(int(trial.rate), n // 20)
-    ramp[:rising] = 0.5 - 0.5 * np.cos(np.pi * np.arange(rising) / rising)
-    ramp[-rising:] = ramp[:rising][::-1]
-    force = trial.force * ramp[:, None]
+    rising = _rising(trial)
     kept = prev_fast_len(n - run_in - rising // 2, real=True)
     window = tukey(kept, 0.08)
     window /= np.sqrt(np.sum(window**2))
     axis = np.arange(kept // 2 + 1) * trial.rate / kept
     lines = np.flatnonzero((axis >= max(band[0], 3 * trial.rate / kept)) & (axis <= band[1]))
-    none = np.zeros(0, dtype=complex)
-    stub = WindowedLines(trial, padded, run_in, window, lines, axis[lines], none, none, none)
-    return WindowedLines(
-        trial,
-        padded,
-        run_in,
-        window,
-        lines,
-        axis[lines],
-        np.asarray(rfft(force, n=padded, axis=0)),
-        stub.cut(trial.force),
-        stub.cut(trial.response),
+    none, trust = np.zeros(0, dtype=complex), np.tile(np.eye(trial.force.shape[1], dtype=complex), (len(lines), 1, 1))
+    stub = WindowedLines(trial, padded, run_in, window, lines, axis[lines], none, none, none, trust)
+    return replace(
+        stub,
+        force_lines=_padded_force(stub),
+        force_here=stub.cut(trial.force),
+        measured=stub.cut(trial.response),
     )
+
+
+def without_force_noise(lines: WindowedLines, variance: Real) -> WindowedLines:
+    """Replace a trial's measured forces by what they say of the true ones, ``F_hat = W F``, ``W = (P - S) P^-1``.
+
+    P is the measured forces' spectral matrix around a line and S the variance of their noise (Wiener, 1949). Where a
+    spectrum holds little but noise, as between the harmonics of a steady cut or above the band of the cutting force,
+    the structure was not pushed by what was measured: predicted from it, a response would be missing and a mode would
+    seem to cancel it. The same holds across forces that rise and fall together.
+
+    Parameters
+    ----------
+    lines
+        Prepared trial, its forces replaced already or not.
+    variance : (n_excitations,)
+        Of the forces' noise a line; no more of it is believed than what the quietest lines hold.
+    """
+    n = lines.start + len(lines.window)
+    spectrum = rfft(lines.trial.force[lines.start : n] * lines.window[:, None], axis=0)
+    products = spectrum[:, :, None] * spectrum[:, None, :].conj()
+    own = np.einsum("kqq->kq", products).real
+    wide = min(WIDELY, len(own) // 5)
+    quiet = np.quantile(_around(own, wide)[wide:-wide], QUIETEST, axis=0)
+    deviation = np.sqrt(np.maximum(np.minimum(variance, quiet), 1e-12 * own.mean(axis=0)))
+    values, vectors = np.linalg.eigh(_around(products, min(NEIGHBOURS, wide)) / np.outer(deviation, deviation))
+    share = np.where(values > LEAST_POWER, 1 - 1 / np.maximum(values, 1.0), 0.0)
+    whole, root = (
+        deviation[:, None] * (vectors * weight[:, None, :]) @ vectors.conj().swapaxes(1, 2) / deviation
+        for weight in (share, np.sqrt(share))
+    )
+    place = lines.padded_frequencies * len(lines.window) / lines.trial.rate
+    low = np.minimum(place.astype(int), len(whole) - 2)
+    high = (place - low)[:, None, None]
+    padded = (1 - high) * whole[low] + high * whole[low + 1]
+    return replace(
+        lines,
+        force_lines=np.einsum("kij,kj->ki", padded, _padded_force(lines)),
+        force_here=np.einsum("kij,kj->ki", whole[lines.band], spectrum[lines.band]),
+        trust=root[lines.band],
+    )
+
+
+def _rising(trial: Trial) -> int:
+    """Samples over which the force is ramped in and out."""
+    return min(int(trial.rate), len(trial.force) // 20)
+
+
+def _padded_force(lines: WindowedLines) -> Complex:
+    """Spectrum of the ramped and padded force."""
+    ramp, rising = np.ones(len(lines.trial.force)), _rising(lines.trial)
+    ramp[:rising] = 0.5 - 0.5 * np.cos(np.pi * np.arange(rising) / rising)
+    ramp[-rising:] = ramp[:rising][::-1]
+    return np.asarray(rfft(lines.trial.force * ramp[:, None], n=lines.padded, axis=0))
+
+
+def _around(power: Complex, count: int) -> Complex:
+    """Mean over ``count`` neighbouring lines, tapered."""
+    weights = hann(count + 2)[1:-1]
+    flat = power.reshape(len(power), -1)
+    mean = convolve(flat, (weights / weights.sum())[:, None], mode="same", method="fft")
+    return np.asarray(mean.reshape(power.shape))
 
 
 def receptance_at(model: ModalModel, frequencies: Real) -> Complex:
@@ -148,7 +214,7 @@ def displacement_at(model: ModalModel, frequencies: Real, force: Complex) -> Com
     frequencies : (n,), Hz
     force : (n, n_excitations), N
     """
-    s = 2j * np.pi * frequencies
+    s = np.asarray(2j * np.pi * frequencies, dtype=complex)
     out = np.empty((len(s), model.right.shape[1]), dtype=complex)
     modal_displacement(s, model.poles, model.right, model.left, np.ascontiguousarray(force), out)
     if model.residuals is not None:
