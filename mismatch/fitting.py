@@ -173,7 +173,7 @@ def jacobian(explanation: Explanation, lines: WindowedLines, predicted: Predicte
         force = force - np.einsum("kqp,kp->kq", around.feedback, np.einsum("kpq,kq->kp", closed, force))
     linear = explanation.shape.jacobian(explanation.u, lines.frequencies, force)
     if around.feedback is not None:
-        linear = np.linalg.solve(np.eye(receptance.shape[1]) + receptance @ around.feedback, linear)
+        linear = np.asarray(np.linalg.solve(np.eye(receptance.shape[1]) + receptance @ around.feedback, linear))
     result = np.zeros((*linear.shape[:2], explanation.size), dtype=complex)
     result[:, :, : linear.shape[2]] = linear
     if predicted.joints:

@@ -1,0 +1,45 @@
+"""Mass between force cell and structure: its inertia is measured as force, or is missing from it."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import DegreeOfFreedom
+from modal_fit import ModalModel
+
+from .protocol import Chain, Parameter
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+class DynamometerTableInertia:
+    """A table, a holder or another tool moves with the structure, and the model does not have its mass."""
+
+    name = "dynamometer_table_inertia"
+    equation = "F = F_measured - m X''"
+    source = "Ewins, Modal Testing, 2nd ed., section 3.7 (mass cancellation)"
+    parameters = (Parameter("mass_kg", "kg", 0.05, -100.0, 100.0),)
+    confusable_with = ("payload", "modal_parameters")
+
+    def places(self, model: ModalModel) -> tuple[str, ...]:
+        """One place, if every force has a response along its axis."""
+        return ("",) if set(_axes(model.excitations)) <= set(_axes(model.responses)) else ()
+
+    def start(self, model: ModalModel) -> Real:
+        """Absent."""
+        return np.array([0.0])
+
+    def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
+        """Matrices at ``s``, rad/s."""
+        rows = _axes(model.responses)
+        moved = np.zeros((len(model.excitations), len(model.responses)))
+        for column, axis in enumerate(_axes(model.excitations)):
+            moved[column, rows.index(axis)] = values[0]
+        return Chain(feedback=s[:, None, None] ** 2 * moved)
+
+
+def _axes(labels: tuple[str, ...]) -> list[str]:
+    return [DegreeOfFreedom.parse(label).axis for label in labels]
+
+
+PHYSICS = DynamometerTableInertia()

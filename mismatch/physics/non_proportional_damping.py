@@ -1,0 +1,53 @@
+"""A damper that acts on some of the structure: it couples the modes that proportional damping keeps apart."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import DegreeOfFreedom
+from modal_fit import ModalModel
+
+from .protocol import Chain, Parameter
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+class NonProportionalDamping:
+    """Joints or the cut damp the tool's motion by a symmetric matrix that the model's modal damping does not hold."""
+
+    name = "non_proportional_damping"
+    equation = "F = F_outer - C X', C = C^T"
+    source = "Caughey & O'Kelly, J. Applied Mechanics 32, 1965; Meirovitch, Fundamentals of Vibrations, section 7.15"
+    parameters = tuple(
+        Parameter(f"damping_{'xyz'[i]}{'xyz'[j]}_ns_per_m", "N s/m", 20.0, -1e6, 1e6) for i, j in PLACES
+    )
+    confusable_with = ("modal_parameters",)
+
+    def places(self, model: ModalModel) -> tuple[str, ...]:
+        """One place, if forces and responses both have X, Y and Z once."""
+        return ("",) if all(sorted(_axes(labels)) == ["X", "Y", "Z"] for labels in _sides(model)) else ()
+
+    def start(self, model: ModalModel) -> Real:
+        """Absent."""
+        return np.zeros(len(PLACES))
+
+    def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
+        """Matrices at ``s``, rad/s."""
+        damping = np.zeros((3, 3))
+        for value, (i, j) in zip(values, PLACES, strict=True):
+            damping[i, j] = damping[j, i] = value
+        columns, rows = (["XYZ".index(axis) for axis in _axes(labels)] for labels in _sides(model))
+        return Chain(feedback=s[:, None, None] * damping[np.ix_(columns, rows)])
+
+
+def _sides(model: ModalModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    return model.excitations, model.responses
+
+
+def _axes(labels: tuple[str, ...]) -> list[str]:
+    return [DegreeOfFreedom.parse(label).axis for label in labels]
+
+
+PHYSICS = NonProportionalDamping()
