@@ -138,6 +138,11 @@ def residual(fitted: Fit, lines: list[WindowedLines]) -> list[Complex]:
     return [one.measured - predict_lines(fitted.explanation, one).response for one in lines]
 
 
+def misfit_under(lines: list[WindowedLines], explanation: Explanation, noises: tuple[NoiseModel, ...]) -> float:
+    """Misfit of an explanation to recordings under given noise."""
+    return sum(_assess(one, explanation, noise).misfit for one, noise in zip(lines, noises, strict=True))
+
+
 def least_misfit(explanation: Explanation, lines: WindowedLines) -> float:
     """Misfit of an explanation to one recording under the noise that fits its residual best."""
     return _with_noise(lines, explanation, None).misfit
@@ -171,6 +176,8 @@ def jacobian(explanation: Explanation, lines: WindowedLines, predicted: Predicte
     closed = around.closed(receptance)
     if around.feedback is not None:
         force = force - np.einsum("kqp,kp->kq", around.feedback, np.einsum("kpq,kq->kp", closed, force))
+    if not explanation.causes:
+        return explanation.shape.jacobian(explanation.u, lines.frequencies, force, lines.kinematic)
     linear = explanation.shape.jacobian(explanation.u, lines.frequencies, force)
     if around.feedback is not None:
         linear = np.asarray(np.linalg.solve(np.eye(receptance.shape[1]) + receptance @ around.feedback, linear))

@@ -9,7 +9,7 @@ from .acceptance import LEAST_EVIDENCE, NOISE_LIKE, SMALL, Option, evidence_need
 from .chain_screening import ScreenedChain, screen_chains
 from .diagnosis import Candidate
 from .explanation import Cause, Explanation
-from .fitting import Fit, fit
+from .fitting import Fit, fit, misfit_under
 from .joint_direction import find_direction
 from .joint_screening import screen_joints
 from .leftover import Leftover, leftover
@@ -56,7 +56,7 @@ def fitted_options(
     left = leftover((best.fitted if best else current).explanation, lines)
     first = best is None and not current.explanation.causes
     if first or (left.share > NOISE_LIKE and left.power > 3 * SMALL * before.power):
-        joint_options, joint_weighed = _joints(lines, current, linear_floor(current, lines), causes)
+        joint_options, joint_weighed = _joints(lines, current, base, linear_floor(current, lines), causes)
         weighed += joint_weighed
         options += joint_options
     for option in options:
@@ -73,7 +73,7 @@ def _linear_options(
     largest = max([one.gain for one in chains] + [mode.gain, 0.0])
     for one in chains[:MOST_CHAINS]:
         if one.gain > max(least, one.cause.size * cost, 0.03 * largest):
-            start = replace(current.explanation, causes=(*current.explanation.causes, one.cause))
+            start = _best_start(lines, current, one.cause)
             options.append(Option(one.cause.physics.name, _place(one.cause), fit(lines, start, current.noises)))
     numbers = current.explanation.shape.per_mode - 2
     if not current.explanation.causes and mode.gain > max(least, numbers * cost, 0.03 * largest):
@@ -83,8 +83,19 @@ def _linear_options(
     return options
 
 
+def _best_start(lines: list[WindowedLines], current: Fit, cause: Cause) -> Explanation:
+    """The cause at its linearised best, or at a part of it where that overshoots."""
+    assert isinstance(cause.physics, ChainPhysics)
+    absent = replace(cause, values=cause.physics.start(current.explanation.shape.nominal)).coordinates()
+    starts = [
+        _added(current.explanation, cause.moved(absent + share * (cause.coordinates() - absent)))
+        for share in (1.0, 0.25, 0.06)
+    ]
+    return min(starts, key=lambda start: misfit_under(lines, start, current.noises))
+
+
 def _joints(
-    lines: list[WindowedLines], current: Fit, floor: Floor, causes: dict[str, Physics]
+    lines: list[WindowedLines], current: Fit, base: Fit, floor: Floor, causes: dict[str, Physics]
 ) -> tuple[list[Option], list[Candidate]]:
     """Joint laws along the likeliest direction: driven by the seen motion first, the best then simulated freely."""
     laws = [p for p in causes.values() if isinstance(p, JointPhysics)]
@@ -96,7 +107,8 @@ def _joints(
     location = {"direction": [round(float(x), 6) for x in sighting.direction]}
     screened = screen_joints(floor, current.explanation, sighting.direction, laws)
     weighed = [Candidate(one.causes[0].physics.name, one.gain, "screened", location) for one in screened]
-    promising = [one for one in screened if one.gain > max(60.0, PROMISING * screened[0].gain)][:MOST_LAWS]
+    least = max(60.0, WITHIN_REACH * evidence_needed(current, base, sighting.direction))
+    promising = [one for one in screened if one.gain > max(least, PROMISING * screened[0].gain)][:MOST_LAWS]
     driven = []
     for one in promising:
         starts = [

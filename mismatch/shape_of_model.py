@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
+from .line_loops import modal_slopes
+
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
@@ -99,27 +101,30 @@ class ModelShape:
         left = self.nominal.left + left_unit[:, None] * (rest[:, :m] + 1j * rest[:, m:])
         return replace(self.nominal, poles=poles, right=right, left=left, covariance=None)
 
-    def jacobian(self, u: Real, frequencies: Real, force: Complex) -> Complex:
-        """Derivative of the displacement lines by u for force lines, (n_lines, n_responses, size)."""
+    def jacobian(self, u: Real, frequencies: Real, force: Complex, factor: Complex | None = None) -> Complex:
+        """Derivative of the displacement lines by u for force lines, (n_lines, n_responses, size).
+
+        Parameters
+        ----------
+        u : (size,)
+        frequencies : (n_lines,), Hz
+        force : (n_lines, n_excitations)
+        factor : (n_lines, n_responses)
+            The displacement is multiplied by it; None: one.
+        """
         model = self.model(u)
-        s = 2j * np.pi * frequencies
-        n, m = model.right.shape[1], model.left.shape[1]
-        right_unit, left_unit = self._scales()
-        result = np.zeros((len(s), n, len(model.poles), self.per_mode), dtype=complex)
-        for k, (pole, right, left) in enumerate(zip(model.poles, model.right, model.left, strict=True)):
-            up, down = 1 / (s - pole), 1 / (s - pole.conj())
-            push, pull = force @ left, force @ left.conj()
-            by_pole = np.outer(up**2 * push, right), np.outer(down**2 * pull, right.conj())
-            turn = pole * self.lab.frequency
-            zeta = -pole.real / abs(pole)
-            along = abs(pole) * zeta * self.lab.damping * (-1 - 1j * zeta / np.sqrt(1 - zeta**2))
-            for column, change in ((0, turn), (1, along)):
-                result[:, :, k, column] = by_pole[0] * change + by_pole[1] * np.conj(change)
-            for p in range(n):
-                result[:, p, k, 2 + p] = right_unit[k] * (up * push + down * pull)
-                result[:, p, k, 2 + n + p] = 1j * right_unit[k] * (up * push - down * pull)
-            for q in range(m):
-                one, other = np.outer(up * force[:, q], right), np.outer(down * force[:, q], right.conj())
-                result[:, :, k, 2 + 2 * n + q] = left_unit[k] * (one + other)
-                result[:, :, k, 2 + 2 * n + m + q] = 1j * left_unit[k] * (one - other)
-        return result.reshape(len(s), n, self.size)
+        poles = model.poles
+        zeta = -poles.real / np.abs(poles)
+        along = np.abs(poles) * zeta * self.lab.damping * (-1 - 1j * zeta / np.sqrt(1 - zeta**2))
+        if factor is None:
+            factor = np.ones((len(frequencies), model.right.shape[1]), dtype=complex)
+        result = np.empty((*factor.shape, self.size), dtype=complex)
+        modal_slopes(
+            np.asarray(2j * np.pi * frequencies, dtype=complex),
+            np.ascontiguousarray(force),
+            (poles, model.right, model.left),
+            (poles * self.lab.frequency, along, *self._scales()),
+            factor,
+            result,
+        )
+        return result
