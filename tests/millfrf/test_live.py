@@ -116,9 +116,11 @@ def test_buttons_count_only_where_they_make_sense() -> None:
     assert control.poll() == []
     control.start()
     control.mark()
-    control.mark()
+    control.mark(" entry of the\ncut ", shown_at=3.5)
     [marks] = control.poll()
     assert marks.values.tolist() == [1.0, 2.0]
+    assert marks.texts == ("", "entry of the\ncut")
+    assert [mark.label for mark in control.marks] == ["mark 1", "entry of the\ncut"]
     control.stop()
     control.start()
     assert control.state == "stopping"
@@ -216,6 +218,7 @@ def test_in_a_browser_data_move_and_start_mark_and_stop_work(tmp_path: Path) -> 
         assert recording.complete
         times, marks = recording.events["mark"].read()
         assert marks.tolist() == [1.0]
+        assert recording.events["mark"].read_texts() == ("entry",)
         assert 0 < times[0] < recording.stream().duration + 0.5
         assert f"{recording.stream().n_samples} samples" in said
 
@@ -231,8 +234,9 @@ def _use(page: "Page", url: str, out: Path) -> list[str]:
     page.get_by_text("recording", exact=True).wait_for(timeout=20_000)
     page.wait_for_function(f"({_SHOWN})().end > 0", timeout=20_000)
     first = page.evaluate(_SHOWN)["end"]
+    page.get_by_placeholder("note for the next mark").fill("entry")
     page.get_by_role("button", name="Mark").click()
-    page.get_by_text("1 marks").wait_for(timeout=20_000)
+    page.get_by_text("1 mark (last: entry)").wait_for(timeout=20_000)
     page.wait_for_function(f"({_SHOWN})().end > {first + 1.0} && ({_SHOWN})().frf > 50", timeout=20_000)
     page.screenshot(path=str(Path(os.environ.get("MILLFRF_ARTEFACTS", out.parent)) / "live_page.png"))
     page.get_by_role("button", name="Stop").click()
