@@ -63,7 +63,9 @@ def inspect_file(path: str | os.PathLike[str], watch: Watch = silent) -> Finding
 def _recording(path: str | os.PathLike[str], watch: Watch) -> Findings:
     tables, concerns = [], []
     with Recording(path) as recording:
-        if recording.complete is not True:
+        if recording.being_written:
+            concerns.append("the recording is still being written")
+        elif recording.complete is not True:
             how = f" ({recording.ending})" if recording.ending else ""
             concerns.append(f"the recording was not closed in order{how}: its end may be missing")
         for stream in recording.streams.values():
