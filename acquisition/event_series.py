@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from foundation import FileFormatError, InputError
 
 from .events import EventAxis
+from .recording_format import text_attribute
 
 Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
 Columns = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]
@@ -38,10 +39,14 @@ class EventSeries:
         FileFormatError
             The file names none that is known.
         """
-        stored = [self._group.attrs.get(name, default) for name, default in (("time_axis", "samples"), ("clock", ""))]
-        kind, clock = (text.decode() if isinstance(text, bytes) else str(text) for text in stored)
         try:
-            return EventAxis(kind, clock, "text" in self._group)  # type: ignore[arg-type]  # checked by EventAxis
+            defaults = (("time_axis", "samples"), ("clock", ""))
+            kind, clock = (text_attribute(self._group.attrs, name, default) for name, default in defaults)
+            texts = "text" in self._group
+        except (OSError, RuntimeError, KeyError, ValueError) as error:
+            raise FileFormatError(f"events {self._group.name} are damaged; take a copy of the file") from error
+        try:
+            return EventAxis(kind, clock, texts)  # type: ignore[arg-type]  # checked by EventAxis
         except InputError as error:
             raise FileFormatError(f"events {self._group.name}: {error}") from error
 
@@ -58,7 +63,7 @@ class EventSeries:
         try:
             columns = [np.asarray(self._group[name][:], dtype=float) for name in names]
             n_texts = [self._group["text"].shape[0]] if axis.texts else []
-        except (OSError, KeyError, AttributeError, TypeError, ValueError) as error:
+        except (OSError, RuntimeError, KeyError, AttributeError, TypeError, ValueError) as error:
             raise FileFormatError(f"events {self._group.name} lack readable 'time' and 'value'; record anew") from error
         n_whole = min(*map(len, columns), *n_texts)  # a writer killed between two leaves some longer
         times, values, *arrivals = (column[:n_whole] for column in columns)
