@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -125,3 +126,7 @@ def test_a_tap_tells_polarity_and_delay(sign: float, delay: float) -> None:
     concerns = " ".join(found.concerns())
     assert ("opposite senses" in concerns) == (sign < 0)
     assert ("us apart" in concerns) == (abs(delay / RATE) > 50e-6)
+    late = (max(-delay, 0) / RATE, max(delay, 0) / RATE)
+    told = tuple(replace(channel, input_delay_s=known) for channel, known in zip(channels, late, strict=True))
+    [known] = preflight([(StreamDescription("s", RATE, 0.0, told), samples)]).taps
+    assert known.delay == pytest.approx(0.0, abs=0.1 / RATE), "a delay that is known is no concern"
