@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -89,7 +90,8 @@ def acquire_live(
                 control.ended(f"Ended by an error: {error}")
                 raise
             finally:
-                time.sleep(_LINGER)
+                with suppress(KeyboardInterrupt):  # the file is closed: whoever is in a hurry loses nothing
+                    time.sleep(_LINGER)
             return tally
     finally:
         monitor.close()

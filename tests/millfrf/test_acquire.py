@@ -79,6 +79,15 @@ def test_ctrl_c_ends_in_order(tmp_path: Path) -> None:
         assert recording.stream().n_samples > 0
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
+def test_ctrl_c_while_checking_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("millfrf.chain.preflight.time.monotonic", lambda: signal.raise_signal(signal.SIGINT))
+    assert run(["acquire", str(_session(tmp_path)), "--check"]) == 1
+    assert capsys.readouterr().err == "millfrf: stopped; unfinished files were removed\n"
+
+
 def test_the_check_finds_nothing_wrong_with_the_cell(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["acquire", str(_session(tmp_path)), "--check", "--seconds", "0.5"]) == 0
     assert "nothing wrong" in capsys.readouterr().out
