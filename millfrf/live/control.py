@@ -43,16 +43,22 @@ class Mark:
 class LiveControl:
     """Buttons on one side, the recording on the other; also the feed of marks.
 
+    Parameters
+    ----------
+    series
+        Name of the event series of the marks.
+
     A button counts only in the state in which it makes sense, however often it is pressed and from however many pages.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, series: str = MARKS) -> None:
+        self._series = series
         self._lock = threading.Lock()
         self._state: State = "waiting"
         self._pending: list[Mark] = []
         self._marks: list[Mark] = []
         self.message = ""
-        self.event_series: dict[str, EventAxis] = {MARKS: EventAxis("host", texts=True)}
+        self.event_series: dict[str, EventAxis] = {series: EventAxis("host", texts=True)}
 
     @property
     def state(self) -> State:
@@ -100,7 +106,7 @@ class LiveControl:
             return []
         times = np.array([mark.host_time for mark in marks])
         numbers = np.array([float(mark.number) for mark in marks])
-        return [Events(MARKS, times, numbers, None, tuple(mark.note for mark in marks))]
+        return [Events(self._series, times, numbers, None, tuple(mark.note for mark in marks))]
 
     def close(self) -> None:
         """As a feed: nothing to do."""
