@@ -19,7 +19,9 @@ from scipy.sparse import coo_array
 
 from acquisition import HOST_AXIS, Channel, Events, Recording, RecordingWriter, StreamDescription, guarded_reading
 from acquisition.conversion.array_file import open_arrays
+from estimation import write_frf_uff
 from foundation import FileFormatError
+from replay_data import table_one_model
 
 OPENER = """
 import contextlib, faulthandler, io, json, os, pathlib, resource, sys
@@ -113,6 +115,15 @@ def _npz(path: Path) -> None:
     np.savez(path, x=SAMPLES)
 
 
+def _npy(path: Path) -> None:
+    np.save(path, SAMPLES)
+
+
+def _uff_frf(path: Path) -> None:
+    pytest.importorskip("pyuff")
+    write_frf_uff(path, table_one_model().frf(np.arange(1.0, 20.0, 0.5)))
+
+
 def _mat(path: Path) -> None:
     savemat(path, {"x": SAMPLES})
 
@@ -173,6 +184,8 @@ KINDS = {
     "wav": ("convert", ".wav", WITH_OWN_RATE, _wav),
     "csv": ("convert", ".csv", CHANNEL_MAP, _csv),
     "uff": ("convert", ".uff", WITH_OWN_RATE, _uff),
+    "uff frf": ("convert", ".uff", "", _uff_frf),
+    "npy": ("convert", ".npy", CHANNEL_MAP, _npy),
     "npz": ("convert", ".npz", CHANNEL_MAP, _npz),
     "mat": ("convert", ".mat", CHANNEL_MAP, _mat),
     "mat of all kinds": ("convert", ".mat", ARRAY_MAP, _mat_of_all_kinds),
@@ -230,8 +243,9 @@ needs_linux = pytest.mark.skipif(sys.platform != "linux", reason="limits memory 
 
 @needs_linux
 def test_damaged_files_are_understood_or_refused(tmp_path: Path) -> None:
-    few = {"hdf5": range(3), "mat of all kinds": range(3)}  # each in a process of its own
-    _open_all(tmp_path, {kind: range(40) for kind in KINDS if kind not in GUARDED} | few)
+    few = {"hdf5": range(3), "mat of all kinds": range(3)}  # each file in a process of its own
+    few |= dict.fromkeys(("npy", "tdms", "uff frf"), range(16))
+    _open_all(tmp_path, {kind: range(40) for kind in KINDS if kind not in GUARDED and kind not in few} | few)
 
 
 @pytest.mark.slow
