@@ -1,5 +1,6 @@
 """Channels, recordings and the sources they come from: knows nothing of spectra or models."""
 
+from .aligner import Aligner, aligned_blocks, aligned_samples
 from .channel import Channel
 from .conversion import convert
 from .drivers import ReplaySource
@@ -17,6 +18,7 @@ from .source import Block, Source, StreamDescription
 __all__ = [
     "HOST_AXIS",
     "SAMPLES_AXIS",
+    "Aligner",
     "Block",
     "Channel",
     "DeviceError",
@@ -38,6 +40,8 @@ __all__ = [
     "Stream",
     "StreamDescription",
     "WithFeeds",
+    "aligned_blocks",
+    "aligned_samples",
     "convert",
     "record",
     "recover",

@@ -15,6 +15,8 @@ from .source import StreamDescription
 class Alignment:
     """Takes event times to ``start_time + sample / sample_rate`` of one stream.
 
+    Samples that come late by their inputs' delays show an event late: times are those of the least delayed channel.
+
     Parameters
     ----------
     stream
@@ -78,4 +80,5 @@ class Alignment:
         if axis.kind == "samples" or not len(times):
             return times, values
         host = self.device_clock(axis.clock).host(times) if axis.kind == "device" else times
-        return self._stream.start_time + self.stream_clock().local(host) / self._stream.sample_rate, values
+        origin = self._stream.start_time + self._stream.common_delay
+        return origin + self.stream_clock().local(host) / self._stream.sample_rate, values

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .durability import SpareSpace, is_disk_full
 from .errors import DiskFull
 
-Rows = Sequence[tuple[h5py.Dataset, NDArray[np.floating]]]
+Rows = Sequence[tuple[h5py.Dataset, NDArray[np.generic]]]
 
 
 def append_rows(rows: Rows, spare: SpareSpace | None, path: object) -> None:
@@ -41,7 +41,7 @@ def append_rows(rows: Rows, spare: SpareSpace | None, path: object) -> None:
         raise DiskFull(f"the disk of {path} is full; the recording ends here, make room for the next one") from error
 
 
-def _extend(table: h5py.Dataset, new: NDArray[np.floating]) -> None:
+def _extend(table: h5py.Dataset, new: NDArray[np.generic]) -> None:
     start = table.shape[0]
     table.resize(start + len(new), axis=0)
     table[start:] = new

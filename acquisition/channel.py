@@ -5,7 +5,10 @@ from typing import Any
 
 from foundation import SI_UNITS, DegreeOfFreedom, FileFormatError, InputError
 
-_FIELDS = ("name", "quantity", "unit", "node", "direction", "full_scale", "high_pass_hz", "sensor")
+_FIELDS = ("name", "quantity", "unit", "node", "direction", "full_scale", "high_pass_hz", "sensor", "input_delay_s")
+
+LONGEST_DELAY = 1.0
+"""Largest delay of an input that is believed, s."""
 
 
 @dataclass(frozen=True)
@@ -28,13 +31,17 @@ class Channel:
         Corner of the sensor's first-order high-pass (IEPE), Hz. None: none known.
     sensor
         Model and serial number, free text.
+    input_delay_s
+        Time by which its samples come late, known of its input or amplifier, s. The samples are stored as they came;
+        spectra, fits and diagnoses take it out. None: none known.
     extra
         Whatever else a file says of the channel; kept, not interpreted.
 
     Raises
     ------
     InputError
-        Unknown quantity, a unit that is not the SI one, an empty name, or a malformed direction.
+        Unknown quantity, a unit that is not the SI one, an empty name, a malformed direction, or a delay
+        below 0 or over 1 s.
 
     Examples
     --------
@@ -50,6 +57,7 @@ class Channel:
     full_scale: float | None = None
     high_pass_hz: float | None = None
     sensor: str = ""
+    input_delay_s: float | None = None
     extra: dict[str, Any] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
@@ -64,6 +72,11 @@ class Channel:
             raise InputError(
                 f"channel {self.name}: unit {self.unit!r} is not {expected!r}, the SI unit of {self.quantity}; "
                 "convert when importing"
+            )
+        if self.input_delay_s is not None and not 0 <= self.input_delay_s <= LONGEST_DELAY:
+            raise InputError(
+                f"channel {self.name}: input delay {self.input_delay_s!r} s must be between 0 and {LONGEST_DELAY:g} s; "
+                "take it from the module's data sheet"
             )
         if self.node or self.direction:
             DegreeOfFreedom(self.node, self.direction)

@@ -9,6 +9,8 @@ import h5py
 from foundation import FileFormatError, InputError
 
 from .durability import is_being_written
+from .guarded_reading import rehearse
+from .text_heap import heaps_are_sound
 from .unclosed_file import UnclosedFile, is_marked_as_written, superblock
 
 
@@ -61,20 +63,48 @@ def open_for_reading(path: Path, *, accept_cut: bool = False) -> h5py.File:
     """
     if not path.is_file():
         raise InputError(f"no file {path}; check the name")
+    if superblock(path) is None and h5py.is_hdf5(path):  # an older form, whose parts have no checksums
+        rehearse(path)
     try:
-        return h5py.File(path, "r")
+        return _without_loose_texts(h5py.File(path, "r"), path)
     except OSError:
         pass
     try:
         if is_marked_as_written(path) and is_being_written(path):
             return h5py.File(path, "r", libver="latest", swmr=True)
         if is_marked_as_written(path) or (accept_cut and superblock(path) is not None):
-            return h5py.File(UnclosedFile(path), "r")
+            return _without_loose_texts(h5py.File(UnclosedFile(path), "r"), path)
     except (OSError, ValueError, RuntimeError) as error:
         raise FileFormatError(f"{path} is damaged beyond what a killed writer leaves; take a copy of it") from error
     raise FileFormatError(
         f"{path} is not an HDF5 file, or it was cut short or damaged; give a whole recording, or try millfrf recover"
     )
+
+
+def _without_loose_texts(file: h5py.File, path: Path) -> h5py.File:
+    """The open file, once it is known that its texts of any length, which have no checksum, can be read."""
+    try:
+        with reporting_damage(path):
+            parts = (file, *_groups(file.get("signals")), *_groups(file.get("events")))
+            loose = any(_has_loose_text(part) for part in parts)
+        if loose and not heaps_are_sound(path):
+            rehearse(path)
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def _groups(parent: object) -> list[h5py.Group]:
+    return (
+        [entry for entry in parent.values() if isinstance(entry, h5py.Group)] if isinstance(parent, h5py.Group) else []
+    )
+
+
+def _has_loose_text(part: h5py.Group) -> bool:
+    """Whether an attribute is a text of any length; its type is looked at, not its value."""
+    kinds = (part.attrs.get_id(name).get_type() for name in part.attrs)
+    return any(isinstance(kind, h5py.h5t.TypeStringID) and kind.is_variable_str() for kind in kinds)
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from foundation import FileFormatError, InputError
 
 from .events import EventAxis
+from .recording_format import text_attribute
 
 Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
 Columns = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]
@@ -38,10 +39,14 @@ class EventSeries:
         FileFormatError
             The file names none that is known.
         """
-        stored = [self._group.attrs.get(name, default) for name, default in (("time_axis", "samples"), ("clock", ""))]
-        kind, clock = (text.decode() if isinstance(text, bytes) else str(text) for text in stored)
         try:
-            return EventAxis(kind, clock)  # type: ignore[arg-type]  # checked by EventAxis
+            defaults = (("time_axis", "samples"), ("clock", ""))
+            kind, clock = (text_attribute(self._group.attrs, name, default) for name, default in defaults)
+            texts = "text" in self._group
+        except (OSError, RuntimeError, KeyError, ValueError) as error:
+            raise FileFormatError(f"events {self._group.name} are damaged; take a copy of the file") from error
+        try:
+            return EventAxis(kind, clock, texts)  # type: ignore[arg-type]  # checked by EventAxis
         except InputError as error:
             raise FileFormatError(f"events {self._group.name}: {error}") from error
 
@@ -53,14 +58,33 @@ class EventSeries:
         FileFormatError
             The series is damaged.
         """
-        names = ("time", "value", *(("arrival",) if self.axis.kind == "device" else ()))
+        axis = self.axis
+        names = ("time", "value", *(("arrival",) if axis.kind == "device" else ()))
         try:
             columns = [np.asarray(self._group[name][:], dtype=float) for name in names]
-        except (OSError, KeyError, AttributeError, TypeError, ValueError) as error:
+            n_texts = [self._group["text"].shape[0]] if axis.texts else []
+        except (OSError, RuntimeError, KeyError, AttributeError, TypeError, ValueError) as error:
             raise FileFormatError(f"events {self._group.name} lack readable 'time' and 'value'; record anew") from error
-        n_whole = min(len(column) for column in columns)  # a writer killed between two leaves some longer
+        n_whole = min(*map(len, columns), *n_texts)  # a writer killed between two leaves some longer
         times, values, *arrivals = (column[:n_whole] for column in columns)
         return times, values, arrivals[0] if arrivals else None
+
+    def read_texts(self) -> tuple[str, ...]:
+        """The text of each value; empty texts where the series has none.
+
+        Raises
+        ------
+        FileFormatError
+            The series is damaged.
+        """
+        n_whole = len(self.read_raw()[0])
+        if not self.axis.texts:
+            return ("",) * n_whole
+        try:
+            stored = np.asarray(self._group["text"][:n_whole])
+            return tuple(bytes(text).decode("utf-8", "replace") for text in stored)
+        except (OSError, TypeError, ValueError) as error:
+            raise FileFormatError(f"events {self._group.name} have no readable 'text'; record anew") from error
 
     def read(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Times on the samples' axis (s) and values, each (n_events,).

@@ -1,6 +1,6 @@
 """Slow or asynchronous values: in which clock their times are told, and how a source hands them over."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, runtime_checkable
 
@@ -21,6 +21,8 @@ class EventAxis:
         ``device``: a clock of the device's own, and the host's arrival times are stored beside.
     clock
         Name of the device's clock; series of one clock are aligned together.
+    texts
+        Whether a short text comes with each value, such as a mark's note.
 
     Raises
     ------
@@ -30,6 +32,7 @@ class EventAxis:
 
     kind: Literal["samples", "host", "device"] = "samples"
     clock: str = ""
+    texts: bool = False
 
     def __post_init__(self) -> None:
         if self.kind not in ("samples", "host", "device"):
@@ -37,6 +40,9 @@ class EventAxis:
         if self.kind == "device" and not self.clock:
             raise InputError("a device's time axis needs the name of its clock, such as can0")
 
+
+TEXT_BYTES = 120
+"""Room for the text of a value; a longer one is cut."""
 
 SAMPLES_AXIS = EventAxis()
 """Times on the axis of the samples, s."""
@@ -58,12 +64,15 @@ class Events:
     values : (n,)
     arrivals : (n,), s, or None
         Host's monotonic time at which each was there; needed where the axis is a device's.
+    texts : n of them, or None
+        Needed where the axis has texts; longer ones are cut to `TEXT_BYTES` bytes of UTF-8.
     """
 
     series: str
     times: NDArray[np.float64]
     values: NDArray[np.float64]
     arrivals: NDArray[np.float64] | None = None
+    texts: tuple[str, ...] | None = None
 
 
 @runtime_checkable
@@ -73,6 +82,18 @@ class AnnouncesEvents(Protocol):
     @property
     def event_series(self) -> Mapping[str, EventAxis]:
         """The series to come and the clock of each."""
+
+
+def stored_texts(texts: Sequence[str]) -> NDArray[np.bytes_]:
+    """Texts as they are stored: UTF-8, cut at a whole character to `TEXT_BYTES`.
+
+    Examples
+    --------
+    >>> stored_texts(["Fräser " + 60 * "ü"])[0].decode()[-3:]
+    'üüü'
+    """
+    cut = [" ".join(text.split()).encode("utf-8", "replace")[:TEXT_BYTES].decode("utf-8", "ignore") for text in texts]
+    return np.array([text.encode() for text in cut], f"S{TEXT_BYTES}")
 
 
 def announced_events(source: object) -> dict[str, EventAxis]:

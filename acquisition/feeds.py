@@ -7,8 +7,9 @@ from typing import Protocol, runtime_checkable
 
 from foundation import InputError, MillfrfError
 
+from .around_source import AroundSource
 from .events import EventAxis, Events, announced_events
-from .source import Block, Source, StreamDescription
+from .source import Block, Source
 
 
 @runtime_checkable
@@ -29,7 +30,7 @@ class EventFeed(Protocol):
         """Stop and release the device; harmless when not open."""
 
 
-class WithFeeds:
+class WithFeeds(AroundSource):
     """A source whose blocks are interleaved with the events of some feeds.
 
     Feeds are opened first, in their order, and closed last.
@@ -48,7 +49,8 @@ class WithFeeds:
     """
 
     def __init__(self, source: Source, feeds: Sequence[EventFeed]) -> None:
-        self._source, self._feeds = source, tuple(feeds)
+        super().__init__(source)
+        self._feeds = tuple(feeds)
         self._waiting: deque[Block | Events] = deque()
         self._error: MillfrfError | None = None
         self._opened = ExitStack()
@@ -59,26 +61,6 @@ class WithFeeds:
             if twice:
                 raise InputError(f"event series {', '.join(twice)} comes from two devices; give unique names")
             self.event_series.update(feed.event_series)
-
-    @property
-    def title(self) -> str:
-        """The source's title."""
-        return self._source.title
-
-    @property
-    def setup(self) -> str:
-        """The source's setup."""
-        return self._source.setup
-
-    @property
-    def streams(self) -> tuple[StreamDescription, ...]:
-        """The source's streams."""
-        return self._source.streams
-
-    @property
-    def n_samples(self) -> int | None:
-        """The source's number of samples."""
-        return self._source.n_samples
 
     def open(self) -> None:
         """Open the feeds, then the source; what was opened is closed again where one fails."""

@@ -5,8 +5,9 @@ import time
 
 from foundation import InputError
 
+from .around_source import AroundSource
 from .events import EventAxis, Events, announced_events
-from .source import Block, Source, StreamDescription
+from .source import Block, Source
 
 
 class Pace:
@@ -43,7 +44,7 @@ class Pace:
         return time.monotonic()
 
 
-class Paced:
+class Paced(AroundSource):
     """A source that delivers no block before its last sample's time.
 
     Parameters
@@ -60,29 +61,9 @@ class Paced:
     """
 
     def __init__(self, source: Source, speed: float = 1.0) -> None:
-        self._source = source
+        super().__init__(source)
         self._pace = Pace(speed)
         self._rates = {stream.name: stream.sample_rate for stream in source.streams}
-
-    @property
-    def title(self) -> str:
-        """The source's title."""
-        return self._source.title
-
-    @property
-    def setup(self) -> str:
-        """The source's setup."""
-        return self._source.setup
-
-    @property
-    def streams(self) -> tuple[StreamDescription, ...]:
-        """The source's streams."""
-        return self._source.streams
-
-    @property
-    def n_samples(self) -> int | None:
-        """The source's number of samples."""
-        return self._source.n_samples
 
     def open(self) -> None:
         """Open the source and start the clock."""

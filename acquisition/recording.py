@@ -15,6 +15,7 @@ from foundation import FileFormatError, InputError
 from .alignment import Alignment
 from .channel import Channel
 from .damage import open_for_reading, reporting_damage, require_stored, whole_rows
+from .durability import is_being_written
 from .event_series import EventSeries
 from .recording_format import check_format, stream_from_attributes, text_attribute
 from .source import StreamDescription
@@ -150,6 +151,7 @@ class Recording:
     def __init__(self, path: str | os.PathLike[str], *, accept_cut: bool = False) -> None:
         self.path = Path(path)
         self._accept_cut = accept_cut
+        self._locked = self.path.is_file() and is_being_written(self.path)  # asked before this reader holds it, too
         self._file = open_for_reading(self.path, accept_cut=accept_cut)
         try:
             with reporting_damage(self.path):
@@ -198,6 +200,11 @@ class Recording:
         """Whether the writer closed the file in order; None where the file does not say."""
         value = self._file.attrs.get("complete")
         return None if value is None else bool(value)
+
+    @property
+    def being_written(self) -> bool:
+        """Whether a living writer held the file when it was opened (False where the system has no such locks)."""
+        return self._locked and self.complete is False
 
     @property
     def ending(self) -> str:

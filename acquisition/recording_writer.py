@@ -17,7 +17,7 @@ from foundation import InputError
 from .appending import append_rows
 from .durability import SpareSpace, Syncer, is_being_written, is_disk_full
 from .errors import DiskFull
-from .events import SAMPLES_AXIS, EventAxis, Events
+from .events import SAMPLES_AXIS, TEXT_BYTES, EventAxis, Events, stored_texts
 from .recording_format import ENDING_BYTES, FORMAT, FORMAT_VERSION
 from .source import StreamDescription
 
@@ -130,6 +130,8 @@ class RecordingWriter:
         group.attrs["clock"] = axis.clock
         for column in ("time", "value", *(("arrival",) if axis.kind == "device" else ())):
             group.create_dataset(column, (0,), "f8", maxshape=(None,), chunks=(_CLOCK_CHUNK,))
+        if axis.texts:
+            group.create_dataset("text", (0,), f"S{TEXT_BYTES}", maxshape=(None,), chunks=(_CLOCK_CHUNK,))
 
     def append(self, stream: str, samples: NDArray[np.floating]) -> None:
         """Append rows (n_samples, n_channels) in SI units to a stream.
@@ -178,14 +180,16 @@ class RecordingWriter:
         axis, name = self._event_axes.get(events.series), events.series
         if axis is None:
             raise InputError(f"event series {name!r} was not announced; name it in event_names")
-        columns = {"time": events.times, "value": events.values}
+        columns: dict[str, NDArray[np.generic]] = {"time": events.times, "value": events.values}
         if axis.kind == "device":
             if events.arrivals is None:
                 raise InputError(f"event {name}: times of the clock {axis.clock} need the host's arrival times beside")
             columns["arrival"] = events.arrivals
+        if axis.texts:
+            columns["text"] = stored_texts(events.texts or ("",) * len(events.values))
         if events.times.ndim != 1 or len({column.shape for column in columns.values()}) != 1:
             raise InputError(
-                f"event {name}: {events.times.size} times but {events.values.size} values; give one value a time"
+                f"event {name}: {events.times.size} times but {events.values.size} values (or texts); give one a time"
             )
         group = self._file[f"events/{name}"]
         append_rows([(group[key], column) for key, column in columns.items()], self._spare, self.path)

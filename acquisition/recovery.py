@@ -97,7 +97,7 @@ def _copy(source: Path, temporary: Path, target: Path, progress: Callable[[int],
                 writer.append_clock_pairs(name, recording.clock_pairs(name))
             for name, series in events.items():
                 raw = series.read_raw()
-                writer.append_events(Events(name, *raw))
+                writer.append_events(Events(name, *raw, series.read_texts()))
                 n_events[name] = len(raw[0])
             writer.close(complete=False, ending=f"recovered from {source.name}: its writer did not close it")
     return Recovered(target, samples, n_events, lost)

@@ -50,6 +50,11 @@ class StreamDescription:
         if twice:
             raise InputError(f"stream {self.name}: channel {', '.join(twice)} appears twice; give unique names")
 
+    @property
+    def common_delay(self) -> float:
+        """By which the samples of its least delayed channel come late, s; events are put on that channel's axis."""
+        return min(channel.input_delay_s or 0.0 for channel in self.channels)
+
 
 @dataclass(frozen=True)
 class Block:

@@ -30,7 +30,9 @@ class ShaftAngle:
     pulse_times: Real
 
 
-def pulse_times(samples: Real, sample_rate: float, *, low: float | None = None, high: float | None = None) -> Real:
+def pulse_times(
+    samples: Real, sample_rate: float, *, low: float | None = None, high: float | None = None, delay: float = 0.0
+) -> Real:
     """Times (s) at which a signal rises through ``high`` after it was below ``low``; a straight line between samples.
 
     Parameters
@@ -41,6 +43,8 @@ def pulse_times(samples: Real, sample_rate: float, *, low: float | None = None, 
         Hz.
     low, high
         Levels of the hysteresis; None: at 40 % and 60 % between the 1st and 99th percentile.
+    delay
+        By which the channel comes late behind those it is compared with, s; taken off the times.
 
     Raises
     ------
@@ -57,12 +61,14 @@ def pulse_times(samples: Real, sample_rate: float, *, low: float | None = None, 
     rises = decided[1:][(state[decided][1:] == 1) & (state[decided][:-1] == -1)]
     before, after = samples[rises - 1], samples[rises]
     share = np.divide(high - before, after - before, out=np.zeros(len(rises)), where=after > before)
-    times: Real = (rises - 1 + share) / sample_rate
+    times: Real = (rises - 1 + share) / sample_rate - delay
     return times
 
 
-def shaft_angle(samples: Real, sample_rate: float, pulses_per_revolution: int = 1) -> ShaftAngle:
+def shaft_angle(samples: Real, sample_rate: float, pulses_per_revolution: int = 1, *, delay: float = 0.0) -> ShaftAngle:
     r"""Angle at each sample between the first and the last pulse, monotone and smooth in between.
+
+    ``delay`` is that of `pulse_times`.
 
     At pulse :math:`k` the angle is :math:`2\pi k/P`; between pulses it is a monotone cubic (Fritsch, Carlson 1980).
 
@@ -73,7 +79,7 @@ def shaft_angle(samples: Real, sample_rate: float, pulses_per_revolution: int = 
     """
     if pulses_per_revolution < 1:
         raise InputError(f"{pulses_per_revolution} pulses per revolution; give 1 or more")
-    times = pulse_times(samples, sample_rate)
+    times = pulse_times(samples, sample_rate, delay=delay)
     if len(times) < 2:
         raise InputError(f"the tachometer channel has {len(times)} pulses; at least two are needed, check the sensor")
     first, last = int(np.ceil(times[0] * sample_rate)), int(np.floor(times[-1] * sample_rate))

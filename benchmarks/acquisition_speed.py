@@ -73,7 +73,8 @@ def watch_page(url: str, picture: Path, seconds: float) -> str:
     if browser is None:
         return "not open (no Chromium or playwright)"
     with sync_playwright() as driver:
-        page = driver.chromium.launch(executable_path=browser, args=["--no-sandbox"]).new_page()
+        started = driver.chromium.launch(executable_path=browser, args=["--no-sandbox"])
+        page = started.new_page(viewport={"width": 1400, "height": 1250})
         page.goto(url)
         page.wait_for_timeout(1000 * max(seconds - 12, 2))
         status = page.locator("text=samples a channel").first.inner_text()

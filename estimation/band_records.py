@@ -1,12 +1,12 @@
 """Records reduced to a low band: filtered and decimated block by block, forces and responses alike."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Channel, Recording
+from acquisition import Channel, Recording, aligned_blocks
 from foundation import InputError
 
 _STOPBAND_DB = 90.0
@@ -116,6 +116,8 @@ def band_record(
 ) -> BandRecord:
     """Read a recording once, block by block, and keep the band up to ``highest_frequency`` (Hz).
 
+    Known input delays are taken out, and the channels of the result have none.
+
     Parameters
     ----------
     recording
@@ -139,7 +141,7 @@ def band_record(
     names = [channel.name for channel in (*excitations, *responses)]
     pieces = []
     done = 0
-    for block in source.blocks(1 << 16, names):
+    for block in aligned_blocks(source, names):
         pieces.append(decimator.add(block))
         done += len(block)
         if progress is not None:
@@ -158,6 +160,6 @@ def band_record(
         decimator.usable_band,
         samples[:, :n],
         samples[:, n:],
-        tuple(excitations),
-        tuple(responses),
+        tuple(replace(channel, input_delay_s=None) for channel in excitations),
+        tuple(replace(channel, input_delay_s=None) for channel in responses),
     )

@@ -23,7 +23,8 @@ class SpectralAccumulator:
     """Sums windowed cross spectra over segments as samples arrive.
 
     ``S_uv[k] = 2 / (fs sum w^2) * mean over segments of U_k conj(V_k)``, one-sided; lines 0 and Nyquist are not
-    doubled (Welch 1967; Bendat & Piersol, Random Data, 4th ed., section 11.5).
+    doubled (Welch 1967; Bendat & Piersol, Random Data, 4th ed., section 11.5). Known input delays of the channels are
+    taken out of the result.
 
     Parameters
     ----------
@@ -186,10 +187,11 @@ class SpectralAccumulator:
 
     def _spectra(self, mean: NDArray[np.complex128]) -> CrossSpectra:
         n = len(self.excitations)
+        lines = np.fft.rfftfreq(self.settings.segment_length, 1 / self.sample_rate)
+        frequencies = np.asarray(lines, dtype=np.float64)
+        take_out_delays(mean, frequencies, (*self.excitations, *self.responses))
         return CrossSpectra(
-            frequencies=np.asarray(
-                np.fft.rfftfreq(self.settings.segment_length, 1 / self.sample_rate), dtype=np.float64
-            ),
+            frequencies=frequencies,
             input_spectra=mean[:, :n, :n],
             cross_spectra=mean[:, n:, :n],
             output_spectra=mean[:, n:, n:],
@@ -201,6 +203,21 @@ class SpectralAccumulator:
             sample_rate=self.sample_rate,
             n_excluded=self.n_excluded,
         )
+
+
+def take_out_delays(
+    spectra: NDArray[np.complex128], frequencies: NDArray[np.float64], channels: Sequence[Channel]
+) -> None:
+    """Turn the phases of spectra (n_lines, n, n), in place, to those of channels without their input delays.
+
+    ``S_uv exp(2 pi i f (tau_u - tau_v))``: being late by tau turns a channel's lines by ``exp(-2 pi i f tau)``.
+    """
+    delays = np.array([channel.input_delay_s or 0.0 for channel in channels])
+    if np.ptp(delays) == 0:
+        return
+    turned = np.exp(2j * np.pi * frequencies[:, None] * (delays - delays.min()))
+    for row in range(len(channels)):  # row by row: no second array of this size
+        spectra[:, row, :] *= turned[:, row, None] * turned.conj()
 
 
 def _detrended(segments: NDArray[np.float64], kind: str) -> NDArray[np.float64]:

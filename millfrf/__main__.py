@@ -12,6 +12,9 @@ from .commands import COMMANDS
 from .robot.commands import robot_app
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
+INTERRUPTED = 130
+"""What newer versions of typer return instead of raising KeyboardInterrupt."""
+STOPPED = "stopped; unfinished files were removed"
 
 app = typer.Typer(
     name="millfrf",
@@ -34,9 +37,11 @@ def run(arguments: Sequence[str]) -> int:
     try:
         result = command.main(args=list(arguments), prog_name="millfrf", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
-        return _fail("stopped; unfinished files were removed", FAILED)
+        return _fail(STOPPED, FAILED)
     except Exception as error:
         return _explain(error)
+    if result == INTERRUPTED:
+        return _fail(STOPPED, FAILED)
     return result if isinstance(result, int) else DONE
 
 

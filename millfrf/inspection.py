@@ -63,7 +63,9 @@ def inspect_file(path: str | os.PathLike[str], watch: Watch = silent) -> Finding
 def _recording(path: str | os.PathLike[str], watch: Watch) -> Findings:
     tables, concerns = [], []
     with Recording(path) as recording:
-        if recording.complete is not True:
+        if recording.being_written:
+            concerns.append("the recording is still being written")
+        elif recording.complete is not True:
             how = f" ({recording.ending})" if recording.ending else ""
             concerns.append(f"the recording was not closed in order{how}: its end may be missing")
         for stream in recording.streams.values():
@@ -79,7 +81,18 @@ def _recording(path: str | os.PathLike[str], watch: Watch) -> Findings:
         if recording.events:
             rows = tuple((name, str(len(series.read()[0]))) for name, series in recording.events.items())
             tables.append(Table("events", ("name", "values"), rows))
+            tables += [
+                _text_table(name, series.read(), series.read_texts())
+                for name, series in recording.events.items()
+                if series.axis.texts and len(series.read_raw()[0])
+            ]
     return Findings(RECORDING, summary, tuple(tables), tuple(concerns))
+
+
+def _text_table(name: str, values: tuple[np.ndarray, np.ndarray], texts: tuple[str, ...]) -> Table:
+    """When each mark was set, and its note."""
+    rows = tuple((f"{time:.3f}", f"{value:g}", text) for time, value, text in zip(*values, texts, strict=True))
+    return Table(name, ("time (s)", "number", "note"), rows)
 
 
 def _frf(path: str | os.PathLike[str]) -> Findings:

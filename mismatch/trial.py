@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import resample_poly
 
-from acquisition import Channel, Recording, Stream
+from acquisition import Channel, Recording, Stream, aligned_samples
 from foundation import DegreeOfFreedom, InputError
 from modal_fit import ModalModel
 
@@ -101,7 +101,7 @@ def read_trial(path: str | os.PathLike[str], model: ModalModel, *, stream: str |
         forces, force_signs = _matched(source, model.excitations, ("force", "voltage"))
         responses, response_signs = _matched(source, model.responses, tuple(POWERS))
         names = tuple(channel.name for channel in (*forces, *responses))
-        samples = source.read(channels=names) * np.array(force_signs + response_signs)
+        samples = aligned_samples(source, names) * np.array(force_signs + response_signs)
         rate = source.sample_rate
     bad = ~np.isfinite(samples).all(axis=0)
     if bad.any():

@@ -1,5 +1,7 @@
 """Named arrays in a file of another program: NPY, NPZ, MAT (any version), HDF5, TDMS, CSV, WAV, UFF."""
 
+import logging
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -11,9 +13,10 @@ from scipy.io import loadmat
 
 from foundation import FileFormatError, InputError
 
+from ..guarded_reading import read_guarded
 from .csv_file import read_csv
 from .flat_fields import numbers
-from .mat_check import require_whole_tags
+from .mat_check import is_plain_mat
 from .sampled_files import read_uff_times, read_wav
 
 SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5", ".tdms", ".csv", ".txt", ".wav", ".uff", ".unv")
@@ -95,10 +98,12 @@ def open_arrays(path: Path, **csv_options: Any) -> ArrayFile:
     if suffix not in readers and suffix not in sampled:
         raise InputError(f"cannot read {path.name}: suffix {path.suffix!r}; use one of {', '.join(SUFFIXES)}")
     try:
-        if suffix in sampled:
-            fields, rate = sampled[suffix](path)
-            return ArrayFile(path, fields, sample_rate=rate)
-        return ArrayFile(path, readers[suffix](path))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what the readers' libraries say beside their errors is no line of ours
+            if suffix in sampled:
+                fields, rate = sampled[suffix](path)
+                return ArrayFile(path, fields, sample_rate=rate)
+            return ArrayFile(path, readers[suffix](path))
     except InputError:
         raise
     except Exception as error:  # damaged files make numpy, scipy and zipfile raise nearly anything
@@ -125,47 +130,22 @@ def _tdms(path: Path) -> dict[str, Any]:
         from nptdms import TdmsFile
     except ModuleNotFoundError as error:
         raise InputError("TDMS files need the package npTDMS; run 'pip install millfrf[formats]'") from error
+    logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # it prints whole pieces of a damaged file
     with TdmsFile.open(path) as opened:
         return {f"{group.name}/{channel.name}": channel[:] for group in opened.groups() for channel in group.channels()}
 
 
 def _mat(path: Path) -> dict[str, Any]:
-    """Version 5 by scipy; version 7.3 is HDF5 with the axes reversed."""
+    """Up to version 7 by scipy; version 7.3 is HDF5 with the axes reversed."""
     if h5py.is_hdf5(path):
         return {name: _reversed_axes(value) for name, value in _hdf5(path).items()}
-    require_whole_tags(path)
-    loaded = loadmat(path, squeeze_me=False, struct_as_record=True)
-    fields: dict[str, Any] = {}
-    for name, value in loaded.items():
-        if not name.startswith("__"):
-            _flatten(name, value, fields)
-    return fields
-
-
-def _flatten(name: str, value: Any, into: dict[str, Any]) -> None:
-    """MATLAB structures become ``structure.field``."""
-    if isinstance(value, np.ndarray) and value.dtype.names and value.size == 1:
-        for field in value.dtype.names:
-            _flatten(f"{name}.{field}", value.reshape(-1)[0][field], into)
-    else:
-        into[name] = value
+    if not is_plain_mat(path):
+        return read_guarded(path, "mat")
+    return {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
 
 
 def _hdf5(path: Path) -> dict[str, Any]:
-    fields: dict[str, Any] = {}
-
-    def visit(name: str, item: Any) -> None:
-        if isinstance(item, h5py.Dataset) and not name.startswith("#"):
-            key = name.replace("/", ".")
-            fields[key] = _matlab_text(item) if item.attrs.get("MATLAB_class") == b"char" else np.asarray(item[()])
-
-    with h5py.File(path, "r") as file:
-        file.visititems(visit)
-    return fields
-
-
-def _matlab_text(item: Any) -> str:
-    return "".join(map(chr, np.asarray(item[()]).reshape(-1).astype(int)))
+    return read_guarded(path, "arrays")
 
 
 def _reversed_axes(value: Any) -> Any:

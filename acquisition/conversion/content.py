@@ -89,6 +89,8 @@ class Content:
         As in a recording; ``recorded_at`` is empty where it is not known.
     events
         Times (s) and values by name.
+    event_texts
+        The text of each value by name, for series that have texts.
     clock_pairs
         (sample index, host time) by stream, (n_pairs, 2).
     """
@@ -99,17 +101,20 @@ class Content:
     recorded_at: str = ""
     events: Mapping[str, Pairs] = field(default_factory=dict)
     clock_pairs: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    event_texts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def recording_content(recording: Recording) -> Content:
     """Content of an open recording; its samples stay in the file."""
+    events = recording.events
     return Content(
         tuple(recording.streams.values()),
         recording.title,
         recording.setup,
         recording.recorded_at,
-        {name: series.read() for name, series in recording.events.items()},
+        {name: series.read() for name, series in events.items()},
         {name: recording.clock_pairs(name) for name in recording.streams},
+        {name: series.read_texts() for name, series in events.items() if series.axis.texts},
     )
 
 

@@ -16,6 +16,7 @@ from foundation import FileFormatError
 
 from ..recording_format import check_format, stream_from_attributes
 from .content import ArraySamples, Content
+from .flat_fields import event_texts
 
 
 @dataclass(frozen=True)
@@ -111,8 +112,9 @@ def read_own_csv(path: Path) -> Content:
         clock = np.array(metadata.get("clock", []), dtype=float).reshape(-1, 2)
     except (TypeError, ValueError, AttributeError) as error:
         raise FileFormatError(f"{path}: comment lines 'events' or 'clock' are damaged; convert anew") from error
+    notes = event_texts(metadata.get("event_texts"), events, path)
     title, setup, recorded_at = (str(metadata.get(name, "")) for name in ("title", "setup", "recorded_at"))
-    return Content((ArraySamples(described, kept),), title, setup, recorded_at, events, {described.name: clock})
+    return Content((ArraySamples(described, kept),), title, setup, recorded_at, events, {described.name: clock}, notes)
 
 
 def _parse(rows: list[tuple[int, str]], delimiter: str, decimal: str, path: Path) -> NDArray[np.float64]:

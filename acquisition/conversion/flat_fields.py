@@ -27,6 +27,7 @@ def to_fields(content: Content) -> FlatFields:
         "recorded_at": content.recorded_at,
         "setup": content.setup,
         "event_names": json.dumps(list(content.events)),
+        "event_texts": json.dumps({name: list(texts) for name, texts in content.event_texts.items()}),
     }
     for number, samples in enumerate(content.streams):
         end = _ending(number)
@@ -62,7 +63,8 @@ def from_fields(fields: Mapping[str, Any], path: object) -> Content:
     if not streams:
         raise FileFormatError(f"{path} holds no array 'samples'; convert the recording anew")
     events = _events(fields, path)
-    return Content(tuple(streams), texts["title"], texts["setup"], texts["recorded_at"], events, clocks)
+    notes = event_texts(_json(fields, "event_texts", "{}", path), events, path)
+    return Content(tuple(streams), texts["title"], texts["setup"], texts["recorded_at"], events, clocks, notes)
 
 
 def numbers(value: Any, name: str, path: object) -> NDArray[np.floating]:
@@ -106,10 +108,7 @@ def _clock(value: Any, path: object) -> NDArray[np.float64]:
 
 
 def _events(fields: Mapping[str, Any], path: object) -> dict[str, Pairs]:
-    try:
-        names = json.loads(_text(fields.get("event_names", "")) or "[]")
-    except json.JSONDecodeError as error:
-        raise FileFormatError(f"{path}: event_names is not JSON ({error}); convert the recording anew") from error
+    names = _json(fields, "event_names", "[]", path)
     events = {}
     for number, name in enumerate(names):
         pair = [
@@ -120,6 +119,30 @@ def _events(fields: Mapping[str, Any], path: object) -> dict[str, Pairs]:
             raise FileFormatError(f"{path}: events {name} have {pair[0].size} times but {pair[1].size} values")
         events[str(name)] = (pair[0], pair[1])
     return events
+
+
+def event_texts(stored: Any, events: Mapping[str, Pairs], path: object) -> dict[str, tuple[str, ...]]:
+    """Texts by series, one a value.
+
+    Raises
+    ------
+    FileFormatError
+        Series that are not there, or not as many texts as values.
+    """
+    found = stored if isinstance(stored, dict) else {}
+    for name, texts in found.items():
+        if name not in events or not isinstance(texts, list) or len(texts) != len(events[name][0]):
+            raise FileFormatError(
+                f"{path}: event_texts of {name!r} do not match its values; convert the recording anew"
+            )
+    return {str(name): tuple(map(str, texts)) for name, texts in found.items()}
+
+
+def _json(fields: Mapping[str, Any], name: str, otherwise: str, path: object) -> Any:
+    try:
+        return json.loads(_text(fields.get(name, "")) or otherwise)
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise FileFormatError(f"{path}: {name} is not JSON ({error}); convert the recording anew") from error
 
 
 def _text(value: Any) -> str:

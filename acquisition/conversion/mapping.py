@@ -50,7 +50,7 @@ class ChannelMapping(BaseModel):
 
     Parameters
     ----------
-    name, quantity, unit, node, direction, high_pass_hz, sensor
+    name, quantity, unit, node, direction, high_pass_hz, sensor, input_delay_s
         As in a recording's `Channel`, but ``unit`` is the file's own: ``kN``, ``g``, ``um``.
     array
         Key of ``[arrays.KEY]`` or name of an array in the input; None where there is only one.
@@ -75,6 +75,7 @@ class ChannelMapping(BaseModel):
     full_scale: Annotated[float, Field(gt=0)] | None = None
     high_pass_hz: Annotated[float, Field(gt=0)] | None = None
     sensor: str = ""
+    input_delay_s: Annotated[float, Field(ge=0, le=1)] | None = None
     sensitivity: float = 1.0
     offset: float = 0.0
 
@@ -94,7 +95,14 @@ class ChannelMapping(BaseModel):
         full_scale = None if self.full_scale is None else self.full_scale * abs(factor)
         place = (self.node, self.direction)
         return Channel(
-            self.name, self.quantity, SI_UNITS[self.quantity], *place, full_scale, self.high_pass_hz, self.sensor
+            self.name,
+            self.quantity,
+            SI_UNITS[self.quantity],
+            *place,
+            full_scale,
+            self.high_pass_hz,
+            self.sensor,
+            self.input_delay_s,
         )
 
     def to_si(self, stored: np.ndarray) -> np.ndarray:

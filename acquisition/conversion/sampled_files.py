@@ -26,7 +26,10 @@ def read_wav(path: Path) -> tuple[dict[str, Any], float]:
     """
     from scipy.io import wavfile
 
-    rate, stored = wavfile.read(path)
+    try:
+        rate, stored = wavfile.read(path)
+    except UnboundLocalError as error:  # what scipy says of a file without samples
+        raise FileFormatError(f"{path} holds no samples; it is cut short, record or export it anew") from error
     if not rate > 0:
         raise FileFormatError(f"{path} states a sample rate of {rate}; convert it anew")
     if stored.dtype == np.uint8:

@@ -12,6 +12,7 @@ from scipy.io import savemat
 
 from foundation import InputError
 
+from ..events import EventAxis, Events
 from ..recording_format import FORMAT, FORMAT_VERSION
 from ..recording_writer import RecordingWriter
 from .content import Content, row_blocks
@@ -54,7 +55,7 @@ def _write_h5(content: Content, path: Path, progress: Progress) -> None:
         title=content.title,
         setup=content.setup,
         dtype=dtype,
-        event_names=list(content.events),
+        event_axes={name: EventAxis(texts=name in content.event_texts) for name in content.events},
         recorded_at=content.recorded_at or None,
         overwrite=True,
     ) as writer:
@@ -65,7 +66,7 @@ def _write_h5(content: Content, path: Path, progress: Progress) -> None:
                 written += len(block)
                 progress(written)
         for name, (times, values) in content.events.items():
-            writer.append_event(name, times, values)
+            writer.append_events(Events(name, times, values, None, content.event_texts.get(name)))
         for name, pairs in content.clock_pairs.items():
             if len(pairs):
                 writer.append_clock_pairs(name, np.asarray(pairs, dtype=float))
@@ -132,5 +133,6 @@ def _csv_metadata(content: Content) -> dict[str, object]:
         "dtype": samples.dtype.name,
         "channels": [channel.to_json() for channel in described.channels],
         "events": {name: listed(pairs) for name, pairs in content.events.items()},
+        "event_texts": {name: list(texts) for name, texts in content.event_texts.items()},
         "clock": content.clock_pairs.get(described.name, np.empty((0, 2))).tolist(),
     }

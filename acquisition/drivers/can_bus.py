@@ -14,7 +14,8 @@ from foundation import FileFormatError, InputError
 
 from ..errors import DeviceTimeout, Disconnected, DriverMissing
 from ..events import EventAxis, Events
-from ..receiver import Put, Receiver
+from ..receiver import Put
+from ..threaded_feed import ThreadedFeed
 from .serial_line import LINE_FAILURES
 
 _POLL = 0.1
@@ -96,7 +97,7 @@ class DbcDecoder:
         return [(each.name, float(values[each.signal]) * each.factor) for each in found if each.signal in values]
 
 
-class CanFeed:
+class CanFeed(ThreadedFeed):
     """A CAN bus as a feed of events, with the interface's own time stamps.
 
     Parameters
@@ -128,22 +129,13 @@ class CanFeed:
         options: Mapping[str, Any] | None = None,
     ) -> None:
         self._decoder = DbcDecoder(dbc, signals)
-        self._where = f"CAN bus {interface} {channel}"
+        axis = EventAxis("device", f"{interface}:{channel}")
+        super().__init__(f"CAN bus {interface} {channel}", {signal.name: axis for signal in signals})
         self._arguments = {"interface": interface, "channel": channel, **(options or {})}
         self._silence = silence
-        axis = EventAxis("device", f"{interface}:{channel}")
-        self.event_series: dict[str, EventAxis] = {signal.name: axis for signal in signals}
-        self._receiver = Receiver(self._where)
         self._bus: Any = None
 
-    def open(self) -> None:
-        """Open the bus and start to receive.
-
-        Raises
-        ------
-        DriverMissing, Disconnected
-        """
-        self.close()
+    def _connect(self) -> None:
         try:
             import can
         except ImportError as error:
@@ -154,7 +146,6 @@ class CanFeed:
             raise DriverMissing(f"{self._where}: {error}; install the interface's driver") from error
         except (can.CanError, OSError, ValueError, TypeError) as error:
             raise Disconnected(f"{self._where} cannot be opened: {error}; check its name and plug") from error
-        self._receiver.start(self._receive)
 
     def _receive(self, put: Put, stopped: Callable[[], bool]) -> None:
         import can
@@ -175,19 +166,7 @@ class CanFeed:
                     f"{self._where}: no wanted message for {self._silence:g} s; check bus, bitrate and DBC file"
                 )
 
-    def poll(self) -> list[Events]:
-        """What came since the last call.
-
-        Raises
-        ------
-        Disconnected, DeviceTimeout
-            The bus is gone or silent.
-        """
-        return self._receiver.drain()
-
-    def close(self) -> None:
-        """Stop and release the bus."""
-        self._receiver.stop()
+    def _release(self) -> None:
         bus, self._bus = self._bus, None
         if bus is not None:
             with suppress(Exception):  # interfaces that are gone raise whatever they like

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import DeviceTimeout, Disconnected, DriverMissing
-from ..events import HOST_AXIS, EventAxis, Events
-from ..receiver import Put, Receiver
+from ..events import HOST_AXIS, Events
+from ..receiver import Put
+from ..threaded_feed import ThreadedFeed
 from .serial_line import BITS_A_BYTE, LINE_FAILURES
 
 _REPLY_BYTES = 7  # address, function, length, two data bytes, two of the checksum
@@ -41,7 +42,7 @@ class Register:
     input_register: bool = False
 
 
-class ModbusFeed:
+class ModbusFeed(ThreadedFeed):
     """Registers of one slave, asked in turn.
 
     Parameters
@@ -68,21 +69,13 @@ class ModbusFeed:
         interval: float = 0.1,
         timeout: float = 0.2,
     ) -> None:
+        super().__init__(f"Modbus {port}", {register.series: HOST_AXIS for register in registers})
         self._port, self._baud, self._slave = port, baud, slave
         self._registers = tuple(registers)
         self._interval, self._timeout = interval, timeout
-        self.event_series: dict[str, EventAxis] = {register.series: HOST_AXIS for register in registers}
-        self._receiver = Receiver(f"Modbus {port}")
         self._drive: Any = None
 
-    def open(self) -> None:
-        """Open the line and start to ask.
-
-        Raises
-        ------
-        DriverMissing, Disconnected
-        """
-        self.close()
+    def _connect(self) -> None:
         try:
             import minimalmodbus
         except ImportError as error:
@@ -93,7 +86,6 @@ class ModbusFeed:
             raise Disconnected(f"serial line {self._port} cannot be opened: {error}; check its name") from error
         self._drive.serial.baudrate = self._baud
         self._drive.serial.timeout = self._timeout
-        self._receiver.start(self._receive)
 
     def _receive(self, put: Put, stopped: Callable[[], bool]) -> None:
         failures, due = 0, time.monotonic()
@@ -125,18 +117,7 @@ class ModbusFeed:
         except LINE_FAILURES as error:
             raise Disconnected(f"serial line {self._port} is gone ({error}); check its plug") from error
 
-    def poll(self) -> list[Events]:
-        """What came since the last call.
-
-        Raises
-        ------
-        Disconnected, DeviceTimeout
-        """
-        return self._receiver.drain()
-
-    def close(self) -> None:
-        """Stop and close the line."""
-        self._receiver.stop()
+    def _release(self) -> None:
         if self._drive is not None:
             self._drive.serial.close()
             self._drive = None

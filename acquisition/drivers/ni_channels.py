@@ -1,5 +1,6 @@
 """What is wired to a National Instruments input, and how it becomes a channel of a DAQmx task."""
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -67,13 +68,17 @@ class NiInput:
         """What the task's values are multiplied by: 1 where DAQmx scales, else SI units per V."""
         return 1.0 if self.iepe_current else 1.0 / self.sensitivity
 
-    def described(self, input_delay: float | None) -> Channel:
-        """The channel as recorded, with its terminal, sensitivity and the module's input delay (s; None: not known)."""
+    def described(self, module_delay: float | None) -> Channel:
+        """The channel as recorded: with its terminal, sensitivity, and all delays known of it.
+
+        ``module_delay`` is the module's own (s; None: it tells none); an amplifier's, which the channel had, is added.
+        """
         extra = {**self.channel.extra, "terminal": self.terminal, "sensitivity_v_per_unit": self.sensitivity}
-        if input_delay is not None:
-            extra["input_delay_s"] = input_delay
+        known = [delay for delay in (self.channel.input_delay_s, module_delay) if delay is not None]
         full_scale = self.channel.full_scale if self.channel.full_scale is not None else self.full_scale
-        return replace(self.channel, full_scale=full_scale, extra=extra)
+        return replace(
+            self.channel, full_scale=full_scale, input_delay_s=float(sum(known)) if known else None, extra=extra
+        )
 
     def add_to(self, channels: Any) -> Any:
         """Create the channel among those of a DAQmx task, and return what DAQmx calls it."""
@@ -109,10 +114,19 @@ class NiInput:
 
 
 def input_delay(created: Any) -> float | None:
-    """Time between a signal and its sample in this module, s, where the driver tells it; ask after the rate is set."""
+    """Time between a signal and its sample in this module, s, where the driver tells it; ask after the rate is set.
+
+    Zero where the module takes its filter's delay out itself; None where it has no such filter.
+    """
+    from nidaqmx import constants
     from nidaqmx.errors import DaqError, DaqFunctionNotSupportedError
 
-    try:
+    unknown = (DaqError, DaqFunctionNotSupportedError)
+    with suppress(*unknown):
+        if created.ai_remove_filter_delay:
+            return 0.0
+    with suppress(*unknown):
+        created.ai_filter_delay_units = constants.DigitalWidthUnits.SECONDS
+    with suppress(*unknown):
         return float(created.ai_filter_delay)
-    except (DaqError, DaqFunctionNotSupportedError):  # not every module has such a filter
-        return None
+    return None

@@ -11,14 +11,15 @@ from foundation import InputError
 
 from ..errors import DeviceTimeout
 from ..events import HOST_AXIS, EventAxis, Events
-from ..receiver import Put, Receiver
+from ..receiver import Put
+from ..threaded_feed import ThreadedFeed
 from .serial_line import BITS_A_BYTE, on_line, open_line
 
 _NUMBER = r"([-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)"
 _LONGEST_LINE = 4096
 
 
-class TachometerFeed:
+class TachometerFeed(ThreadedFeed):
     """Lines of text, each with a value, as a feed of events.
 
     Parameters
@@ -60,23 +61,14 @@ class TachometerFeed:
             raise InputError(f"serial line {port}: pattern {pattern!r} is not a regular expression: {error}") from error
         if not self._pattern.groups:
             raise InputError(f"serial line {port}: pattern {pattern!r} needs a group ( ) around the number")
+        axis = HOST_AXIS if period is None else EventAxis("device", f"line:{port}")
+        super().__init__(f"line {port}", {series: axis})
         self._port, self._baud, self._series = port, baud, series
         self._factor, self._period, self._silence = factor, period, silence
-        axis = HOST_AXIS if period is None else EventAxis("device", f"line:{port}")
-        self.event_series: dict[str, EventAxis] = {series: axis}
-        self._receiver = Receiver(f"line {port}")
         self._line: Any = None
 
-    def open(self) -> None:
-        """Open the line and start to receive.
-
-        Raises
-        ------
-        DriverMissing, Disconnected
-        """
-        self.close()
+    def _connect(self) -> None:
         self._line = open_line(self._port, self._baud, 0.1)
-        self._receiver.start(self._receive)
 
     def _receive(self, put: Put, stopped: Callable[[], bool]) -> None:
         pending, n_lines, heard = b"", 0, time.monotonic()
@@ -105,18 +97,7 @@ class TachometerFeed:
         arrivals = None if self._period is None else np.array([begun])
         put(Events(self._series, np.array([stamp]), np.array([value]), arrivals))
 
-    def poll(self) -> list[Events]:
-        """What came since the last call.
-
-        Raises
-        ------
-        Disconnected, DeviceTimeout
-        """
-        return self._receiver.drain()
-
-    def close(self) -> None:
-        """Stop and close the line."""
-        self._receiver.stop()
+    def _release(self) -> None:
         if self._line is not None:
             self._line.close()
             self._line = None

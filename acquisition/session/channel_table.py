@@ -33,6 +33,8 @@ class ChannelTable(BaseModel):
         Largest magnitude of the input, V.
     iepe_ma
         Excitation current of an IEPE sensor, mA; 0: none.
+    delay_us
+        By which an amplifier before the input delays the signal, microseconds; the module's own delay is added.
     """
 
     model_config = STRICT
@@ -44,6 +46,7 @@ class ChannelTable(BaseModel):
     units_per_volt: float | None = None
     range_v: Positive = 5.0
     iepe_ma: Annotated[float, Field(ge=0, le=20)] = 0.0
+    delay_us: Annotated[float, Field(ge=0, le=1e6)] = 0.0
     node: str = ""
     direction: str = ""
     high_pass_hz: Positive | None = None
@@ -89,5 +92,6 @@ class ChannelTable(BaseModel):
             None,
             self.high_pass_hz,
             self.sensor,
+            self.delay_us * 1e-6 or None,
         )
         return NiInput(channel, self.terminal, self.volts_per_si_unit, self.range_v, self.iepe_ma * 1e-3)

@@ -9,10 +9,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from acquisition import Block, Events, Paced, Source, record
+from acquisition import Block, DeviceError, DiskFull, Events, Paced, Source, record
 from acquisition.session import Session, build_source
 from acquisition.session.read import session_from_text, session_text
 from acquisition.session.tables import SimulatedDevice
+from foundation import MillfrfError
 
 Watcher = Callable[[Block | Events], None]
 
@@ -140,8 +141,8 @@ def acquire(
 
     Raises
     ------
-    InputError, DeviceError, DiskFull
-        The file is closed and holds what came before.
+    InputError, DeviceError, DiskFull, MillfrfError
+        The file is closed and holds what came before; the last where it was interrupted twice.
     """
     tally = Tally({stream.name: stream.sample_rate for stream in opened.source.streams})
     duration = opened.session.duration_s or math.inf
@@ -151,15 +152,26 @@ def acquire(
         for watcher in watchers:
             watcher(taken)
 
-    with interrupts() as interrupted:
-        record(
-            opened.source,
-            out,
-            watch=watch,
-            progress=progress,
-            stop=lambda: interrupted() or stop() or tally.seconds() >= duration,
-        )
+    try:
+        with interrupts() as interrupted:
+            record(
+                opened.source,
+                out,
+                watch=watch,
+                progress=progress,
+                stop=lambda: interrupted() or stop() or tally.seconds() >= duration,
+            )
+    except (DeviceError, DiskFull) as error:
+        error.args = (f"{error}; {_kept(tally, out)}",)
+        raise
+    except KeyboardInterrupt as error:
+        raise MillfrfError(f"stopped at once; {_kept(tally, out)}") from error
     return tally
+
+
+def _kept(tally: Tally, out: str | os.PathLike[str]) -> str:
+    """What a recording that ended too early holds."""
+    return f"{os.fspath(out)} holds the {tally.seconds():.2f} s before"
 
 
 @contextmanager

@@ -3,15 +3,18 @@
 import os
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 from acquisition import Source
+from acquisition.events import announced_events
 from acquisition.feeds import WithFeeds
 from acquisition.session import Session
 from foundation import MillfrfError
 
 from ..live import LiveControl, LiveMonitor, LiveServer, LiveSettings
+from ..live.control import MARKS
 from ..live.server import LOOPBACK
 from .acquire import OpenedSession, Tally, acquire, interrupts
 
@@ -71,7 +74,8 @@ def acquire_live(
     InputError, DeviceError, DiskFull
         The file is closed and holds what came before.
     """
-    control = LiveControl()
+    replayed = announced_events(opened.source)
+    control = LiveControl(MARKS if MARKS not in replayed else f"{MARKS}_while_replaying")
     monitor = LiveMonitor(opened.source.streams, live_settings(opened.session))
     try:
         with LiveServer(monitor, control, address, port) as server:
@@ -89,7 +93,8 @@ def acquire_live(
                 control.ended(f"Ended by an error: {error}")
                 raise
             finally:
-                time.sleep(_LINGER)
+                with suppress(KeyboardInterrupt):  # the file is closed: whoever is in a hurry loses nothing
+                    time.sleep(_LINGER)
             return tally
     finally:
         monitor.close()

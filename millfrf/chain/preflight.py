@@ -85,7 +85,7 @@ class TapCheck:
     force, acceleration
         Channels.
     delay
-        Of the acceleration after the force, s.
+        Of the acceleration after the force, s, beyond what the channels' known input delays explain.
     agrees
         Whether both point the way that their signed directions say.
     """
@@ -101,7 +101,7 @@ class TapCheck:
         if not self.agrees:
             found.append(f"{pair}: a tap moves them in opposite senses; correct a direction's sign or a sensitivity's")
         if abs(self.delay) > LARGEST_DELAY:
-            found.append(f"{pair}: {1e6 * self.delay:.0f} us apart; correct with the modules' input delays")
+            found.append(f"{pair}: {1e6 * self.delay:.0f} us apart; tell the later one's amplifier by delay_us")
         return found
 
 
@@ -225,4 +225,5 @@ def _tap_check(
     left, middle, right = total[top - 1 : top + 2]
     curvature = left - 2 * middle + right
     shift = 0.5 * (left - right) / curvature if curvature else 0.0
-    return TapCheck(force, acceleration, float((lags[top] + shift) / rate), bool(middle > 0))
+    known = (acceleration.input_delay_s or 0.0) - (force.input_delay_s or 0.0)
+    return TapCheck(force, acceleration, float((lags[top] + shift) / rate) - known, bool(middle > 0))

@@ -2,31 +2,63 @@
 
 import threading
 import time
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from acquisition import HOST_AXIS, EventAxis, Events
+from acquisition import EventAxis, Events
 
 MARKS = "mark"
-"""Event series of the marks; their values count 1, 2, 3 ..."""
+"""Event series of the marks; their values count 1, 2, 3 ..., their texts are the user's notes."""
 
 State = Literal["waiting", "recording", "stopping", "ended"]
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A moment that the user marked.
+
+    Parameters
+    ----------
+    number, note
+        Counted from 1; what the user typed, possibly empty.
+    host_time
+        Host's monotonic time, s.
+    shown_at
+        Where the page draws it, s since the start.
+    """
+
+    number: int
+    note: str
+    host_time: float
+    shown_at: float
+
+    @property
+    def label(self) -> str:
+        """Its note, or its number."""
+        return self.note or f"mark {self.number}"
 
 
 class LiveControl:
     """Buttons on one side, the recording on the other; also the feed of marks.
 
+    Parameters
+    ----------
+    series
+        Name of the event series of the marks.
+
     A button counts only in the state in which it makes sense, however often it is pressed and from however many pages.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, series: str = MARKS) -> None:
+        self._series = series
         self._lock = threading.Lock()
         self._state: State = "waiting"
-        self._pending: list[float] = []
-        self._n_marks = 0
+        self._pending: list[Mark] = []
+        self._marks: list[Mark] = []
         self.message = ""
-        self.event_series: dict[str, EventAxis] = {MARKS: HOST_AXIS}
+        self.event_series: dict[str, EventAxis] = {series: EventAxis("host", texts=True)}
 
     @property
     def state(self) -> State:
@@ -34,9 +66,9 @@ class LiveControl:
         return self._state
 
     @property
-    def n_marks(self) -> int:
-        """Marks so far."""
-        return self._n_marks
+    def marks(self) -> tuple[Mark, ...]:
+        """Those set so far."""
+        return tuple(self._marks)
 
     def start(self) -> None:
         """Start to record."""
@@ -55,12 +87,13 @@ class LiveControl:
         with self._lock:
             self._state, self.message = "ended", message
 
-    def mark(self) -> None:
-        """Mark this moment."""
+    def mark(self, note: str = "", shown_at: float = 0.0) -> None:
+        """Mark this moment, with a note; ``shown_at`` is where the page draws it, s since the start."""
         with self._lock:
             if self._state == "recording":
-                self._pending.append(time.monotonic())
-                self._n_marks += 1
+                set_now = Mark(len(self._marks) + 1, note.strip(), time.monotonic(), shown_at)
+                self._pending.append(set_now)
+                self._marks.append(set_now)
 
     def open(self) -> None:
         """As a feed: nothing to do."""
@@ -68,11 +101,12 @@ class LiveControl:
     def poll(self) -> list[Events]:
         """As a feed: the marks since the last call."""
         with self._lock:
-            times, self._pending = self._pending, []
-            first = self._n_marks - len(times) + 1
-        if not times:
+            marks, self._pending = self._pending, []
+        if not marks:
             return []
-        return [Events(MARKS, np.array(times), np.arange(first, first + len(times), dtype=float))]
+        times = np.array([mark.host_time for mark in marks])
+        numbers = np.array([float(mark.number) for mark in marks])
+        return [Events(self._series, times, numbers, None, tuple(mark.note for mark in marks))]
 
     def close(self) -> None:
         """As a feed: nothing to do."""

@@ -118,6 +118,11 @@ class LiveMonitor:
         """Those shown."""
         return self.stream.channels
 
+    @property
+    def seconds(self) -> float:
+        """Of the stream since the start, as far as drawn."""
+        return self._n_samples / self.stream.sample_rate
+
     def _begin(self) -> None:
         n = len(self.channels)
         self._traces = TraceBuffer(n, self.stream.sample_rate)
@@ -196,7 +201,7 @@ class LiveMonitor:
             times, traces = self._traces.drawn()
             peaks = np.max([size for _, size in self._recent], axis=0) if self._recent else 0 * self._overloads
             return Snapshot(
-                self._n_samples / self.stream.sample_rate,
+                self.seconds,
                 self._n_samples,
                 times,
                 traces,

@@ -5,8 +5,10 @@ import time
 from typing import Any
 
 from .control import LiveControl
-from .drawings import Drawing, enough, levels, spectrum, traces, transfer
+from .drawing import Drawing
+from .frequency_drawings import enough, spectrum, transfer
 from .monitor import LiveMonitor, Snapshot
+from .time_drawings import levels, traces
 
 PERIOD_MS = 500
 _SPECTRA_SHOWN = 4
@@ -15,16 +17,22 @@ _SPECTRA_SHOWN = 4
 def build_page(document: Any, monitor: LiveMonitor, control: LiveControl) -> None:
     """Fill a Bokeh document; called once for every browser that connects."""
     from bokeh.layouts import column, row
-    from bokeh.models import Button, Div, MultiChoice, Select
+    from bokeh.models import Button, Div, MultiChoice, Select, TextInput
 
     responses, excitations, names = _choices(monitor)
     start = Button(label="Start", button_type="success", name="start")
+    note = TextInput(placeholder="note for the next mark", name="note", width=220)
     mark = Button(label="Mark", name="mark")
     stop = Button(label="Stop", button_type="danger", name="stop")
     start.on_click(control.start)
-    mark.on_click(control.mark)
+
+    def set_mark() -> None:
+        control.mark(note.value, monitor.seconds)
+        note.value = ""
+
+    mark.on_click(set_mark)
     stop.on_click(control.stop)
-    status = Div(text="connected", name="status", width=900)
+    status = Div(text="connected", name="status", sizing_mode="stretch_width")
     shown = MultiChoice(title="Spectra of", options=names, value=names[:_SPECTRA_SHOWN], width=420)
     response = Select(title="Response", options=responses or ["none"], value=(responses or ["none"])[0])
     excitation = Select(title="Excitation", options=excitations or ["none"], value=(excitations or ["none"])[0])
@@ -33,8 +41,9 @@ def build_page(document: Any, monitor: LiveMonitor, control: LiveControl) -> Non
         return response.options.index(response.value), excitation.options.index(excitation.value)
 
     drawings = [
-        *(traces(monitor.channels), levels(monitor.channels), spectrum(lambda: list(shown.value))),
-        *(transfer("frf", entry), transfer("coherence", entry), enough()),
+        *(traces(monitor.channels, lambda: control.marks), levels(monitor.channels)),
+        *(spectrum(monitor.channels, lambda: list(shown.value)), transfer("magnitude", entry)),
+        *(transfer("coherence", entry), transfer("phase", entry), enough()),
     ]
     figures = [drawing.figure for drawing in drawings]
     for figure in figures:
@@ -42,11 +51,11 @@ def build_page(document: Any, monitor: LiveMonitor, control: LiveControl) -> Non
     document.title = "millfrf live"
     document.add_root(
         column(
-            row(start, mark, stop, status, sizing_mode="stretch_width"),
+            row(start, note, mark, stop, status, sizing_mode="stretch_width"),
             row(figures[0], figures[1], sizing_mode="stretch_width"),
             row(shown, response, excitation),
             row(figures[2], figures[3], sizing_mode="stretch_width"),
-            row(figures[4], figures[5], sizing_mode="stretch_width"),
+            row(figures[4], figures[5], figures[6], sizing_mode="stretch_width"),
             sizing_mode="stretch_width",
         )
     )
@@ -88,10 +97,12 @@ def _feeder(
 
 def status_line(now: Snapshot, control: LiveControl) -> str:
     """State, time, samples, marks, and what was left out of the drawing; as HTML."""
+    n = len(control.marks)
+    marks = f", {n} mark{'' if n == 1 else 's'}" + (f" (last: {html.escape(control.marks[-1].label)})" if n else "")
     skipped = f", {now.n_skipped} blocks recorded but not drawn" if now.n_skipped else ""
     averages = "" if now.spectra is None else f", {now.spectra.averages:.0f} averages"
     message = f" {html.escape(control.message)}" if control.message else ""
     return (
         f"<b>{control.state}</b> {now.seconds:.1f} s, {now.n_samples} samples a channel{averages}, "
-        f"{control.n_marks} marks{skipped}.{message}"
+        f"{marks.removeprefix(', ')}{skipped}.{message}"
     )

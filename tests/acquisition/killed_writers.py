@@ -8,9 +8,10 @@ import sys
 
 import numpy as np
 
-from acquisition import HOST_AXIS, Channel, Events, RecordingWriter, StreamDescription
+from acquisition import HOST_AXIS, Channel, EventAxis, Events, RecordingWriter, StreamDescription
 
 WIDTH = 3
+AXES = {"speed": HOST_AXIS, "mark": EventAxis("host", texts=True)}
 
 
 def rows(start: int, stop: int, rate: int) -> np.ndarray:
@@ -23,7 +24,7 @@ def write_forever(path: str, seed: int) -> None:
     streams = [StreamDescription(name, 1000.0, 0.0, channels) for name in ("one", "two")]
     generator = np.random.default_rng(seed)
     dtype = "float64"
-    with RecordingWriter(path, streams, dtype=dtype, block_length=512, event_axes={"speed": HOST_AXIS}) as writer:
+    with RecordingWriter(path, streams, dtype=dtype, block_length=512, event_axes=AXES) as writer:
         n = [0, 0]
         while True:
             block = int(generator.integers(1, 2000))
@@ -32,6 +33,7 @@ def write_forever(path: str, seed: int) -> None:
                 n[k] += block
                 writer.append_clock_pair(name, n[k], n[k] / 1000.0)
             writer.append_events(Events("speed", np.array([float(n[0])]), np.array([2.0 * n[0]])))
+            writer.append_events(Events("mark", np.array([float(n[0])]), np.zeros(1), None, (f"at {n[0]}",)))
             os.write(1, f"{n[0]}\n".encode())
 
 

@@ -5,7 +5,9 @@
    SIM_DAQMX_PPM        sample clock's error, parts per million
    SIM_DAQMX_FAIL_AT    sample from which on every read fails with ...
    SIM_DAQMX_FAIL_CODE  ... this code; -200284: no more samples come
-   SIM_DAQMX_WAVE       "noise": white noise of rms SIM_DAQMX_RMS (1) with a common part, instead of the ramp */
+   SIM_DAQMX_WAVE       "noise": white noise of rms SIM_DAQMX_RMS (1) with a common part, instead of the ramp;
+                        "chord": the same sines on every channel, as late as the input's delay
+   Modules delay as an NI-9234 does, cDAQ1Mod9 has no filter, cDAQ1Mod8 takes its delay out itself. */
 
 #include <math.h>
 #include <stdint.h>
@@ -16,9 +18,12 @@
 
 #define TOO_LATE (-200279)
 #define NOT_YET (-200284)
+#define SECONDS 10364
+#define MOST 64
 
 typedef struct {
-    int channels, running;
+    int channels, running, module[MOST], in_seconds[MOST];
+    char names[MOST][64];
     double wished, started;
     uint64_t position;
     uint32_t buffer;
@@ -72,27 +77,30 @@ int32_t DAQmxGetTaskAttribute(Task *task, int32_t attribute, char *value, uint32
     return size ? 0 : 10;
 }
 
-static int32_t add(Task *task, const char *terminal) {
+static int32_t add(Task *task, const char *terminal, const char *name) {
     if (strncmp(terminal, "cDAQ1Mod", 8))
         return fail(-200220, "Device identifier is invalid.");
     if (!strstr(terminal, "/ai"))
         return fail(-200170, "Physical channel specified does not exist on this device.");
+    if (task->channels == MOST) return fail(-200489, "Too many channels.");
+    task->module[task->channels] = atoi(terminal + 8);
+    snprintf(task->names[task->channels], 64, "%s", name);
     task->channels++;
     return 0;
 }
 
 int32_t DAQmxCreateAIVoltageChan(Task *task, const char *terminal, const char *name, int32_t config, double low,
                                  double high, int32_t units, const char *scale) {
-    (void)name, (void)config, (void)low, (void)high, (void)units, (void)scale;
-    return add(task, terminal);
+    (void)config, (void)low, (void)high, (void)units, (void)scale;
+    return add(task, terminal, name);
 }
 
 int32_t DAQmxCreateAIAccelChan(Task *task, const char *terminal, const char *name, int32_t config, double low,
                                double high, int32_t units, double sensitivity, int32_t sensitivity_units,
                                int32_t source, double current, const char *scale) {
-    (void)name, (void)config, (void)low, (void)high, (void)units, (void)sensitivity, (void)sensitivity_units;
+    (void)config, (void)low, (void)high, (void)units, (void)sensitivity, (void)sensitivity_units;
     (void)source, (void)current, (void)scale;
-    return add(task, terminal);
+    return add(task, terminal, name);
 }
 
 int32_t DAQmxCreateAIForceIEPEChan(Task *task, const char *terminal, const char *name, int32_t config, double low,
@@ -102,10 +110,34 @@ int32_t DAQmxCreateAIForceIEPEChan(Task *task, const char *terminal, const char 
                                   source, current, scale);
 }
 
-int32_t DAQmxGetChanAttribute(Task *task, const char *name, int32_t attribute, double *value) {
-    (void)name;
-    if (attribute != 0x2fed) return fail(-200452, "Specified property is not supported.");
-    *value = (40 + 5.0 / 512) / (task->wished > 0 ? achieved(task) : 51200) + 2.6e-6;
+static double delay_in_samples(const Task *task, int module) {
+    return module >= 8 ? 0 : 40 + 5.0 / 512 + 2.6e-6 * achieved(task);
+}
+
+static int number_of(const Task *task, const char *name) {
+    for (int c = 0; c < task->channels; c++)
+        if (!strcmp(task->names[c], name)) return c;
+    return -1;
+}
+
+int32_t DAQmxGetChanAttribute(Task *task, const char *name, int32_t attribute, void *value) {
+    int c = number_of(task, name);
+    if (c < 0) return fail(-200488, "Channel specified does not exist in the task.");
+    if (attribute == 0x2fbd && task->module[c] == 8) {
+        *(uint32_t *)value = 1;
+        return 0;
+    }
+    if (attribute != 0x2fed || task->module[c] == 9) return fail(-200452, "Specified property is not supported.");
+    double samples = task->module[c] == 8 ? 99 : delay_in_samples(task, task->module[c]);
+    *(double *)value = task->in_seconds[c] ? samples / achieved(task) : samples;
+    return 0;
+}
+
+int32_t DAQmxSetChanAttribute(Task *task, const char *name, int32_t attribute, int32_t value) {
+    int c = number_of(task, name);
+    if (c < 0 || attribute != 0x3071 || task->module[c] == 9)
+        return fail(-200452, "Specified property is not supported.");
+    task->in_seconds[c] = value == SECONDS;
     return 0;
 }
 
@@ -162,15 +194,25 @@ static double noise(uint64_t i, int c) {
     return (((x ^ (x >> 31)) >> 11) * 0x1p-53 - 0.5) * sqrt(12.0);
 }
 
+static double chord(double seconds) {
+    double sum = 0;
+    for (int k = 1; k <= 60; k++) sum += sin(6.283185307179586 * 64 * k * seconds + 0.37 * k * k);
+    return sum;
+}
+
 static void fill(const Task *task, uint64_t n, double *values) {
     const char *wave = getenv("SIM_DAQMX_WAVE");
-    double rms = setting("SIM_DAQMX_RMS", 1);
-    for (int c = 0; c < task->channels; c++)
+    int noisy = wave && !strcmp(wave, "noise"), sounding = wave && !noisy;
+    double rms = setting("SIM_DAQMX_RMS", 1), rate = task->wished > 0 ? achieved(task) : 1;
+    for (int c = 0; c < task->channels; c++) {
+        double late = delay_in_samples(task, task->module[c]);
         for (uint64_t k = 0; k < n; k++) {
             uint64_t i = task->position + k;
-            values[c * n + k] = wave && !strcmp(wave, "noise") ? rms * (0.8 * noise(i, 0) + 0.6 * noise(i, c + 1))
-                                                               : (double)((uint64_t)(c + 1) * i % 65536);
+            values[c * n + k] = noisy      ? rms * (0.8 * noise(i, 0) + 0.6 * noise(i, c + 1))
+                                : sounding ? chord(((double)i - late) / rate)
+                                           : (double)((uint64_t)(c + 1) * i % 65536);
         }
+    }
 }
 
 int32_t DAQmxReadAnalogF64(Task *task, int32_t n, double timeout, int32_t mode, double *values, uint32_t size,

@@ -9,7 +9,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition import HOST_AXIS, Block, Channel, EventAxis, Events, Recording, StreamDescription, record
+from acquisition import (
+    HOST_AXIS,
+    Aligner,
+    Block,
+    Channel,
+    EventAxis,
+    Events,
+    Recording,
+    RecordingWriter,
+    StreamDescription,
+    record,
+)
 from acquisition.clock import fit_clock
 from acquisition.tachometer import pulse_times, shaft_angle
 from foundation import FileFormatError, InputError
@@ -116,13 +127,43 @@ def test_events_without_any_clock_pair_are_an_error_in_one_line(tmp_path: Path) 
     lab = DriftingLab(2.0, 1)
     lab.open()
     events = [item for item in lab._play() if isinstance(item, Events)]
-    from acquisition import RecordingWriter
-
     with RecordingWriter(tmp_path / "a.h5", [STREAM], event_axes=lab.event_series) as writer:
         for item in events:
             writer.append_events(item)
     with Recording(tmp_path / "a.h5") as recording, pytest.raises(FileFormatError, match="cannot be aligned"):
         recording.events["can"].read()
+
+
+@pytest.mark.parametrize(("delays", "late"), [((0.02, 0.02), 0.02), ((0.05, None), 0.0), ((0.05, 0.02), 0.02)])
+def test_events_lie_where_the_least_delayed_channel_shows_them(
+    tmp_path: Path, delays: tuple[float, float | None], late: float
+) -> None:
+    channels = tuple(Channel(f"a{k}", "acceleration", "m/s^2", input_delay_s=d) for k, d in enumerate(delays))
+    stream = StreamDescription("main", RATE, 0.5, channels)
+    with RecordingWriter(tmp_path / "a.h5", [stream], event_axes={"speed": HOST_AXIS}) as writer:
+        writer.append("main", np.zeros((1000, 2)))
+        writer.append_clock_pairs("main", np.array([[0, 77.0], [500, 77.5], [1000, 78.0]]))
+        writer.append_events(Events("speed", np.array([77.25]), np.array([1.0])))
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.events["speed"].read()[0] == pytest.approx([0.5 + 0.25 + late], abs=1e-9)
+        assert recording.stream().channels == channels
+
+
+@given(cuts=st.lists(st.integers(0, 600), max_size=6), delays=st.lists(st.floats(0, 0.05), min_size=1, max_size=3))
+def test_channels_are_aligned_alike_in_any_blocks(cuts: list[int], delays: list[float]) -> None:
+    """Tones below 0.45 of the rate, each channel as late as it says: the same values at the same times."""
+    rate, tones = 1000.0, np.array([3.7, 61.0, 210.0, 440.0])
+    time = np.arange(600)[:, None] / rate - np.array(delays)
+    late = np.sin(2 * np.pi * time[..., None] * tones).sum(axis=-1)
+    whole = Aligner(delays, rate)
+    even = whole.add(late)
+    rows = np.arange(len(even)) + whole.skipped
+    true = np.sin(2 * np.pi * rows[:, None] / rate * tones).sum(axis=1)
+    if not whole.idle or not any(delays):
+        assert np.abs(even - true[:, None]).max() < 1e-3
+    parts = Aligner(delays, rate)
+    pieces = [parts.add(part) for part in np.split(late, sorted(cuts))]
+    np.testing.assert_allclose(np.concatenate(pieces), even, atol=1e-12)
 
 
 def test_shaft_angle_follows_a_changing_speed() -> None:
@@ -134,6 +175,9 @@ def test_shaft_angle_follows_a_changing_speed() -> None:
     found = shaft_angle(voltage, rate, pulses)
     true = angle[found.first_sample : found.first_sample + len(found.angle)]
     error = np.degrees(found.angle - true - np.mean(found.angle - true))
+    late = shaft_angle(voltage, rate, pulses, delay=100 / rate)
+    assert late.first_sample == found.first_sample - 100
+    np.testing.assert_allclose(late.angle, found.angle[: len(late.angle)], atol=1e-9)
     assert np.abs(error).max() < 0.8  # one sample at 56 revolutions a second is 0.79 degrees
     assert len(pulse_times(np.zeros(10) + np.arange(10.0), 1.0, low=2.0, high=4.0)) == 1
     with pytest.raises(InputError, match="0 pulses"):

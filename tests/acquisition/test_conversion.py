@@ -10,13 +10,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
-from acquisition import Channel, Recording, RecordingWriter, StreamDescription, convert
+from acquisition import Channel, EventAxis, Events, Recording, RecordingWriter, StreamDescription, convert
 from foundation import FileFormatError, InputError
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 FORCE = Channel("fx", "force", "N", "TCP", "+X", full_scale=500.0, sensor="9255B, s/n 12", extra={"gain": 2})
 SPEED = Channel("spindle, measured", "angular_velocity", "rad/s")
 ACCELERATION = Channel("ax", "acceleration", "m/s^2", "HOUSING", "-X", high_pass_hz=0.5)
+EVENTS = {"temperature": EventAxis(), "mark": EventAxis(texts=True)}
 SETUP = '[tool]\nname = "Fräser Ø 12,7"\nteeth = 2\n'
 
 
@@ -25,11 +26,12 @@ def write_recording(path: Path, samples: np.ndarray, dtype: str = "float64", str
     channels = (FORCE, SPEED, ACCELERATION)[: samples.shape[1]]
     described = [StreamDescription(f"clock{k}", 1000.0 / (k + 1), 0.25 * k, channels) for k in range(streams)]
     texts = {"title": "Schnitt Nr. 1", "setup": SETUP, "recorded_at": "2026-01-02T03:04:05+00:00"}
-    with RecordingWriter(path, described, dtype=dtype, event_names=["temperature"], **texts) as writer:
+    with RecordingWriter(path, described, dtype=dtype, event_axes=EVENTS, **texts) as writer:
         for k, stream in enumerate(described):
             writer.append(stream.name, samples * (k + 1))
             writer.append_clock_pair(stream.name, len(samples), 77.125)
         writer.append_event("temperature", np.array([0.1, 0.2]), np.array([293.15, 294.0]))
+        writer.append_events(Events("mark", np.array([0.3, 0.4]), np.array([1.0, 2.0]), None, ("Eintritt, ü", "")))
 
 
 def assert_same_recording(first: Path, second: Path) -> None:
@@ -44,6 +46,8 @@ def assert_same_recording(first: Path, second: Path) -> None:
             np.testing.assert_array_equal(a.clock_pairs(name), b.clock_pairs(name))
         for name, series in a.events.items():
             np.testing.assert_array_equal(series.read(), b.events[name].read())
+            assert series.read_texts() == b.events[name].read_texts()
+            assert series.axis.texts == b.events[name].axis.texts
         assert list(a.events) == list(b.events)
 
 

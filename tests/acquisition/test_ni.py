@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import Recording
+from acquisition import Recording, aligned_samples
 from acquisition.drivers.ni import ni_9234_rate
+from estimation import band_record, cross_spectra, h1, settings_for
 
 RunWithDaqmx = Callable[..., subprocess.CompletedProcess[str]]
 COMMON = """
@@ -49,10 +50,37 @@ def test_24_channels_come_without_a_gap_at_the_rate_the_device_made(with_daqmx: 
         force = stream.channels[0]
         assert force.full_scale == 20.0
         assert force.extra["terminal"] == "cDAQ1Mod1/ai0"
-        assert force.extra["input_delay_s"] == pytest.approx((40 + 5 / 512) / 51200 + 2.6e-6)
+        assert force.input_delay_s == pytest.approx((40 + 5 / 512) / 51200 + 2.6e-6)
         pairs = recording.clock_pairs("ni")
     slope, _ = np.polyfit(pairs[:, 0], pairs[:, 1], 1)
     assert slope == pytest.approx(1 / 51200, rel=0.02)
+
+
+def test_what_modules_delay_is_taken_out_when_data_are_used(with_daqmx: RunWithDaqmx, tmp_path: Path) -> None:
+    """A force without a filter, one accelerometer as late as an NI-9234 makes it, one whose module mends it itself."""
+    program = COMMON + (
+        "force = NiInput(Channel('fx', 'force', 'N', 'TCP', '+X'), 'cDAQ1Mod9/ai0', 0.5, range_volts=10.0)\n"
+        "late, mended = (NiInput(Channel(f'a{m}', 'acceleration', 'm/s^2', 'TCP', '+X'), f'cDAQ1Mod{m}/ai0', 0.01,\n"
+        "    iepe_current=0.002) for m in (2, 8))\n"
+        "attempt(NiSource([force, late, mended], 25600.0, duration=1.2), dtype='float64')"
+    )
+    done = with_daqmx(program, SIM_DAQMX_WAVE="chord")
+    assert (done.stdout, done.stderr) == ("", "")
+    with Recording(tmp_path / "a.h5") as recording:
+        stream = recording.stream()
+        delays = [channel.input_delay_s for channel in stream.channels]
+        assert delays == [None, pytest.approx((40 + 5 / 512) / 25600 + 2.6e-6), 0.0]
+        raw = stream.read()
+        np.testing.assert_allclose(raw[:, 2], 0.5 * raw[:, 0], atol=1e-9)
+        assert np.abs(raw[:, 1] - raw[:, 2]).max() > 10, "the simulated device delays nothing"
+        even = aligned_samples(stream, ["fx", "a2", "a8"])
+        np.testing.assert_allclose(even[:, 1], even[:, 2], atol=1e-3 * raw[:, 2].std())
+        found = h1(cross_spectra(recording, settings_for(25600.0, 0.125, overlap=0.0, window="boxcar")))
+        lines = np.arange(8, 480, 8)  # 64 Hz apart, each a whole number of periods in a segment
+        np.testing.assert_allclose(found.values[lines, :, 0], 0.5, atol=2e-3)
+        low = band_record(recording, 2000.0, stream.channels[:1], stream.channels[1:])
+        assert np.abs(low.response_samples - 0.5 * low.excitation_samples).max() < 1e-3 * raw[:, 2].std()
+        assert low.responses[0].input_delay_s is None
 
 
 def test_an_overrun_says_how_many_samples_are_missing(with_daqmx: RunWithDaqmx, tmp_path: Path) -> None:

@@ -11,7 +11,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from acquisition import Block, Channel, Paced, Recording, RecordingWriter, ReplaySource, StreamDescription, record
+from acquisition import (
+    HOST_AXIS,
+    Block,
+    Channel,
+    EventAxis,
+    Events,
+    Paced,
+    Recording,
+    RecordingWriter,
+    ReplaySource,
+    StreamDescription,
+    record,
+)
 from foundation import FileFormatError, InputError
 
 CHANNELS = (
@@ -101,6 +113,39 @@ def test_replay_gives_back_the_recording_and_can_be_paced(tmp_path: Path) -> Non
         pairs = again.clock_pairs("main")
     assert np.diff(pairs[:, 1]).min() > 0
     assert pairs[-1, 1] - pairs[0, 1] >= (300 - 37) / 1000 / 100 * 0.9
+
+
+def test_replay_gives_back_events_with_their_texts_in_their_time(tmp_path: Path) -> None:
+    axes = {"spindle_speed_rpm": HOST_AXIS, "mark": EventAxis("host", texts=True), "empty": HOST_AXIS}
+    with RecordingWriter(tmp_path / "a.h5", [STREAM], event_axes=axes) as writer:
+        writer.append("main", np.zeros((1000, 2)))
+        writer.append_clock_pairs("main", np.array([[0, 50.0], [1000, 51.0]]))
+        writer.append_events(Events("spindle_speed_rpm", 50.02 + np.arange(12) / 10, 6000.0 + np.arange(12)))
+        writer.append_events(Events("mark", np.array([50.35]), np.array([1.0]), None, ("entry",)))
+    order = []
+    source = ReplaySource(tmp_path / "a.h5", block_length=250)
+    source.open()
+    while (taken := source.read()) is not None:
+        order.append(taken.stream if isinstance(taken, Block) else (taken.series, len(taken.times)))
+    source.close()
+    speed = "spindle_speed_rpm"
+    assert order == [
+        "main",
+        (speed, 3),
+        "main",
+        (speed, 2),
+        ("mark", 1),
+        "main",
+        (speed, 3),
+        "main",
+        (speed, 2),
+        (speed, 2),
+    ]
+    record(ReplaySource(tmp_path / "a.h5"), tmp_path / "b.h5")
+    with Recording(tmp_path / "a.h5") as first, Recording(tmp_path / "b.h5") as second:
+        for name, series in first.events.items():
+            np.testing.assert_allclose(second.events[name].read(), series.read(), atol=1e-9)
+            assert second.events[name].read_texts() == series.read_texts()
 
 
 def test_events_and_the_second_writer(tmp_path: Path) -> None:

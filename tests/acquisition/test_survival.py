@@ -78,6 +78,9 @@ def _kill_and_recover(killer: Killer, folder: Path, seed: int) -> None:
         times, values, _ = recording.events["speed"].read_raw()
         assert times[-1] >= acknowledged
         np.testing.assert_array_equal(values, 2 * times)
+        marks = recording.events["mark"]
+        assert marks.read_raw()[0][-1] >= acknowledged
+        assert marks.read_texts() == tuple(f"at {time:.0f}" for time in marks.read_raw()[0])
     path.unlink()
     back.path.unlink()
 

@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -78,6 +79,15 @@ def test_ctrl_c_ends_in_order(tmp_path: Path) -> None:
         assert recording.stream().n_samples > 0
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
+def test_ctrl_c_while_checking_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("millfrf.chain.preflight.time.monotonic", lambda: signal.raise_signal(signal.SIGINT))
+    assert run(["acquire", str(_session(tmp_path)), "--check"]) == 1
+    assert capsys.readouterr().err == "millfrf: stopped; unfinished files were removed\n"
+
+
 def test_the_check_finds_nothing_wrong_with_the_cell(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["acquire", str(_session(tmp_path)), "--check", "--seconds", "0.5"]) == 0
     assert "nothing wrong" in capsys.readouterr().out
@@ -125,3 +135,7 @@ def test_a_tap_tells_polarity_and_delay(sign: float, delay: float) -> None:
     concerns = " ".join(found.concerns())
     assert ("opposite senses" in concerns) == (sign < 0)
     assert ("us apart" in concerns) == (abs(delay / RATE) > 50e-6)
+    late = (max(-delay, 0) / RATE, max(delay, 0) / RATE)
+    told = tuple(replace(channel, input_delay_s=known) for channel, known in zip(channels, late, strict=True))
+    [known] = preflight([(StreamDescription("s", RATE, 0.0, told), samples)]).taps
+    assert known.delay == pytest.approx(0.0, abs=0.1 / RATE), "a delay that is known is no concern"

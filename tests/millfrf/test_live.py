@@ -116,9 +116,11 @@ def test_buttons_count_only_where_they_make_sense() -> None:
     assert control.poll() == []
     control.start()
     control.mark()
-    control.mark()
+    control.mark(" entry of the\ncut ", shown_at=3.5)
     [marks] = control.poll()
     assert marks.values.tolist() == [1.0, 2.0]
+    assert marks.texts == ("", "entry of the\ncut")
+    assert [mark.label for mark in control.marks] == ["mark 1", "entry of the\ncut"]
     control.stop()
     control.start()
     assert control.state == "stopping"
@@ -150,6 +152,57 @@ def test_the_page_is_on_loopback_or_behind_a_token(monitor: LiveMonitor) -> None
         assert _status(server.url) == 200
         assert _status(root + "/") == 404
         assert _status(root + "/" + token[:-1]) == 404
+
+
+IN_A_NETWORK = """
+import fcntl, http.client, socket, struct, urllib.error, urllib.request
+from acquisition import Channel, StreamDescription
+from millfrf.live import LiveControl, LiveMonitor, LiveServer, LiveSettings
+
+def address(text):
+    return struct.pack("HH4s8x", socket.AF_INET, 0, socket.inet_aton(text))
+
+control = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)  # the namespace's own loopback gets a second address
+fcntl.ioctl(control, 0x8916, struct.pack("16s16s8x", b"lo:1", address("192.0.2.1")))  # SIOCSIFADDR
+fcntl.ioctl(control, 0x8914, struct.pack("16sH22x", b"lo", 0x41))  # SIOCSIFFLAGS: up
+
+def status(url):
+    try:
+        with urllib.request.urlopen(url, timeout=10) as answer:
+            return answer.status
+    except urllib.error.HTTPError as error:
+        return error.code
+
+stream = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))
+monitor = LiveMonitor([stream], LiveSettings())
+with LiveServer(monitor, LiveControl(), "192.0.2.1") as server:
+    root, token = server.url.rsplit("/", 1)
+    upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13"}
+    upgrade |= {"Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ=="}
+    print(root.rsplit(":", 1)[0], len(token) >= 32)
+    print([status(url) for url in (server.url, root + "/", root, root + "/" + token[:-1], root + "/ws")])
+    for origin in ("http://192.0.2.7", root):
+        client = http.client.HTTPConnection("192.0.2.1", int(root.rsplit(":", 1)[1]), timeout=10)
+        client.request("GET", f"/{token}/ws", headers=upgrade | {"Origin": origin})
+        print(client.getresponse().status)
+monitor.close()
+"""
+
+
+def test_on_another_address_the_page_demands_its_token() -> None:
+    """In a network of its own (RFC 5737's address on a private loopback), so that nothing is reached from outside."""
+    command = ["unshare", "-rn", sys.executable, "-c", IN_A_NETWORK]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    except FileNotFoundError:
+        pytest.skip("no unshare: a network of its own cannot be made")
+    if "unshare" in done.stderr:
+        pytest.skip(f"a network of its own cannot be made here: {done.stderr.strip()}")
+    assert done.returncode == 0, done.stderr
+    where, pages, foreign, own = done.stdout.splitlines()
+    assert where == "http://192.0.2.1 True"
+    assert pages == "[200, 404, 404, 404, 404]"
+    assert (foreign, own) == ("403", "101")  # a page of another site may not speak to it
 
 
 @pytest.mark.parametrize("address", ["everywhere", "0.0.0.0", "::"])
@@ -216,6 +269,7 @@ def test_in_a_browser_data_move_and_start_mark_and_stop_work(tmp_path: Path) -> 
         assert recording.complete
         times, marks = recording.events["mark"].read()
         assert marks.tolist() == [1.0]
+        assert recording.events["mark"].read_texts() == ("entry",)
         assert 0 < times[0] < recording.stream().duration + 0.5
         assert f"{recording.stream().n_samples} samples" in said
 
@@ -231,8 +285,9 @@ def _use(page: "Page", url: str, out: Path) -> list[str]:
     page.get_by_text("recording", exact=True).wait_for(timeout=20_000)
     page.wait_for_function(f"({_SHOWN})().end > 0", timeout=20_000)
     first = page.evaluate(_SHOWN)["end"]
+    page.get_by_placeholder("note for the next mark").fill("entry")
     page.get_by_role("button", name="Mark").click()
-    page.get_by_text("1 marks").wait_for(timeout=20_000)
+    page.get_by_text("1 mark (last: entry)").wait_for(timeout=20_000)
     page.wait_for_function(f"({_SHOWN})().end > {first + 1.0} && ({_SHOWN})().frf > 50", timeout=20_000)
     page.screenshot(path=str(Path(os.environ.get("MILLFRF_ARTEFACTS", out.parent)) / "live_page.png"))
     page.get_by_role("button", name="Stop").click()

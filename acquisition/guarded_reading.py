@@ -1,0 +1,78 @@
+"""Files whose reader may crash, hang or ask for endless memory on damaged bytes are read in a process of their own.
+
+scipy's reader of MAT files and the HDF5 library trust what they read: a flipped bit can end Python itself, or lead them
+in a circle (texts of any length lie in HDF5's global heap, which has no checksum; see `text_heap`). A child with limits
+of time and memory reads such a file first; nothing it hands over is ever unpickled.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from foundation import FileFormatError
+
+_CHILD = Path(__file__).with_name("reading_child.py")
+_REFUSED = 3
+_WALL_SECONDS = 60.0
+_BYTES_A_SECOND = 2e6
+_rehearsed: set[tuple[str, int, int]] = set()
+
+
+def read_guarded(path: Path, job: Literal["mat", "arrays"]) -> dict[str, Any]:
+    """Arrays and texts of a file by name; what is neither is an empty array of objects.
+
+    Raises
+    ------
+    FileFormatError
+        The file is damaged.
+    """
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        _run(path, job, folder)
+        fields: dict[str, Any] = {}
+        for entry in json.loads((folder / "index.json").read_text(encoding="utf-8")):
+            if "text" in entry:
+                fields[entry["name"]] = entry["text"]
+            elif "file" in entry:
+                fields[entry["name"]] = np.load(folder / entry["file"], allow_pickle=False)
+            else:
+                fields[entry["name"]] = np.empty(0, dtype=object)
+    return fields
+
+
+def rehearse(path: Path) -> None:
+    """Have a child open a recording and read its structure and texts; once for each state of a file.
+
+    Raises
+    ------
+    FileFormatError
+        It cannot be read, crashed its reader, or did not let it come to an end.
+    """
+    status = path.stat()
+    state = (os.fspath(path.resolve()), status.st_mtime_ns, status.st_size)
+    if state in _rehearsed:
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        _run(path, "rehearsal", Path(folder))
+    _rehearsed.add(state)
+
+
+def _run(path: Path, job: str, folder: Path) -> None:
+    command = [sys.executable, "-P", str(_CHILD), job, str(path), str(folder)]
+    longest = _WALL_SECONDS + path.stat().st_size / _BYTES_A_SECOND
+    try:
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=longest)
+    except subprocess.TimeoutExpired as error:
+        raise FileFormatError(f"{path} is damaged: reading it does not come to an end; take a copy of it") from error
+    if done.returncode == 0:
+        return
+    if done.returncode == _REFUSED:
+        lines = done.stderr.decode("utf-8", "replace").splitlines() or ["it cannot be read"]
+        raise FileFormatError(f"{path} is damaged: {lines[-1]}; take a copy of it")
+    raise FileFormatError(f"{path} is damaged: reading it crashes or does not come to an end; take a copy of it")

@@ -1,0 +1,148 @@
+"""The program that reads a file for `guarded_reading` in a process of its own; it imports nothing of this package.
+
+    python reading_child.py JOB FILE FOLDER
+
+JOB ``mat`` or ``arrays``: FOLDER gets one NPY file an array and ``index.json``. JOB ``rehearsal``: a recording's
+structure and texts are read, nothing is written. Exit code 3: one line on standard error says what is wrong.
+"""
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+REFUSED = 3
+_SPARE_BYTES = 256_000_000
+_EXPANSION = 16
+_CPU_SECONDS = 5.0
+_BYTES_A_SECOND = 20e6
+_LARGEST_RATIO = 1100.0
+"""No compression that HDF5 files use shrinks by more (deflate: 1032)."""
+
+
+def limit(size: int) -> None:
+    """Bound memory and time by the file's size (bytes), where the system can."""
+    try:
+        import resource
+    except ImportError:  # Windows: the parent's clock must do
+        return
+    pages = int(Path("/proc/self/statm").read_text().split()[0]) if Path("/proc/self/statm").exists() else 0
+    used = pages * resource.getpagesize() if pages else 1_000_000_000
+    memory, seconds = used + _SPARE_BYTES + _EXPANSION * size, int(_CPU_SECONDS + size / _BYTES_A_SECOND)
+    for kind, most in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CPU, seconds), (resource.RLIMIT_CORE, 0)):
+        hard = resource.getrlimit(kind)[1]
+        resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+
+
+def rehearse(path: Path, folder: Path) -> None:
+    """Everything a reader of the recording will ask the library for, except the samples between first and last."""
+    del folder
+    try:
+        file = _opened(path)
+    except (OSError, ValueError):  # it does not open: the parent says so better
+        return
+    with file:
+        dict(file.attrs)
+        file.visititems(_look_at)
+
+
+def _opened(path: Path) -> Any:
+    """The file, or what a killed writer left of it, as the package opens it."""
+    try:
+        return h5py.File(path, "r")
+    except OSError:
+        described = importlib.util.spec_from_file_location("unclosed", Path(__file__).with_name("unclosed_file.py"))
+        if described is None or described.loader is None:
+            raise
+        unclosed = importlib.util.module_from_spec(described)
+        described.loader.exec_module(unclosed)
+        return h5py.File(unclosed.UnclosedFile(path), "r")
+
+
+def _look_at(name: str, item: Any) -> None:
+    dict(item.attrs)
+    if not isinstance(item, h5py.Dataset):
+        return
+    stored = item.id.get_storage_size()
+    if item.dtype.hasobject:
+        item[()]
+    elif item.size and item.nbytes > _LARGEST_RATIO * stored + 1_000_000:
+        raise ValueError(f"/{name} announces {item.nbytes} bytes but stores {stored}")
+    elif item.ndim and item.size:
+        item[0], item[-1]
+
+
+def read_arrays(path: Path, folder: Path) -> None:
+    """Every dataset, by its path with dots; MATLAB's own (version 7.3) have their axes turned round by the reader."""
+    fields: dict[str, Any] = {}
+
+    def visit(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset) and not name.startswith("#"):
+            _look_at(name, item)
+            text = item.attrs.get("MATLAB_class") == b"char"
+            value = np.asarray(item[()])
+            fields[name.replace("/", ".")] = "".join(map(chr, value.reshape(-1).astype(int))) if text else value
+
+    with h5py.File(path, "r") as file:
+        file.visititems(visit)
+    _hand_over(fields, folder)
+
+
+def read_mat(path: Path, folder: Path) -> None:
+    """Every variable of a MAT file up to version 7; structures become ``structure.field``."""
+    from scipy.io import loadmat
+
+    limit(path.stat().st_size)  # scipy's own size is no matter of the file's
+    fields: dict[str, Any] = {}
+    for name, value in loadmat(path, squeeze_me=False, struct_as_record=True).items():
+        if not name.startswith("__"):
+            flatten(name, value, fields)
+    _hand_over(fields, folder)
+
+
+def flatten(name: str, value: Any, into: dict[str, Any]) -> None:
+    """MATLAB structures become ``structure.field``."""
+    if isinstance(value, np.ndarray) and value.dtype.names and value.size == 1:
+        for field in value.dtype.names:
+            flatten(f"{name}.{field}", value.reshape(-1)[0][field], into)
+    else:
+        into[name] = value
+
+
+def _hand_over(fields: dict[str, Any], folder: Path) -> None:
+    index = []
+    for number, (name, value) in enumerate(fields.items()):
+        entry: dict[str, Any] = {"name": name}
+        if isinstance(value, str):
+            entry["text"] = value
+        elif isinstance(value, np.ndarray) and not value.dtype.hasobject and not value.dtype.names:
+            entry["file"] = f"{number}.npy"
+            np.save(folder / entry["file"], value, allow_pickle=False)
+        index.append(entry)
+    (folder / "index.json").write_text(json.dumps(index), encoding="utf-8")
+
+
+JOBS = {"rehearsal": rehearse, "arrays": read_arrays, "mat": read_mat}
+
+
+def main() -> int:
+    """Do the job; returns the exit code."""
+    job, path, folder = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
+    limit(path.stat().st_size)
+    try:
+        JOBS[job](path, folder)
+    except MemoryError:
+        print("it asks for far more memory than its size", file=sys.stderr)
+        return REFUSED
+    except Exception as error:  # damaged files make the libraries raise nearly anything
+        print(" ".join(str(error).split()) or type(error).__name__, file=sys.stderr)
+        return REFUSED
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
