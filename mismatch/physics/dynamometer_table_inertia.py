@@ -19,7 +19,7 @@ class DynamometerTableInertia:
     equation = "F = F_measured - m X''"
     source = "Ewins, Modal Testing, 2nd ed., section 3.7 (mass cancellation)"
     parameters = (Parameter("mass_kg", "kg", 0.05, -100.0, 100.0),)
-    confusable_with = ("payload", "modal_parameters")
+    confusable_with = ("modal_parameters",)
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
         """One place, if every force has a response along its axis."""
