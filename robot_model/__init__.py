@@ -4,6 +4,7 @@ from .any_robot import PostureResult, in_posture, named_posture, read_robot
 from .beam_element import beam_mass, beam_stiffness
 from .causes import Cause, PostureFrequencies, equivalent_causes, explain_frequencies
 from .cell_structure import cell_structure_at
+from .changes import Change, changed_robot, possible_changes
 from .constrained_statics import constrained_system, tip_compliance, tip_stiffness
 from .drilling_deviation import DeviationMap, deviation_map, drilling_wrench, joint_deformation, joint_deviation
 from .drilling_force import Drill, DrillingLoad, SpecificForce, catalogue_load, drilling_load, fitted_to_catalogue
@@ -11,6 +12,7 @@ from .exact_beam import planar_dynamic_stiffness, spatial_dynamic_stiffness
 from .exact_chain import coupled_receptance, exact_receptance
 from .exact_structure import exact_frf_at
 from .generalised_coordinates import coordinate_basis
+from .gravity import gravity_hessian, with_gravity
 from .identification import Identification, identify
 from .inverse_kinematics import inverse_kinematics
 from .loop_closure import close_loops, posture_warnings, tool_jacobian
@@ -50,12 +52,13 @@ from .uncertainty_budget import (
     monte_carlo_deformation,
     tolerance_grade,
 )
-from .variations import with_joint_factor, with_link_factor, with_payload, with_rigid_links
+from .variations import with_damping_factor, with_joint_factor, with_link_factor, with_payload, with_rigid_links
 
 __all__ = [
     "Beam",
     "Body",
     "Cause",
+    "Change",
     "CompensatedPath",
     "CutPlace",
     "Deflection",
@@ -94,6 +97,7 @@ __all__ = [
     "block_diagonal",
     "catalogue_load",
     "cell_structure_at",
+    "changed_robot",
     "close_loops",
     "compensate_path",
     "constrained_system",
@@ -112,6 +116,7 @@ __all__ = [
     "fitted_to_catalogue",
     "frequencies_over",
     "frf_at",
+    "gravity_hessian",
     "hollow_circle",
     "identify",
     "identify_from_frequencies",
@@ -134,6 +139,7 @@ __all__ = [
     "natural_robot",
     "nearest_solution",
     "planar_dynamic_stiffness",
+    "possible_changes",
     "posture_map",
     "posture_warnings",
     "predicted_deflections",
@@ -156,6 +162,8 @@ __all__ = [
     "tool_down",
     "tool_jacobian",
     "turned_place",
+    "with_damping_factor",
+    "with_gravity",
     "with_joint_factor",
     "with_link_factor",
     "with_payload",

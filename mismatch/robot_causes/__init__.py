@@ -1,0 +1,19 @@
+"""What is wrong with a robot's model: recordings in several postures against a few numbers of the robot."""
+
+from .posed_recording import PosedRecording, posed, read_posed
+from .robot_diagnosis import ROBOT_ERROR, HeldOut, RobotCause, RobotDiagnosis, diagnose_robot
+from .robot_fit import RobotFit, Setting, fit_robot
+
+__all__ = [
+    "ROBOT_ERROR",
+    "HeldOut",
+    "PosedRecording",
+    "RobotCause",
+    "RobotDiagnosis",
+    "RobotFit",
+    "Setting",
+    "diagnose_robot",
+    "fit_robot",
+    "posed",
+    "read_posed",
+]

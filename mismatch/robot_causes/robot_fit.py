@@ -1,0 +1,274 @@
+"""Gauss-Newton on recordings in several postures: a few numbers of the robot, and each mode's deviation from it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import InputError
+from robot_model import Change, SpatialRobot, changed_robot
+
+from ..noise_model import NoiseModel, fit_noise, whitening
+from ..shape_of_model import LabError
+from .posed_recording import PosedRecording
+from .robot_receptance import RobotModes, predicted_lines, quick_lines, robot_modes
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+Changes = tuple[tuple[Change, float], ...]
+
+STEP = 1e-3
+"""Of a change's coordinate for its derivative: ln of a factor, or rad."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What stays the same while causes are compared.
+
+    Parameters
+    ----------
+    robot
+        As its file has it.
+    rigid_links
+        The model in question has its links made rigid.
+    recordings
+        One or more.
+    sensor : (3,), m
+        Housing sensor from the tip, in the recordings' axes.
+    error
+        One standard deviation of what a right robot model's modes are still off.
+    counts
+        Modes of each recording's band.
+    """
+
+    robot: SpatialRobot
+    rigid_links: bool
+    recordings: tuple[PosedRecording, ...]
+    sensor: Real
+    error: LabError
+    counts: tuple[int, ...]
+
+    def modes(self, changes: Changes) -> list[RobotModes]:
+        """Modes in every recording's posture with the changes made."""
+        robot, offset = changed_robot(self.robot, changes, rigid_links=self.rigid_links)
+        return [
+            robot_modes(robot, recording, offset, self.sensor, count)
+            for recording, count in zip(self.recordings, self.counts, strict=True)
+        ]
+
+    def only(self, chosen: Sequence[int]) -> "Setting":
+        """The same with some of the recordings."""
+        return replace(
+            self,
+            recordings=tuple(self.recordings[i] for i in chosen),
+            counts=tuple(self.counts[i] for i in chosen),
+        )
+
+
+@dataclass(frozen=True)
+class RobotFit:
+    """A robot with changes, fitted to recordings.
+
+    Parameters
+    ----------
+    changes
+        With their numbers.
+    deviations
+        u of each recording, in units of the setting's error.
+    misfit
+        ``2 sum r^H V^-1 r`` over lines and recordings, V known.
+    deviation
+        ``sum |u|^2``.
+    standard_errors : (n_changes,)
+        Of the numbers, in their units.
+    modes
+        Of each recording's posture, deviations included.
+    told
+        How many deviations the recordings tell: ``sum 1 - belief var(u)``; what |u|^2 is expected to be.
+    """
+
+    changes: Changes
+    deviations: tuple[Real, ...]
+    misfit: float
+    deviation: float
+    standard_errors: Real
+    modes: tuple[RobotModes, ...]
+    told: float
+
+    @property
+    def cost(self) -> float:
+        """Misfit and deviation: what the changes are judged by."""
+        return self.misfit + self.deviation
+
+
+def fit_robot(
+    setting: Setting,
+    changes: Changes,
+    whiteners: Sequence[Complex],
+    *,
+    start: Sequence[Real] | None = None,
+    belief: float = 1.0,
+    iterations: int = 12,
+) -> RobotFit:
+    """Fit the changes' numbers and the modes' deviations: minimise ``2 sum |W r|^2 + belief |u|^2``.
+
+    Parameters
+    ----------
+    setting
+    changes
+        With their numbers at the start.
+    whiteners
+        W of each recording, (n_lines, n_responses, n_responses).
+    start
+        Deviations to begin with; None: zero.
+    belief
+        Precision of the belief that u is zero: 1, or little to fit the modes freely.
+    iterations
+        At most.
+    """
+    state = _State(setting, changes, list(start) if start is not None else None)
+    cost, rest = _cost(setting, state, whiteners, belief)
+    damping = 0.0
+    matrix, gradient = _normal(setting, state, rest, whiteners, belief)
+    for _ in range(iterations):
+        step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), gradient)
+        for shorter in (1.0, 0.25):
+            trial = state.moved(shorter * step)
+            trial_cost, trial_rest = _cost(setting, trial, whiteners, belief)
+            if trial_cost < cost:
+                break
+        if not trial_cost < cost:
+            if damping > 10:
+                break
+            damping = max(10 * damping, 0.1)
+            continue
+        gained, state, cost, rest, damping = cost - trial_cost, trial, trial_cost, trial_rest, damping / 10
+        matrix, gradient = _normal(setting, state, rest, whiteners, belief)
+        if gained < 0.05:
+            break
+    deviation = float(sum(u @ u for u in state.deviations))
+    variance = np.maximum(np.diag(np.linalg.inv(matrix)), 0.0)
+    spread, told = np.sqrt(variance[: len(changes)]), float(np.sum(1 - belief * variance[len(changes) :]))
+    units = np.array([number if change.logarithmic else 1.0 for change, number in state.changes])
+    seen = tuple(one.moved(u, setting.error) for one, u in zip(state.modes, state.deviations, strict=True))
+    return RobotFit(
+        state.changes, tuple(state.deviations), cost - belief * deviation, deviation, spread * units, seen, told
+    )
+
+
+class _State:
+    """Where a fit stands."""
+
+    def __init__(
+        self,
+        setting: Setting,
+        changes: Changes,
+        deviations: list[Real] | None,
+        reference: list[RobotModes] | None = None,
+    ) -> None:
+        self.changes = changes
+        self.modes = setting.modes(changes)
+        if reference is not None:
+            self.modes = [one.aligned(other) for one, other in zip(self.modes, reference, strict=True)]
+        self.deviations = deviations if deviations is not None else [np.zeros(modes.size) for modes in self.modes]
+        self._setting = setting
+
+    def moved(self, step: Real) -> "_State":
+        """The state after a step of the numbers' coordinates and then of all deviations."""
+        count = len(self.changes)
+        changes = tuple(
+            (change, change.from_fit(change.to_fit(number) + float(np.clip(part, -0.5, 0.5))))
+            for (change, number), part in zip(self.changes, step[:count], strict=True)
+        )
+        deviations, at = [], count
+        for u in self.deviations:
+            deviations.append(u + np.clip(step[at : at + len(u)], -15.0, 15.0))
+            at += len(u)
+        return _State(self._setting, changes, deviations, self.modes)
+
+    def beside(self, which: int) -> Changes:
+        """The changes with one coordinate a little off."""
+        changes = list(self.changes)
+        change, number = changes[which]
+        changes[which] = (change, change.from_fit(change.to_fit(number) + STEP))
+        return tuple(changes)
+
+
+def _cost(setting: Setting, state: _State, whiteners: Sequence[Complex], belief: float) -> tuple[float, list[Complex]]:
+    """Misfit and belief; whitened residuals (n_lines, n_responses) of each recording."""
+    rest = []
+    for modes, u, recording, white in zip(state.modes, state.deviations, setting.recordings, whiteners, strict=True):
+        predicted = predicted_lines(modes.moved(u, setting.error), recording.lines)
+        rest.append(np.einsum("kij,kj->ki", white, recording.lines.measured - predicted))
+    misfit = 2 * sum(float(np.sum(np.abs(one) ** 2)) for one in rest)
+    cost = misfit + belief * float(sum(u @ u for u in state.deviations))
+    return (cost if np.isfinite(cost) else np.inf), rest
+
+
+def _normal(
+    setting: Setting, state: _State, rest: list[Complex], whiteners: Sequence[Complex], belief: float
+) -> tuple[Real, Real]:
+    """Normal equations over the numbers' coordinates and all deviations, in this order."""
+    count = len(state.changes)
+    size = count + sum(len(u) for u in state.deviations)
+    matrix, gradient = np.diag(np.full(size, belief)), np.zeros(size)
+    matrix[:count, :count] = 1e-6 * np.eye(count)
+    beside = [
+        [one.aligned(other) for one, other in zip(setting.modes(state.beside(which)), state.modes, strict=True)]
+        for which in range(count)
+    ]
+    at = count
+    for number, (recording, white) in enumerate(zip(setting.recordings, whiteners, strict=True)):
+        lines, u = recording.lines, state.deviations[number]
+        modes = state.modes[number].moved(u, setting.error)
+        slopes = modes.slopes(state.modes[number], lines.frequencies, lines.force_here, setting.error)
+        slopes = slopes * lines.kinematic(lines.frequencies)[:, :, None]
+        here = quick_lines(modes, lines)
+        columns = [
+            (quick_lines(aside[number].moved(u, setting.error), lines) - here)[:, :, None] / STEP for aside in beside
+        ]
+        slope = (white @ np.concatenate([*columns, slopes], axis=2)).reshape(rest[number].size, -1)
+        small = rest[number].ravel()
+        places = np.concatenate([np.arange(count), np.arange(at, at + len(u))])
+        matrix[np.ix_(places, places)] += 2 * (slope.real.T @ slope.real + slope.imag.T @ slope.imag)
+        gradient[places] += 2 * (slope.real.T @ small.real + slope.imag.T @ small.imag)
+        gradient[at : at + len(u)] -= belief * u
+        at += len(u)
+    return matrix, gradient
+
+
+def noise_of(setting: Setting, fitted: RobotFit) -> list[NoiseModel]:
+    """Noise of each recording from what a fit leaves over (:func:`mismatch.noise_model.fit_noise`).
+
+    Raises
+    ------
+    InputError
+        A channel that is zero in the band.
+    """
+    noises = []
+    for recording, here in zip(setting.recordings, fitted.modes, strict=True):
+        lines = recording.lines
+        rest = lines.measured - predicted_lines(here, lines)
+        levels = (
+            np.sqrt(np.mean(np.abs(lines.measured) ** 2, axis=0)),
+            np.sqrt(np.mean(np.abs(lines.force_here) ** 2, axis=0)),
+        )
+        if not (levels[0].all() and levels[1].all()):
+            raise InputError(f"{recording.name}: a channel is zero in the band; leave it out")
+        noises.append(fit_noise(lines.frequencies, rest, _through(here, recording), levels))
+    return noises
+
+
+def whiteners_of(setting: Setting, fitted: RobotFit, noises: Sequence[NoiseModel]) -> list[Complex]:
+    """W of each recording: covariance of the noise at the fit's receptances, inverted."""
+    return [
+        whitening(noise.covariance(recording.lines.frequencies, _through(here, recording)))
+        for recording, here, noise in zip(setting.recordings, fitted.modes, noises, strict=True)
+    ]
+
+
+def _through(modes: RobotModes, recording: PosedRecording) -> Complex:
+    frequencies = recording.lines.frequencies
+    return np.asarray(modes.receptance(frequencies) * recording.lines.kinematic(frequencies)[:, :, None])
