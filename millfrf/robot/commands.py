@@ -1,9 +1,11 @@
-"""`millfrf robot`: modes, FRFs, stiffness, deviation, lobes and path compensation of robot models."""
+"""`millfrf robot`: modes, FRFs, stiffness, deviation, lobes, path compensation and diagnosis of robot models."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from .diagnose_command import diagnose
 
 robot_app = typer.Typer(
     name="robot",
@@ -11,6 +13,7 @@ robot_app = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,
 )
+robot_app.command()(diagnose)
 
 Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file (.toml), or a name that `robot list` shows.")]
 Pose = Annotated[str | None, typer.Option("--pose", help="Posture named in the robot's file; default: its first.")]

@@ -2,6 +2,7 @@
 
 from .posed_recording import PosedRecording, posed, read_posed
 from .robot_diagnosis import ROBOT_ERROR, HeldOut, RobotCause, RobotDiagnosis, diagnose_robot
+from .robot_diagnosis_file import robot_diagnosis_content, write_robot_diagnosis
 from .robot_fit import RobotFit, Setting, fit_robot
 
 __all__ = [
@@ -16,4 +17,6 @@ __all__ = [
     "fit_robot",
     "posed",
     "read_posed",
+    "robot_diagnosis_content",
+    "write_robot_diagnosis",
 ]

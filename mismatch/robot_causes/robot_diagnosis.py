@@ -96,8 +96,8 @@ class RobotDiagnosis:
     candidates
         All that were weighed in the first round, best first.
     excess_before, excess_after
-        What the robot leaves beyond freely fitted modes, for each deviation of a mode that the recordings tell: 1 at most
-        where the robot is right.
+        What the robot leaves beyond freely fitted modes, for each deviation of a mode that the recordings tell: at
+        most 1 where the robot is right.
     held_out
         One for each recording that was left out in turn.
     setting, nominal, final, free
@@ -135,8 +135,8 @@ def diagnose_robot(
 
     Every change has one number. Each is fitted together with the deviations of all modes (frequency, damping, shape)
     that a right model still has, ``error``, independent in each posture; the score is
-    ``2 sum r^H V^-1 r + |u|^2 + n ln N``, so that a change must gain more than deviations cost. A further change is sought
-    where the first leaves more than noise.
+    ``2 sum r^H V^-1 r + |u|^2 + n ln N``, so that a change must gain more than deviations cost. A further change is
+    sought where the first leaves more than noise.
 
     Parameters
     ----------

@@ -131,11 +131,12 @@ def fit_robot(
     state = _State(setting, changes, list(start) if start is not None else None)
     cost, rest = _cost(setting, state, whiteners, belief)
     damping = 0.0
-    matrix, gradient = _normal(setting, state, rest, whiteners, belief)
+    beside = state.beside()
+    matrix, gradient = _normal(setting, state, beside, rest, whiteners, belief)
     for _ in range(iterations):
-        step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), gradient)
+        step = np.asarray(np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), gradient), dtype=float)
         for shorter in (1.0, 0.25):
-            trial = state.moved(shorter * step)
+            trial = state.moved(np.asarray(shorter * step, dtype=float), beside)
             trial_cost, trial_rest = _cost(setting, trial, whiteners, belief)
             if trial_cost < cost:
                 break
@@ -145,7 +146,8 @@ def fit_robot(
             damping = max(10 * damping, 0.1)
             continue
         gained, state, cost, rest, damping = cost - trial_cost, trial, trial_cost, trial_rest, damping / 10
-        matrix, gradient = _normal(setting, state, rest, whiteners, belief)
+        beside = state.beside()
+        matrix, gradient = _normal(setting, state, beside, rest, whiteners, belief)
         if gained < 0.05:
             break
     deviation = float(sum(u @ u for u in state.deviations))
@@ -175,25 +177,40 @@ class _State:
         self.deviations = deviations if deviations is not None else [np.zeros(modes.size) for modes in self.modes]
         self._setting = setting
 
-    def moved(self, step: Real) -> "_State":
-        """The state after a step of the numbers' coordinates and then of all deviations."""
-        count = len(self.changes)
+    def beside(self) -> list[list[RobotModes]]:
+        """Modes with one coordinate after the other a little off: one list a change, one entry a recording."""
+        result = []
+        for which, (change, number) in enumerate(self.changes):
+            changes = list(self.changes)
+            changes[which] = (change, change.from_fit(change.to_fit(number) + STEP))
+            pairs = zip(self._setting.modes(tuple(changes)), self.modes, strict=True)
+            result.append([one.aligned(other) for one, other in pairs])
+        return result
+
+    def moved(self, step: Real, beside: list[list[RobotModes]]) -> "_State":
+        """The state after a step of the numbers' coordinates and then of all deviations.
+
+        The recordings fix the modes far better than the robot's numbers, so the step is taken linearly in the modes as
+        seen; deviations are what the new robot needs to show them. Taken linearly in u, it would leave a narrow valley.
+        """
+        count, error = len(self.changes), self._setting.error
         changes = tuple(
             (change, change.from_fit(change.to_fit(number) + float(np.clip(part, -0.5, 0.5))))
             for (change, number), part in zip(self.changes, step[:count], strict=True)
         )
-        deviations, at = [], count
-        for u in self.deviations:
-            deviations.append(u + np.clip(step[at : at + len(u)], -15.0, 15.0))
+        state = _State(self._setting, changes, None, self.modes)
+        taken = [
+            change.to_fit(after) - change.to_fit(before)
+            for (change, before), (_, after) in zip(self.changes, changes, strict=True)
+        ]
+        at = count
+        for number, (old, u) in enumerate(zip(self.modes, self.deviations, strict=True)):
+            shown = u + np.clip(step[at : at + len(u)], -15.0, 15.0)
+            for part, aside in zip(taken, beside, strict=True):
+                shown = shown + part / STEP * old.deviations(aside[number], error)
+            state.deviations[number] = state.modes[number].deviations(old.moved(shown, error), error)
             at += len(u)
-        return _State(self._setting, changes, deviations, self.modes)
-
-    def beside(self, which: int) -> Changes:
-        """The changes with one coordinate a little off."""
-        changes = list(self.changes)
-        change, number = changes[which]
-        changes[which] = (change, change.from_fit(change.to_fit(number) + STEP))
-        return tuple(changes)
+        return state
 
 
 def _cost(setting: Setting, state: _State, whiteners: Sequence[Complex], belief: float) -> tuple[float, list[Complex]]:
@@ -208,17 +225,18 @@ def _cost(setting: Setting, state: _State, whiteners: Sequence[Complex], belief:
 
 
 def _normal(
-    setting: Setting, state: _State, rest: list[Complex], whiteners: Sequence[Complex], belief: float
+    setting: Setting,
+    state: _State,
+    beside: list[list[RobotModes]],
+    rest: list[Complex],
+    whiteners: Sequence[Complex],
+    belief: float,
 ) -> tuple[Real, Real]:
     """Normal equations over the numbers' coordinates and all deviations, in this order."""
     count = len(state.changes)
     size = count + sum(len(u) for u in state.deviations)
     matrix, gradient = np.diag(np.full(size, belief)), np.zeros(size)
     matrix[:count, :count] = 1e-6 * np.eye(count)
-    beside = [
-        [one.aligned(other) for one, other in zip(setting.modes(state.beside(which)), state.modes, strict=True)]
-        for which in range(count)
-    ]
     at = count
     for number, (recording, white) in enumerate(zip(setting.recordings, whiteners, strict=True)):
         lines, u = recording.lines, state.deviations[number]
@@ -226,9 +244,12 @@ def _normal(
         slopes = modes.slopes(state.modes[number], lines.frequencies, lines.force_here, setting.error)
         slopes = slopes * lines.kinematic(lines.frequencies)[:, :, None]
         here = quick_lines(modes, lines)
-        columns = [
-            (quick_lines(aside[number].moved(u, setting.error), lines) - here)[:, :, None] / STEP for aside in beside
-        ]
+        columns = []
+        for aside in (one[number] for one in beside):
+            # modes that may deviate are followed exactly, the others by differences: the valley is narrow
+            followed = slopes @ state.modes[number].deviations(aside, setting.error)
+            held = aside.moved(aside.deviations(modes, setting.error), setting.error)
+            columns.append(((followed + quick_lines(held, lines) - here) / STEP)[:, :, None])
         slope = (white @ np.concatenate([*columns, slopes], axis=2)).reshape(rest[number].size, -1)
         small = rest[number].ravel()
         places = np.concatenate([np.arange(count), np.arange(at, at + len(u))])

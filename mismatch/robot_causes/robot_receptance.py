@@ -43,7 +43,7 @@ class RobotModes:
     @property
     def per_mode(self) -> int:
         """Deviations of one mode: ln frequency, ln damping ratio, each entry of the shape."""
-        return 2 + self.shapes.shape[1]
+        return 2 + int(self.shapes.shape[1])
 
     @property
     def size(self) -> int:
@@ -91,7 +91,7 @@ class RobotModes:
         return np.asarray(1 / (self.natural**2 - omega**2 + 2j * self.damping * self.natural * omega))
 
     def slopes(self, base: "RobotModes", frequencies: Real, force: Complex, error: LabError) -> Complex:
-        """Derivative of displacement lines by u at force lines, (n_lines, n_rows, size); ``base``: the modes at u = 0."""
+        """Derivative of displacement lines by u at force lines, (n_lines, n_rows, size); ``base``: modes at u = 0."""
         omega = 2 * np.pi * frequencies[:, None]
         gain = self._gain(frequencies)[:, : self.count]
         natural, damping = self.natural[: self.count], self.damping[: self.count]

@@ -94,9 +94,7 @@ def free_fit(setting: Setting, start: Changes) -> FreeFit:
 
 
 def fit_from(setting: Setting, start: Changes, free: FreeFit) -> RobotFit:
-    """Fit a cause with full belief, from the modes as the recordings show them and from the robot's own."""
-    seen = [
-        one.deviations(other, setting.error) for one, other in zip(setting.modes(start), free.fitted.modes, strict=True)
-    ]
-    fits = [fit_robot(setting, start, free.whiteners, start=begin) for begin in (seen, None)]
-    return min(fits, key=lambda fitted: fitted.cost)
+    """Fit a cause with full belief, beginning with the modes as the recordings show them."""
+    pairs = zip(setting.modes(start), free.fitted.modes, strict=True)
+    seen = [one.deviations(other, setting.error) for one, other in pairs]
+    return fit_robot(setting, start, free.whiteners, start=seen)
