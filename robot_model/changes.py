@@ -35,6 +35,8 @@ class Change:
         Numbers from which a search starts, from small to large change.
     bounds
         Within which the number is sought.
+    neutral
+        Number at which next to nothing is changed.
     apply
         From a robot and the number to the changed robot and the offset of its joints.
     """
@@ -45,6 +47,7 @@ class Change:
     logarithmic: bool
     values: tuple[float, ...]
     bounds: tuple[float, float]
+    neutral: float
     apply: Callable[[SpatialRobot, float], Changed]
 
     def to_fit(self, number: float) -> float:
@@ -82,6 +85,7 @@ def possible_changes(
             True,
             _FACTOR_STARTS,
             _FACTORS,
+            1.0,
             partial(_with_joint, joint.frame, nothing),
         )
         for joint in robot.joints
@@ -89,20 +93,20 @@ def possible_changes(
     ]
     if any(link.section is not None for link in robot.links):
         name = "link flexibility left out" if rigid_links else "links"
-        changes.append(Change(name, "links", "", True, _LINK_STARTS, (1e-2, 1e3), partial(_with_links, nothing)))
+        changes.append(Change(name, "links", "", True, _LINK_STARTS, (1e-2, 1e3), 1.0, partial(_with_links, nothing)))
     loaded = partial(_with_load, payload_at, nothing)
-    changes.append(Change("payload", "payload", "kg", True, _PAYLOADS, (1e-3, 500.0), loaded))
+    changes.append(Change("payload", "payload", "kg", True, _PAYLOADS, (1e-3, 500.0), 0.05, loaded))
     for column, index in enumerate(robot.mechanism.moving):
         if robot.mechanism.frames[index].active and robot.mechanism.frames[index].motion == "revolute":
             name = f"posture of joint {robot.mechanism.frames[index].name}"
             offset = partial(_with_offset, np.eye(len(nothing))[column])
-            changes.append(Change(name, "posture", "rad", False, _OFFSETS, (-0.5, 0.5), offset))
+            changes.append(Change(name, "posture", "rad", False, _OFFSETS, (-0.5, 0.5), 0.0, offset))
     if not robot.gravity and not robot.mechanism.closures:
-        gravity = Change("gravity", "gravity", "m/s^2", True, (9.81,), (1.0, 20.0), partial(_with_weight, nothing))
+        gravity = Change("gravity", "gravity", "m/s^2", True, (9.81,), (1.0, 20.0), 1.0, partial(_with_weight, nothing))
         changes.append(gravity)
     if robot.damping_ratio or any(robot.rayleigh):
         damped = partial(_with_damping, nothing)
-        changes.append(Change("damping", "damping", "", True, _FACTOR_STARTS, _FACTORS, damped))
+        changes.append(Change("damping", "damping", "", True, _FACTOR_STARTS, _FACTORS, 1.0, damped))
     return tuple(changes)
 
 

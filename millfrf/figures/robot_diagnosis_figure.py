@@ -58,14 +58,16 @@ def _averaged(values: Real) -> Real:
 def robot_evidence_figure(found: RobotDiagnosis) -> Figure:
     """Evidence of every candidate, best on top; on a symmetric logarithmic scale."""
     causes = found.candidates[::-1]
-    figure = new_figure(12.0 + 5.0 * len(causes))
+    figure = new_figure(18.0 + 5.0 * len(causes))
     axes = figure.subplots()
     accepted = {cause.name for cause in found.causes} | set(found.equivalents)
     colours = [COLOURS[1] if cause.name in accepted else "0.7" for cause in causes]
     axes.barh([cause.name for cause in causes], [cause.evidence for cause in causes], color=colours, height=0.7)
     axes.set_xscale("symlog", linthresh=20.0, linscale=0.5)
     axes.axvline(20.0, color="k", linewidth=0.8, linestyle="--")
-    axes.text(20.0, len(causes) - 0.4, " least that is accepted", va="bottom", ha="left")
+    axes.text(20.0, len(causes) - 0.35, " least that is accepted", va="bottom", ha="left")
+    axes.set_xlim(left=min(-20.0, 1.2 * causes[0].evidence))
+    axes.set_ylim(top=len(causes) + 0.6)
     axes.set_xlabel("evidence: gain in score over the robot as modelled")
     axes.grid(axis="y", visible=False)
     return figure

@@ -231,15 +231,10 @@ def _ranked(
     for change in changes:
         if any(change.name == other.name for other, _ in current.changes):
             continue
-        starts = best_starts(setting, current.changes, change)
-        fitted = min(
-            (fit_from(setting, start.changes, free) for start in starts if np.isfinite(start.left)),
-            key=lambda one: one.cost,
-            default=None,
-        )
-        if fitted is None:
-            continue
-        evidence = current.cost - fitted.cost - price
+        starts = [(*current.changes, (change, change.neutral))]
+        starts += [one.changes for one in best_starts(setting, current.changes, change) if np.isfinite(one.left)]
+        fitted = min((fit_from(setting, start, free) for start in starts), key=lambda one: one.cost)
+        evidence = max(current.cost - fitted.cost, 0.0) - price
         number, spread = fitted.changes[-1][1], float(fitted.standard_errors[-1])
         cause = RobotCause(change.name, change.kind, change.unit, number, spread, evidence)
         ranked.append((cause, fitted))

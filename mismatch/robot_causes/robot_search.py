@@ -34,7 +34,7 @@ class Start:
     left: float
 
 
-def best_starts(setting: Setting, before: Changes, change: Change, most: int = 2) -> list[Start]:
+def best_starts(setting: Setting, before: Changes, change: Change, most: int = 1) -> list[Start]:
     """The numbers of one further change from which a fit is worth while, best first.
 
     With noise of unknown size on each channel, ``sum n ln(sum |r|^2)`` is its likelihood (Seber & Wild, Nonlinear
