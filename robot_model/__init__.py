@@ -7,7 +7,6 @@ from .cell_structure import cell_structure_at
 from .changes import Change, changed_robot, possible_changes
 from .constrained_statics import constrained_system, tip_compliance, tip_stiffness
 from .drilling_deviation import DeviationMap, deviation_map, drilling_wrench, joint_deformation, joint_deviation
-from .drilling_force import Drill, DrillingLoad, SpecificForce, catalogue_load, drilling_load, fitted_to_catalogue
 from .exact_beam import planar_dynamic_stiffness, spatial_dynamic_stiffness
 from .exact_chain import coupled_receptance, exact_receptance
 from .exact_structure import exact_frf_at
@@ -63,8 +62,6 @@ __all__ = [
     "CutPlace",
     "Deflection",
     "DeviationMap",
-    "Drill",
-    "DrillingLoad",
     "ElasticJoint",
     "Frame",
     "Identification",
@@ -83,7 +80,6 @@ __all__ = [
     "Section",
     "SpatialCase",
     "SpatialRobot",
-    "SpecificForce",
     "Spring",
     "Structure",
     "StructureModes",
@@ -95,7 +91,6 @@ __all__ = [
     "beam_mass",
     "beam_stiffness",
     "block_diagonal",
-    "catalogue_load",
     "cell_structure_at",
     "changed_robot",
     "close_loops",
@@ -107,13 +102,11 @@ __all__ = [
     "damping_warnings",
     "deformation_uncertainty",
     "deviation_map",
-    "drilling_load",
     "drilling_wrench",
     "equivalent_causes",
     "exact_frf_at",
     "exact_receptance",
     "explain_frequencies",
-    "fitted_to_catalogue",
     "frequencies_over",
     "frf_at",
     "gravity_hessian",

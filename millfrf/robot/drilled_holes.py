@@ -7,17 +7,15 @@ from pathlib import Path
 import numpy as np
 import typer
 
+from cutting import Drill, drilling_load, fitted_to_catalogue
 from foundation import InputError, writing_whole_file
 from robot_model import (
     DeviationMap,
-    Drill,
     LoadUncertainty,
     UncertaintyBudget,
     deformation_uncertainty,
     deviation_map,
-    drilling_load,
     drilling_wrench,
-    fitted_to_catalogue,
     measured_machining_uncertainty,
     read_robot,
     tool_down,
