@@ -177,7 +177,7 @@ def diagnose_robot(
         best, fitted = ranked[0]
         if best.evidence < LEAST_EVIDENCE:
             break
-        accepted.append(best)
+        accepted = [*_updated(accepted, fitted), best]
         equivalents = tuple(one.name for one, _ in ranked[1:] if one.evidence > best.evidence - AS_GOOD)
         current = fitted
     before, after = _excess(nominal, free), _excess(current, free)
@@ -239,6 +239,12 @@ def _ranked(
         cause = RobotCause(change.name, change.kind, change.unit, number, spread, evidence)
         ranked.append((cause, fitted))
     return sorted(ranked, key=lambda pair: -pair[0].evidence)
+
+
+def _updated(causes: list[RobotCause], fitted: RobotFit) -> list[RobotCause]:
+    """Causes accepted before with the numbers that they have beside a further one."""
+    pairs = zip(causes, fitted.changes, fitted.standard_errors, strict=False)
+    return [replace(cause, number=number, standard_error=float(error)) for cause, (_, number), error in pairs]
 
 
 def _excess(fitted: RobotFit, free: FreeFit) -> float:

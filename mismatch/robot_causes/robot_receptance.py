@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from robot_model import SpatialRobot, modes_at
 from robot_model.spatial_modes import modal_damping
@@ -14,6 +15,12 @@ from .posed_recording import HOUSING, TIP, PosedRecording
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+
+MARGIN = 2
+"""Modes beyond those that may deviate which take part when modes are paired."""
+
+PAIRED = 0.1
+"""Difference of ln frequency that counts as much against a pair as a quarter of the shape."""
 
 
 @dataclass(frozen=True)
@@ -60,11 +67,22 @@ class RobotModes:
         return RobotModes(natural, damping, shapes, self.rows, self.columns, self.count)
 
     def aligned(self, reference: "RobotModes") -> "RobotModes":
-        """The same with every shape on the side of that of a reference: an eigenvector's sign means nothing."""
-        both = min(len(self.shapes), len(reference.shapes))
-        signs = np.ones(len(self.shapes))
-        signs[:both] = np.where(np.sum(self.shapes[:both] * reference.shapes[:both], axis=1) < 0, -1.0, 1.0)
-        return RobotModes(self.natural, self.damping, signs[:, None] * self.shapes, self.rows, self.columns, self.count)
+        """The same modes in the order and on the side of those of a reference.
+
+        Modes may cross when the robot changes, and an eigenvector's sign means nothing: modes are paired so that
+        frequencies and shapes (modal assurance criterion, Allemang & Brown 1982) agree best.
+        """
+        near = min(self.count + MARGIN, len(self.natural), len(reference.natural))
+        mine, theirs = self.shapes[:near], reference.shapes[:near]
+        overlap = theirs @ mine.T
+        sizes = np.outer(np.sum(theirs**2, axis=1), np.sum(mine**2, axis=1))
+        apart = np.log(reference.natural[:near, None] / self.natural[:near]) / PAIRED
+        order = linear_sum_assignment(apart**2 + 4 * (1 - overlap**2 / np.maximum(sizes, 1e-300)))[1]
+        whole = np.concatenate([order, np.arange(near, len(self.natural))])
+        signs = np.ones(len(whole))
+        signs[:near] = np.where(overlap[np.arange(near), order] < 0, -1.0, 1.0)
+        shapes = signs[:, None] * self.shapes[whole]
+        return RobotModes(self.natural[whole], self.damping[whole], shapes, self.rows, self.columns, self.count)
 
     def deviations(self, seen: "RobotModes", error: LabError) -> Real:
         """u (size,) that moves these modes onto those seen, mode by mode."""
