@@ -216,10 +216,10 @@ def _setting(
 
 
 def _nearest(setting: Setting, changes: Sequence[Change]) -> Changes:
-    """The robot, changed in one thing or not, that leaves least of the recordings as it stands."""
+    """The robot, changed in one thing if that is clearly better, that leaves least of the recordings as it stands."""
     starts = [best_starts(setting, (), change, 1)[0] for change in changes]
     best = min(starts, key=lambda start: start.left)
-    return best.changes if best.left < what_is_left(setting, ()) else ()
+    return best.changes if best.left < what_is_left(setting, ()) - LEAST_EVIDENCE else ()
 
 
 def _ranked(

@@ -160,6 +160,11 @@ def fit_robot(
     )
 
 
+def start_cost(setting: Setting, changes: Changes, whiteners: Sequence[Complex], deviations: Sequence[Real]) -> float:
+    """``2 sum |W r|^2 + |u|^2`` at given numbers and deviations."""
+    return _cost(setting, _State(setting, changes, list(deviations)), whiteners, 1.0)[0]
+
+
 class _State:
     """Where a fit stands."""
 

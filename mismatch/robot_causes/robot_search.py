@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from foundation import InputError
 from robot_model import Change
 
-from .robot_fit import Changes, RobotFit, Setting, fit_robot, noise_of, whiteners_of
+from .robot_fit import Changes, RobotFit, Setting, fit_robot, noise_of, start_cost, whiteners_of
 from .robot_receptance import quick_lines
 
 Complex = NDArray[np.complex128]
@@ -16,6 +16,10 @@ Real = NDArray[np.float64]
 
 LOOSE = 0.01
 """Precision of the belief with which modes are fitted freely: ten standard deviations count as one."""
+
+
+STRANGE = 60.0
+"""Deviation, in standard deviations, beyond which a mode that is seen is not taken for one of the robot's."""
 
 
 @dataclass(frozen=True)
@@ -94,7 +98,15 @@ def free_fit(setting: Setting, start: Changes) -> FreeFit:
 
 
 def fit_from(setting: Setting, start: Changes, free: FreeFit) -> RobotFit:
-    """Fit a cause with full belief, beginning with the modes as the recordings show them."""
-    pairs = zip(setting.modes(start), free.fitted.modes, strict=True)
-    seen = [one.deviations(other, setting.error) for one, other in pairs]
-    return fit_robot(setting, start, free.whiteners, start=seen)
+    """Fit a cause with full belief, from the modes as the recordings show them or from the robot's own.
+
+    The nearer of the two begins; a mode that the robot has and the recordings do not show keeps the robot's numbers.
+    """
+    seen = []
+    for one, other in zip(setting.modes(start), free.fitted.modes, strict=True):
+        table = one.deviations(other, setting.error).reshape(one.count, -1)
+        table[np.abs(table).max(axis=1) > STRANGE] = 0.0
+        seen.append(table.ravel())
+    own = [np.zeros_like(u) for u in seen]
+    begin = min((seen, own), key=lambda u: start_cost(setting, start, free.whiteners, u))
+    return fit_robot(setting, start, free.whiteners, start=begin)

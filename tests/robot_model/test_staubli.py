@@ -33,6 +33,7 @@ from robot_model import (
     structure_at,
     tip_compliance,
     tool_down,
+    with_gravity,
     wrist_solutions,
 )
 
@@ -163,6 +164,16 @@ def test_rigid_links_in_space_are_the_lagrange_model(name: str) -> None:
     tip = rigid_model(replace(case.robot, damping_ratios=np.zeros(3)), angles).receptance(np.array([3.0]))[0, :2, :2]
     space = frf_at(chen_in_space(flexible=False), angles, np.array([3.0])).values[0][np.ix_([0, 2], [0, 2])]
     assert space == pytest.approx(tip, rel=1e-9, abs=1e-16)
+
+
+@pytest.mark.parametrize("name", ["P1", "P3"])
+def test_gravity_in_space_is_that_of_the_lagrange_model(name: str) -> None:
+    """Under a weight a hundred times the earth's, so that it shows."""
+    case = read_planar_robot("chen_2026")
+    angles = case.poses[name]
+    space = modes_at(with_gravity(chen_in_space(flexible=False), 981.0), angles).frequencies
+    assert space == pytest.approx(rigid_model(case.robot, angles, 981.0).natural_frequencies, rel=1e-9)
+    assert np.abs(space / modes_at(chen_in_space(flexible=False), angles).frequencies - 1).max() > 0.01
 
 
 def test_beam_elements_tend_to_the_exact_chain() -> None:
