@@ -9,7 +9,7 @@ from .constrained_statics import constrained_system, tip_compliance, tip_stiffne
 from .drilling_deviation import DeviationMap, deviation_map, drilling_wrench, joint_deformation, joint_deviation
 from .exact_beam import planar_dynamic_stiffness, spatial_dynamic_stiffness
 from .exact_chain import coupled_receptance, exact_receptance
-from .exact_structure import exact_frf_at
+from .exact_structure import coupled_frf_at, exact_frf_at
 from .generalised_coordinates import coordinate_basis
 from .gravity import gravity_hessian, with_gravity
 from .identification import Identification, identify
@@ -26,7 +26,7 @@ from .planar_file import PlanarCase, read_planar_robot
 from .planar_identification import apply_identified, identify_from_frequencies, identify_from_frfs
 from .planar_robot import PlanarRobot
 from .posture_map import CutPlace, PostureMap, frequencies_over, posture_map, target_of, tool_down, turned_place
-from .receptance_coupling import block_diagonal, couple_receptances
+from .receptance_coupling import block_diagonal, couple_along, couple_receptances
 from .rigid_links import rigid_matrices, rigid_model
 from .robot_files import assumptions, robot_names
 from .section import Material, Section, hollow_circle
@@ -97,7 +97,9 @@ __all__ = [
     "compensate_path",
     "constrained_system",
     "coordinate_basis",
+    "couple_along",
     "couple_receptances",
+    "coupled_frf_at",
     "coupled_receptance",
     "damping_warnings",
     "deformation_uncertainty",
