@@ -108,19 +108,15 @@ def _of_change(deviations: Callable[[SpatialRobot, Real], Real], robot: SpatialR
 
 
 def _fit(residuals: Callable[[Real], Real], change: Change) -> tuple[float, float, float]:
-    """Number, its standard error and chi^2, from the best two of the starts."""
+    """Number, its standard error and chi^2, from the best of the change's starts."""
     bounds = [change.to_fit(bound) for bound in change.bounds]
-    starts = sorted((change.to_fit(value) for value in change.values), key=lambda x: _size(residuals, x))
-    best: tuple[float, float, float] | None = None
-    for start in starts[:2]:
-        found = least_squares(residuals, [start], bounds=bounds, x_scale=0.1 if change.logarithmic else 0.01)
-        slope = float(np.sqrt(found.jac[:, 0] @ found.jac[:, 0]))
-        number, chi_square = change.from_fit(float(found.x[0])), float(found.fun @ found.fun)
-        error = np.inf if slope == 0 else (number if change.logarithmic else 1.0) / slope
-        if best is None or chi_square < best[2]:
-            best = number, float(error), chi_square
-    assert best is not None
-    return best
+    start = min((change.to_fit(value) for value in change.values[::2]), key=lambda x: _size(residuals, x))
+    scale = 0.1 if change.logarithmic else 0.01
+    found = least_squares(residuals, [start], bounds=bounds, x_scale=scale, max_nfev=15, xtol=1e-6)
+    slope = float(np.sqrt(found.jac[:, 0] @ found.jac[:, 0]))
+    number, chi_square = change.from_fit(float(found.x[0])), float(found.fun @ found.fun)
+    error = np.inf if slope == 0 else (number if change.logarithmic else 1.0) / slope
+    return number, float(error), chi_square
 
 
 def _size(residuals: Callable[[Real], Real], x: float) -> float:

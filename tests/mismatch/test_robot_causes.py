@@ -82,8 +82,8 @@ def assert_named(found: RobotDiagnosis, name: str, number: float) -> None:
     assert found.equivalents == ()
     assert found.causes[0].number == pytest.approx(number, abs=3.5 * found.causes[0].standard_error)
     for one in found.held_out:
-        assert one.after < 0.3 * one.before
-        assert one.after < 1.3 * one.free
+        # noise is all that is left, but for a twentieth of what was wrong: the number comes from the other postures
+        assert one.after < np.hypot(one.free, 0.05 * one.before)
 
 
 def test_a_softer_joint_is_named_with_its_stiffness_from_one_posture() -> None:
