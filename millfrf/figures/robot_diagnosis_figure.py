@@ -64,6 +64,10 @@ def robot_evidence_figure(found: RobotDiagnosis) -> Figure:
     colours = [COLOURS[1] if cause.name in accepted else "0.7" for cause in causes]
     axes.barh([cause.name for cause in causes], [cause.evidence for cause in causes], color=colours, height=0.7)
     axes.set_xscale("symlog", linthresh=20.0, linscale=0.5)
+    reach = max(20.0, causes[-1].evidence)
+    ticks = [tick for tick in (-10, 0, 10, 20, 50, 100, 200, 500, 1e3, 1e4, 1e5, 1e6) if tick <= 1.2 * reach]
+    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks], minor=False)
+    axes.set_xticks([], minor=True)
     axes.axvline(20.0, color="k", linewidth=0.8, linestyle="--")
     axes.text(20.0, len(causes) - 0.35, " least that is accepted", va="bottom", ha="left")
     axes.set_xlim(left=min(-20.0, 1.2 * causes[0].evidence))

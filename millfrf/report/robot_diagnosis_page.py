@@ -92,6 +92,8 @@ def _candidates(found: RobotDiagnosis) -> Section:
 
 
 def _number(cause: RobotCause) -> tuple[str, str]:
+    if not cause.standard_error < 3 * abs(cause.number) + 0.5:
+        return "not told by the data", ""
     if cause.kind == "posture":
         return with_error(float(np.degrees(cause.number)), float(np.degrees(cause.standard_error)), sign=True), "deg"
     return with_error(cause.number, cause.standard_error), cause.unit or "times"

@@ -1,11 +1,14 @@
 """Every example of the robot models runs, on a small scale, and shows what its page says."""
 
 import importlib.util
+import json
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
+
+from acquisition import Recording
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples"
 
@@ -64,3 +67,28 @@ def test_stiffness_identification() -> None:
 def test_path_compensation() -> None:
     outcome = load("robot_path_compensation").run(points=10)
     assert outcome.corrected.mean() < 0.25 * outcome.without.mean()
+
+
+def test_diagnosis_of_a_robot_that_mills(tmp_path: Path) -> None:
+    """The truths that it offers; one of them milled, recorded and read back."""
+    example = load("robot_diagnosis")
+    for change in ("nothing", "joint-3", "payload", "posture", "links"):
+        assert example.truth_of(change).offset.shape == (6,)
+    example.mill(example.truth_of("payload"), example.POSTURES[0], tmp_path / "a.h5", 1.0, 0)
+    with Recording(tmp_path / "a.h5") as recording:
+        assert {channel.node for channel in recording.stream(None).channels} == {"TCP", "HOUSING"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("change", "name"), [("joint-3", "joint 3 stiffness"), ("payload", "payload")])
+def test_a_robot_that_mills_is_diagnosed(tmp_path: Path, change: str, name: str) -> None:
+    example = load("robot_diagnosis")
+    assert example.main(tmp_path, change, 2, 30.0) == 0
+    content = json.loads((tmp_path / "diagnosis" / "robot_diagnosis.json").read_text())
+    assert content["verdict"] == "explained"
+    cause = content["causes"][0]
+    assert cause["name"] == name
+    truth = {"joint-3": 0.7, "payload": 12.0}[change]
+    assert cause["number"] == pytest.approx(truth, abs=3.5 * cause["standard_error"])
+    for one in content["held_out"]:
+        assert one["after"] < 0.15 * one["before"]
