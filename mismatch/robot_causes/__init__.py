@@ -1,9 +1,11 @@
 """What is wrong with a robot's model: recordings in several postures against a few numbers of the robot."""
 
 from .posed_recording import PosedRecording, posed, read_posed
-from .robot_diagnosis import ROBOT_ERROR, HeldOut, RobotCause, RobotDiagnosis, diagnose_robot
+from .robot_diagnosis import ROBOT_ERROR, diagnose_robot
 from .robot_diagnosis_file import robot_diagnosis_content, write_robot_diagnosis
-from .robot_fit import RobotFit, Setting, fit_robot
+from .robot_fit import RobotFit, fit_robot
+from .robot_results import HeldOut, RobotCause, RobotDiagnosis
+from .robot_setting import Setting
 
 __all__ = [
     "ROBOT_ERROR",

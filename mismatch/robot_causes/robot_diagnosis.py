@@ -1,23 +1,23 @@
 """What is wrong with a robot's model, from recordings in one or more postures."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foundation import InputError
-from robot_model import Change, SpatialRobot, changed_robot, modes_at, possible_changes
+from robot_model import Change, SpatialRobot, modes_at, possible_changes
 
 from ..shape_of_model import LabError
-from .posed_recording import PosedRecording, halves
-from .robot_fit import Changes, RobotFit, Setting
-from .robot_receptance import predicted_lines
+from .posed_recording import PosedRecording
+from .robot_fit import RobotFit
+from .robot_held_out import held_out
+from .robot_results import RobotCause, RobotDiagnosis
 from .robot_search import FreeFit, best_starts, fit_from, free_fit, what_is_left
+from .robot_setting import Changes, Setting
 
 Real = NDArray[np.float64]
-
-VERDICTS = ("none", "explained", "class", "unexplained")
 
 LEAST_EVIDENCE = 20.0
 """Gain in score below which no change is accepted, as everywhere in :mod:`mismatch`."""
@@ -36,89 +36,6 @@ EXPLAINED = 0.9
 
 ROBOT_ERROR = LabError(frequency=0.01, damping=0.15, shape=0.05)
 """What the modes of a right robot model are still off: one per cent, 15 per cent, a twentieth of a shape's size."""
-
-
-@dataclass(frozen=True)
-class RobotCause:
-    """One change, fitted.
-
-    Parameters
-    ----------
-    name, kind, unit
-        Of the change.
-    number, standard_error
-        Factor, kg or rad.
-    evidence
-        Gain in score over the robot without it.
-    """
-
-    name: str
-    kind: str
-    unit: str
-    number: float
-    standard_error: float
-    evidence: float
-
-
-@dataclass(frozen=True)
-class HeldOut:
-    """Error on a recording left out of the fit, relative to its root mean square response.
-
-    Parameters
-    ----------
-    name
-        Of the recording.
-    before, after
-        Of the robot as modelled and with the changes, no mode allowed to deviate.
-    free
-        Of modes fitted to it freely: what noise leaves.
-    """
-
-    name: str
-    before: float
-    after: float
-    free: float
-
-
-@dataclass(frozen=True)
-class RobotDiagnosis:
-    """What the recordings say about the robot's model.
-
-    Parameters
-    ----------
-    verdict
-        ``none``: nothing needs changing; ``explained``: one change stands alone; ``class``: several changes explain
-        as well as each other; ``unexplained``: something is wrong that no change explains.
-    causes
-        Accepted, in the order found.
-    equivalents
-        Names that the recordings cannot tell from the last accepted cause.
-    candidates
-        All that were weighed in the first round, best first.
-    excess_before, excess_after
-        What the robot leaves beyond freely fitted modes, for each deviation of a mode that the recordings tell: at
-        most 1 where the robot is right.
-    held_out
-        One for each recording that was left out in turn.
-    setting, nominal, final, free
-        What the diagnosis was made with.
-    """
-
-    verdict: str
-    causes: tuple[RobotCause, ...]
-    equivalents: tuple[str, ...]
-    candidates: tuple[RobotCause, ...]
-    excess_before: float
-    excess_after: float
-    held_out: tuple[HeldOut, ...]
-    setting: Setting
-    nominal: RobotFit
-    final: RobotFit
-    free: FreeFit
-
-    def improved_robot(self) -> tuple[SpatialRobot, Real]:
-        """The robot with the accepted changes, and by how much its joints stand elsewhere, rad."""
-        return changed_robot(self.setting.robot, self.final.changes, rigid_links=self.setting.rigid_links)
 
 
 def diagnose_robot(
@@ -182,7 +99,7 @@ def diagnose_robot(
         current = fitted
     before, after = _excess(nominal, free), _excess(current, free)
     verdict = _verdict(bool(accepted), bool(equivalents), before, after)
-    held = _held_out(setting, current.changes)
+    held = held_out(setting, current.changes)
     return RobotDiagnosis(
         verdict, tuple(accepted), equivalents, candidates, before, after, held, setting, nominal, current, free
     )
@@ -258,23 +175,3 @@ def _verdict(accepted: bool, equivalents: bool, before: float, after: float) -> 
     if not accepted:
         return "none"
     return "class" if equivalents else "explained"
-
-
-def _held_out(setting: Setting, changes: Changes) -> tuple[HeldOut, ...]:
-    """Each recording predicted by a robot fitted to the others; a single one is cut in two."""
-    if len(setting.recordings) == 1:
-        setting = replace(setting, recordings=halves(setting.recordings[0]), counts=setting.counts * 2)
-    result = []
-    for left_out, recording in enumerate(setting.recordings):
-        others = setting.only([i for i in range(len(setting.recordings)) if i != left_out])
-        alone = setting.only([left_out])
-        fitted: Changes = ()
-        if changes:
-            fitted = fit_from(others, changes, free_fit(others, changes)).changes
-        free = free_fit(alone, changes)
-        measured = recording.lines.measured
-        parts = (alone.modes(())[0], alone.modes(fitted)[0], free.fitted.modes[0])
-        errors = [float(np.linalg.norm(measured - predicted_lines(modes, recording.lines))) for modes in parts]
-        whole = float(np.linalg.norm(measured))
-        result.append(HeldOut(recording.name, *(one / whole for one in errors)))
-    return tuple(result)

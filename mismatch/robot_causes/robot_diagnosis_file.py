@@ -9,7 +9,7 @@ import numpy as np
 
 from foundation import writing_whole_file
 
-from .robot_diagnosis import RobotCause, RobotDiagnosis
+from .robot_results import RobotCause, RobotDiagnosis
 
 FORMAT = "millfrf.robot_diagnosis"
 FORMAT_VERSION = 1

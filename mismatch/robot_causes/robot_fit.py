@@ -1,70 +1,19 @@
 """Gauss-Newton on recordings in several postures: a few numbers of the robot, and each mode's deviation from it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
-from robot_model import Change, SpatialRobot, changed_robot
-
-from ..noise_model import NoiseModel, fit_noise, whitening
-from ..shape_of_model import LabError
-from .posed_recording import PosedRecording
-from .robot_receptance import RobotModes, predicted_lines, quick_lines, robot_modes
+from .robot_receptance import RobotModes, predicted_lines, quick_lines
+from .robot_setting import Changes, Setting
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
-Changes = tuple[tuple[Change, float], ...]
-
 STEP = 1e-3
 """Of a change's coordinate for its derivative: ln of a factor, or rad."""
-
-
-@dataclass(frozen=True)
-class Setting:
-    """What stays the same while causes are compared.
-
-    Parameters
-    ----------
-    robot
-        As its file has it.
-    rigid_links
-        The model in question has its links made rigid.
-    recordings
-        One or more.
-    sensor : (3,), m
-        Housing sensor from the tip, in the recordings' axes.
-    error
-        One standard deviation of what a right robot model's modes are still off.
-    counts
-        Modes of each recording's band.
-    """
-
-    robot: SpatialRobot
-    rigid_links: bool
-    recordings: tuple[PosedRecording, ...]
-    sensor: Real
-    error: LabError
-    counts: tuple[int, ...]
-
-    def modes(self, changes: Changes) -> list[RobotModes]:
-        """Modes in every recording's posture with the changes made."""
-        robot, offset = changed_robot(self.robot, changes, rigid_links=self.rigid_links)
-        return [
-            robot_modes(robot, recording, offset, self.sensor, count)
-            for recording, count in zip(self.recordings, self.counts, strict=True)
-        ]
-
-    def only(self, chosen: Sequence[int]) -> "Setting":
-        """The same with some of the recordings."""
-        return replace(
-            self,
-            recordings=tuple(self.recordings[i] for i in chosen),
-            counts=tuple(self.counts[i] for i in chosen),
-        )
 
 
 @dataclass(frozen=True)
@@ -263,38 +212,3 @@ def _normal(
         gradient[at : at + len(u)] -= belief * u
         at += len(u)
     return matrix, gradient
-
-
-def noise_of(setting: Setting, fitted: RobotFit) -> list[NoiseModel]:
-    """Noise of each recording from what a fit leaves over (:func:`mismatch.noise_model.fit_noise`).
-
-    Raises
-    ------
-    InputError
-        A channel that is zero in the band.
-    """
-    noises = []
-    for recording, here in zip(setting.recordings, fitted.modes, strict=True):
-        lines = recording.lines
-        rest = lines.measured - predicted_lines(here, lines)
-        levels = (
-            np.sqrt(np.mean(np.abs(lines.measured) ** 2, axis=0)),
-            np.sqrt(np.mean(np.abs(lines.force_here) ** 2, axis=0)),
-        )
-        if not (levels[0].all() and levels[1].all()):
-            raise InputError(f"{recording.name}: a channel is zero in the band; leave it out")
-        noises.append(fit_noise(lines.frequencies, rest, _through(here, recording), levels))
-    return noises
-
-
-def whiteners_of(setting: Setting, fitted: RobotFit, noises: Sequence[NoiseModel]) -> list[Complex]:
-    """W of each recording: covariance of the noise at the fit's receptances, inverted."""
-    return [
-        whitening(noise.covariance(recording.lines.frequencies, _through(here, recording)))
-        for recording, here, noise in zip(setting.recordings, fitted.modes, noises, strict=True)
-    ]
-
-
-def _through(modes: RobotModes, recording: PosedRecording) -> Complex:
-    frequencies = recording.lines.frequencies
-    return np.asarray(modes.receptance(frequencies) * recording.lines.kinematic(frequencies)[:, :, None])

@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 from foundation import InputError
 from robot_model import Change
 
-from .robot_fit import Changes, RobotFit, Setting, fit_robot, noise_of, start_cost, whiteners_of
+from .robot_fit import RobotFit, fit_robot, start_cost
+from .robot_noise import noise_of, whiteners_of
 from .robot_receptance import quick_lines
+from .robot_setting import Changes, Setting
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
