@@ -1,4 +1,4 @@
-"""Milling forces and directional coefficients: knows nothing of structures."""
+"""Milling and drilling forces, and directional coefficients: knows nothing of structures."""
 
 from .cutting_file import read_cutting_process
 from .directional import (
@@ -10,6 +10,7 @@ from .directional import (
     force_direction,
     turn_harmonics,
 )
+from .drilling_force import Drill, DrillingLoad, SpecificForce, catalogue_load, drilling_load, fitted_to_catalogue
 from .engaged_edge import damping_matrices, edge_matrices
 from .force_harmonics import force_harmonics
 from .immersion import IMMERSIONS, immersion_angles
@@ -18,14 +19,20 @@ from .refusal import refuse_varied
 
 __all__ = [
     "IMMERSIONS",
+    "Drill",
+    "DrillingLoad",
     "MillingProcess",
+    "SpecificForce",
     "average_directional_matrix",
+    "catalogue_load",
     "chip_direction",
     "damping_harmonics",
     "damping_matrices",
     "directional_harmonics",
     "directional_matrix",
+    "drilling_load",
     "edge_matrices",
+    "fitted_to_catalogue",
     "force_direction",
     "force_harmonics",
     "immersion_angles",

@@ -4,13 +4,14 @@ from .any_robot import PostureResult, in_posture, named_posture, read_robot
 from .beam_element import beam_mass, beam_stiffness
 from .causes import Cause, PostureFrequencies, equivalent_causes, explain_frequencies
 from .cell_structure import cell_structure_at
+from .changes import Change, changed_robot, possible_changes
 from .constrained_statics import constrained_system, tip_compliance, tip_stiffness
 from .drilling_deviation import DeviationMap, deviation_map, drilling_wrench, joint_deformation, joint_deviation
-from .drilling_force import Drill, DrillingLoad, SpecificForce, catalogue_load, drilling_load, fitted_to_catalogue
 from .exact_beam import planar_dynamic_stiffness, spatial_dynamic_stiffness
 from .exact_chain import coupled_receptance, exact_receptance
-from .exact_structure import exact_frf_at
+from .exact_structure import coupled_frf_at, exact_frf_at
 from .generalised_coordinates import coordinate_basis
+from .gravity import gravity_hessian, with_gravity
 from .identification import Identification, identify
 from .inverse_kinematics import inverse_kinematics
 from .loop_closure import close_loops, posture_warnings, tool_jacobian
@@ -25,7 +26,7 @@ from .planar_file import PlanarCase, read_planar_robot
 from .planar_identification import apply_identified, identify_from_frequencies, identify_from_frfs
 from .planar_robot import PlanarRobot
 from .posture_map import CutPlace, PostureMap, frequencies_over, posture_map, target_of, tool_down, turned_place
-from .receptance_coupling import block_diagonal, couple_receptances
+from .receptance_coupling import block_diagonal, couple_along, couple_receptances
 from .rigid_links import rigid_matrices, rigid_model
 from .robot_files import assumptions, robot_names
 from .section import Material, Section, hollow_circle
@@ -50,18 +51,17 @@ from .uncertainty_budget import (
     monte_carlo_deformation,
     tolerance_grade,
 )
-from .variations import with_joint_factor, with_link_factor, with_payload, with_rigid_links
+from .variations import with_damping_factor, with_joint_factor, with_link_factor, with_payload, with_rigid_links
 
 __all__ = [
     "Beam",
     "Body",
     "Cause",
+    "Change",
     "CompensatedPath",
     "CutPlace",
     "Deflection",
     "DeviationMap",
-    "Drill",
-    "DrillingLoad",
     "ElasticJoint",
     "Frame",
     "Identification",
@@ -80,7 +80,6 @@ __all__ = [
     "Section",
     "SpatialCase",
     "SpatialRobot",
-    "SpecificForce",
     "Spring",
     "Structure",
     "StructureModes",
@@ -92,26 +91,27 @@ __all__ = [
     "beam_mass",
     "beam_stiffness",
     "block_diagonal",
-    "catalogue_load",
     "cell_structure_at",
+    "changed_robot",
     "close_loops",
     "compensate_path",
     "constrained_system",
     "coordinate_basis",
+    "couple_along",
     "couple_receptances",
+    "coupled_frf_at",
     "coupled_receptance",
     "damping_warnings",
     "deformation_uncertainty",
     "deviation_map",
-    "drilling_load",
     "drilling_wrench",
     "equivalent_causes",
     "exact_frf_at",
     "exact_receptance",
     "explain_frequencies",
-    "fitted_to_catalogue",
     "frequencies_over",
     "frf_at",
+    "gravity_hessian",
     "hollow_circle",
     "identify",
     "identify_from_frequencies",
@@ -134,6 +134,7 @@ __all__ = [
     "natural_robot",
     "nearest_solution",
     "planar_dynamic_stiffness",
+    "possible_changes",
     "posture_map",
     "posture_warnings",
     "predicted_deflections",
@@ -156,6 +157,8 @@ __all__ = [
     "tool_down",
     "tool_jacobian",
     "turned_place",
+    "with_damping_factor",
+    "with_gravity",
     "with_joint_factor",
     "with_link_factor",
     "with_payload",

@@ -6,15 +6,18 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from foundation import InputError
 
-from .identification import identify
+from .changes import Change, possible_changes
 from .spatial_modes import modes_at
 from .spatial_robot import SpatialRobot
-from .variations import with_joint_factor, with_link_factor, with_payload
 
 Real = NDArray[np.float64]
+
+_BLIND = "posture of joint 1"
+"""A turn of the whole robot changes no frequency."""
 
 AS_GOOD = 6.0
 """Rise of chi^2 up to which another cause with as many parameters counts as equivalent (likelihood ratio of 20)."""
@@ -35,9 +38,10 @@ class Cause:
     Parameters
     ----------
     name
-        ``joint 3 stiffness``, ``payload``, ``links``, or ``as modelled`` (nothing changed).
+        As :class:`robot_model.Change`, or ``as modelled`` (nothing changed).
     parameter, standard_error
-        Factor of the stiffness, or mass in kg; 1 and 0 where nothing changed.
+        The change's number (a factor, kg, rad, m/s^2); 1 and 0 where nothing changed. Infinite: the frequencies do not
+        depend on it.
     chi_square
         Sum of squared deviations in units of their expected error.
     n_data
@@ -78,15 +82,19 @@ def explain_frequencies(
     if not n_data or not relative_error > 0:
         raise InputError(f"{n_data} frequencies with relative error {relative_error!r}: both must be positive")
 
-    def deviations(trial: SpatialRobot) -> Real:
-        parts = [modes_at(trial, case.q).frequencies[: len(case.frequencies)] / case.frequencies - 1 for case in found]
+    def deviations(trial: SpatialRobot, offset: Real) -> Real:
+        parts = [
+            modes_at(trial, case.q + offset).frequencies[: len(case.frequencies)] / case.frequencies - 1
+            for case in found
+        ]
         return np.concatenate(parts) / relative_error
 
-    nominal = deviations(robot)
+    nominal = deviations(robot, np.zeros(len(robot.mechanism.moving)))
     causes = [Cause("as modelled", 1.0, 0.0, float(nominal @ nominal), n_data)]
-    for name, change, start, bounds in _candidates(robot):
-        fitted = _fit(partial(_of_change, deviations, change), name, start, bounds)
-        causes.append(Cause(name, *fitted, n_data))
+    for change in possible_changes(robot):
+        if change.kind == "damping" or change.name == _BLIND:
+            continue
+        causes.append(Cause(change.name, *_fit(partial(_of_change, deviations, robot, change), change), n_data))
     return tuple(sorted(causes, key=lambda cause: cause.chi_square))
 
 
@@ -95,35 +103,22 @@ def equivalent_causes(causes: Sequence[Cause]) -> tuple[Cause, ...]:
     return tuple(cause for cause in causes if cause.chi_square <= causes[0].chi_square + AS_GOOD)
 
 
-_Change = Callable[[float], SpatialRobot]
+def _of_change(deviations: Callable[[SpatialRobot, Real], Real], robot: SpatialRobot, change: Change, x: Real) -> Real:
+    return deviations(*change.apply(robot, change.from_fit(float(x[0]))))
 
 
-def _candidates(robot: SpatialRobot) -> list[tuple[str, _Change, float, tuple[float, float]]]:
-    factor = (0.05, 20.0)
-    joints = [joint.frame for joint in robot.joints if np.isfinite(joint.stiffness).any()]
-    candidates: list[tuple[str, _Change, float, tuple[float, float]]] = [
-        (f"joint {name} stiffness", partial(with_joint_factor, robot, name), 1.0, factor) for name in joints
-    ]
-    if any(link.section is not None for link in robot.links):
-        candidates.append(("links", partial(with_link_factor, robot), 1.0, (0.01, 1000.0)))
-    candidates.append(("payload", partial(with_payload, robot), 1.0, (1e-3, 500.0)))
-    return candidates
+def _fit(residuals: Callable[[Real], Real], change: Change) -> tuple[float, float, float]:
+    """Number, its standard error and chi^2, from the best of the change's starts."""
+    bounds = [change.to_fit(bound) for bound in change.bounds]
+    start = min((change.to_fit(value) for value in change.values[::2]), key=lambda x: _size(residuals, x))
+    scale = 0.1 if change.logarithmic else 0.01
+    found = least_squares(residuals, [start], bounds=bounds, x_scale=scale, max_nfev=15, xtol=1e-6)
+    slope = float(np.sqrt(found.jac[:, 0] @ found.jac[:, 0]))
+    number, chi_square = change.from_fit(float(found.x[0])), float(found.fun @ found.fun)
+    error = np.inf if slope == 0 else (number if change.logarithmic else 1.0) / slope
+    return number, float(error), chi_square
 
 
-def _of_change(deviations: Callable[[SpatialRobot], Real], change: _Change, x: Real) -> Real:
-    return deviations(change(float(x[0])))
-
-
-def _fit(
-    residuals: Callable[[Real], Real], name: str, start: float, bounds: tuple[float, float]
-) -> tuple[float, float, float]:
-    """Parameter, its standard error and chi^2, from the better of two starts."""
-    best: tuple[float, float, float] | None = None
-    for begin in (0.5 * start, 2 * start):
-        found = identify(residuals, (name,), np.array([bounds[0]]), np.array([bounds[1]]), start=np.array([begin]))
-        left = residuals(found.values)
-        chi_square = float(left @ left)
-        if best is None or chi_square < best[2]:
-            best = float(found.values[0]), float(found.values[0] * found.relative_errors[0]), chi_square
-    assert best is not None
-    return best
+def _size(residuals: Callable[[Real], Real], x: float) -> float:
+    left = residuals(np.array([x]))
+    return float(left @ left)

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cutting import DrillingLoad
 from foundation import InputError
 
 from .constrained_statics import tip_compliance
-from .drilling_force import DrillingLoad
 from .loop_closure import tool_jacobian
 from .posture_map import CutPlace, target_of
 from .spatial_robot import SpatialRobot, structure_at

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
 
 
 def couple_receptances(
@@ -42,9 +43,17 @@ def couple_receptances(
     for column, (first, second) in enumerate(pairs):
         signs[first, column] += 1
         signs[second, column] -= 1
-    columns = receptance @ signs
-    gap = signs.T @ columns + np.diag(np.asarray(compliance))
-    return np.asarray(receptance - columns @ np.linalg.solve(gap, signs.T @ receptance))
+    return couple_along(receptance, signs, compliance)
+
+
+def couple_along(receptance: Complex, directions: Real, compliance: Sequence[complex] | Complex) -> Complex:
+    """The same along any directions: each column of ``directions`` (n_dof, n_pairs) is a gap that a spring closes.
+
+    A column may turn degrees of freedom into a joint's axes, hold a rigid link's end, or tie one to the ground.
+    """
+    columns = receptance @ directions
+    gap = directions.T @ columns + np.diag(np.asarray(compliance))
+    return np.asarray(receptance - columns @ np.linalg.solve(gap, directions.T @ receptance))
 
 
 def block_diagonal(blocks: Sequence[Complex]) -> Complex:

@@ -22,6 +22,7 @@ class _Head(Table):
     kind: str
     tip_node: int
     tool_frame: str
+    gravity_m_per_s2: float = Field(0.0, ge=0)
 
 
 class _Frame(Table):
@@ -147,6 +148,7 @@ def _case(content: _File) -> SpatialCase:
         tip=content.robot.tip_node,
         rayleigh=_rayleigh(content.damping),
         damping_ratio=None if content.damping is None else content.damping.ratio,
+        gravity=content.robot.gravity_m_per_s2,
     )
     poses = {pose.name: np.radians(pose.driven_deg) for pose in content.poses}
     return SpatialCase(content.robot.name, spatial, poses)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
+from .gravity import gravity_stiffness
 from .mechanism import Mechanism
 from .section import Section
 from .structure import Beam, Body, Spring, Structure, cross_matrix
@@ -70,11 +71,13 @@ class SpatialRobot:
         ``(a, b)`` of ``C = a M + b K``, 1/s and s.
     damping_ratio
         One for all modes, instead of Rayleigh's constants; or None.
+    gravity
+        m/s^2 along the base's -z: the stiffness of weight is added to that of the joints; 0: left out.
 
     Raises
     ------
     InputError
-        A node that is placed nowhere.
+        A node that is placed nowhere, or gravity on a robot with closed loops.
     """
 
     mechanism: Mechanism
@@ -85,6 +88,7 @@ class SpatialRobot:
     tip: int
     rayleigh: tuple[float, float] = (0.0, 0.0)
     damping_ratio: float | None = None
+    gravity: float = 0.0
 
     def __post_init__(self) -> None:
         placed = {node for joint in self.joints for node in joint.nodes} | set(self.points)
@@ -92,6 +96,8 @@ class SpatialRobot:
         missing = sorted((wanted | set(range(max(wanted | placed) + 1))) - placed)
         if missing:
             raise InputError(f"robot: nodes {missing} are at no joint and no point; give their place")
+        if self.gravity and self.mechanism.closures:
+            raise InputError("gravity is given for open chains only; this robot has closed loops: leave it at 0")
 
     @property
     def n_nodes(self) -> int:
@@ -130,7 +136,10 @@ def structure_at(robot: SpatialRobot, q: Real) -> Structure:
     positions = np.vstack([places, *extra]) if extra else places
     rigid = tuple(link.nodes for link in robot.links if link.section is None)
     bodies = tuple(_body(body, frames[body.frame][:3, :3]) for body in robot.bodies)
-    return Structure(positions, tuple(springs), tuple(beams), rigid, bodies, robot.tip)
+    structure = Structure(positions, tuple(springs), tuple(beams), rigid, bodies, robot.tip)
+    if not robot.gravity:
+        return structure
+    return replace(structure, weight=gravity_stiffness(robot, q, structure))
 
 
 def _divide(link: Link, frames: dict[str, Real], places: Real, beams: list[Beam], extra: list[Real]) -> None:

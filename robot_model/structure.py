@@ -65,6 +65,8 @@ class Structure:
         Pairs of nodes that a rigid link joins.
     tip
         Node of the tool tip.
+    weight : (6 n_nodes, 6 n_nodes) or None
+        Stiffness of the weight that the joints carry; None: left out.
     """
 
     positions: Real
@@ -73,12 +75,13 @@ class Structure:
     rigid: tuple[tuple[int, int], ...]
     bodies: tuple[Body, ...]
     tip: int
+    weight: Real | None = None
 
 
 def stiffness_matrix(structure: Structure) -> Real:
     """Stiffness over all nodes before the clamp, shape (6 H, 6 H); rigid directions of joints are left out."""
     size = 6 * len(structure.positions)
-    whole = np.zeros((size, size))
+    whole = np.zeros((size, size)) if structure.weight is None else structure.weight.copy()
     for spring in structure.springs:
         elastic = np.where(np.isfinite(spring.stiffness), spring.stiffness, 0.0)
         turn = six_by_six(spring.axes)

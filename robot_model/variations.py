@@ -47,6 +47,15 @@ def with_link_factor(robot: SpatialRobot, factor: float) -> SpatialRobot:
     return replace(robot, links=links)
 
 
+def with_damping_factor(robot: SpatialRobot, factor: float) -> SpatialRobot:
+    """Damping of every mode times ``factor``, whether it is Rayleigh's or one ratio."""
+    if not factor > 0:
+        raise InputError(f"damping factor {factor!r} must be positive")
+    a, b = robot.rayleigh
+    ratio = None if robot.damping_ratio is None else factor * robot.damping_ratio
+    return replace(robot, rayleigh=(factor * a, factor * b), damping_ratio=ratio)
+
+
 def with_rigid_links(robot: SpatialRobot) -> SpatialRobot:
     """Flexible links made rigid, with the mass and inertia that they had: joints alone give way.
 

@@ -1,9 +1,11 @@
-"""`millfrf robot`: modes, FRFs, stiffness, deviation, lobes and path compensation of robot models."""
+"""`millfrf robot`: modes, FRFs, stiffness, deviation, lobes, path compensation and diagnosis of robot models."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from .diagnose_command import diagnose
 
 robot_app = typer.Typer(
     name="robot",
@@ -11,6 +13,7 @@ robot_app = typer.Typer(
     add_completion=False,
     rich_markup_mode=None,
 )
+robot_app.command()(diagnose)
 
 Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file (.toml), or a name that `robot list` shows.")]
 Pose = Annotated[str | None, typer.Option("--pose", help="Posture named in the robot's file; default: its first.")]
@@ -134,7 +137,9 @@ def lobes(
     cutting: Annotated[Path, typer.Option("--cutting", metavar="CUT.toml", help="Cutter, engagement, coefficients.")],
     max_depth: Annotated[float, typer.Option("--max-depth", metavar="M", help="Largest depth looked at, m.")],
     out: Annotated[Path, typer.Option("--out", metavar="FILE.csv", help="Lobes, or with --angles a posture map.")],
-    at: Annotated[tuple[float, float, float], typer.Option("--at", metavar="X Y Z", help="Tip of the tool, m.")],
+    at: At = None,
+    pose: Pose = None,
+    joints: Joints = None,
     feed: Feed = 0.0,
     turn: Turn = 0.0,
     redundancy: Redundancy = "table",
@@ -146,16 +151,22 @@ def lobes(
     ] = None,
     speed: Speed = None,
     method: Annotated[str, typer.Option("--method", help="Solver of the lobes, as `millfrf lobes`.")] = "zero-order",
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="Picture of the lobes or the posture map.")
+    ] = None,
+    depth: Annotated[
+        float | None, typer.Option("--depth", metavar="M", help="Cut to mark in the picture of a posture map, m.")
+    ] = None,
 ) -> None:
     """Stability lobes in a posture (--speeds), or the depth limit over a redundancy angle (--angles and --speed)."""
     from .postures import Asked
-    from .results import write_lobes_in_posture, write_map_over_redundancy
+    from .robot_lobes import write_lobes_in_posture, write_map_over_redundancy
 
-    asked = Asked(None, None, at, feed, turn, redundancy)
+    asked = Asked(pose, joints, at, feed, turn, redundancy)
     if angles is not None:
-        write_map_over_redundancy(robot, asked, cutting, angles, speed, max_depth, out)
+        write_map_over_redundancy(robot, asked, cutting, angles, speed, max_depth, out, (picture, depth))
     else:
-        write_lobes_in_posture(robot, asked, cutting, speeds, max_depth, method, out)
+        write_lobes_in_posture(robot, asked, cutting, speeds, max_depth, method, out, picture)
 
 
 @robot_app.command("map")

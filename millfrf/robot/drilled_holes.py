@@ -7,19 +7,19 @@ from pathlib import Path
 import numpy as np
 import typer
 
+from cutting import Drill, drilling_load, fitted_to_catalogue
 from foundation import InputError, writing_whole_file
 from robot_model import (
     DeviationMap,
-    Drill,
     LoadUncertainty,
     UncertaintyBudget,
     deformation_uncertainty,
     deviation_map,
-    drilling_load,
     drilling_wrench,
-    fitted_to_catalogue,
     measured_machining_uncertainty,
+    monte_carlo_deformation,
     read_robot,
+    tolerance_grade,
     tool_down,
 )
 from robot_model.uncertainty_budget import ROBOT_REPEATABILITY
@@ -79,16 +79,23 @@ def _show_budget(robot: str, area: DrillingArea, found: DeviationMap, worst: int
         typer.echo(f"no uncertainty budget: {error}")
         return
     deformation = deformation_uncertainty(case.robot, found.q[worst], wrench, LoadUncertainty())
+    _, trial = monte_carlo_deformation(case.robot, found.q[worst], wrench, LoadUncertainty(), trials=400)
     budget = UncertaintyBudget(ROBOT_REPEATABILITY, deformation, machining)
     parts = (
         ("robot without load", budget.robot_position),
         ("deformation under load", budget.robot_deformation),
+        ("the same, 400 Monte Carlo trials", trial),
         ("machining", budget.machining),
         ("hole position", budget.work),
     )
-    rows = tuple((name, f"{1e6 * value:.1f}") for name, value in parts)
+    rows = tuple((name, f"{1e6 * value:.1f}", _grade(2 * value, area.diameter)) for name, value in parts)
     title = "Expanded uncertainty at the worst hole (forces 5 %, joint stiffness 10 %: assumed)"
-    show(Table(title, ("part", "U, k = 2 (um)"), rows))
+    show(Table(title, ("part", "U, k = 2 (um)", "2 U fits in"), rows))
+
+
+def _grade(width: float, diameter: float) -> str:
+    grade = tolerance_grade(width, diameter)
+    return f"IT{grade}" if grade <= 16 else "none"
 
 
 def _write_deviations(out: Path, found: DeviationMap) -> None:

@@ -19,6 +19,7 @@ def mode_page(name: str, modes: StructureModes, lines: list[tuple[int, int]]) ->
     largest = np.linalg.norm(shapes, axis=2).max(axis=1)
     data = {
         "positions": modes.structure.positions.round(5).tolist(),
+        "tip": modes.structure.tip,
         "lines": [list(pair) for pair in lines],
         "frequencies": modes.frequencies[:count].round(3).tolist(),
         "shapes": (shapes / np.maximum(largest, 1e-300)[:, None, None]).round(4).tolist(),

@@ -11,13 +11,16 @@ from numpy.typing import NDArray
 from foundation import writing_whole_file
 from robot_model import CutPlace, DeviationMap, SpatialCase, StructureModes, close_loops, modes_at
 
-from ..figures.style import COLOURS, SHADE, house_style, new_figure
+from ..figures.style import COLOURS, house_style, new_figure, panel_letter
 from .mode_page import mode_page
 
 Real = NDArray[np.float64]
 
 _SHOWN = 0.25
 """Largest displacement drawn, m."""
+
+_REST = "0.78"
+"""Grey of the robot at rest."""
 
 
 def skeleton(modes: StructureModes) -> list[tuple[int, int]]:
@@ -41,18 +44,41 @@ def draw_modes(path: Path, case: SpatialCase, driven: Real) -> None:
 
 
 def robot_figure(modes: StructureModes, n_modes: int = 4) -> Figure:
-    """The robot at rest in grey and its lowest mode shapes in colour, largest displacement 0.25 m."""
+    """The robot at rest in grey and its lowest mode shapes in colour, largest displacement 0.25 m.
+
+    Above from the front left, below from above: what swings sideways shows in one of them.
+    """
     with house_style():
-        figure = new_figure(70.0)
+        figure = new_figure(105.0, layout=None)
         shown = min(n_modes, len(modes.squares))
         for mode in range(shown):
-            axes = figure.add_subplot(1, shown, mode + 1, projection="3d")
             moved = modes.structure.positions + exaggeration(modes, mode) * modes.shapes[mode, :, :3]
-            _lines(axes, modes, modes.structure.positions, SHADE, 3.0)
-            _lines(axes, modes, moved, COLOURS[1], 1.2)
-            axes.set_title(f"Mode {mode + 1}, {modes.frequencies[mode]:.1f} Hz")
-            _equal_axes(axes, modes.structure.positions)
+            left, width = 0.04 + mode * 0.95 / shown, 0.95 / shown
+            upper = figure.add_axes((left, 0.42, width, 0.55), projection="3d")
+            _lines(upper, modes, modes.structure.positions, _REST, 3.0)
+            _lines(upper, modes, moved, COLOURS[1], 1.3)
+            _equal_axes(upper, modes.structure.positions)
+            title = f"mode {mode + 1}, {modes.frequencies[mode]:.1f} Hz"
+            figure.text(left + 0.5 * width, 0.98, title, ha="center", va="top")
+            lower = figure.add_axes((left + 0.03, 0.11, width - 0.05, 0.30))
+            _from_above(lower, modes, moved)
+            if mode == 0:
+                lower.set_ylabel("y (m)")
     return figure
+
+
+def _from_above(axes: Axes, modes: StructureModes, moved: Real) -> None:
+    """The same from above, x to the right."""
+    for positions, colour, width in ((modes.structure.positions, _REST, 3.0), (moved, COLOURS[1], 1.3)):
+        for first, second in skeleton(modes):
+            axes.plot(*positions[[first, second]][:, :2].T, color=colour, linewidth=width, marker="o", markersize=2)
+    rest = modes.structure.positions
+    middle = (rest.max(axis=0) + rest.min(axis=0)) / 2
+    half = max(float(np.ptp(rest[:, :2], axis=0).max()) / 2 + 1.2 * _SHOWN, 0.4)
+    axes.set_xlim(middle[0] - half, middle[0] + half)
+    axes.set_ylim(middle[1] - half, middle[1] + half)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x (m)")
 
 
 def draw_deviation(path: Path, found: DeviationMap, shape: tuple[int, int]) -> None:
@@ -62,37 +88,49 @@ def draw_deviation(path: Path, found: DeviationMap, shape: tuple[int, int]) -> N
 
 def deviation_figure(found: DeviationMap, shape: tuple[int, int]) -> Figure:
     """The same as a figure; ``shape``: how many places along x and y."""
-    sizes = 1e3 * np.linalg.norm(found.deviations, axis=1).reshape(shape)
-    x, y = (found.positions[:, axis].reshape(shape) for axis in (0, 1))
-    with house_style():
-        figure = new_figure(80.0)
-        axes = figure.subplots()
-        drawn = axes.pcolormesh(y, x, np.ma.masked_invalid(sizes), shading="nearest", cmap="viridis")
-        figure.colorbar(drawn, ax=axes, label="deviation (mm)")
-        axes.set_xlabel("y (m)")
-        axes.set_ylabel("x (m)")
-        axes.set_aspect("equal")
-    return figure
+    sizes = 1e3 * np.linalg.norm(found.deviations, axis=1)
+    return map_figure(found.positions, shape, [(sizes, "deviation (mm)")])
 
 
 def draw_workspace(path: Path, places: Sequence[CutPlace], shape: tuple[int, int], lowest: Real, limits: Real) -> None:
     """Lowest frequency (Hz) over y and x, and beside it the depth limit (mm) where there is one."""
-    positions = np.array([place.position for place in places])
-    x, y = (positions[:, axis].reshape(shape) for axis in (0, 1))
-    fields = [(lowest, "lowest frequency (Hz)")]
+    fields = [(lowest, "lowest natural frequency (Hz)")]
     if np.isfinite(limits).any():
         fields.append((1e3 * limits, "depth limit (mm)"))
+    _save(map_figure(np.array([place.position for place in places]), shape, fields), path)
+
+
+def map_figure(positions: Real, shape: tuple[int, int], fields: Sequence[tuple[Real, str]]) -> Figure:
+    """Fields over y (across) and x (reach), with contours that carry their values; white where not reached.
+
+    Parameters
+    ----------
+    positions : (n, 3), m
+    shape
+        How many places along x and y.
+    fields
+        Values (n,) and label with unit, one a panel.
+    """
+    x, y = (positions[:, axis].reshape(shape) for axis in (0, 1))
+    tall = float(np.ptp(x)) / max(float(np.ptp(y)), 1e-9)
     with house_style():
-        figure = new_figure(75.0)
+        figure = new_figure(float(np.clip(150.0 / len(fields) * tall + 18.0, 55.0, 120.0)))
+        figure.set_layout_engine("compressed")
         panels = figure.subplots(1, len(fields), squeeze=False)[0]
-        for axes, (field, label) in zip(panels, fields, strict=True):
+        for number, (axes, (field, label)) in enumerate(zip(panels, fields, strict=True)):
             shown = np.ma.masked_invalid(field.reshape(shape))
             drawn = axes.pcolormesh(y, x, shown, shading="nearest", cmap="viridis")
-            figure.colorbar(drawn, ax=axes, label=label)
+            if min(shape) > 2 and shown.count() > 8 and np.ptp(shown.compressed()) > 0:
+                lines = axes.contour(y, x, shown, 6, colors="white", linewidths=0.7)
+                axes.clabel(lines, fontsize=7)
+            figure.colorbar(drawn, ax=axes, label=label, pad=0.02)
             axes.set_xlabel("y (m)")
             axes.set_ylabel("x (m)")
             axes.set_aspect("equal")
-    _save(figure, path)
+            axes.grid(visible=False)
+            if len(fields) > 1:
+                panel_letter(axes, number)
+    return figure
 
 
 def _lines(axes: Axes, modes: StructureModes, positions: Real, colour: str, width: float) -> None:
@@ -105,8 +143,10 @@ def _equal_axes(axes: Axes, positions: Real) -> None:
     half = np.ptp(positions, axis=0).max() / 2 + _SHOWN
     for name, centre in zip(("x", "y", "z"), middle, strict=True):
         getattr(axes, f"set_{name}lim")(centre - half, centre + half)
-        getattr(axes, f"set_{name}ticks")([])
-    axes.set_box_aspect((1, 1, 1))  # type: ignore[arg-type]
+        getattr(axes, f"{name}axis").set_ticklabels([])
+        getattr(axes, f"set_{name}label")(name, labelpad=-12)
+    axes.set_box_aspect((1, 1, 1), zoom=1.1)  # type: ignore[arg-type, call-arg]
+    axes.view_init(elev=18, azim=-50)  # type: ignore[attr-defined]
 
 
 def _save(figure: Figure, path: Path) -> None:

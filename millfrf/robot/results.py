@@ -21,14 +21,12 @@ from robot_model import (
     tool_down,
     write_compensated_path,
 )
-from stability import write_lobes
 
-from ..chain.lobes import compute_lobes, speed_axis
 from ..commands.options import check_band, check_output
 from ..progress import bar
 from ..tables import Table, show
-from .posture_maps import depth_over_places, depth_over_redundancy, write_posture_map
-from .postures import Asked, cut_place, posture_of, spatial
+from .posture_maps import depth_over_places
+from .postures import Asked, posture_of, spatial
 
 RPM = np.pi / 30
 
@@ -45,7 +43,7 @@ def show_modes(robot: str, asked: Asked, count: int, picture: Path | None) -> No
     shown = [(f, kept.get(f"{f:.6f}", "overdamped")) for f in result.frequencies[:count]]
     rows = tuple((str(i + 1), f"{f:.3f}", ratio) for i, (f, ratio) in enumerate(shown))
     show(Table(f"Modes in the posture {_degrees(driven)}", ("mode", "frequency (Hz)", "damping ratio (%)"), rows))
-    _warn(result)
+    warn(result)
     if picture is not None:
         from .picture import draw_modes
 
@@ -76,7 +74,7 @@ def write_receptance(
         write_modal_model(out, model)
     else:
         write_frf(out, model.frf(np.linspace(*band, lines)))
-    _warn(result)
+    warn(result)
     typer.echo(f"wrote {out}: {len(model.poles)} modes from {model.natural_frequencies.min():.2f} Hz")
 
 
@@ -94,64 +92,7 @@ def show_stiffness(robot: str, asked: Asked, force: float) -> None:
         parts = ", ".join(f"{names[i][1:]} {d:+.2f}" for i, d in zip(moving, direction, strict=True))
         typer.echo(f"{1e-6 / value:8.3f} N/um along ({parts})")
     typer.echo(f"largest deflection under {force:g} N: {1e3 * force * values[-1]:.3f} mm")
-    _warn(result)
-
-
-def write_lobes_in_posture(
-    robot: str,
-    asked: Asked,
-    cutting: Path,
-    speeds: tuple[float, float, int] | None,
-    max_depth: float,
-    method: str,
-    out: Path,
-) -> None:
-    """Lobes of one posture, in the axes of the cut."""
-    check_output(out, (".csv",))
-    if speeds is None:
-        raise InputError("give --speeds LO HI N for lobes, or --angles LO HI N with --speed RPM for a posture map")
-    case = read_robot(robot)
-    driven, axes = posture_of(case, asked)
-    result = in_posture(case, driven, axes)
-    process = read_cutting_process(cutting)
-    found = compute_lobes(result.known_model(), process, speed_axis(*speeds), max_depth, method, bar)
-    write_lobes(out, found)
-    _warn(result)
-    lowest = found.depth_limits.argmin()
-    typer.echo(
-        f"wrote {out}: lowest limit {1e3 * found.depth_limits[lowest]:.3g} mm "
-        f"at {found.spindle_speeds_rpm[lowest]:.0f} rpm"
-    )
-
-
-def write_map_over_redundancy(
-    robot: str,
-    asked: Asked,
-    cutting: Path,
-    angles: tuple[float, float, int],
-    speed: float | None,
-    max_depth: float,
-    out: Path,
-) -> None:
-    """Depth limit over the redundancy angle, and the best posture."""
-    check_output(out, (".csv",))
-    if speed is None or not speed > 0:
-        raise InputError("a posture map is at one spindle speed: give --speed RPM")
-    if angles[2] < 1 or not max_depth > 0:
-        raise InputError(f"{angles[2]} angles up to a depth of {max_depth!r} m: both must be positive")
-    case = spatial(read_robot(robot))
-    process = read_cutting_process(cutting)
-    axis = np.radians(np.linspace(*angles))
-    with bar("posture map"):
-        found = depth_over_redundancy(
-            case.robot, cut_place(asked), axis, process, speed * RPM, max_depth, asked.redundancy
-        )
-    best = found.best()
-    write_posture_map(out, found)
-    typer.echo(
-        f"wrote {out}: {found.reached.sum()} of {len(axis)} angles reached; best {1e3 * found.values[best]:.3g} mm at "
-        f"{np.degrees(axis[best]):.1f} deg, worst {1e3 * np.nanmin(found.values):.3g} mm"
-    )
+    warn(result)
 
 
 def write_workspace_map(
@@ -203,6 +144,7 @@ def _degrees(driven: object) -> str:
     return ", ".join(f"{angle:.1f}" for angle in np.degrees(np.asarray(driven))) + " deg"
 
 
-def _warn(result: PostureResult) -> None:
+def warn(result: PostureResult) -> None:
+    """Print a posture's warnings."""
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)

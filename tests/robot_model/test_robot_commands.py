@@ -13,9 +13,10 @@ from estimation import read_frf
 from millfrf.__main__ import BAD_INPUT, DONE, run
 from millfrf.robot.depth_map import depth_limits
 from millfrf.robot.posture_maps import depth_over_places, depth_over_redundancy
+from millfrf.robot.robot_lobes import at_the_tip
 from modal_fit import read_modal_model
 from replay_data import MillingCell
-from robot_model import modal_model_at, read_spatial_robot, tool_down
+from robot_model import modal_model_at, read_planar_robot, read_spatial_robot, rigid_model, tool_down
 from stability import read_lobes, zero_order
 
 STAUBLI = read_spatial_robot("staubli_rx170").robot
@@ -51,10 +52,11 @@ def test_compiled_limits_are_the_zero_order_solution(process: MillingProcess, rp
 
 
 def test_turning_the_redundancy_makes_an_unstable_cut_stable() -> None:
-    """3 mm at 3000 rpm chatters with the tool upright and is stable with tool and table turned by 30 degrees."""
-    place = tool_down([0.9, 0.1, 0.8], pi / 2)
-    found = depth_over_redundancy(STAUBLI, place, np.radians([0.0, -30.0]), HALF_DOWN, 100 * pi, 0.02, "table")
-    assert found.values[0] < 3e-3 < found.values[1]
+    """4 mm at 6000 rpm chatters with the tool upright and is stable with tool and table turned by 90 degrees."""
+    place = tool_down([1.1, 0.0, 0.85], pi)
+    found = depth_over_redundancy(STAUBLI, place, np.radians([0.0, 90.0]), HALF_DOWN, 200 * pi, 0.02, "table")
+    assert found.values[0] < 3.6e-3
+    assert found.values[1] > 4.4e-3
 
 
 def test_places_on_two_processes_are_those_on_one() -> None:
@@ -115,7 +117,10 @@ def test_deviation_of_drilled_holes(tmp_path: Path, capsys: pytest.CaptureFixtur
     area = ["--x", "0.7", "1.0", "2", "--y", "-0.2", "0.2", "3"]
     options = ["--drill", "8", *area, "--out", str(table), "--picture", str(picture)]
     assert run(["robot", "deviation", "staubli_rx170", *options]) == DONE
-    assert "thrust 1" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "thrust 1" in printed
+    assert "Monte Carlo" in printed
+    assert "IT" in printed
     with table.open() as stream:
         assert len(list(csv.DictReader(stream))) == 6
     assert picture.exists()
@@ -130,8 +135,26 @@ def test_lobes_and_posture_map(tmp_path: Path, cut: str) -> None:
     with out.open() as stream:
         rows = list(csv.DictReader(stream))
     assert [float(row["angle_deg"]) for row in rows] == pytest.approx([-20, 0, 20])
+    picture = tmp_path / "map.png"
+    drawn = ["--angles", "-20", "20", "3", "--speed", "3000", "--picture", str(picture), "--depth", "0.002"]
+    assert run(["robot", "lobes", *common, *drawn]) == DONE
+    assert picture.stat().st_size > 10_000
+    assert run(["robot", "lobes", *common, *drawn[:-1], "-1"]) == BAD_INPUT
     assert run(["robot", "lobes", *common]) == BAD_INPUT
     assert run(["robot", "lobes", *common, "--angles", "-20", "20", "3"]) == BAD_INPUT
+
+
+def test_lobes_of_a_planar_robot_are_rigid_across(tmp_path: Path, cut: str) -> None:
+    """Y has no compliance: the limit is that of the model with zeros there."""
+    out, picture = tmp_path / "l.csv", tmp_path / "l.png"
+    common = ["chen_2026", "--pose", "P2", "--cutting", cut, "--max-depth", "0.05", "--speeds", "2000", "3000", "2"]
+    assert run(["robot", "lobes", *common, "--out", str(out), "--picture", str(picture)]) == DONE
+    assert picture.exists()
+    chen = read_planar_robot("chen_2026")
+    model = at_the_tip(rigid_model(chen.robot, chen.poses["P2"]))
+    assert np.abs(model.receptance(np.array([9.0]))[0, 1]).max() == 0
+    limits = zero_order(model, HALF_DOWN, np.array([2000.0, 3000.0]) * pi / 30, 0.05).depth_limits
+    assert read_lobes(out).depth_limits == pytest.approx(limits, rel=1e-6)
 
 
 def test_workspace_map(tmp_path: Path, cut: str, capsys: pytest.CaptureFixture[str]) -> None:

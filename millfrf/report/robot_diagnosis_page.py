@@ -1,0 +1,113 @@
+"""The page that a robot's diagnosis leaves behind."""
+
+import os
+from datetime import UTC, datetime
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from foundation import writing_whole_file
+from mismatch.robot_causes import RobotCause, RobotDiagnosis
+
+from ..figures.embed import as_data_uri
+from ..figures.robot_diagnosis_figure import robot_evidence_figure, robot_spectra_figure
+from ..figures.style import house_style
+from ..provenance import versions
+from ..tables import Table, with_error
+from .section import Picture, Section
+
+
+def write_robot_report(
+    path: str | os.PathLike[str], found: RobotDiagnosis, robot_name: str, summary: list[str]
+) -> None:
+    """Write one HTML page, figures inside, that needs no other file and no network.
+
+    Parameters
+    ----------
+    path
+        Of the page.
+    found
+        The diagnosis.
+    robot_name
+        For the title.
+    summary
+        Verdict, a sentence on it, and a line for each cause and held-out recording.
+    """
+    environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
+    names = ", ".join(one.name for one in found.setting.recordings)
+    text = environment.get_template("diagnosis.html.j2").render(
+        title=f"{robot_name} against {names}",
+        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
+        verdict=f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",
+        answers=[("What was found", summary[2:] or ["Nothing to change."])],
+        warnings=_warnings(found),
+        sections=[_spectra(found), _candidates(found), _postures(found)],
+        versions=versions(),
+    )
+    with writing_whole_file(path) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8")
+
+
+def _warnings(found: RobotDiagnosis) -> list[str]:
+    error = found.setting.error
+    warnings = [
+        f"A right model is taken to be off by {100 * error.frequency:g} % in frequency, {100 * error.damping:g} % in "
+        f"damping and {100 * error.shape:g} % of a shape's size in each posture; what is smaller is not named."
+    ]
+    if len(found.setting.recordings) == 1:
+        warnings.append("One posture loads the joints in one way: causes are told apart better from several.")
+    if found.excess_after > 2:
+        warnings.append(
+            f"What is left is {found.excess_after:.1f} times what a right model leaves: some of the physics is missing."
+        )
+    return warnings
+
+
+def _spectra(found: RobotDiagnosis) -> Section:
+    with house_style():
+        picture = as_data_uri(robot_spectra_figure(found))
+    caption = (
+        "Root of response power over force power, all channels of a recording together, as receptance. The modes of "
+        "the robot are drawn without the small deviations that a right model is allowed."
+    )
+    rows = tuple(
+        (one.name, f"{100 * one.before:.3g}", f"{100 * one.after:.3g}", f"{100 * one.free:.3g}")
+        for one in found.held_out
+    )
+    columns = ("recording", "as modelled", "with the change", "modes fitted freely")
+    table = Table("Error of recordings that were left out of the fit (% of the response)", columns, rows)
+    return Section("On the recordings", (), (table,), (Picture(picture, caption, "Spectra before and after"),))
+
+
+def _candidates(found: RobotDiagnosis) -> Section:
+    with house_style():
+        picture = as_data_uri(robot_evidence_figure(found))
+    rows = tuple((one.name, *_number(one), f"{one.evidence:.1f}") for one in found.candidates)
+    table = Table("Every change with its number", ("change", "number", "unit", "evidence"), rows)
+    caption = "Gain in score of each single change (twice a log Bayes factor); blue: accepted, or as good."
+    return Section("What was weighed", (), (table,), (Picture(picture, caption, "Evidence of the candidates"),))
+
+
+def _number(cause: RobotCause) -> tuple[str, str]:
+    if not cause.standard_error < 3 * abs(cause.number) + 0.5:
+        return "not told by the data", ""
+    if cause.kind == "posture":
+        return with_error(float(np.degrees(cause.number)), float(np.degrees(cause.standard_error)), sign=True), "deg"
+    return with_error(cause.number, cause.standard_error), cause.unit or "times"
+
+
+def _postures(found: RobotDiagnosis) -> Section:
+    rows = tuple(
+        (
+            one.name,
+            ", ".join(f"{angle:.1f}" for angle in np.degrees(one.q)),
+            f"{one.lines.frequencies[0]:.3g} to {one.lines.frequencies[-1]:.3g}",
+            ", ".join(one.responses),
+        )
+        for one in found.setting.recordings
+    )
+    table = Table("Recordings and their postures", ("recording", "joints (deg)", "band (Hz)", "responses"), rows)
+    return Section("What was compared", (), (table,))

@@ -1,0 +1,24 @@
+"""What is wrong with a robot's model: recordings in several postures against a few numbers of the robot."""
+
+from .posed_recording import PosedRecording, posed, read_posed
+from .robot_diagnosis import ROBOT_ERROR, diagnose_robot
+from .robot_diagnosis_file import robot_diagnosis_content, write_robot_diagnosis
+from .robot_fit import RobotFit, fit_robot
+from .robot_results import HeldOut, RobotCause, RobotDiagnosis
+from .robot_setting import Setting
+
+__all__ = [
+    "ROBOT_ERROR",
+    "HeldOut",
+    "PosedRecording",
+    "RobotCause",
+    "RobotDiagnosis",
+    "RobotFit",
+    "Setting",
+    "diagnose_robot",
+    "fit_robot",
+    "posed",
+    "read_posed",
+    "robot_diagnosis_content",
+    "write_robot_diagnosis",
+]

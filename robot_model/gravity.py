@@ -1,0 +1,110 @@
+"""Gravity as a stiffness: what the weight of links and bodies does to small rotations of the joints."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import InputError
+
+from .structure import Structure
+
+if TYPE_CHECKING:
+    from .spatial_robot import SpatialRobot
+
+Real = NDArray[np.float64]
+
+STANDARD_GRAVITY = 9.80665
+"""m/s^2."""
+
+UP = np.array([0.0, 0.0, 1.0])
+"""Axis of the base frame against which weight acts."""
+
+
+def with_gravity(robot: SpatialRobot, gravity: float = STANDARD_GRAVITY) -> SpatialRobot:
+    """The robot with the stiffness of its own weight, ``gravity`` m/s^2 along the base's -z.
+
+    Raises
+    ------
+    InputError
+        A negative or infinite gravity, or a robot with closed loops.
+    """
+    if not (np.isfinite(gravity) and gravity >= 0):
+        raise InputError(f"gravity {gravity!r} m/s^2 must be zero or more, and finite")
+    return replace(robot, gravity=gravity)
+
+
+def gravity_hessian(robot: SpatialRobot, q: Real, structure: Structure) -> Real:
+    """Second derivative of ``V = sum m g z`` over the joint values, N m/rad, shape (n_moving, n_moving).
+
+    A mass at p on a body that joints i and j carry, i nearer to the base, has ``d^2 p / dq_i dq_j = z_i x (z_j x
+    (p - o_j))`` with z the joints' axes and o their origins (Siciliano et al., Robotics, section 3.6): the spatial form
+    of the term ``sum m_i y_i g`` of Chen et al. 2026, Eq. 18. Beams count with half their mass at each end; links are
+    taken as rigid in this term, so that joints alone turn the weight.
+    """
+    mechanism = robot.mechanism
+    placed = mechanism.transforms(q)
+    size = len(mechanism.moving)
+    hessian = np.zeros((size, size))
+    for frame, mass, place in _masses(robot, structure):
+        carried = [
+            column for column, index in enumerate(mechanism.moving) if frame >= 0 and _carries(robot, index, frame)
+        ]
+        for position, first in enumerate(carried):
+            for second in carried[position:]:
+                near, far = (placed[mechanism.moving[column]] for column in (first, second))
+                bend = np.cross(near[:3, 2], np.cross(far[:3, 2], place - far[:3, 3]))
+                hessian[first, second] += mass * robot.gravity * float(UP @ bend)
+                hessian[second, first] = hessian[first, second]
+    return hessian
+
+
+def gravity_stiffness(robot: SpatialRobot, q: Real, structure: Structure) -> Real:
+    """The same over all nodes, (6 H, 6 H): ``S^T G S`` with S the relative rotation of each joint about its axis."""
+    hessian = gravity_hessian(robot, q, structure)
+    rows = np.zeros((len(hessian), 6 * len(structure.positions)))
+    names = [robot.mechanism.frames[index].name for index in robot.mechanism.moving]
+    for joint, spring in zip(robot.joints, structure.springs, strict=True):
+        row = rows[names.index(joint.frame)]
+        for node, sign in zip(spring.nodes, (-1.0, 1.0), strict=True):
+            row[6 * node + 3 : 6 * node + 6] += sign * spring.axes[:, 2]
+    return np.asarray(rows.T @ hessian @ rows)
+
+
+def _masses(robot: SpatialRobot, structure: Structure) -> list[tuple[int, float, Real]]:
+    """Frame that carries it (-1: the base), mass and place of every lump."""
+    owner = {node: name for node, (name, _) in robot.points.items()}
+    for joint in robot.joints:
+        owner.setdefault(joint.nodes[0], _before(robot, joint.frame))
+        owner[joint.nodes[1]] = joint.frame
+    lumps = [
+        (_index(robot, body.frame), body.mass, structure.positions[body.node] + placed.centre)
+        for body, placed in zip(robot.bodies, structure.bodies, strict=True)
+    ]
+    for link in robot.links:
+        if link.section is None:
+            continue
+        ends = structure.positions[list(link.nodes)]
+        half = link.section.mass * float(np.linalg.norm(ends[1] - ends[0])) / 2
+        lumps += [(_index(robot, owner.get(link.nodes[0], "0")), half, end) for end in ends]
+    return lumps
+
+
+def _before(robot: SpatialRobot, frame: str) -> str:
+    return robot.mechanism.frames[robot.mechanism.index(frame)].antecedent
+
+
+def _index(robot: SpatialRobot, name: str) -> int:
+    return -1 if name == "0" else robot.mechanism.index(name)
+
+
+def _carries(robot: SpatialRobot, joint: int, frame: int) -> bool:
+    """Whether the joint at one frame moves the body of another."""
+    while frame >= 0:
+        if frame == joint:
+            return True
+        frame = _index(robot, robot.mechanism.frames[frame].antecedent)
+    return False
