@@ -71,7 +71,7 @@ def test_units_become_si_at_this_edge() -> None:
 
 def test_the_example_is_a_session() -> None:
     session = read_session(Path(__file__).parents[2] / "examples" / "session.toml")
-    assert [channel.wired().channel.name for channel in session.channels] == ["fx", "ax"]
+    assert [channel.wired().channel.name for channel in session.channels] == ["fx", "ax", "tacho"]
     assert len(session.feeds) == 2
 
 
