@@ -28,8 +28,8 @@ class JointResponse:
     ----------
     force : (n_padded_lines,), N
         Padded spectrum.
-    deflection, velocity : (n_padded,), m and m/s
-        At the recording's samples.
+    deflection, velocity : (k n_padded,), m and m/s
+        At the recording's samples, or k times as often (:func:`substeps`).
     """
 
     force: Complex
@@ -59,6 +59,12 @@ def common_axes(model: ModalModel) -> tuple[list[int], list[int]]:
 def fineness(model: ModalModel, rate: float) -> int:
     """Instants of the simulation a sample."""
     return max(4, int(np.ceil(INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate)))
+
+
+def substeps(model: ModalModel, rate: float, fine: int) -> int:
+    """Instants a sample at which a motion is kept: a divisor of ``fine`` that follows the highest mode."""
+    wanted = INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate
+    return next((k for k in range(1, fine) if fine % k == 0 and k >= wanted), fine)
 
 
 def joint_response(
@@ -99,13 +105,14 @@ def joint_response(
         written,
     )
     force_lines = np.asarray(rfft(written[0])[: len(frequencies)] / fine)
-    return JointResponse(force_lines, written[1][::fine].copy(), written[2][::fine].copy())
+    every = fine // substeps(model, lines.trial.rate, fine)
+    return JointResponse(force_lines, written[1][::every].copy(), written[2][::every].copy())
 
 
-def driven_force(lines: WindowedLines, deflection: Real, velocity: Real, law: JointLaw) -> Real:
-    """The joint's force (n,), N, for a motion sampled at the trial's rate."""
+def driven_force(lines: WindowedLines, deflection: Real, velocity: Real, law: JointLaw, *, often: int = 1) -> Real:
+    """The joint's force (n,), N, for a motion sampled at the trial's rate, or ``often`` times it."""
     result = np.empty(len(deflection))
-    ramp = stiffness_ramp(law, len(deflection), 1 / lines.trial.rate, lines.trial.duration)
+    ramp = stiffness_ramp(law, len(deflection), 1 / (often * lines.trial.rate), lines.trial.duration)
     driven_run(deflection, velocity, law.tables(), (law.reach, law.speed), ramp, (law.springs, law.yields), result)
     return result
 

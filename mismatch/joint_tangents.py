@@ -86,18 +86,18 @@ def _force_change(
 ) -> NDArray[np.float32]:
     """Derivative of g at the samples, (n, size)."""
     cause, own, answer = joint
-    n = len(lines.trial.force)
+    often = len(answer.deflection) // (len(lines.trial.force) if cause.seen is not None else lines.padded)
+    n = often * len(lines.trial.force)
     # a derivative need not be known to more than six digits
     dg = np.zeros((n, explanation.size), dtype=np.float32)
-    dg[:, own] = _law_change(cause, lines, answer)
+    dg[:, own] = _law_change(cause, lines, answer, often)
     if cause.seen is not None:
         return dg
     driven = _driven_change(explanation, lines, joint, force, change)
-    frequencies = lines.padded_frequencies
-    spectrum = np.zeros((len(frequencies), explanation.size), dtype=np.complex64)
-    spectrum[: len(driven)] = driven
-    s = np.asarray(2j * np.pi * frequencies[:, None], dtype=np.complex64)
-    law, step = cause.law(), 1 / lines.trial.rate
+    spectrum = np.zeros((often * lines.padded // 2 + 1, explanation.size), dtype=np.complex64)
+    spectrum[: len(driven)] = often * driven
+    law, step = cause.law(), 1 / (often * lines.trial.rate)
+    s = 2j * np.pi * np.arange(len(spectrum), dtype=np.float32)[:, None] / np.float32(lines.padded * step * often)
     assert cause.direction is not None
     tangent_run(
         (answer.deflection[:n], answer.velocity[:n]),
@@ -107,25 +107,37 @@ def _force_change(
         stiffness_ramp(law, n, step, lines.trial.duration),
         (law.springs, law.yields),
         (
-            irfft(spectrum, n=lines.padded, axis=0)[:n],
-            irfft(s * spectrum, n=lines.padded, axis=0)[:n],
+            irfft(spectrum, n=often * lines.padded, axis=0)[:n],
+            irfft(s * spectrum, n=often * lines.padded, axis=0)[:n],
         ),
         dg,
     )
-    return dg
+    return at_samples(dg, often)
 
 
-def _law_change(cause: Cause, lines: WindowedLines, answer: JointResponse) -> Real:
+def at_samples(signal: NDArray[np.float32], often: int) -> NDArray[np.float32]:
+    """Every ``often``-th instant of signals (often n, n_columns), each the mean of those around it, tapered."""
+    if often == 1:
+        return signal
+    weights = np.bartlett(2 * often + 1)[1:-1]
+    weights /= weights.sum()
+    padded = np.pad(signal, ((often - 1, often - 1), (0, 0)))
+    return np.asarray(
+        sum(weight * padded[k : k + len(signal) : often] for k, weight in enumerate(weights.astype(np.float32)))
+    )
+
+
+def _law_change(cause: Cause, lines: WindowedLines, answer: JointResponse, often: int) -> Real:
     """Derivative of g at given motion by the cause's own numbers, (n, cause.size); none by angles."""
-    n = len(lines.trial.force)
+    n = often * len(lines.trial.force)
     x, v = answer.deflection[:n], answer.velocity[:n]
     result = np.zeros((n, cause.size))
     here = cause.coordinates()
-    plain = driven_force(lines, x, v, cause.law())
+    plain = driven_force(lines, x, v, cause.law(), often=often)
     for k in range(len(cause.values)):
         aside = here.copy()
         aside[k] += ASIDE
-        result[:, k] = (driven_force(lines, x, v, cause.moved(aside).law()) - plain) / ASIDE
+        result[:, k] = (driven_force(lines, x, v, cause.moved(aside).law(), often=often) - plain) / ASIDE
     return result
 
 

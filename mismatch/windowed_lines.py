@@ -17,8 +17,11 @@ from .trial import Trial
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
-NEIGHBOURS = 41
+NEIGHBOURS = 61
 """Lines over which the spectral matrix of the forces is averaged."""
+
+CLOSEST = 7
+"""The same, to see where there is less force than around."""
 
 WIDELY, QUIETEST = 201, 0.05
 """The same, so wide that chance hardly counts, to find the share of lines whose power bounds the forces' noise."""
@@ -152,11 +155,18 @@ def without_force_noise(lines: WindowedLines, variance: Real) -> WindowedLines:
     wide = min(WIDELY, len(own) // 5)
     quiet = np.quantile(_around(own, wide)[wide:-wide], QUIETEST, axis=0)
     deviation = np.sqrt(np.maximum(np.minimum(variance, quiet), 1e-12 * own.mean(axis=0)))
-    values, vectors = np.linalg.eigh(_around(products, min(NEIGHBOURS, wide)) / np.outer(deviation, deviation))
+    count = min(NEIGHBOURS, wide)
+    whitened = products / np.outer(deviation, deviation)
+    total = np.einsum("kqq->kq", whitened).real.sum(axis=1)
+    # beside a harmonic or the end of a band, less is there than around
+    less = np.minimum(_around(total, CLOSEST) / np.maximum(_around(total, count), 1e-300), 1.0)
+    values, vectors = np.linalg.eigh(np.maximum(less, 0.0)[:, None, None] * _around(whitened, count))
     share = np.where(values > LEAST_POWER, 1 - 1 / np.maximum(values, 1.0), 0.0)
+    # which directions these are is itself known from some lines only
+    unsure = np.maximum(1 - 1 / np.maximum(values, 1.0), np.sum(_weights(count) ** 2))
     whole, root = (
         deviation[:, None] * (vectors * weight[:, None, :]) @ vectors.conj().swapaxes(1, 2) / deviation
-        for weight in (share, np.sqrt(share))
+        for weight in (share, np.sqrt(unsure))
     )
     place = lines.padded_frequencies * len(lines.window) / lines.trial.rate
     low = np.minimum(place.astype(int), len(whole) - 2)
@@ -185,10 +195,14 @@ def _padded_force(lines: WindowedLines) -> Complex:
 
 def _around(power: Complex, count: int) -> Complex:
     """Mean over ``count`` neighbouring lines, tapered."""
-    weights = hann(count + 2)[1:-1]
     flat = power.reshape(len(power), -1)
-    mean = convolve(flat, (weights / weights.sum())[:, None], mode="same", method="fft")
-    return np.asarray(mean.reshape(power.shape))
+    return np.asarray(convolve(flat, _weights(count)[:, None], mode="same", method="fft").reshape(power.shape))
+
+
+def _weights(count: int) -> Real:
+    """Of neighbours in a mean."""
+    weights = hann(count + 2)[1:-1]
+    return np.asarray(weights / weights.sum())
 
 
 def receptance_at(model: ModalModel, frequencies: Real) -> Complex:

@@ -37,7 +37,7 @@ def robot_spectra_figure(found: RobotDiagnosis) -> Figure:
             drawn.append((changed, {"color": COLOURS[1], "label": "with the change"}))
         force = _averaged(np.sum(np.abs(lines.force_here) ** 2, axis=1))
         at = _averaged(lines.frequencies)
-        shift = np.abs(lines.kinematic(at)[:, 0])
+        shift = _averaged(np.abs(lines.kinematic[:, 0]))
         for values, look in drawn:
             power = _averaged(np.sum(np.abs(values) ** 2, axis=1))
             axes.semilogy(at, 1e6 * np.sqrt(power / force) / shift, **look)

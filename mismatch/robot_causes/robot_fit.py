@@ -196,7 +196,7 @@ def _normal(
         lines, u = recording.lines, state.deviations[number]
         modes = state.modes[number].moved(u, setting.error)
         slopes = modes.slopes(state.modes[number], lines.frequencies, lines.force_here, setting.error)
-        slopes = slopes * lines.kinematic(lines.frequencies)[:, :, None]
+        slopes = slopes * lines.kinematic[:, :, None]
         here = quick_lines(modes, lines)
         columns = []
         for aside in (one[number] for one in beside):

@@ -48,4 +48,4 @@ def whiteners_of(setting: Setting, fitted: RobotFit, noises: Sequence[NoiseModel
 
 def _through(modes: RobotModes, recording: PosedRecording) -> Complex:
     frequencies = recording.lines.frequencies
-    return np.asarray(modes.receptance(frequencies) * recording.lines.kinematic(frequencies)[:, :, None])
+    return np.asarray(modes.receptance(frequencies) * recording.lines.kinematic[:, :, None])

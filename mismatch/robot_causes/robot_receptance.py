@@ -175,11 +175,11 @@ def predicted_lines(modes: RobotModes, lines: WindowedLines) -> Complex:
     response = np.zeros((len(frequencies), len(modes.rows)), dtype=complex)
     near = frequencies[needed]
     moved = np.einsum("kpq,kq->kp", modes.receptance(near), lines.force_lines[needed])
-    response[needed] = moved * lines.kinematic(near)
+    response[needed] = moved * lines.padded_kinematic[needed]
     return lines.cut(lines.signal(response))
 
 
 def quick_lines(modes: RobotModes, lines: WindowedLines) -> Complex:
     """The same from the windowed forces, line by line: for searches and derivatives, no leakage."""
     moved = np.einsum("kpq,kq->kp", modes.receptance(lines.frequencies), lines.force_here)
-    return np.asarray(moved * lines.kinematic(lines.frequencies))
+    return np.asarray(moved * lines.kinematic)

@@ -1,0 +1,75 @@
+"""Forces are measured with noise too: what that does to a comparison, and that it is undone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.signal import firwin, lfilter
+
+from mismatch import Explanation, LabError, ModelShape, Trial, band_of, diagnose, predict_lines, windowed_lines
+from mismatch.windowed_lines import WindowedLines, without_force_noise
+from modal_fit import ModalModel
+
+RATE, SILENT = 128.0, 26.0
+"""Hz; above ``SILENT`` nothing pushes."""
+
+
+def _trial(model: ModalModel, level: float, seed: int) -> tuple[Trial, NDArray[np.float64]]:
+    """Two forces that rise and fall together, silent above 26 Hz, 6 % noise on all signals; and that on forces."""
+    rng = np.random.default_rng(seed)
+    n = int(40 * RATE)
+    common = lfilter(firwin(129, SILENT - 3, fs=RATE), 1.0, rng.normal(size=n))
+    own = lfilter(firwin(129, SILENT - 3, fs=RATE), 1.0, rng.normal(size=(n, 2)), axis=0)
+    force = level * (common[:, None] * [1.0, 0.4] + 0.005 * own)
+    empty = Trial("t", RATE, force, np.zeros((n, 2)), np.array([2, 2]), ("fx", "fy", "ax", "ay"))
+    lines = windowed_lines(empty, band_of(model, RATE), 1.0)
+    shape = ModelShape(model, LabError())
+    response = lines.signal(predict_lines(Explanation(shape, np.zeros(shape.size)), lines).spectrum)
+    noise = 0.06 * force.std(axis=0) * rng.normal(size=force.shape)
+    measured = response + 0.06 * response.std(axis=0) * rng.normal(size=response.shape)
+    return Trial(f"level {level:g}", RATE, force + noise, measured, np.array([2, 2]), empty.channels), noise
+
+
+@pytest.fixture(scope="module")
+def lines(small_model: ModalModel) -> WindowedLines:
+    return windowed_lines(_trial(small_model, 40.0, 1)[0], band_of(small_model, RATE), 1.0)
+
+
+def _spectrum(lines: WindowedLines, force: NDArray[np.float64]) -> NDArray[np.complex128]:
+    return lines.cut(force)
+
+
+def test_what_is_only_noise_is_taken_for_nothing(small_model: ModalModel, lines: WindowedLines) -> None:
+    trial, noise = _trial(small_model, 40.0, 1)
+    variance = noise.var(axis=0)
+    weighed = without_force_noise(lines, variance)
+    silent = lines.frequencies > SILENT + 2
+    assert silent.sum() > 100
+    left = np.mean(np.abs(weighed.force_here[silent]) ** 2, axis=0) / np.mean(np.abs(lines.force_here[silent]) ** 2)
+    assert (left < 0.1).all()
+    # where there is force, what is used is nearer to the true force than what was measured
+    loud = lines.frequencies < SILENT - 8
+    true = _spectrum(lines, trial.force - noise)[loud]
+    error = np.mean(np.abs(weighed.force_here[loud] - true) ** 2, axis=0)
+    assert (error < 0.8 * np.mean(np.abs(lines.force_here[loud] - true) ** 2, axis=0)).all()
+
+
+def test_without_noise_forces_stay(lines: WindowedLines) -> None:
+    same = without_force_noise(lines, np.zeros(2))
+    np.testing.assert_allclose(same.force_here, lines.force_here, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(same.force_lines, lines.force_lines, rtol=1e-6, atol=1e-6)
+
+
+def test_noisy_forces_are_no_missing_mode(small_model: ModalModel) -> None:
+    """Without it a mode near the silent band cancels the response that the noise seems to ask for."""
+    trials = [_trial(small_model, level, seed)[0] for level, seed in ((20.0, 2), (40.0, 3), (80.0, 4))]
+    result = diagnose(small_model, trials)
+    assert result.verdict == "none", [(cause.name, cause.evidence) for cause in result.physics]
+
+
+def test_a_recording_too_short_for_wide_means(small_model: ModalModel) -> None:
+    trial = _trial(small_model, 40.0, 5)[0]
+    short = replace(trial, force=trial.force[: 6 * int(RATE)], response=trial.response[: 6 * int(RATE)])
+    prepared = windowed_lines(short, band_of(small_model, RATE), 2.0)
+    assert np.isfinite(without_force_noise(prepared, np.ones(2)).force_here).all()

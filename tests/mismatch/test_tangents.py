@@ -1,0 +1,88 @@
+"""The tangent of a joint's free run against difference quotients of whole simulations, and the loops over lines."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mismatch import Explanation, LabError, ModelShape, Trial, band_of, predict_lines, windowed_lines
+from mismatch.explanation import Cause
+from mismatch.fitting import jacobian
+from mismatch.joint_law import JointMotion
+from mismatch.joint_simulation import driven_force
+from mismatch.line_loops import noise_likelihood, whiten_lines
+from mismatch.physics import JointPhysics, library
+from mismatch.windowed_lines import WindowedLines, displacement_at
+from modal_fit import ModalModel
+
+DIRECTION = np.array([0.8, 0.6])
+
+
+def _explanation(model: ModalModel, lines: WindowedLines, name: str) -> Explanation:
+    """A joint whose force is a third of the elastic one, rms."""
+    physics = library()[name]
+    assert isinstance(physics, JointPhysics)
+    x = lines.signal(displacement_at(model, lines.padded_frequencies, lines.force_lines)) @ DIRECTION
+    v = np.gradient(x) * lines.trial.rate
+    stiffness = 1 / float(DIRECTION @ model.receptance(np.array([0.2]))[0].real @ DIRECTION)
+    motion = JointMotion(float(x.std()), float(v.std()), 3 * np.abs(x).max(), 3 * np.abs(v).max(), stiffness)
+    values = physics.starts(motion)[0].copy()
+    values[0] *= 0.3 * stiffness * x.std() / driven_force(lines, x, v, physics.law(values, motion)).std()
+    shape = ModelShape(model, LabError())
+    return Explanation(shape, np.zeros(shape.size), (Cause(physics, values, "", DIRECTION, motion),))
+
+
+@pytest.mark.parametrize(
+    "name", ["stiffness_hardening", "coulomb_friction", "hysteresis", "quadratic_damping", "pose_drift"]
+)
+def test_the_tangent_is_that_of_whole_simulations(
+    small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], Trial], name: str
+) -> None:
+    """By frequency, damping, shapes, the law's own numbers and the angle.
+
+    Derivatives of the linear part leave leakage out; damping is made so high here that a window's edge hides it.
+    """
+    omega = np.abs(small_model.poles)
+    damped = replace(small_model, poles=omega * (-0.1 + 1j * np.sqrt(1 - 0.01)))
+    lines = windowed_lines(trial_of(damped, "mid", 50.0, 4), band_of(damped, 128.0), 4.0)
+    explanation = _explanation(damped, lines, name)
+    slope = jacobian(explanation, lines, predict_lines(explanation, lines))
+    size, h = explanation.shape.size, 0.03
+
+    def moved(k: int, by: float) -> np.ndarray:
+        if k < size:
+            u = np.zeros(size)
+            u[k] = by
+            return predict_lines(replace(explanation, u=u), lines).response
+        coordinates = explanation.coordinates()
+        coordinates[k - size] += by
+        return predict_lines(explanation.with_causes(coordinates), lines).response
+
+    for k in [0, 1, 2, 7, 10, *range(size, explanation.size)]:
+        quotient = (moved(k, h) - moved(k, -h)) / (2 * h)
+        assert np.linalg.norm(slope[:, :, k] - quotient) < 0.2 * np.linalg.norm(quotient), k
+
+
+def test_whitening_of_lines() -> None:
+    rng = np.random.default_rng(5)
+    root = rng.normal(size=(7, 4, 4)) + 1j * rng.normal(size=(7, 4, 4))
+    covariance = root @ root.conj().swapaxes(1, 2) + 0.1 * np.eye(4)
+    white = covariance.copy()
+    total = whiten_lines(white)
+    assert total == pytest.approx(np.linalg.slogdet(covariance)[1].sum(), rel=1e-12)
+    np.testing.assert_allclose(white.conj().swapaxes(1, 2) @ white, np.linalg.inv(covariance), atol=1e-9)
+    assert whiten_lines(-covariance) == np.inf
+
+
+def test_likelihood_of_noise_is_gaussian() -> None:
+    """Against NumPy's determinant and inverse."""
+    rng = np.random.default_rng(6)
+    root = rng.normal(size=(3, 2, 2, 2)) + 1j * rng.normal(size=(3, 2, 2, 2))
+    sample, through = root[:, 0] @ root[:, 0].conj().swapaxes(1, 2), root @ root.conj().swapaxes(2, 3)
+    counts, own, pushed = np.array([4.0, 9.0, 2.0]), rng.uniform(0.5, 2, (3, 2)), np.array([0.3, 0.8])
+    by_own, by_force = np.empty((3, 2)), np.empty(2)
+    cost = noise_likelihood(counts, sample, through, own, pushed, by_own, by_force)
+    covariance = np.einsum("q,bqij->bij", pushed, through) + own[:, :, None] * np.eye(2)
+    traces = np.trace(np.linalg.solve(covariance, sample), axis1=1, axis2=2).real
+    assert cost == pytest.approx(float(counts @ (np.linalg.slogdet(covariance)[1] + traces)), rel=1e-10)
