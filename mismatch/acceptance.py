@@ -4,14 +4,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .diagnosis import Improvement
 from .fitting import Fit
 from .leftover import Leftover
 from .physics import ChainPhysics
-
-Real = NDArray[np.float64]
 
 LEAST_EVIDENCE = 20.0
 """Gain in score below which nothing is accepted: odds of some twenty thousand to one."""
@@ -31,11 +28,8 @@ CLEAR = 4.0
 SMALL = 0.01
 """Evidence of a further cause, as a share of what the first ones had, below which it may mend the form of their law."""
 
-SAME_JOINT = 0.9
-"""Cosine between the directions of two laws of one joint."""
-
-AFTER_A_LAW = 0.06
-"""The same once a joint's law was accepted, whose form is never quite the true one; half of it for another joint."""
+AFTER_A_LAW = 0.1
+"""The same once a joint's law was accepted, whose form is never quite the true one."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +46,7 @@ def unexplained(left: Leftover, before: Leftover) -> bool:
     return left.share > NOISE_LIKE and left.power > (1 - EXPLAINED) * before.power
 
 
-def evidence_needed(current: Fit, base: Fit, direction: Real | None = None) -> float:
+def evidence_needed(current: Fit, base: Fit) -> float:
     """Gain in score that a further cause needs: a small one may only mend the form of those found.
 
     Parameters
@@ -61,14 +55,9 @@ def evidence_needed(current: Fit, base: Fit, direction: Real | None = None) -> f
         With the causes found so far.
     base
         Without any.
-    direction : (n_axes,)
-        Of a further joint; None: a linear cause.
     """
-    laws = [cause.direction for cause in current.explanation.causes if cause.direction is not None]
-    share = SMALL
-    if laws:
-        apart = direction is not None and all(abs(float(direction @ old)) < SAME_JOINT for old in laws)
-        share = AFTER_A_LAW / 2 if apart else AFTER_A_LAW
+    a_law = any(cause.direction is not None for cause in current.explanation.causes)
+    share = AFTER_A_LAW if a_law else SMALL
     return max(LEAST_EVIDENCE, share * (base.score - current.score))
 
 
@@ -86,8 +75,7 @@ def worth_it(option: Option, current: Fit, base: Fit) -> bool:
     gain = current.score - option.fitted.score
     if option.name != "missing_mode" and not _measured(option.fitted):
         return False
-    new = None if option.name == "missing_mode" else option.fitted.explanation.causes[-1].direction
-    if gain < evidence_needed(current, base, new):
+    if gain < evidence_needed(current, base):
         return False
     if current.misfit - option.fitted.misfit > LEAST_EVIDENCE:
         return True

@@ -15,6 +15,7 @@ from .fault_repair import repair_plain_faults
 from .fitting import Fit, fit
 from .held_out import held_out_improvement
 from .leftover import Leftover, leftover
+from .linear_part import with_linear_part
 from .options import fitted_options
 from .physics import Physics, library
 from .reporting_numbers import accepted_cause, accepted_mode, modal_deviation
@@ -86,7 +87,7 @@ def diagnose(
     search, improvement = _that_hold_elsewhere(search, lines)
     current, accepted, candidates = search.steps[-1], search.accepted, search.candidates
     tell("what is left")
-    deviation = modal_deviation(current)
+    deviation = _deviation(lines, current)
     if deviation is not None:
         accepted.append(deviation)
     left = leftover(current.explanation, lines)
@@ -129,7 +130,7 @@ def _search(
         if best is None or best.fitted.score > current.score - LEAST_EVIDENCE:
             break
         # evidence counts from where a fit has settled; a next cause must not live on what this one left undone
-        best = replace(best, fitted=fit(lines, best.fitted.explanation, best.fitted.noises, iterations=20))
+        best = replace(best, fitted=fit(lines, best.fitted.explanation, best.fitted.noises, iterations=60))
         if not worth_it(best, current, base):
             break
         line = best.fitted.score + LEAST_EVIDENCE / 2
@@ -151,6 +152,17 @@ def _that_hold_elsewhere(search: _Search, lines: list[WindowedLines]) -> tuple[_
         steps.pop()
         last = accepted.pop()
         candidates.append(Candidate(last.name, last.evidence, "rejected", last.location))
+
+
+def _deviation(lines: list[WindowedLines], current: Fit) -> AcceptedCause | None:
+    """Modal parameters that are off by more than a lab's error, and not by the linear part of a joint's law."""
+    found = modal_deviation(current)
+    causes = current.explanation.causes
+    if found is None or all(cause.direction is None for cause in causes):
+        return found
+    freed = tuple(with_linear_part(cause) if cause.direction is not None else cause for cause in causes)
+    again = fit(lines, replace(current.explanation, causes=freed), current.noises, iterations=20)
+    return found if modal_deviation(again) is not None else None
 
 
 def _describe(option: Option, current: Fit) -> AcceptedCause:

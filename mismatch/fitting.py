@@ -17,6 +17,9 @@ Real = NDArray[np.float64]
 
 THREADS = 2
 
+MORE_THAN_EXPECTED, LONGER = 1.5, 3.0
+"""Gain of a step over the gain that was expected of it from which a longer one is tried, and how much longer."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -94,13 +97,7 @@ def fit(
             step = _solved(matrix + damping * np.diag(np.diag(matrix)), gradient)
             if step @ gradient < 0.1 * tolerance:
                 break
-            for _ in range(4):
-                trial = _moved(explanation, step)
-                again = list(pool.map(_assess, lines, [trial] * len(lines), [one.noise for one in seen]))
-                trial_cost = _cost(again, trial)
-                if trial_cost < cost:
-                    break
-                step = step / 4
+            trial, again, trial_cost = _downhill(pool, lines, explanation, (step, float(step @ gradient)), seen)
             if not trial_cost < cost:
                 if damping > 1:
                     break
@@ -136,11 +133,6 @@ def fit(
 def residual(fitted: Fit, lines: list[WindowedLines]) -> list[Complex]:
     """What a fit leaves of each recording, (n_lines, n_responses)."""
     return [one.measured - predict_lines(fitted.explanation, one).response for one in lines]
-
-
-def misfit_under(lines: list[WindowedLines], explanation: Explanation, noises: tuple[NoiseModel, ...]) -> float:
-    """Misfit of an explanation to recordings under given noise."""
-    return sum(_assess(one, explanation, noise).misfit for one, noise in zip(lines, noises, strict=True))
 
 
 def least_misfit(explanation: Explanation, lines: WindowedLines) -> float:
@@ -263,6 +255,40 @@ def _normal_equations(
     gradient = sum((part[1] for part in parts), np.zeros(count))
     gradient[:size] -= explanation.shape.belief * explanation.u
     return matrix, gradient
+
+
+def _downhill(
+    pool: ThreadPoolExecutor,
+    lines: list[WindowedLines],
+    here: Explanation,
+    step: tuple[Real, float],
+    seen: list[_Assessed],
+) -> tuple[Explanation, list[_Assessed], float]:
+    """Where a step (and the gain expected of it) leads, shortened until it gains, lengthened while that gains more."""
+    way, expected = step
+    cost = _cost(seen, here)
+    for _ in range(4):
+        trial, again = _try(pool, lines, here, way, seen)
+        trial_cost = _cost(again, trial)
+        if trial_cost < cost:
+            break
+        way = way / 4
+    while cost - trial_cost > MORE_THAN_EXPECTED * expected:
+        # a valley that is longer than its derivatives say, as those leave leakage out
+        way = LONGER * way
+        farther, then = _try(pool, lines, here, way, seen)
+        if not _cost(then, farther) < trial_cost:
+            break
+        trial, again, trial_cost = farther, then, _cost(then, farther)
+    return trial, again, trial_cost
+
+
+def _try(
+    pool: ThreadPoolExecutor, lines: list[WindowedLines], here: Explanation, step: Real, seen: list[_Assessed]
+) -> tuple[Explanation, list[_Assessed]]:
+    """The explanation a step away, under the noise so far."""
+    trial = _moved(here, step)
+    return trial, list(pool.map(_assess, lines, [trial] * len(lines), [one.noise for one in seen]))
 
 
 def _moved(explanation: Explanation, step: Real) -> Explanation:

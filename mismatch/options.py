@@ -9,7 +9,7 @@ from .acceptance import LEAST_EVIDENCE, NOISE_LIKE, SMALL, Option, evidence_need
 from .chain_screening import ScreenedChain, screen_chains
 from .diagnosis import Candidate
 from .explanation import Cause, Explanation
-from .fitting import Fit, fit, misfit_under
+from .fitting import Fit, fit
 from .joint_direction import find_direction
 from .joint_screening import screen_joints
 from .leftover import Leftover, leftover
@@ -23,6 +23,9 @@ MOST_CHAINS = 3
 
 WITHIN_REACH = 0.5
 """Screened gain of a linear cause, as a share of the evidence it needs, from which it is fitted."""
+
+RESOLVED = 2.0
+"""Least half-power bandwidth of an added mode, in spacings of lines."""
 
 PROMISING = 0.1
 """Screened gain, as a share of the best law's, from which a law is fitted."""
@@ -73,25 +76,23 @@ def _linear_options(
     largest = max([one.gain for one in chains] + [mode.gain, 0.0])
     for one in chains[:MOST_CHAINS]:
         if one.gain > max(least, one.cause.size * cost, 0.03 * largest):
-            start = _best_start(lines, current, one.cause)
+            start = _added(current.explanation, one.cause)
             options.append(Option(one.cause.physics.name, _place(one.cause), fit(lines, start, current.noises)))
     numbers = current.explanation.shape.per_mode - 2
     if not current.explanation.causes and mode.gain > max(least, numbers * cost, 0.03 * largest):
         shape = current.explanation.shape.with_mode(mode.pole, mode.right, mode.left)
         start = Explanation(shape, np.concatenate([current.explanation.u, np.zeros(shape.per_mode)]))
-        options.append(Option("missing_mode", {}, fit(lines, start, current.noises, iterations=12)))
+        fitted = fit(lines, start, current.noises, iterations=12)
+        if _is_resolved(fitted, lines):
+            options.append(Option("missing_mode", {}, fitted))
     return options
 
 
-def _best_start(lines: list[WindowedLines], current: Fit, cause: Cause) -> Explanation:
-    """The cause at its linearised best, or at a part of it where that overshoots."""
-    assert isinstance(cause.physics, ChainPhysics)
-    absent = replace(cause, values=cause.physics.start(current.explanation.shape.nominal)).coordinates()
-    starts = [
-        _added(current.explanation, cause.moved(absent + share * (cause.coordinates() - absent)))
-        for share in (1.0, 0.25, 0.06)
-    ]
-    return min(starts, key=lambda start: misfit_under(lines, start, current.noises))
+def _is_resolved(fitted: Fit, lines: list[WindowedLines]) -> bool:
+    """Whether the added mode is wider than the lines of a record: else it is a tone, or an accident of some lines."""
+    pole = fitted.explanation.model.poles[-1]
+    width = -float(pole.real) / np.pi
+    return width > RESOLVED * max(one.trial.rate / len(one.window) for one in lines)
 
 
 def _joints(
@@ -107,7 +108,7 @@ def _joints(
     location = {"direction": [round(float(x), 6) for x in sighting.direction]}
     screened = screen_joints(floor, current.explanation, sighting.direction, laws)
     weighed = [Candidate(one.causes[0].physics.name, one.gain, "screened", location) for one in screened]
-    least = max(60.0, WITHIN_REACH * evidence_needed(current, base, sighting.direction))
+    least = max(60.0, WITHIN_REACH * evidence_needed(current, base))
     promising = [one for one in screened if one.gain > max(least, PROMISING * screened[0].gain)][:MOST_LAWS]
     driven = []
     for one in promising:

@@ -14,8 +14,9 @@ from .windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
 
-TONE_CONTRAST = 30.0
-"""Of a residual line against its neighbourhood, a channel; noise passes 15 once in 3 million lines."""
+TONE_CONTRAST, SEEN_AGAIN = 60.0, 5.0
+"""Of a residual line against its neighbourhood, summed over recordings, and what two of them must show at least; noise
+alone passes 15 in one recording once in 3 million lines."""
 
 NEAR = 41
 """Lines of a neighbourhood."""
@@ -64,7 +65,11 @@ class Clipping:
 
 
 def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
-    """The strongest residual line that stands out in every recording at one frequency, and in no force."""
+    """The strongest residual line that stands out of the recordings at one frequency, and of no force.
+
+    A tone from elsewhere is the weaker beside the noise the harder is cut, as noise grows with the signal: it must be
+    seen in two recordings (in the only one, where there is one).
+    """
     if len(lines) == 0:
         return None
     contrasts = [_contrast(fitted, one, noise) for one, noise in zip(lines, fitted.noises, strict=True)]
@@ -74,7 +79,9 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
             np.max([np.interp(axis + shift * _step(one), one.frequencies, c) for shift in (-1, 0, 1)], axis=0)
             for one, c in zip(lines, contrasts, strict=True)
         ]
-    ).min(axis=0)
+    )
+    again = np.sort(together, axis=0)[-min(2, len(lines))]
+    together = np.where(again > SEEN_AGAIN, together.sum(axis=0), 0.0)
     for k in np.argsort(-together)[:20]:
         if together[k] < TONE_CONTRAST:
             return None

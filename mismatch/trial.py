@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -123,6 +123,36 @@ def read_trial(path: str | os.PathLike[str], model: ModalModel, *, stream: str |
     return Trial(Path(path).stem, rate, samples[:, :count], samples[:, count:], powers, names)
 
 
+def measured_part(
+    model: ModalModel, paths: Sequence[str | os.PathLike[str]], *, stream: str | None = None
+) -> ModalModel:
+    """The model with the responses that every recording has; a sensor that was not mounted is no obstacle.
+
+    Raises
+    ------
+    InputError
+        No response of the model is in all recordings.
+    """
+    rows = list(range(len(model.responses)))
+    for path in paths:
+        with Recording(path) as recording:
+            source = recording.stream(stream)
+            rows = [k for k in rows if _channel_at(source, model.responses[k], tuple(POWERS)) is not None]
+    if not rows:
+        raise InputError(
+            f"no displacement, velocity or acceleration at {', '.join(model.responses)} is in every recording; "
+            "give recordings of the model's degrees of freedom"
+        )
+    if len(rows) == len(model.responses):
+        return model
+    residuals = model.residuals
+    if residuals is not None:
+        kept = None if residuals.residues is None else residuals.residues[:, rows]
+        residuals = replace(residuals, upper=residuals.upper[rows], lower=residuals.lower[rows], residues=kept)
+    labels = tuple(model.responses[k] for k in rows)
+    return replace(model, right=model.right[:, rows], responses=labels, residuals=residuals, covariance=None)
+
+
 def read_trials(
     paths: Sequence[str | os.PathLike[str]], model: ModalModel, *, stream: str | None = None
 ) -> list[Trial]:
@@ -146,16 +176,8 @@ def _matched(stream: Stream, wanted: Sequence[str], quantities: tuple[str, ...])
     """The channel at each degree of freedom, and the sign that turns its direction into the wanted one."""
     chosen, signs = [], []
     for label in wanted:
-        aim = DegreeOfFreedom.parse(label)
-        for channel in stream.channels:
-            if channel.quantity not in quantities or not channel.node:
-                continue
-            here = DegreeOfFreedom(channel.node, channel.direction)
-            if (here.node, here.axis) == (aim.node, aim.axis):
-                chosen.append(channel)
-                signs.append(here.sign * aim.sign)
-                break
-        else:
+        found = _channel_at(stream, label, quantities)
+        if found is None:
             there = ", ".join(
                 f"{channel.name} ({channel.quantity} {channel.degree_of_freedom})" for channel in stream.channels
             )
@@ -163,4 +185,17 @@ def _matched(stream: Stream, wanted: Sequence[str], quantities: tuple[str, ...])
                 f"{stream.path.name}: no {' or '.join(quantities)} at {label}, which the model speaks of; "
                 f"it has {there}"
             )
+        chosen.append(found[0])
+        signs.append(found[1])
     return chosen, signs
+
+
+def _channel_at(stream: Stream, label: str, quantities: tuple[str, ...]) -> tuple[Channel, float] | None:
+    """The first channel of those quantities at a degree of freedom, and its sign; None where there is none."""
+    aim = DegreeOfFreedom.parse(label)
+    for channel in stream.channels:
+        if channel.quantity in quantities and channel.node:
+            here = DegreeOfFreedom(channel.node, channel.direction)
+            if (here.node, here.axis) == (aim.node, aim.axis):
+                return channel, here.sign * aim.sign
+    return None

@@ -9,6 +9,7 @@ from foundation import InputError
 from mismatch import Diagnosis, Settings, diagnose, read_trials
 from mismatch.diagnosis_file import improved_model_of, write_diagnosis
 from mismatch.spindle_orders import SpindleSpeed, spindle_speed
+from mismatch.trial import measured_part
 from modal_fit import read_modal_model, write_modal_model
 
 from ..progress import Watch, silent
@@ -44,7 +45,8 @@ def diagnose_files(
     folder = Path(out)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder} is a file; name a folder with --out")
-    model = read_modal_model(model_path)
+    whole = read_modal_model(model_path)
+    model = measured_part(whole, recordings, stream=stream)
     trials = read_trials(recordings, model, stream=stream)
     with watch("diagnosing"):
         diagnosis = diagnose(model, trials, settings)
@@ -56,7 +58,9 @@ def diagnose_files(
     write_modal_model(paths[1], improved_model_of(diagnosis))
     with watch("writing the report"):
         write_diagnosis_report(paths[2], view, Path(model_path).name)
-    return DiagnosisFiles(diagnosis, paths, tuple(summary(diagnosis)))
+    missing = [label for label in whole.responses if label not in model.responses]
+    note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []
+    return DiagnosisFiles(diagnosis, paths, (*note, *summary(diagnosis)))
 
 
 def nominal_from_simulation(

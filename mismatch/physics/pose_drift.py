@@ -17,18 +17,24 @@ class PoseDrift:
     """The robot moves along its path, or warms up: one joint softens or stiffens from beginning to end."""
 
     name = "pose_drift"
-    equation = "g = r (t / T - 1/2) x"
+    equation = "g = r (t / T - n) x"
     source = "Verboven et al. 2004 on slowly varying structures; linear time-varying stiffness"
-    parameters = (Parameter("stiffness_change_n_per_m", "N/m", SCALE, -1e12, 1e12),)
+    parameters = (
+        Parameter("stiffness_change_n_per_m", "N/m", SCALE, -1e12, 1e12),
+        Parameter("nominal_at", "share of the recording", 0.1, -5.0, 5.0),
+    )
     confusable_with = ("stiffness_softening",)
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Shapes to try, amplitude 1."""
-        return (np.array([1.0]),)
+        """Shapes to try, amplitude 1: the nominal model holds in the middle of a recording."""
+        return (np.array([1.0, 0.5]),)
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
         """The joint's force."""
-        return JointLaw(ramp=values[0])
+        lasting = values[0] * (0.5 - values[1])
+        return JointLaw(
+            reach=motion.reach, stiffness=lasting * np.linspace(-motion.reach, motion.reach, 3), ramp=values[0]
+        )
 
 
 PHYSICS = PoseDrift()
