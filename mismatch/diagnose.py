@@ -18,6 +18,7 @@ from .leftover import Leftover, leftover
 from .linear_part import with_linear_part
 from .options import fitted_options
 from .physics import Physics, library
+from .pruning import pruned
 from .reporting_numbers import accepted_cause, accepted_mode, modal_deviation
 from .shape_of_model import LabError, ModelShape
 from .trial import Trial, band_of
@@ -139,7 +140,9 @@ def _search(
         accepted.append(_describe(best, current))
         current = best.fitted
         steps.append(current)
-    return _Search(steps, accepted, candidates, equivalents, before)
+    tell("causes made needless")
+    steps, accepted, rejected = pruned(lines, steps, accepted)
+    return _Search(steps, accepted, candidates + rejected, equivalents, before)
 
 
 def _that_hold_elsewhere(search: _Search, lines: list[WindowedLines]) -> tuple[_Search, Improvement]:

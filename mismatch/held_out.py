@@ -1,7 +1,5 @@
 """What an explanation is worth on a recording that it was not fitted to."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft
@@ -11,7 +9,7 @@ from .diagnosis import Improvement
 from .explanation import Explanation, predict_lines
 from .fitting import fit, least_misfit, through_structure
 from .noise_model import NoiseModel
-from .shape_of_model import ModelShape
+from .pruning import zero_of
 from .windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
@@ -35,8 +33,7 @@ def held_out_improvement(lines: list[WindowedLines], final: Explanation, noises:
     noises
         From the fit on all.
     """
-    nominal = Explanation(final.shape if not final.shape.added else _without_added(final), np.zeros(0))
-    nominal = replace(nominal, u=np.zeros(nominal.shape.size))
+    nominal = zero_of(final.shape)
     kept = (len(lines) - 1) // 2
     others = [one for k, one in enumerate(lines) if k != kept] or lines
     linear = fit(others, nominal, iterations=6).explanation
@@ -60,19 +57,6 @@ def held_out_improvement(lines: list[WindowedLines], final: Explanation, noises:
         _interval(blocks[0], blocks[2]),
         evidence,
     )
-
-
-def _without_added(explanation: Explanation) -> ModelShape:
-    shape = explanation.shape
-    count = len(shape.nominal.poles) - shape.added
-    model = replace(
-        shape.nominal,
-        poles=shape.nominal.poles[:count],
-        right=shape.nominal.right[:count],
-        left=shape.nominal.left[:count],
-        covariance=None,
-    )
-    return replace(shape, nominal=model, added=0)
 
 
 def _line_error(explanation: Explanation, lines: WindowedLines) -> float:
