@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from cutting import MillingProcess
 from foundation import InputError
 from mismatch import Diagnosis, Settings, diagnose, read_trials
 from mismatch.diagnosis_file import improved_model_of, write_diagnosis
@@ -33,6 +34,7 @@ def diagnose_files(
     settings: Settings | None = None,
     *,
     stream: str | None = None,
+    process: MillingProcess | None = None,
     watch: Watch = silent,
 ) -> DiagnosisFiles:
     """Diagnose and write diagnosis, improved model and report into a folder, made if need be.
@@ -57,7 +59,7 @@ def diagnose_files(
     write_diagnosis(paths[0], diagnosis)
     write_modal_model(paths[1], improved_model_of(diagnosis))
     with watch("writing the report"):
-        write_diagnosis_report(paths[2], view, Path(model_path).name)
+        write_diagnosis_report(paths[2], view, Path(model_path).name, process)
     missing = [label for label in whole.responses if label not in model.responses]
     note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []
     return DiagnosisFiles(diagnosis, paths, (*note, *summary(diagnosis)))

@@ -25,9 +25,13 @@ def diagnose(
         tuple[float, float, float],
         typer.Option("--lab-error", help="What a lab's own fit is off: frequency, damping, shapes, as shares."),
     ] = (0.01, 0.12, 0.03),
+    cutting: Annotated[
+        Path | None, typer.Option("--cutting", metavar="CUT.toml", help="Cut whose stability lobes the report shows.")
+    ] = None,
     stream: Annotated[str | None, typer.Option("--stream", help="Sample clock.")] = None,
 ) -> None:
     """Locate where a model and recordings disagree, name the physics left out, model it, show that the fit improves."""
+    from cutting import read_cutting_process
     from mismatch import LabError, Settings
 
     from ..chain.diagnose import diagnose_files, nominal_from_simulation
@@ -42,7 +46,9 @@ def diagnose(
         if band is None:
             raise InputError("--simulated needs --band LO HI, the band in which the nominal model is fitted")
         model = nominal_from_simulation(simulated, band, out, stream=stream, watch=bar)
-    result = diagnose_files(model, recordings, out, Settings(LabError(*lab_error)), stream=stream, watch=bar)
+    process = read_cutting_process(cutting) if cutting is not None else None
+    settings = Settings(LabError(*lab_error))
+    result = diagnose_files(model, recordings, out, settings, stream=stream, process=process, watch=bar)
     for line in result.summary:
         typer.echo(line)
     typer.echo(f"wrote {', '.join(str(path) for path in result.written)}")

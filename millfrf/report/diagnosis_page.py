@@ -9,6 +9,7 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from cutting import MillingProcess
 from foundation import writing_whole_file
 from mismatch import Diagnosis, Trial
 from mismatch.locate import located
@@ -17,6 +18,7 @@ from mismatch.spindle_orders import SpindleSpeed
 
 from ..provenance import versions
 from .diagnosis_answers import answers, verdict_sentence, warnings
+from .diagnosis_lobes import diagnosis_lobes_section
 from .diagnosis_sections import (
     candidate_section,
     growth_section,
@@ -47,7 +49,9 @@ def with_location(
     return full, replace(view, diagnosis=full)
 
 
-def write_diagnosis_report(path: str | os.PathLike[str], view: ResidualView, model_name: str = "") -> None:
+def write_diagnosis_report(
+    path: str | os.PathLike[str], view: ResidualView, model_name: str = "", process: MillingProcess | None = None
+) -> None:
     """Write one HTML page, figures inside, that needs no other file and no network.
 
     Parameters
@@ -58,24 +62,27 @@ def write_diagnosis_report(path: str | os.PathLike[str], view: ResidualView, mod
         Of a located diagnosis (:func:`with_location`).
     model_name
         Of the nominal model, for the title.
+    process
+        Cut for the lobes; None: one that is assumed.
 
     Raises
     ------
     InputError
         The folder cannot be written to.
     """
-    text = report_text(view, model_name)
+    text = report_text(view, model_name, process)
     with writing_whole_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
 
 
-def report_text(view: ResidualView, model_name: str = "") -> str:
+def report_text(view: ResidualView, model_name: str = "", process: MillingProcess | None = None) -> str:
     """The page as text."""
     diagnosis = view.diagnosis
     sections = (
         number_section(diagnosis),
         if_possible(lambda: law_section(diagnosis), "The measured force of the joint"),
         if_possible(lambda: held_out_section(diagnosis), "On data that was not fitted"),
+        if_possible(lambda: diagnosis_lobes_section(diagnosis, process), "What it does to the lobes"),
         location_section(view),
         growth_section(diagnosis),
         candidate_section(diagnosis),
