@@ -17,6 +17,9 @@ Real = NDArray[np.float64]
 
 THREADS = 2
 
+ENOUGH, LEFT_OUT = 4000, 3
+"""Lines of a recording on which a fit begins if it has more, and the steps on all lines that this saves."""
+
 MORE_THAN_EXPECTED, LONGER = 1.5, 3.0
 """Gain of a step over the gain that was expected of it from which a longer one is tried, and how much longer."""
 
@@ -71,7 +74,8 @@ def fit(
     """Fit an explanation to recordings.
 
     Minimises ``misfit + |u|^2`` by Gauss-Newton with step halving (Levenberg's damping where halving fails); noise is
-    estimated anew at each step, so causes compete on what they leave, not on a noise that one of them assumed.
+    estimated anew at each step, so causes compete on what they leave, not on a noise that one of them assumed. Of long
+    recordings every few lines come first.
 
     Parameters
     ----------
@@ -86,31 +90,14 @@ def fit(
     tolerance
         Of the misfit: two gains below it end the fit, or a tenth of it expected.
     """
-    explanation = start
+    explanation, known = start, noises
     with ThreadPoolExecutor(THREADS) as pool:
-        current = list(noises) if noises is not None else [None] * len(lines)
-        seen = list(pool.map(_with_noise, lines, [explanation] * len(lines), current))
-        matrix, gradient = _normal_equations(pool, lines, explanation, seen)
-        damping, idle = 0.0, 0
-        for _ in range(iterations):
-            cost = _cost(seen, explanation)
-            step = _solved(matrix + damping * np.diag(np.diag(matrix)), gradient)
-            if step @ gradient < 0.1 * tolerance:
-                break
-            trial, again, trial_cost = _downhill(pool, lines, explanation, (step, float(step @ gradient)), seen)
-            if not trial_cost < cost:
-                if damping > 1:
-                    break
-                damping = max(10 * damping, 0.1)
-                continue
-            damping /= 10
-            explanation = trial
-            seen = list(pool.map(_with_noise, lines, [trial] * len(lines), [one.noise for one in again], again))
-            # the noise may still be settling when a step gains nothing
-            idle = idle + 1 if cost - _cost(seen, explanation) < tolerance else 0
-            if idle == 2:
-                break
-            matrix, gradient = _normal_equations(pool, lines, explanation, seen)
+        rough = [one.thinned(ENOUGH) for one in lines]
+        if any(few is not one for few, one in zip(rough, lines, strict=True)):
+            explanation, seen, _ = _descended(pool, rough, explanation, known, (iterations, tolerance))
+            known = tuple(one.noise for one in seen)
+            iterations = max(0, iterations - LEFT_OUT)
+        explanation, seen, matrix = _descended(pool, lines, explanation, known, (iterations, tolerance))
         cold = list(pool.map(_with_noise, lines, [explanation] * len(lines), [None] * len(lines), seen))
     # a noise that crept along from a bad beginning may have stopped short: of two searches the better counts
     seen = [min(pair, key=lambda one: one.misfit) for pair in zip(seen, cold, strict=True)]
@@ -128,6 +115,42 @@ def fit(
         misfit + deviation + numbers * float(np.log(count)),
         np.asarray(np.linalg.pinv(matrix, hermitian=True), dtype=float),
     )
+
+
+def _descended(
+    pool: ThreadPoolExecutor,
+    lines: list[WindowedLines],
+    start: Explanation,
+    noises: tuple[NoiseModel, ...] | None,
+    limits: tuple[int, float],
+) -> tuple[Explanation, list[_Assessed], Real]:
+    """Where Gauss-Newton's steps end, the recordings there, and the normal matrix; limits as for :func:`fit`."""
+    iterations, tolerance = limits
+    explanation = start
+    current = list(noises) if noises is not None else [None] * len(lines)
+    seen = list(pool.map(_with_noise, lines, [explanation] * len(lines), current))
+    matrix, gradient = _normal_equations(pool, lines, explanation, seen)
+    damping, idle = 0.0, 0
+    for _ in range(iterations):
+        cost = _cost(seen, explanation)
+        step = _solved(matrix + damping * np.diag(np.diag(matrix)), gradient)
+        if step @ gradient < 0.1 * tolerance:
+            break
+        trial, again, trial_cost = _downhill(pool, lines, explanation, (step, float(step @ gradient)), seen)
+        if not trial_cost < cost:
+            if damping > 1:
+                break
+            damping = max(10 * damping, 0.1)
+            continue
+        damping /= 10
+        explanation = trial
+        seen = list(pool.map(_with_noise, lines, [trial] * len(lines), [one.noise for one in again], again))
+        # the noise may still be settling when a step gains nothing
+        idle = idle + 1 if cost - _cost(seen, explanation) < tolerance else 0
+        if idle == 2:
+            break
+        matrix, gradient = _normal_equations(pool, lines, explanation, seen)
+    return explanation, seen, matrix
 
 
 def residual(fitted: Fit, lines: list[WindowedLines]) -> list[Complex]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.stats import gamma
 
 from .explanation import predict_lines
-from .fitting import Fit, jacobian, levels, through_structure, whitened
+from .fitting import ENOUGH, Fit, jacobian, levels, through_structure, whitened
 from .noise_model import whitening
 from .windowed_lines import WindowedLines
 
@@ -101,7 +101,8 @@ def linear_floor(fitted: Fit, lines: list[WindowedLines]) -> Floor:
     shows at resonances does not raise it, while the fitted noise model may have taken such an omission for noise.
     """
 
-    def covariance(k: int, rest: Complex, through: Complex) -> Complex:
+    def covariance(k: int, rest: Complex, through: Complex, few: WindowedLines) -> Complex:
+        del few
         return _floor_covariance(rest, through, levels(lines[k]))
 
     return _floor(fitted, lines, covariance)
@@ -110,24 +111,29 @@ def linear_floor(fitted: Fit, lines: list[WindowedLines]) -> Floor:
 def noise_floor(fitted: Fit, lines: list[WindowedLines]) -> Floor:
     """Put a fit's residual on its own fitted noise: there the fit is at its optimum, and gains are a score test's."""
 
-    def covariance(k: int, rest: Complex, through: Complex) -> Complex:
+    def covariance(k: int, rest: Complex, through: Complex, few: WindowedLines) -> Complex:
         del rest
-        return fitted.noises[k].covariance(lines[k].frequencies, through)
+        return fitted.noises[k].covariance(few.frequencies, through)
 
     return _floor(fitted, lines, covariance)
 
 
-def _floor(fitted: Fit, lines: list[WindowedLines], covariance: Callable[[int, Complex, Complex], Complex]) -> Floor:
+def _floor(
+    fitted: Fit, lines: list[WindowedLines], covariance: Callable[[int, Complex, Complex, WindowedLines], Complex]
+) -> Floor:
+    """Of many lines every few count, each for as many as it stands for."""
     records = []
     size = fitted.explanation.size
     matrix, gradient = np.zeros((size, size)), np.zeros(size)
     belief = np.full(size, 1e-6)
     belief[: fitted.explanation.shape.size] = fitted.explanation.shape.belief
-    for k, one in enumerate(lines):
+    for k, whole in enumerate(lines):
+        one = whole.thinned(ENOUGH)
+        stands_for = len(whole.frequencies) / len(one.frequencies)
         predicted = predict_lines(fitted.explanation, one)
         rest = one.measured - predicted.response
         through = through_structure(fitted.explanation, one)
-        white = whitening(covariance(k, rest, through))
+        white = whitening(covariance(k, rest, through, one)) * np.sqrt(stands_for)
         stacked = whitened(white, jacobian(fitted.explanation, one, predicted))
         record = FloorRecord(one, rest, through, white, stacked, whitened(white, rest[:, :, None])[:, 0])
         records.append(record)

@@ -76,6 +76,20 @@ class WindowedLines:
         """Frequencies of ``force_lines``, Hz."""
         return np.asarray(np.arange(self.padded // 2 + 1) * self.trial.rate / self.padded)
 
+    def thinned(self, enough: int) -> "WindowedLines":
+        """Every few lines, so that about ``enough`` are left; itself where it has no more."""
+        every = len(self.frequencies) // enough
+        if every < 2:
+            return self
+        return replace(
+            self,
+            band=self.band[::every],
+            frequencies=self.frequencies[::every],
+            force_here=self.force_here[::every],
+            measured=self.measured[::every],
+            trust=self.trust[::every],
+        )
+
     def cut(self, signal: NDArray[np.floating]) -> Complex:
         """Windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the record."""
         kept = signal[self.start : self.start + len(self.window)]
