@@ -79,8 +79,7 @@ def diagnose(
     tell("modal parameters")
     nominal = Explanation(ModelShape(model, settings.lab), np.zeros(ModelShape(model, settings.lab).size))
     base = fit(lines, nominal)
-    lines = [without_force_noise(one, np.exp(noise.forces)) for one, noise in zip(lines, base.noises, strict=True)]
-    base = fit(lines, base.explanation, base.noises)
+    lines, base = _with_true_forces(lines, base)
     tell("tones and clipping")
     lines, base, faults = repair_plain_faults(lines, base, decay)
     search = _search(lines, base, faults, causes, tell)
@@ -102,6 +101,19 @@ def diagnose(
     return Diagnosis(
         verdict, tuple(accepted), ranked, search.equivalents, improvement, left.share, base, current, tuple(lines)
     )
+
+
+def _with_true_forces(lines: list[WindowedLines], base: Fit) -> tuple[list[WindowedLines], Fit]:
+    """Forces as measured, with the noise that the first fit found taken out, or with that of their quietest lines.
+
+    The likelihood chooses: hum on the responses hides how noisy the forces are, and forces may have no noise at all.
+    """
+    found = [(lines, base)]
+    estimated = [np.exp(noise.forces) for noise in base.noises]
+    for variances in (estimated, [np.full(len(variance), np.inf) for variance in estimated]):
+        weighed = [without_force_noise(one, variance) for one, variance in zip(lines, variances, strict=True)]
+        found.append((weighed, fit(weighed, base.explanation, base.noises)))
+    return min(found, key=lambda pair: pair[1].score)
 
 
 @dataclass(frozen=True)
