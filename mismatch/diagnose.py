@@ -22,7 +22,8 @@ from .pruning import pruned
 from .reporting_numbers import accepted_cause, accepted_mode, modal_deviation
 from .shape_of_model import LabError, ModelShape
 from .trial import Trial, band_of
-from .windowed_lines import WindowedLines, windowed_lines, without_force_noise
+from .true_forces import without_force_noise
+from .windowed_lines import WindowedLines, windowed_lines
 
 Real = NDArray[np.float64]
 Progress = Callable[[str], None]

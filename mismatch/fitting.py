@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .explanation import Explanation, Predicted, line_response, predict_lines, surround
-from .joint_tangents import joint_changes
-from .line_loops import whitened_columns
-from .noise_model import NoiseModel, fit_noise, whitening_and_determinant
+from .assessment import Assessed, assess, whitened, with_noise
+from .explanation import Explanation, predict_lines
+from .jacobian import jacobian
+from .noise_model import NoiseModel
 from .windowed_lines import WindowedLines
 
 Complex = NDArray[np.complex128]
@@ -52,17 +52,6 @@ class Fit:
     covariance: Real
 
 
-@dataclass(frozen=True)
-class _Assessed:
-    """One recording under an explanation."""
-
-    predicted: Predicted
-    white: Complex
-    rest: Complex
-    misfit: float
-    noise: NoiseModel
-
-
 def fit(
     lines: list[WindowedLines],
     start: Explanation,
@@ -98,7 +87,7 @@ def fit(
             known = tuple(one.noise for one in seen)
             iterations = max(0, iterations - LEFT_OUT)
         explanation, seen, matrix = _descended(pool, lines, explanation, known, (iterations, tolerance))
-        cold = list(pool.map(_with_noise, lines, [explanation] * len(lines), [None] * len(lines), seen))
+        cold = list(pool.map(with_noise, lines, [explanation] * len(lines), [None] * len(lines), seen))
     # a noise that crept along from a bad beginning may have stopped short: of two searches the better counts
     seen = [min(pair, key=lambda one: one.misfit) for pair in zip(seen, cold, strict=True)]
     misfit = sum(one.misfit for one in seen)
@@ -123,12 +112,12 @@ def _descended(
     start: Explanation,
     noises: tuple[NoiseModel, ...] | None,
     limits: tuple[int, float],
-) -> tuple[Explanation, list[_Assessed], Real]:
+) -> tuple[Explanation, list[Assessed], Real]:
     """Where Gauss-Newton's steps end, the recordings there, and the normal matrix; limits as for :func:`fit`."""
     iterations, tolerance = limits
     explanation = start
     current = list(noises) if noises is not None else [None] * len(lines)
-    seen = list(pool.map(_with_noise, lines, [explanation] * len(lines), current))
+    seen = list(pool.map(with_noise, lines, [explanation] * len(lines), current))
     matrix, gradient = _normal_equations(pool, lines, explanation, seen)
     damping, idle = 0.0, 0
     for _ in range(iterations):
@@ -144,7 +133,7 @@ def _descended(
             continue
         damping /= 10
         explanation = trial
-        seen = list(pool.map(_with_noise, lines, [trial] * len(lines), [one.noise for one in again], again))
+        seen = list(pool.map(with_noise, lines, [trial] * len(lines), [one.noise for one in again], again))
         # the noise may still be settling when a step gains nothing
         idle = idle + 1 if cost - _cost(seen, explanation) < tolerance else 0
         if idle == 2:
@@ -158,101 +147,6 @@ def residual(fitted: Fit, lines: list[WindowedLines]) -> list[Complex]:
     return [one.measured - predict_lines(fitted.explanation, one).response for one in lines]
 
 
-def least_misfit(explanation: Explanation, lines: WindowedLines) -> float:
-    """Misfit of an explanation to one recording under the noise that fits its residual best."""
-    return _with_noise(lines, explanation, None).misfit
-
-
-def through_structure(explanation: Explanation, lines: WindowedLines) -> Complex:
-    """From forces to measured responses at the lines, (n_lines, n_responses, n_excitations)."""
-    around = surround(explanation, lines.frequencies)
-    closed = around.closed(explanation.model.receptance(lines.frequencies))
-    if around.force is not None:
-        closed = closed @ around.force
-    return np.asarray(around.shown(closed * lines.kinematic[:, :, None]) @ lines.trust)
-
-
-def levels(lines: WindowedLines) -> tuple[Real, Real]:
-    """Root mean square a line of responses and of forces."""
-    return (
-        np.sqrt(np.mean(np.abs(lines.measured) ** 2, axis=0)),
-        np.sqrt(np.mean(np.abs(lines.force_here) ** 2, axis=0)),
-    )
-
-
-def jacobian(explanation: Explanation, lines: WindowedLines, predicted: Predicted) -> Complex:
-    """Derivative of the response lines by u and the causes' coordinates, (n_lines, n_responses, size)."""
-    around = surround(explanation, lines.frequencies)
-    force: Complex = around.pushed(lines.force_here)
-    joint = lines.cut(lines.signal(predicted.joint)) if predicted.joints else None
-    if joint is not None:
-        force = force - joint
-    receptance = explanation.model.receptance(lines.frequencies)
-    closed = around.closed(receptance)
-    if around.feedback is not None:
-        force = force - np.einsum("kqp,kp->kq", around.feedback, np.einsum("kpq,kq->kp", closed, force))
-    if not explanation.causes:
-        return explanation.shape.jacobian(explanation.u, lines.frequencies, force, lines.kinematic)
-    linear = explanation.shape.jacobian(explanation.u, lines.frequencies, force)
-    if around.feedback is not None:
-        linear = np.asarray(np.linalg.solve(np.eye(receptance.shape[1]) + receptance @ around.feedback, linear))
-    result = np.zeros((*linear.shape[:2], explanation.size), dtype=complex)
-    result[:, :, : linear.shape[2]] = linear
-    if predicted.joints:
-        result += closed @ joint_changes(explanation, lines, predicted)
-    result *= lines.kinematic[:, :, None]
-    shown: Complex = np.asarray(around.shown(result), dtype=complex)
-    here, plain = explanation.coordinates(), line_response(explanation, lines, joint)
-    chain = np.concatenate([np.zeros(0)] + [np.full(c.size, c.direction is None) for c in explanation.causes])
-    for k in np.flatnonzero(chain):
-        aside = here.copy()
-        aside[k] += 0.02
-        change = line_response(explanation.with_causes(aside), lines, joint) - plain
-        shown[:, :, linear.shape[2] + k] += change / 0.02
-    return shown
-
-
-def whitened(white: Complex, lines: Complex) -> Real:
-    """Whitened lines (n_lines, n, n_columns) as real columns (2 n_lines n, n_columns), real above imaginary parts."""
-    out = np.empty((2, *lines.shape))
-    whitened_columns(white, np.ascontiguousarray(lines), out)
-    return out.reshape(-1, lines.shape[2])
-
-
-def _assess(lines: WindowedLines, explanation: Explanation, noise: NoiseModel) -> _Assessed:
-    """Misfit under a given noise; infinite where a prediction is not finite or cannot be made."""
-    try:
-        predicted = predict_lines(explanation, lines)
-        rest = lines.measured - predicted.response
-        return _misfit(lines, explanation, predicted, rest, noise)
-    except np.linalg.LinAlgError:
-        nothing = np.zeros((0, 0), dtype=complex)
-        return _Assessed(Predicted(nothing, nothing, nothing, ()), nothing, nothing, np.inf, noise)
-
-
-def _misfit(
-    lines: WindowedLines, explanation: Explanation, predicted: Predicted, rest: Complex, noise: NoiseModel
-) -> _Assessed:
-    if not np.isfinite(rest).all():
-        return _Assessed(predicted, rest, rest, np.inf, noise)
-    covariance = noise.covariance(lines.frequencies, through_structure(explanation, lines))
-    white, log_determinant = whitening_and_determinant(covariance)
-    small = whitened(white, rest[:, :, None])
-    misfit = 2 * float(log_determinant + np.vdot(small, small))
-    return _Assessed(predicted, white, rest, misfit if np.isfinite(misfit) else np.inf, noise)
-
-
-def _with_noise(
-    lines: WindowedLines, explanation: Explanation, noise: NoiseModel | None, seen: _Assessed | None = None
-) -> _Assessed:
-    """Misfit under the noise that fits the residual best."""
-    predicted = seen.predicted if seen is not None else predict_lines(explanation, lines)
-    rest = lines.measured - predicted.response
-    through = through_structure(explanation, lines)
-    found = fit_noise(lines.frequencies, rest, through, levels(lines), noise)
-    return _misfit(lines, explanation, predicted, rest, found)
-
-
 def _solved(matrix: Real, gradient: Real) -> Real:
     try:
         return np.asarray(np.linalg.solve(matrix, gradient), dtype=float)
@@ -260,14 +154,14 @@ def _solved(matrix: Real, gradient: Real) -> Real:
         return np.asarray(np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0], dtype=float)
 
 
-def _normal_of(lines: WindowedLines, explanation: Explanation, seen: _Assessed) -> tuple[Real, Real]:
+def _normal_of(lines: WindowedLines, explanation: Explanation, seen: Assessed) -> tuple[Real, Real]:
     slope = whitened(seen.white, jacobian(explanation, lines, seen.predicted))
     small = whitened(seen.white, seen.rest[:, :, None])[:, 0]
     return 2 * (slope.T @ slope), 2 * (slope.T @ small)
 
 
 def _normal_equations(
-    pool: ThreadPoolExecutor, lines: list[WindowedLines], explanation: Explanation, seen: list[_Assessed]
+    pool: ThreadPoolExecutor, lines: list[WindowedLines], explanation: Explanation, seen: list[Assessed]
 ) -> tuple[Real, Real]:
     """Normal equations with the lab's belief about u, and a belief so weak that it only keeps them solvable."""
     size, count = explanation.shape.size, explanation.size
@@ -285,8 +179,8 @@ def _downhill(
     lines: list[WindowedLines],
     here: Explanation,
     step: tuple[Real, float],
-    seen: list[_Assessed],
-) -> tuple[Explanation, list[_Assessed], float]:
+    seen: list[Assessed],
+) -> tuple[Explanation, list[Assessed], float]:
     """Where a step (and the gain expected of it) leads, shortened until it gains, lengthened while that gains more."""
     way, expected = step
     cost = _cost(seen, here)
@@ -307,11 +201,11 @@ def _downhill(
 
 
 def _try(
-    pool: ThreadPoolExecutor, lines: list[WindowedLines], here: Explanation, step: Real, seen: list[_Assessed]
-) -> tuple[Explanation, list[_Assessed]]:
+    pool: ThreadPoolExecutor, lines: list[WindowedLines], here: Explanation, step: Real, seen: list[Assessed]
+) -> tuple[Explanation, list[Assessed]]:
     """The explanation a step away, under the noise so far."""
     trial = _moved(here, step)
-    return trial, list(pool.map(_assess, lines, [trial] * len(lines), [one.noise for one in seen]))
+    return trial, list(pool.map(assess, lines, [trial] * len(lines), [one.noise for one in seen]))
 
 
 def _moved(explanation: Explanation, step: Real) -> Explanation:
@@ -322,7 +216,7 @@ def _moved(explanation: Explanation, step: Real) -> Explanation:
     return moved.with_causes(explanation.coordinates() + np.clip(step[size:], -15, 15))
 
 
-def _cost(seen: list[_Assessed], explanation: Explanation) -> float:
+def _cost(seen: list[Assessed], explanation: Explanation) -> float:
     return sum(one.misfit for one in seen) + _deviation(explanation)
 
 

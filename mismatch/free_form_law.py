@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
+from .assessment import through_structure
 from .diagnosis import Diagnosis
 from .explanation import Cause, Explanation, predict_lines
-from .fitting import Fit, through_structure
+from .fitting import Fit
 from .joint_direction import SeenMotion, seen_motion
 from .joint_simulation import driven_force
 from .linear_floor import FloorRecord

@@ -5,9 +5,10 @@ from numpy.typing import NDArray
 from scipy.fft import irfft
 from scipy.stats import wilcoxon
 
+from .assessment import least_misfit, through_structure
 from .diagnosis import Improvement
 from .explanation import Explanation, predict_lines
-from .fitting import fit, least_misfit, through_structure
+from .fitting import fit
 from .noise_model import NoiseModel
 from .pruning import zero_of
 from .windowed_lines import WindowedLines

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .assessment import through_structure
 from .diagnosis import Diagnosis
 from .explanation import Explanation, predict_lines
-from .fitting import fit, through_structure
+from .fitting import fit
 from .noise_model import NoiseModel
 from .residual_maps import band_edges
 from .windowed_lines import WindowedLines

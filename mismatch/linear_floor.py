@@ -7,8 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import gamma
 
+from .assessment import levels, through_structure, whitened
 from .explanation import predict_lines
-from .fitting import ENOUGH, Fit, jacobian, levels, through_structure, whitened
+from .fitting import ENOUGH, Fit
+from .jacobian import jacobian
 from .noise_model import whitening
 from .windowed_lines import WindowedLines
 

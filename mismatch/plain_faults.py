@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 from scipy.fft import irfft
 from scipy.ndimage import median_filter
 
+from .assessment import levels, through_structure
 from .explanation import predict_lines
-from .fitting import Fit, levels, through_structure
+from .fitting import Fit
 from .noise_model import NoiseModel, whitening
 from .windowed_lines import WindowedLines
 

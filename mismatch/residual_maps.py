@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .assessment import through_structure
 from .explanation import Explanation, predict_lines
-from .fitting import Fit, through_structure
+from .fitting import Fit
 from .noise_model import whitening
 from .windowed_lines import WindowedLines
 

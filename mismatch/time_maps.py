@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 from scipy.signal.windows import hann
 
+from .assessment import through_structure
 from .explanation import Explanation, predict_lines
-from .fitting import Fit, through_structure
+from .fitting import Fit
 from .noise_model import whitening
 from .residual_maps import overlap
 from .windowed_lines import WindowedLines

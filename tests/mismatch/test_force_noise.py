@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy.signal import firwin, lfilter
 
 from mismatch import Explanation, LabError, ModelShape, Trial, band_of, diagnose, predict_lines, windowed_lines
-from mismatch.windowed_lines import WindowedLines, without_force_noise
+from mismatch.true_forces import without_force_noise
+from mismatch.windowed_lines import WindowedLines
 from modal_fit import ModalModel
 
 RATE, SILENT = 128.0, 26.0

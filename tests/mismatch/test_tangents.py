@@ -8,7 +8,7 @@ import pytest
 
 from mismatch import Explanation, LabError, ModelShape, Trial, band_of, predict_lines, windowed_lines
 from mismatch.explanation import Cause
-from mismatch.fitting import jacobian
+from mismatch.jacobian import jacobian
 from mismatch.joint_law import JointMotion
 from mismatch.joint_simulation import driven_force
 from mismatch.line_loops import noise_likelihood, whiten_lines
