@@ -30,6 +30,9 @@ Progress = Callable[[str], None]
 
 MOST_CAUSES = 3
 
+MOSTLY = 0.5
+"""Share of a force's power that must be left when its noise is taken out."""
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -107,14 +110,23 @@ def diagnose(
 def _with_true_forces(lines: list[WindowedLines], base: Fit) -> tuple[list[WindowedLines], Fit]:
     """Forces as measured, with the noise that the first fit found taken out, or with that of their quietest lines.
 
-    The likelihood chooses: hum on the responses hides how noisy the forces are, and forces may have no noise at all.
+    The likelihood chooses, and must gain as much as a cause: hum on the responses hides how noisy the forces are, and
+    forces may have no noise at all.
     """
     found = [(lines, base)]
     estimated = [np.exp(noise.forces) for noise in base.noises]
     for variances in (estimated, [np.full(len(variance), np.inf) for variance in estimated]):
         weighed = [without_force_noise(one, variance) for one, variance in zip(lines, variances, strict=True)]
-        found.append((weighed, fit(weighed, base.explanation, base.noises)))
-    return min(found, key=lambda pair: pair[1].score)
+        if all(_mostly_kept(one, before) for one, before in zip(weighed, lines, strict=True)):
+            found.append((weighed, fit(weighed, base.explanation, base.noises)))
+    best = min(found, key=lambda pair: pair[1].score)
+    return best if best[1].score < base.score - LEAST_EVIDENCE else found[0]
+
+
+def _mostly_kept(lines: WindowedLines, before: WindowedLines) -> bool:
+    """Whether most of every force's power is left: else its quietest lines were not those without force."""
+    left, had = (np.sum(np.abs(one.force_here) ** 2, axis=0) for one in (lines, before))
+    return bool((left > MOSTLY * had).all())
 
 
 @dataclass(frozen=True)

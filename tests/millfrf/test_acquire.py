@@ -84,7 +84,12 @@ def test_ctrl_c_while_checking_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("millfrf.chain.preflight.time.monotonic", lambda: signal.raise_signal(signal.SIGINT))
-    assert run(["acquire", str(_session(tmp_path)), "--check"]) == 1
+    # a shell that starts the tests in the background has Ctrl-C ignored
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        assert run(["acquire", str(_session(tmp_path)), "--check"]) == 1
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert capsys.readouterr().err == "millfrf: stopped; unfinished files were removed\n"
 
 
