@@ -1,5 +1,6 @@
 """CAN logs (BLF of Vector's tools, ASC text) become the events of a recording that was made at the same time."""
 
+import logging
 import os
 import tomllib
 from collections.abc import Callable
@@ -111,6 +112,8 @@ def read_can_log(log: Path, decoder: DbcDecoder) -> dict[str, tuple[NDArray[np.f
         raise DriverMissing("CAN logs need the package python-can; pip install millfrf[devices]") from error
     found: dict[str, tuple[list[float], list[float]]] = {}
     first: float | None = None
+    said = logging.getLogger("can.io.blf")
+    silent, said.disabled = said.disabled, True  # its warnings of damaged blocks would be a second line
     try:
         with can.LogReader(log) as messages:
             for message in messages:
@@ -121,6 +124,8 @@ def read_can_log(log: Path, decoder: DbcDecoder) -> dict[str, tuple[NDArray[np.f
         raise FileFormatError(
             f"{log} cannot be read as {log.suffix}: {' '.join(str(error).split()) or type(error).__name__}"
         ) from error
+    finally:
+        said.disabled = silent
     if not found:
         raise FileFormatError(f"{log} holds none of the wanted signals; check the DBC file and the bus")
     return {name: (np.array(times), np.array(values)) for name, (times, values) in found.items()}
