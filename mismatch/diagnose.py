@@ -148,8 +148,8 @@ def _search(
     candidates: list[Candidate] = []
     equivalents: tuple[str, ...] = ()
     before = leftover(base.explanation, lines)
-    while len(accepted) < MOST_CAUSES:
-        tell(f"causes, round {len(accepted) + 1}")
+    while len(steps) <= MOST_CAUSES:
+        tell(f"causes, round {len(steps)}")
         options, weighed = fitted_options(lines, current, base, causes, before)
         candidates += weighed
         best = min(options, key=lambda option: option.fitted.score, default=None)

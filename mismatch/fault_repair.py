@@ -1,17 +1,16 @@
 """Tones taken out and clipping mended before causes are looked for."""
 
-from dataclasses import replace
-
 import numpy as np
-from numpy.typing import NDArray
 
 from .acceptance import LEAST_EVIDENCE
+from .clipping import Clipping, find_clipping, mended
 from .diagnosis import AcceptedCause
 from .fitting import Fit, fit
-from .plain_faults import Clipping, Tone, find_clipping, find_tone, unclipped, without_tone
+from .tones import Tone, find_tone, without_tone
+from .tones_beyond import tones_beyond
 from .windowed_lines import WindowedLines
 
-Real = NDArray[np.float64]
+MOST_TONES = 4
 
 
 def repair_plain_faults(
@@ -19,35 +18,19 @@ def repair_plain_faults(
 ) -> tuple[list[WindowedLines], Fit, list[AcceptedCause]]:
     """Take out tones and mend clipping, refitting each time."""
     found: list[AcceptedCause] = []
-    for _ in range(4):
+    for _ in range(MOST_TONES):
         tone = find_tone(base, lines)
         if tone is None or tone.gain < LEAST_EVIDENCE:
             break
         lines = [without_tone(one, tone) for one in lines]
         base = fit(lines, base.explanation, iterations=4)
         found.append(_tone_cause(tone, lines[0]))
+    found += [_tone_cause(tone, lines[0]) for tone in tones_beyond(lines, decay, MOST_TONES - len(found))]
     clipping = find_clipping(base, lines)
     if clipping is not None:
-        originals = [one.trial.response for one in lines]
-        for _ in range(4):
-            lines = [
-                _with_response(one, unclipped(base, one, clipping, original))
-                for one, original in zip(lines, originals, strict=True)
-            ]
-            base = fit(lines, base.explanation, iterations=4)
-            clipping = _same_clipping(base, lines, originals, clipping)
+        base, lines, clipping = mended(base, lines, clipping)
         found.append(_clipping_cause(clipping, lines[0]))
     return lines, base, found
-
-
-def _same_clipping(base: Fit, lines: list[WindowedLines], originals: list[Real], clipping: Clipping) -> Clipping:
-    again = find_clipping(base, [_with_response(one, old) for one, old in zip(lines, originals, strict=True)])
-    return again if again is not None and again.response == clipping.response else clipping
-
-
-def _with_response(lines: WindowedLines, response: Real) -> WindowedLines:
-    changed = replace(lines, trial=replace(lines.trial, response=response))
-    return replace(changed, measured=changed.cut(response))
 
 
 def _tone_cause(tone: Tone, lines: WindowedLines) -> AcceptedCause:
@@ -61,4 +44,6 @@ def _tone_cause(tone: Tone, lines: WindowedLines) -> AcceptedCause:
 
 def _clipping_cause(clipping: Clipping, lines: WindowedLines) -> AcceptedCause:
     name = lines.trial.channels[clipping.response - lines.measured.shape[1]]
-    return AcceptedCause("clipping", {"channel": name}, {"limit": clipping.limit}, {}, clipping.gain)
+    return AcceptedCause(
+        "clipping", {"channel": name}, {"limit": clipping.limit}, {"limit": clipping.error}, clipping.gain
+    )

@@ -14,6 +14,7 @@ from .joint_direction import SeenMotion, seen_motion
 from .joint_simulation import driven_force
 from .linear_floor import FloorRecord
 from .noise_model import whitening
+from .physics import answer_name
 from .windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
@@ -99,7 +100,7 @@ def _measured(diagnosis: Diagnosis, cause: Cause) -> FreeFormLaw:
     rest = replace(samples, force=samples.force - elastic[0], law=samples.law - elastic[1])
     share = 1 - float(np.mean((samples.force - samples.law) ** 2) / np.mean(samples.force**2))
     return FreeFormLaw(
-        cause.physics.name,
+        answer_name(cause.physics),
         cause.direction,
         _binned(samples, samples.x, ends, up),
         _binned(samples, samples.x, ends, ~up),

@@ -15,7 +15,7 @@ from .joint_screening import screen_joints
 from .leftover import Leftover, leftover
 from .linear_floor import Floor, linear_floor, noise_floor
 from .missing_mode import SightedMode, find_mode
-from .physics import ChainPhysics, JointPhysics, Physics
+from .physics import ChainPhysics, JointPhysics, Physics, answer_name
 from .windowed_lines import WindowedLines
 
 MOST_CHAINS = 3
@@ -48,7 +48,7 @@ def fitted_options(
         if (one.cause.physics.name, one.cause.place) not in taken
     ]
     options: list[Option] = []
-    weighed = [Candidate(one.cause.physics.name, one.gain, "screened", _place(one.cause)) for one in chains]
+    weighed = [Candidate(answer_name(one.cause.physics), one.gain, "screened", _place(one.cause)) for one in chains]
     mode = find_mode(own_noise, current.explanation)
     weighed.append(Candidate("missing_mode", mode.gain, "screened"))
     least = WITHIN_REACH * evidence_needed(current, base)
@@ -77,7 +77,7 @@ def _linear_options(
     for one in chains[:MOST_CHAINS]:
         if one.gain > max(least, one.cause.size * cost, 0.03 * largest):
             start = _added(current.explanation, one.cause)
-            options.append(Option(one.cause.physics.name, _place(one.cause), fit(lines, start, current.noises)))
+            options.append(Option(answer_name(one.cause.physics), _place(one.cause), fit(lines, start, current.noises)))
     numbers = current.explanation.shape.per_mode - 2
     if not current.explanation.causes and mode.gain > max(least, numbers * cost, 0.03 * largest):
         shape = current.explanation.shape.with_mode(mode.pole, mode.right, mode.left)
@@ -100,14 +100,16 @@ def _joints(
 ) -> tuple[list[Option], list[Candidate]]:
     """Joint laws along the likeliest direction: driven by the seen motion first, the best then simulated freely."""
     laws = [p for p in causes.values() if isinstance(p, JointPhysics)]
-    laws = [p for p in laws if p.name not in {cause.physics.name for cause in current.explanation.causes}]
+    laws = [
+        p for p in laws if answer_name(p) not in {answer_name(cause.physics) for cause in current.explanation.causes}
+    ]
     sighting = find_direction(floor, current.explanation)
     # along a single axis there is no direction to stand out, and a broad force looks like a higher floor
     if not laws or (len(sighting.direction) > 1 and sighting.gain < 50 * len(lines)):
         return [], []
     location = {"direction": [round(float(x), 6) for x in sighting.direction]}
     screened = screen_joints(floor, current.explanation, sighting.direction, laws)
-    weighed = [Candidate(one.causes[0].physics.name, one.gain, "screened", location) for one in screened]
+    weighed = [Candidate(answer_name(one.causes[0].physics), one.gain, "screened", location) for one in screened]
     least = max(60.0, WITHIN_REACH * evidence_needed(current, base))
     promising = [one for one in screened if one.gain > max(least, PROMISING * screened[0].gain)][:MOST_LAWS]
     driven = []
@@ -126,7 +128,7 @@ def _joints(
         last = near.explanation.causes[-1]
         free = replace(near.explanation, causes=(*near.explanation.causes[:-1], replace(last, seen=None)))
         fitted = fit(lines, free, near.noises, iterations=10)
-        options.append(Option(last.physics.name, _place(fitted.explanation.causes[-1]), fitted))
+        options.append(Option(answer_name(last.physics), _place(fitted.explanation.causes[-1]), fitted))
     return options, weighed
 
 

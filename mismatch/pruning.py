@@ -8,6 +8,7 @@ from .acceptance import evidence_needed
 from .diagnosis import AcceptedCause, Candidate
 from .explanation import Explanation
 from .fitting import Fit, fit
+from .physics import answer_name
 from .shape_of_model import ModelShape
 from .windowed_lines import WindowedLines
 
@@ -56,7 +57,7 @@ def _without(explanation: Explanation, cause: AcceptedCause) -> Explanation:
         shape = without_added(explanation.shape)
         return replace(explanation, shape=shape, u=explanation.u[: shape.size])
     kept = list(explanation.causes)
-    kept.pop(next(k for k, one in enumerate(kept) if one.physics.name == cause.name))
+    kept.pop(next(k for k, one in enumerate(kept) if answer_name(one.physics) == cause.name))
     return replace(explanation, causes=tuple(kept))
 
 

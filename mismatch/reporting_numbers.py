@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from .diagnosis import AcceptedCause
 from .fitting import Fit
+from .physics import answer_name
 
 Real = NDArray[np.float64]
 
@@ -18,7 +19,7 @@ def accepted_cause(fitted: Fit, location: dict[str, object], evidence: float) ->
     for parameter, value, error in zip(cause.physics.parameters, cause.values, spread, strict=False):
         parameters[parameter.name] = float(value)
         errors[parameter.name] = float(error * parameter.unit_step * (abs(value) if parameter.logarithmic else 1.0))
-    return AcceptedCause(cause.physics.name, dict(location), parameters, errors, evidence)
+    return AcceptedCause(answer_name(cause.physics), dict(location), parameters, errors, evidence)
 
 
 def accepted_mode(fitted: Fit, evidence: float) -> AcceptedCause:

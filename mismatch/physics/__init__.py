@@ -3,9 +3,9 @@
 import importlib
 import pkgutil
 
-from .protocol import Chain, ChainPhysics, JointPhysics, Parameter, Physics
+from .protocol import Chain, ChainPhysics, JointPhysics, Parameter, Physics, answer_name
 
-__all__ = ["Chain", "ChainPhysics", "JointPhysics", "Parameter", "Physics", "library"]
+__all__ = ["Chain", "ChainPhysics", "JointPhysics", "Parameter", "Physics", "answer_name", "library"]
 
 
 def library() -> dict[str, Physics]:

@@ -4,17 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..joint_law import JointLaw, JointMotion
-from .protocol import Parameter
+from .protocol import MOST_PRESLIDING, Parameter
 
 Real = NDArray[np.float64]
 
 
 ELEMENTS = 6
 """In parallel, yields spread evenly in their logarithm."""
-
-
-LEAST_YIELD = 0.03
-"""Of the typical deflection; an element that yields at less is dry friction."""
 
 
 class Hysteresis:
@@ -40,7 +36,7 @@ class Hysteresis:
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
         """The joint's force."""
         steps = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
-        yields = max(values[1], LEAST_YIELD * motion.deflection) * np.exp(values[2] * 2 * (steps - 0.5))
+        yields = max(values[1], MOST_PRESLIDING * motion.deflection) * np.exp(values[2] * 2 * (steps - 0.5))
         return JointLaw(springs=np.full(ELEMENTS, values[0] / ELEMENTS), yields=yields)
 
 

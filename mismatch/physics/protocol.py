@@ -14,6 +14,10 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 
+MOST_PRESLIDING = 0.1
+"""Of the typical deflection: an element that yields at less is dry friction, at more hysteresis."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One number of a hypothesis.
@@ -112,3 +116,8 @@ class JointPhysics(Protocol):
 
 
 Physics = ChainPhysics | JointPhysics
+
+
+def answer_name(physics: Physics) -> str:
+    """Name under which a cause is reported: its own, or that of the cause it is a form of (``answers_as``)."""
+    return str(getattr(physics, "answers_as", physics.name))

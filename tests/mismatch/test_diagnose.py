@@ -85,7 +85,7 @@ def test_what_the_library_does_not_have_is_not_named(model: ModalModel) -> None:
     known = {
         name: cause
         for name, cause in library().items()
-        if name not in ("coulomb_friction", "hysteresis", "quadratic_damping")
+        if name not in ("coulomb_friction", "presliding_friction", "hysteresis", "quadratic_damping")
     }
     made = _trials(model, lambda x, v: 25 * float(np.tanh(v / 2e-3)))
     found = diagnose(model, made, Settings(causes=known))

@@ -1,4 +1,4 @@
-"""Faults that are seen in the signals themselves and must go first: a tone from elsewhere, a channel that clips."""
+"""Tones from elsewhere: seen in the residual itself, they go before any cause is looked for."""
 
 from dataclasses import dataclass, replace
 
@@ -18,6 +18,9 @@ Real = NDArray[np.float64]
 TONE_CONTRAST, SEEN_AGAIN = 60.0, 5.0
 """Of a residual line against its neighbourhood, summed over recordings, and what two of them must show at least; noise
 alone passes 15 in one recording once in 3 million lines."""
+
+FORCED = 12.0
+"""Contrast of a force from which a line is the cut's own."""
 
 NEAR = 41
 """Lines of a neighbourhood."""
@@ -46,25 +49,6 @@ class Tone:
     gain: float
 
 
-@dataclass(frozen=True)
-class Clipping:
-    """A response that cannot show more than a limit.
-
-    Parameters
-    ----------
-    response
-        Its number.
-    limit
-        In the channel's unit.
-    gain
-        Twice the log likelihood gained.
-    """
-
-    response: int
-    limit: float
-    gain: float
-
-
 def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
     """The strongest residual line that stands out of the recordings at one frequency, and of no force.
 
@@ -87,24 +71,39 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
         if together[k] < TONE_CONTRAST:
             return None
         frequency = float(axis[k])
-        if any(_force_contrast(one, frequency) > 12.0 for one in lines) or _too_few_left(lines, frequency):
+        if any(force_contrast(one, frequency) > FORCED for one in lines) or _too_few_left(lines, frequency):
             continue
         shown = [np.interp(frequency, one.frequencies, c) for one, c in zip(lines, contrasts, strict=True)]
-        exact = _exact_frequency(fitted, lines, frequency)
+        exact = sharp_frequency(_rests(fitted, lines), [one.trial.rate for one in lines], frequency)
         return Tone(exact, _amplitudes(fitted, lines, exact), 2 * float(np.sum(shown)))
     return None
 
 
-def _exact_frequency(fitted: Fit, lines: list[WindowedLines], frequency: float) -> float:
-    """Peak of the residuals' spectra near a line, padded tenfold, all recordings together."""
-    step = max(_step(one) for one in lines)
-    tries = frequency + step * np.linspace(-2, 2, 161)
+def _rests(fitted: Fit, lines: list[WindowedLines]) -> list[Real]:
+    """Windowed residuals in time, (n_kept, n_responses) each."""
+    rests = [one.trial.response - shown_signal(fitted, one) for one in lines]
+    return [
+        rest[one.start : one.start + len(one.window)] * one.window[:, None]
+        for rest, one in zip(rests, lines, strict=True)
+    ]
+
+
+def sharp_frequency(windowed: list[Real], rates: list[float], near: float) -> float:
+    """Peak (Hz) of windowed signals' spectra about a line, forty points a line, all recordings together.
+
+    Parameters
+    ----------
+    windowed : each (n_kept, n_channels)
+    rates
+        Of each, Hz.
+    near
+        The line, Hz.
+    """
+    step = max(rate / len(kept) for kept, rate in zip(windowed, rates, strict=True))
+    tries = near + step * np.linspace(-2, 2, 161)
     power = np.zeros(len(tries))
-    for one in lines:
-        rest = one.trial.response - _signal(fitted, one)
-        kept = rest[one.start : one.start + len(one.window)] * one.window[:, None]
-        time = np.arange(len(kept)) / one.trial.rate
-        waves = np.exp(-2j * np.pi * tries[:, None] * time)
+    for kept, rate in zip(windowed, rates, strict=True):
+        waves = np.exp(-2j * np.pi * tries[:, None] * np.arange(len(kept)) / rate)
         power += np.sum(np.abs(waves @ kept) ** 2, axis=1)
     return float(tries[np.argmax(power)])
 
@@ -123,50 +122,8 @@ def without_tone(lines: WindowedLines, tone: Tone) -> WindowedLines:
     )
 
 
-def find_clipping(fitted: Fit, lines: list[WindowedLines]) -> Clipping | None:
-    """The response, if any, that follows its prediction only up to a limit."""
-    best: Clipping | None = None
-    predicted = [_signal(fitted, one) for one in lines]
-    for p in range(lines[0].measured.shape[1]):
-        measured = np.concatenate([one.trial.response[one.start :, p] for one in lines])
-        shown = np.concatenate([signal[one.start :, p] for one, signal in zip(lines, predicted, strict=True)])
-        top = float(np.abs(measured).max())
-        plain = float(np.sum((measured - shown) ** 2))
-        for limit in top * np.linspace(0.25, 1.0, 76):
-            beyond = np.abs(shown) > 1.05 * limit
-            if beyond.sum() < 30:
-                continue
-            clipped = float(np.sum((measured - np.clip(shown, -limit, limit)) ** 2))
-            gain = len(measured) * np.log(plain / clipped)
-            # a limit holds: where much more was due, no more than the limit and some noise is shown
-            pile = np.abs(measured[beyond])
-            held = float(np.quantile(pile, 0.98)) < 1.12 * limit and float(np.median(pile)) > 0.88 * limit
-            if (
-                held
-                and _piles_up(measured, float(np.median(pile)))
-                and gain > 60
-                and (best is None or gain > best.gain)
-            ):
-                best = Clipping(p, float(np.median(pile)), gain)
-    return best
-
-
-def _piles_up(measured: Real, limit: float) -> bool:
-    """Whether a signal crowds at a limit and hardly passes it; a vibration that was predicted too large does not."""
-    size = np.abs(measured) / limit
-    at, below = np.sum((size > 0.94) & (size < 1.06)), np.sum((size > 0.76) & (size < 0.88))
-    return bool(at > 1.3 * below and np.quantile(size, 0.9995) < 1.2)
-
-
-def unclipped(fitted: Fit, lines: WindowedLines, clipping: Clipping, original: Real) -> Real:
-    """The response (n_samples, n_responses) with what the limit cut off put back from the prediction."""
-    shown = _signal(fitted, lines)[:, clipping.response]
-    mended = original.copy()
-    mended[:, clipping.response] += shown - np.clip(shown, -clipping.limit, clipping.limit)
-    return mended
-
-
-def _signal(fitted: Fit, lines: WindowedLines) -> Real:
+def shown_signal(fitted: Fit, lines: WindowedLines) -> Real:
+    """Predicted responses in time, (n_samples, n_responses)."""
     spectrum = predict_lines(fitted.explanation, lines).spectrum
     return np.asarray(irfft(spectrum, n=lines.padded, axis=0)[: len(lines.trial.force)])
 
@@ -192,7 +149,8 @@ def _too_few_left(lines: list[WindowedLines], frequency: float) -> bool:
     return any(near.sum() > 0.25 * len(near) for near in reach)
 
 
-def _force_contrast(lines: WindowedLines, frequency: float) -> float:
+def force_contrast(lines: WindowedLines, frequency: float) -> float:
+    """Power of the forces at a line and beside it against the median of its neighbourhood."""
     power = np.sum(np.abs(lines.force_here / levels(lines)[1]) ** 2, axis=1)
     k = int(np.argmin(np.abs(lines.frequencies - frequency)))
     near = power[max(0, k - NEAR // 2) : k + NEAR // 2 + 1]

@@ -1,0 +1,46 @@
+"""Dry friction that gives way a little before it slides."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint_law import JointLaw, JointMotion
+from .protocol import MOST_PRESLIDING, Parameter
+
+Real = NDArray[np.float64]
+
+ELEMENTS = 6
+"""In parallel, yields spread evenly in their logarithm, the same force each."""
+
+
+class PreslidingFriction:
+    """Asperities act as springs until they break away: sliding begins after some micrometres, not at once.
+
+    In the limit of no presliding it is Coulomb's friction, and it is reported as that; where most of the motion is
+    presliding it is :mod:`hysteresis <mismatch.physics.hysteresis>`.
+    """
+
+    name = "presliding_friction"
+    answers_as = "coulomb_friction"
+    equation = "g = F_c p(x): a force that follows the deflection since the last turn, and slides at F_c"
+    source = "Dahl 1968, Aerospace Corp. TOR-0158; Canudas de Wit, Olsson, Astrom & Lischinsky 1995, IEEE TAC 40"
+    parameters = (
+        Parameter("friction_n", "N", 0.1, 0.0, 1e7, logarithmic=True),
+        Parameter("presliding_m", "m", 0.2, 1e-10, 1.0, logarithmic=True),
+    )
+    confusable_with = (
+        "hysteresis",
+        "quadratic_damping",
+    )
+
+    def starts(self, motion: JointMotion) -> tuple[Real, ...]:
+        """Shapes to try, amplitude 1."""
+        return tuple(np.array([1.0, k * motion.deflection]) for k in (0.01, 0.03, 0.08))
+
+    def law(self, values: Real, motion: JointMotion) -> JointLaw:
+        """The joint's force."""
+        steps = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
+        yields = min(values[1], MOST_PRESLIDING * motion.deflection) * np.exp(1.6 * (steps - 0.5))
+        return JointLaw(springs=values[0] / ELEMENTS / yields, yields=yields)
+
+
+PHYSICS = PreslidingFriction()

@@ -1,0 +1,79 @@
+"""Steady tones above the band in which model and recording are compared."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from .tones import NEAR, REACH, SEEN_AGAIN, TONE_CONTRAST, Tone, force_contrast, sharp_frequency
+from .windowed_lines import WindowedLines, windowed_lines
+
+Real = NDArray[np.float64]
+
+HIGHEST = 0.45
+"""Highest frequency looked at, as a share of the sample rate."""
+
+QUIET_FORCE = 5.0
+"""Contrast that no force may show there: above the modes a force's line needs no resonance to be seen in a response."""
+
+
+def tones_beyond(lines: list[WindowedLines], decay: float, most: int) -> list[Tone]:
+    """Lines of the responses above the compared band that stand out in two recordings and in no force.
+
+    No model speaks there, so each response is its own measure: a line's power against the median of its neighbours.
+
+    Parameters
+    ----------
+    lines
+        Recordings.
+    decay
+        Of the slowest mode, 1/s.
+    most
+        How many tones are looked for.
+
+    Returns
+    -------
+    list of Tone
+        Strongest first.
+    """
+    above = [_above(one, decay) for one in lines]
+    if not above or min(len(one.frequencies) for one in above) < 4 * NEAR:
+        return []
+    axis = above[0].frequencies
+    contrasts = [_contrast(one) for one in above]
+    nearest = [np.searchsorted(one.frequencies, axis).clip(1, len(one.frequencies) - 2) for one in above]
+    shown = np.array(
+        [np.max([c[at + shift] for shift in (-1, 0, 1)], axis=0) for c, at in zip(contrasts, nearest, strict=True)]
+    )
+    again = np.sort(shown, axis=0)[-min(2, len(shown))]
+    together = np.where(again > SEEN_AGAIN, shown.sum(axis=0), 0.0)
+    found: list[Tone] = []
+    while len(found) < most and together.max() > TONE_CONTRAST:
+        k = int(np.argmax(together))
+        if all(force_contrast(one, float(axis[k])) < QUIET_FORCE for one in above):
+            found.append(_tone(above, float(axis[k]), float(together[k])))
+        together[max(0, k - REACH) : k + REACH + 1] = 0.0
+    return found
+
+
+def _above(lines: WindowedLines, decay: float) -> WindowedLines:
+    rate = lines.trial.rate
+    return windowed_lines(
+        lines.trial, (float(lines.frequencies[-1]) + REACH / lines.trial.duration, HIGHEST * rate), decay
+    )
+
+
+def _contrast(lines: WindowedLines) -> Real:
+    power = np.abs(lines.measured) ** 2
+    floor = median_filter(power, (NEAR, 1), mode="nearest")
+    return np.asarray((power / np.maximum(floor, 1e-12 * power.max(axis=0) + 1e-300)).mean(axis=1))
+
+
+def _tone(above: list[WindowedLines], near: float, contrast: float) -> Tone:
+    kept = [one.trial.response[one.start : one.start + len(one.window)] * one.window[:, None] for one in above]
+    frequency = sharp_frequency(kept, [one.trial.rate for one in above], near)
+    sizes = []
+    for one in above:
+        k = int(np.argmin(np.abs(one.frequencies - frequency)))
+        power = np.sum(np.abs(one.measured[max(0, k - 2) : k + 3]) ** 2, axis=0)
+        sizes.append(2 * np.sqrt(power / len(one.window)))
+    return Tone(frequency, np.asarray(np.mean(sizes, axis=0)), 2 * contrast)

@@ -1,0 +1,73 @@
+"""A response that stops at a limit is found and mended; one that friction keeps small is not called so."""
+
+import numpy as np
+import pytest
+from concealed_recordings import Concealed, forces, linear_acceleration, structure, trial
+
+from mismatch import Explanation, LabError, ModelShape, band_of
+from mismatch.clipping import find_clipping, mended
+from mismatch.fitting import Fit, fit
+from mismatch.windowed_lines import WindowedLines, windowed_lines
+from modal_fit import ModalModel
+
+OFF = np.array([1.01, 0.99])
+DECAY = 1.7
+
+
+def fitted_to(lines: list[WindowedLines], model: ModalModel) -> Fit:
+    shape = ModelShape(model, LabError())
+    return fit(lines, Explanation(shape, np.zeros(shape.size)))
+
+
+def cuts(
+    limit: float, seed: int, law: Concealed | None = None, *, before: bool = False, duration: float = 40.0
+) -> list[WindowedLines]:
+    """Two cuts; the second response saturates, with the noise on it or before it."""
+    rng, model = np.random.default_rng(seed), structure()
+    found = []
+    for level in (30.0, 60.0):
+        force = forces(rng, level, duration)
+        shown = linear_acceleration(model, force) if law is None else law.acceleration(model, force)
+        held = shown.copy()
+        if not before:
+            held[:, 1] = np.clip(shown[:, 1], -limit, limit)
+        one = trial(f"{level:g} N", force, held, rng)
+        if before:
+            one.response[:, 1] = np.clip(one.response[:, 1], -limit, limit)
+        found.append(windowed_lines(one, band_of(model, one.rate), DECAY))
+    return found
+
+
+def level_of(seed: int) -> float:
+    return float(cuts(np.inf, seed)[1].trial.response[:, 1].std())
+
+
+@pytest.mark.parametrize("before", [False, True])
+@pytest.mark.parametrize("share", [0.8, 1.5, 2.2])
+def test_found_and_mended(share: float, before: bool) -> None:
+    """From a limit that cuts two of five samples to one that cuts one of a hundred."""
+    limit = share * level_of(8)
+    wrong = structure()
+    lines = cuts(limit, 8, before=before)
+    nominal = ModalModel(wrong.poles * OFF, wrong.right, wrong.left, wrong.responses, wrong.excitations)
+    base = fitted_to(lines, nominal)
+    clipping = find_clipping(base, lines)
+    assert clipping is not None
+    assert clipping.response == 1
+    settled, repaired, clipping = mended(base, lines, clipping)
+    assert clipping.limit == pytest.approx(limit, abs=max(4 * clipping.error, 1e-3 * limit))
+    found, true = settled.explanation.model, structure()
+    assert found.natural_frequencies == pytest.approx(true.natural_frequencies, rel=1e-3)
+    assert found.damping_ratios == pytest.approx(true.damping_ratios, rel=0.02)
+    whole = cuts(np.inf, 8)[1].trial.response[:, 1]
+    off = repaired[1].trial.response[:, 1] - whole
+    assert off.std() < 0.04 * whole.std()
+
+
+def test_friction_that_keeps_a_response_small_is_no_limit() -> None:
+    law = Concealed(lambda x, v: 25 * float(np.tanh(v / 2e-3)), np.array([0.3, 0.95]))
+    lines = cuts(np.inf, 9, law, duration=15.0)
+    shape = ModelShape(structure(), LabError())
+    believed = fit(lines, Explanation(shape, np.zeros(shape.size)), iterations=1)
+    assert find_clipping(believed, lines) is None
+    assert find_clipping(fitted_to(lines, structure()), lines) is None

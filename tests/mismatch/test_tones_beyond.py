@@ -1,0 +1,61 @@
+"""Tones above the compared band: found where only the responses know them, and nowhere else."""
+
+import numpy as np
+import pytest
+from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
+from numpy.typing import NDArray
+
+from mismatch.tones_beyond import tones_beyond
+from mismatch.trial import Trial, band_of
+from mismatch.windowed_lines import WindowedLines, windowed_lines
+
+TONE = 83.217
+LEVELS = (20.0, 40.0, 80.0)
+DECAY = 1.7
+
+
+def recordings(
+    seed: int, tones: tuple[float, float, float] = (0.0, 0.0, 0.0), forced: float = 0.0
+) -> list[WindowedLines]:
+    """Three linear cuts; amplitude of the tone in each, and of the same line in the force."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for level, size in zip(LEVELS, tones, strict=True):
+        force = forces(rng, level, 40.0)
+        wave = np.sin(2 * np.pi * TONE * np.arange(len(force)) / RATE + rng.uniform(0, 6))[:, None]
+        force = force + forced * level * wave
+        response = linear_acceleration(structure(), force)
+        found.append(prepared(trial(f"{level:g} N", force, response + size * wave * np.array([1.0, 0.4]), rng)))
+    return found
+
+
+def prepared(one: Trial) -> WindowedLines:
+    return windowed_lines(one, band_of(structure(), one.rate), DECAY)
+
+
+def noise_of(lines: list[WindowedLines]) -> NDArray[np.float64]:
+    """About what 2 % noise is, a response, of the middle recording."""
+    return np.asarray(0.02 * lines[1].trial.response.std(axis=0))
+
+
+def test_a_tone_below_the_noise_is_found_with_frequency_and_size() -> None:
+    size = float(noise_of(recordings(5))[0])
+    lines = recordings(5, (0.7 * size, 0.7 * size, 0.7 * size))
+    assert lines[0].frequencies[-1] < TONE - 20
+    (tone,) = tones_beyond(lines, DECAY, 4)
+    assert tone.frequency == pytest.approx(TONE, abs=0.002)
+    assert tone.amplitudes == pytest.approx([0.7 * size, 0.28 * size], rel=0.2)
+
+
+def test_a_line_of_the_cut_is_no_tone() -> None:
+    assert tones_beyond(recordings(6, forced=0.02), DECAY, 4) == []
+
+
+def test_a_line_in_one_recording_only_is_no_tone() -> None:
+    size = float(noise_of(recordings(7))[0])
+    assert tones_beyond(recordings(7, (0.0, 2 * size, 0.0)), DECAY, 4) == []
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_noise_has_no_tones(seed: int) -> None:
+    assert tones_beyond(recordings(100 + seed), DECAY, 4) == []
