@@ -16,7 +16,7 @@ LEAST_EVIDENCE = 20.0
 NOISE_LIKE = 0.06
 """Share of a residual that may seem to move with the signal by chance, hum or force noise."""
 
-EXPLAINED = 0.9
+EXPLAINED = 0.95
 """Share of what moved with the signal that causes must have taken away, if what is left is not noise-like."""
 
 HELD_OUT = 10.0

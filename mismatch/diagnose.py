@@ -20,6 +20,7 @@ from .options import fitted_options
 from .physics import Physics, library
 from .pruning import pruned
 from .reporting_numbers import accepted_cause, accepted_mode, modal_deviation
+from .settling import settled
 from .shape_of_model import LabError, ModelShape
 from .trial import Trial, band_of
 from .true_forces import without_force_noise
@@ -155,8 +156,7 @@ def _search(
         best = min(options, key=lambda option: option.fitted.score, default=None)
         if best is None or best.fitted.score > current.score - LEAST_EVIDENCE:
             break
-        # evidence counts from where a fit has settled; a next cause must not live on what this one left undone
-        best = replace(best, fitted=fit(lines, best.fitted.explanation, best.fitted.noises, iterations=60))
+        best = replace(best, fitted=settled(lines, best.fitted))
         if not worth_it(best, current, base):
             break
         line = best.fitted.score + LEAST_EVIDENCE / 2

@@ -22,7 +22,7 @@ def repair_plain_faults(
         tone = find_tone(base, lines)
         if tone is None or tone.gain < LEAST_EVIDENCE:
             break
-        lines = [without_tone(one, tone) for one in lines]
+        lines = [without_tone(base, one, tone) for one in lines]
         base = fit(lines, base.explanation, iterations=4)
         found.append(_tone_cause(tone, lines[0]))
     found += [_tone_cause(tone, lines[0]) for tone in tones_beyond(lines, decay, MOST_TONES - len(found))]

@@ -17,7 +17,7 @@ def _none() -> Real:
 
 @dataclass(frozen=True)
 class JointLaw:
-    """Force g that a joint takes beyond its linear stiffness and damping, ``g = S(x) + D(v) + r tau x + sum_i w_i``.
+    """Force g that a joint takes beyond its linear stiffness and damping, ``g = S(x) + D(v) + r(tau) x + sum_i w_i``.
 
     Any law of deflection x and velocity v goes into the two tables; memory is a sum of elastic-plastic elements in
     parallel, ``w_i' = k_i v`` held within ``|w_i| <= k_i y_i`` (Iwan, J. Applied Mechanics 33, 1966): one is an
@@ -35,6 +35,8 @@ class JointLaw:
         D at evenly spaced v; empty: none.
     ramp
         r, N/m: change of stiffness from the beginning to the end of a recording, tau runs from -1/2 to 1/2.
+    bend
+        b, N/m: how far the middle lies below the straight change, ``r tau + b (4 tau^2 - 1)``.
     springs : (n,), N/m
         k of the elastic-plastic elements.
     yields : (n,), m
@@ -46,6 +48,7 @@ class JointLaw:
     speed: float = 1.0
     damping: Real = field(default_factory=_none)
     ramp: float = 0.0
+    bend: float = 0.0
     springs: Real = field(default_factory=_none)
     yields: Real = field(default_factory=_none)
 

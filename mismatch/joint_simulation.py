@@ -119,7 +119,8 @@ def driven_force(lines: WindowedLines, deflection: Real, velocity: Real, law: Jo
 
 def stiffness_ramp(law: JointLaw, n: int, step: float, duration: float) -> Real:
     """Change of stiffness (n,), N/m, at instants ``step`` s apart."""
-    return np.asarray(law.ramp * (np.minimum(np.arange(n) * step / duration, 1.0) - 0.5))
+    tau = np.minimum(np.arange(n) * step / duration, 1.0) - 0.5
+    return np.asarray(law.ramp * tau + law.bend * (4 * tau**2 - 1))
 
 
 def joint_dynamics(

@@ -58,7 +58,9 @@ def fitted_options(
         best = None
     left = leftover((best.fitted if best else current).explanation, lines)
     first = best is None and not current.explanation.causes
-    if first or (left.share > NOISE_LIKE and left.power > 3 * SMALL * before.power):
+    # modes are many-sided: a joint that drifts or rubs is imitated by a few of them
+    imitated = best is not None and best.name == "missing_mode"
+    if first or imitated or (left.share > NOISE_LIKE and left.power > 3 * SMALL * before.power):
         joint_options, joint_weighed = _joints(lines, current, base, linear_floor(current, lines), causes)
         weighed += joint_weighed
         options += joint_options

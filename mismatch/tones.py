@@ -108,16 +108,24 @@ def sharp_frequency(windowed: list[Real], rates: list[float], near: float) -> fl
     return float(tries[np.argmax(power)])
 
 
-def without_tone(lines: WindowedLines, tone: Tone) -> WindowedLines:
-    """The same recording without the lines that the tone reaches."""
-    width = REACH * _step(lines)
-    kept = np.abs(lines.frequencies - tone.frequency) > width
+def without_tone(fitted: Fit, lines: WindowedLines, tone: Tone) -> WindowedLines:
+    """The same recording without the tone, and without the lines about it.
+
+    The sinusoid that fits the residual best is subtracted, or a strong tone's leakage through the window would stand
+    out far from it; what is left of one that wavers is left out.
+    """
+    rest = lines.trial.response - shown_signal(fitted, lines)
+    turn = 2 * np.pi * tone.frequency * np.arange(len(rest)) / lines.trial.rate
+    waves = np.column_stack([np.cos(turn), np.sin(turn)])
+    response = lines.trial.response - waves @ np.linalg.lstsq(waves, rest, rcond=None)[0]
+    kept = np.abs(lines.frequencies - tone.frequency) > REACH * _step(lines)
     return replace(
         lines,
+        trial=replace(lines.trial, response=response),
         band=lines.band[kept],
         frequencies=lines.frequencies[kept],
         force_here=lines.force_here[kept],
-        measured=lines.measured[kept],
+        measured=lines.cut(response)[kept],
         trust=lines.trust[kept],
     )
 

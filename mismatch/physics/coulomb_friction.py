@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..joint_law import JointLaw, JointMotion
-from .protocol import Parameter
+from .protocol import DRY, Parameter
 
 Real = NDArray[np.float64]
 
@@ -26,12 +26,13 @@ class CoulombFriction:
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
         """Shapes to try, amplitude 1."""
-        return tuple(np.array([1.0, k * motion.velocity]) for k in (0.03, 0.15, 0.5))
+        return tuple(np.array([1.0, k * motion.velocity]) for k in (0.01, 0.03, 0.08))
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
         """The joint's force."""
         v = motion.velocities
-        return JointLaw(speed=motion.speed, damping=values[0] * np.tanh(v / max(values[1], 4e-4 * motion.speed)))
+        smooth = min(max(values[1], 4e-4 * motion.speed), DRY * motion.velocity)
+        return JointLaw(speed=motion.speed, damping=values[0] * np.tanh(v / smooth))
 
 
 PHYSICS = CoulombFriction()

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..joint_law import JointLaw, JointMotion
-from .protocol import MOST_PRESLIDING, Parameter
+from .protocol import DRY, Parameter
 
 Real = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ class Hysteresis:
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
         """The joint's force."""
         steps = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
-        yields = max(values[1], MOST_PRESLIDING * motion.deflection) * np.exp(values[2] * 2 * (steps - 0.5))
+        yields = max(values[1], DRY * motion.deflection) * np.exp(values[2] * 2 * (steps - 0.5))
         return JointLaw(springs=np.full(ELEMENTS, values[0] / ELEMENTS), yields=yields)
 
 

@@ -1,4 +1,4 @@
-"""A joint whose stiffness changes steadily during the cut."""
+"""A joint whose stiffness changes steadily during the cut, evenly or sooner or later."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,23 +17,27 @@ class PoseDrift:
     """The robot moves along its path, or warms up: one joint softens or stiffens from beginning to end."""
 
     name = "pose_drift"
-    equation = "g = r (t / T - n) x"
+    equation = "g = (r (t / T - n) + b (4 (t / T - 1/2)^2 - 1)) x"
     source = "Verboven et al. 2004 on slowly varying structures; linear time-varying stiffness"
     parameters = (
         Parameter("stiffness_change_n_per_m", "N/m", SCALE, -1e12, 1e12),
         Parameter("nominal_at", "share of the recording", 0.1, -5.0, 5.0),
+        Parameter("bend_n_per_m", "N/m", SCALE, -1e12, 1e12),
     )
     confusable_with = ("stiffness_softening",)
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Shapes to try, amplitude 1: the nominal model holds in the middle of a recording."""
-        return (np.array([1.0, 0.5]),)
+        """Shapes to try, amplitude 1: the nominal model holds at the beginning of a recording, or at its end."""
+        return (np.array([1.0, 0.0, 0.0]), np.array([1.0, 1.0, 0.0]))
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
         """The joint's force."""
         lasting = values[0] * (0.5 - values[1])
         return JointLaw(
-            reach=motion.reach, stiffness=lasting * np.linspace(-motion.reach, motion.reach, 3), ramp=values[0]
+            reach=motion.reach,
+            stiffness=lasting * np.linspace(-motion.reach, motion.reach, 3),
+            ramp=values[0],
+            bend=values[2],
         )
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..joint_law import JointLaw, JointMotion
-from .protocol import MOST_PRESLIDING, Parameter
+from .protocol import DRY, Parameter
 
 Real = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class PreslidingFriction:
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
         """The joint's force."""
         steps = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
-        yields = min(values[1], MOST_PRESLIDING * motion.deflection) * np.exp(1.6 * (steps - 0.5))
+        yields = min(values[1], DRY * motion.deflection) * np.exp(1.6 * (steps - 0.5))
         return JointLaw(springs=values[0] / ELEMENTS / yields, yields=yields)
 
 

@@ -14,8 +14,9 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 
-MOST_PRESLIDING = 0.1
-"""Of the typical deflection: an element that yields at less is dry friction, at more hysteresis."""
+DRY = 0.1
+"""Of the typical deflection or velocity: what gives way within less is dry friction; an element that yields later is
+hysteresis, and a force that still rises with the speed beyond it is damping of another kind."""
 
 
 @dataclass(frozen=True)
