@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .fitting import Fit, fit
+from .saturation import Saturation, rounded, saturated
 from .tones import shown_signal
 from .windowed_lines import WindowedLines
 
@@ -45,16 +46,19 @@ class Clipping:
     ----------
     response
         Its number.
-    limit, error
-        In the channel's unit, and its standard error.
+    saturation
+        Its characteristic.
     gain
         Twice the log likelihood gained.
     """
 
     response: int
-    limit: float
-    error: float
+    saturation: Saturation
     gain: float
+
+    def of(self, signal: Real) -> Real:
+        """What the channel shows of a signal (n,)."""
+        return saturated(signal, self.saturation.limit, self.saturation.sharpness)
 
 
 def find_clipping(fitted: Fit, lines: list[WindowedLines]) -> Clipping | None:
@@ -80,7 +84,7 @@ def find_clipping(fitted: Fit, lines: list[WindowedLines]) -> Clipping | None:
             clipped = float(np.sum((measured - np.clip(shown, -limit, limit)) ** 2))
             gain = len(measured) * float(np.log(plain / clipped))
             if gain > LEAST_GAIN and (best is None or gain > best.gain):
-                best = Clipping(p, *pile, gain)
+                best = Clipping(p, Saturation(*pile), gain)
     return best
 
 
@@ -149,26 +153,31 @@ def _extrapolated(tried: list[Real], reached: list[Real]) -> Real:
 
 def _error(fitted: Fit, lines: list[WindowedLines], clipping: Clipping) -> float:
     """Power of what the clipped prediction leaves of the response as measured."""
-    p, limit = clipping.response, clipping.limit
-    rests = [
-        (one.trial.response[:, p] - np.clip(shown_signal(fitted, one)[:, p], -limit, limit))[one.start :]
-        for one in lines
-    ]
-    return float(sum(np.sum(rest**2) for rest in rests))
+    measured, shown = _channel(fitted, lines, clipping.response)
+    return float(np.sum((measured - clipping.of(shown)) ** 2))
 
 
 def _repaired(fitted: Fit, lines: list[WindowedLines], clipping: Clipping) -> list[WindowedLines]:
     """Recordings with what the limit cut off taken from the prediction."""
-    p, limit = clipping.response, clipping.limit
+    p = clipping.response
     whole = []
     for one in lines:
         shown = shown_signal(fitted, one)[:, p]
         response = one.trial.response.copy()
-        response[:, p] += shown - np.clip(shown, -limit, limit)
+        response[:, p] += shown - clipping.of(shown)
         whole.append(replace(one, trial=replace(one.trial, response=response), measured=one.cut(response)))
     return whole
 
 
 def _again(fitted: Fit, lines: list[WindowedLines], clipping: Clipping) -> Clipping:
+    """The same channel's limit as the better prediction shows it."""
     again = find_clipping(fitted, lines)
-    return again if again is not None and again.response == clipping.response else clipping
+    found = again if again is not None and again.response == clipping.response else clipping
+    sharp = replace(found.saturation, sharpness=np.inf)
+    return replace(found, saturation=rounded(*_channel(fitted, lines, found.response), sharp))
+
+
+def _channel(fitted: Fit, lines: list[WindowedLines], p: int) -> tuple[Real, Real]:
+    """One response as measured and as predicted, all recordings, run-in left out."""
+    measured = np.concatenate([one.trial.response[one.start :, p] for one in lines])
+    return measured, np.concatenate([shown_signal(fitted, one)[one.start :, p] for one in lines])

@@ -44,6 +44,6 @@ def _tone_cause(tone: Tone, lines: WindowedLines) -> AcceptedCause:
 
 def _clipping_cause(clipping: Clipping, lines: WindowedLines) -> AcceptedCause:
     name = lines.trial.channels[clipping.response - lines.measured.shape[1]]
-    return AcceptedCause(
-        "clipping", {"channel": name}, {"limit": clipping.limit}, {"limit": clipping.error}, clipping.gain
-    )
+    found = clipping.saturation
+    parameters = {"limit": found.limit} | ({} if np.isinf(found.sharpness) else {"sharpness": found.sharpness})
+    return AcceptedCause("clipping", {"channel": name}, parameters, {"limit": found.error}, clipping.gain)

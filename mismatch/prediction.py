@@ -10,6 +10,7 @@ from modal_fit import ModalModel
 
 from .explanation import predict_lines
 from .physics_terms import explanation_of
+from .saturation import saturated
 from .trial import Trial, band_of
 from .windowed_lines import windowed_lines
 
@@ -68,8 +69,8 @@ def predict(model: ModalModel, trial: Trial) -> Prediction:
     for term in model.physics:
         if term["name"] == "clipping":
             column = trial.channels.index(term["location"]["channel"]) - trial.force.shape[1]
-            limit = float(term["parameters"]["limit"])
-            response[:, column] = np.clip(response[:, column], -limit, limit)
+            limit, sharpness = (float(term["parameters"].get(name, np.inf)) for name in ("limit", "sharpness"))
+            response[:, column] = saturated(response[:, column], limit, sharpness)
     measured, shown = (lines.cut(signal) for signal in (trial.response, response))
     rest, power = np.abs(measured - shown) ** 2, np.abs(measured) ** 2
     return Prediction(

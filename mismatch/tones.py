@@ -22,8 +22,11 @@ alone passes 15 in one recording once in 3 million lines."""
 FORCED = 12.0
 """Contrast of a force from which a line is the cut's own."""
 
-NEAR = 41
+NEAR = np.ones(41, dtype=bool)
 """Lines of a neighbourhood."""
+
+BESIDE = np.array([abs(k) > 3 for k in range(-10, 11)])
+"""Lines beside a line, without those that a tone reaches: a narrow resonance is as high there."""
 
 
 REACH = 10
@@ -57,7 +60,8 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
     """
     if len(lines) == 0:
         return None
-    contrasts = [_contrast(fitted, one, noise) for one, noise in zip(lines, fitted.noises, strict=True)]
+    powers = [_whitened_power(fitted, one, noise) for one, noise in zip(lines, fitted.noises, strict=True)]
+    contrasts = [np.minimum(above_neighbours(power, NEAR), above_neighbours(power, BESIDE)) for power in powers]
     axis = lines[0].frequencies
     together = np.array(
         [
@@ -73,7 +77,11 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
         frequency = float(axis[k])
         if any(force_contrast(one, frequency) > FORCED for one in lines) or _too_few_left(lines, frequency):
             continue
-        shown = [np.interp(frequency, one.frequencies, c) for one, c in zip(lines, contrasts, strict=True)]
+        # how strong it is does not depend on how far it leaks
+        shown = [
+            np.interp(frequency, one.frequencies, above_neighbours(power, NEAR))
+            for one, power in zip(lines, powers, strict=True)
+        ]
         exact = sharp_frequency(_rests(fitted, lines), [one.trial.rate for one in lines], frequency)
         return Tone(exact, _amplitudes(fitted, lines, exact), 2 * float(np.sum(shown)))
     return None
@@ -140,15 +148,17 @@ def _step(lines: WindowedLines) -> float:
     return lines.trial.rate / len(lines.window)
 
 
-def _contrast(fitted: Fit, lines: WindowedLines, noise: NoiseModel) -> Real:
-    """Power of each whitened residual line against its neighbourhood, a channel."""
-    predicted = predict_lines(fitted.explanation, lines)
-    through = through_structure(fitted.explanation, lines)
-    rest = lines.measured - predicted.response
-    own = noise.covariance(lines.frequencies, through)
-    white = whitening(own)
-    power = np.sum(np.abs(np.einsum("kij,kj->ki", white, rest)) ** 2, axis=1) / rest.shape[1]
-    return np.asarray(power / np.maximum(median_filter(power, NEAR, mode="nearest"), 1e-3 * power.mean() + 1e-300))
+def _whitened_power(fitted: Fit, lines: WindowedLines, noise: NoiseModel) -> Real:
+    """Power of each residual line in units of its noise, mean over channels."""
+    rest = lines.measured - predict_lines(fitted.explanation, lines).response
+    own = noise.covariance(lines.frequencies, through_structure(fitted.explanation, lines))
+    return np.asarray(np.sum(np.abs(np.einsum("kij,kj->ki", whitening(own), rest)) ** 2, axis=1) / rest.shape[1])
+
+
+def above_neighbours(power: Real, footprint: NDArray[np.bool_]) -> Real:
+    """Each line of a power (n_lines,) over the median of the lines about it that the footprint holds."""
+    around = median_filter(power, footprint=footprint, mode="nearest")
+    return np.asarray(power / np.maximum(around, 1e-3 * power.mean() + 1e-300))
 
 
 def _too_few_left(lines: list[WindowedLines], frequency: float) -> bool:
@@ -161,7 +171,7 @@ def force_contrast(lines: WindowedLines, frequency: float) -> float:
     """Power of the forces at a line and beside it against the median of its neighbourhood."""
     power = np.sum(np.abs(lines.force_here / levels(lines)[1]) ** 2, axis=1)
     k = int(np.argmin(np.abs(lines.frequencies - frequency)))
-    near = power[max(0, k - NEAR // 2) : k + NEAR // 2 + 1]
+    near = power[max(0, k - len(NEAR) // 2) : k + len(NEAR) // 2 + 1]
     return float(power[max(0, k - 1) : k + 2].max() / max(float(np.median(near)), 1e-300))
 
 

@@ -2,9 +2,18 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
 
-from .tones import NEAR, REACH, SEEN_AGAIN, TONE_CONTRAST, Tone, force_contrast, sharp_frequency
+from .tones import (
+    BESIDE,
+    NEAR,
+    REACH,
+    SEEN_AGAIN,
+    TONE_CONTRAST,
+    Tone,
+    above_neighbours,
+    force_contrast,
+    sharp_frequency,
+)
 from .windowed_lines import WindowedLines, windowed_lines
 
 Real = NDArray[np.float64]
@@ -36,7 +45,7 @@ def tones_beyond(lines: list[WindowedLines], decay: float, most: int) -> list[To
         Strongest first.
     """
     above = [_above(one, decay) for one in lines]
-    if not above or min(len(one.frequencies) for one in above) < 4 * NEAR:
+    if not above or min(len(one.frequencies) for one in above) < 4 * len(NEAR):
         return []
     axis = above[0].frequencies
     contrasts = [_contrast(one) for one in above]
@@ -64,8 +73,8 @@ def _above(lines: WindowedLines, decay: float) -> WindowedLines:
 
 def _contrast(lines: WindowedLines) -> Real:
     power = np.abs(lines.measured) ** 2
-    floor = median_filter(power, (NEAR, 1), mode="nearest")
-    return np.asarray((power / np.maximum(floor, 1e-12 * power.max(axis=0) + 1e-300)).mean(axis=1))
+    each = [np.minimum(above_neighbours(column, NEAR), above_neighbours(column, BESIDE)) for column in power.T]
+    return np.asarray(np.mean(each, axis=0))
 
 
 def _tone(above: list[WindowedLines], near: float, contrast: float) -> Tone:

@@ -55,7 +55,7 @@ def test_found_and_mended(share: float, before: bool) -> None:
     assert clipping is not None
     assert clipping.response == 1
     settled, repaired, clipping = mended(base, lines, clipping)
-    assert clipping.limit == pytest.approx(limit, abs=max(4 * clipping.error, 1e-3 * limit))
+    assert clipping.saturation.limit == pytest.approx(limit, abs=max(4 * clipping.saturation.error, 1e-3 * limit))
     found, true = settled.explanation.model, structure()
     assert found.natural_frequencies == pytest.approx(true.natural_frequencies, rel=1e-3)
     assert found.damping_ratios == pytest.approx(true.damping_ratios, rel=0.02)

@@ -1,0 +1,89 @@
+"""The characteristic of a channel that saturates: sharply, or rounding off before its limit."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+Real = NDArray[np.float64]
+
+SOFTEST = 4.0
+"""Sharpness below which a characteristic is bent long before its limit: that is no clipping."""
+
+SHARPEST = 60.0
+"""Sharpness above which rounding cannot be seen."""
+
+LEAST_GAIN = 20.0
+"""Of twice the log likelihood, for a rounded limit over a sharp one."""
+
+
+@dataclass(frozen=True)
+class Saturation:
+    """``y = x / (1 + |x / l|^n)^(1 / n)``; a sharp limit has n = infinity.
+
+    Parameters
+    ----------
+    limit, error
+        l in the channel's unit, and its standard error.
+    sharpness
+        n.
+    """
+
+    limit: float
+    error: float
+    sharpness: float = np.inf
+
+
+def saturated(signal: Real, limit: float, sharpness: float = np.inf) -> Real:
+    """What a saturating channel shows of a signal.
+
+    Parameters
+    ----------
+    signal : (n,)
+    limit, sharpness
+        As of :class:`Saturation`.
+
+    Examples
+    --------
+    >>> saturated(np.array([0.5, 3.0]), 2.0)
+    array([0.5, 2. ])
+    >>> saturated(np.array([0.5, 2.0]), 2.0, 1.0)
+    array([0.4, 1. ])
+    """
+    if np.isinf(sharpness):
+        return np.asarray(np.clip(signal, -limit, limit))
+    share = np.abs(signal) / limit
+    # of what is far beyond the limit the power of the reciprocal stays finite
+    large = np.maximum(share, 1.0)
+    within = np.minimum(share, 1.0) ** sharpness
+    return np.asarray(signal / large * (large**-sharpness + within) ** (-1 / sharpness))
+
+
+def rounded(measured: Real, shown: Real, sharp: Saturation) -> Saturation:
+    """The characteristic that leaves least of a channel, if rounding it is worth its number.
+
+    Parameters
+    ----------
+    measured, shown : (n,)
+        As recorded, and as predicted without a limit.
+    sharp
+        The sharp limit that was found.
+    """
+    near = np.abs(shown) > 0.5 * sharp.limit
+    due, seen = shown[near], measured[near]
+
+    def left(numbers: Real) -> float:
+        inverse = float(np.clip(numbers[1], 0.0, 1 / SOFTEST))
+        sharpness = 1 / inverse if inverse > 1 / SHARPEST else np.inf
+        return float(np.sum((seen - saturated(due, sharp.limit * float(numbers[0]), sharpness)) ** 2))
+
+    start = np.array([[1.0, 0.02], [1.01, 0.06], [1.02, 0.2]])
+    best = minimize(
+        left, start[1], method="Nelder-Mead", options={"initial_simplex": start, "maxiter": 80, "xatol": 1e-4}
+    )
+    inverse = float(np.clip(best.x[1], 0.0, 1 / SOFTEST))
+    gain = len(seen) * float(np.log(left(np.array([1.0, 0.0])) / max(float(best.fun), 1e-300)))
+    if inverse <= 1 / SHARPEST or gain < LEAST_GAIN:
+        return sharp
+    return Saturation(sharp.limit * float(best.x[0]), sharp.error, 1 / inverse)
