@@ -1,0 +1,248 @@
+"""Which physics a computed cutting force leaves out: `diagnose_cut`."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cutting import MillingProcess
+from foundation import InputError
+
+from ..acceptance import CLEAR, EXPLAINED, HELD_OUT, LEAST_EVIDENCE, NOISE_LIKE
+from ..diagnosis import AcceptedCause, Candidate
+from .cut_fit import CutFit, fit_cut
+from .cut_held_out import FITTED, held_out_gain, improvement
+from .cut_leftover import CutLeftover, leftover
+from .cut_recording import CutRecording
+from .cut_results import COEFFICIENTS, CutDiagnosis
+from .cut_setting import Attempt, CutSetting
+from .cut_start import fit_turned, started
+from .force_coefficients import Belief
+from .force_lines import force_lines
+from .force_noise import noise_of
+from .physics import CutPhysics, library
+
+AS_GOOD = 6.0
+"""Evidence by which another cause may be worse and still not be told from the best: a likelihood ratio of 20."""
+
+ODD = 3.0
+"""Laboratory's errors by which a coefficient must be off to be named."""
+
+FORCE_ERROR = 0.005
+"""Share by which each spectral line of a right computed force is still off."""
+
+
+@dataclass(frozen=True)
+class _Round:
+    """One cause fitted beside those accepted before."""
+
+    name: str
+    evidence: float
+    fitted: CutFit
+
+
+def diagnose_cut(
+    process: MillingProcess,
+    depth: float,
+    recordings: Sequence[CutRecording],
+    *,
+    coefficient_error: float = 0.15,
+    force_error: float = FORCE_ERROR,
+) -> CutDiagnosis:
+    """Compare measured with computed cutting forces, and name what the computed ones leave out.
+
+    Coefficients are refitted within ``coefficient_error`` first. A cause is accepted if it lowers the score
+    ``2 sum |W r|^2 + |u|^2 + n ln N`` by 20, stands out of its own error by four, and, fitted to every other block of
+    time, lowers the misfit of the blocks between by 10. What is left and is neither noise nor usual error makes the
+    verdict ``unexplained``, and then nothing is named.
+
+    Parameters
+    ----------
+    process
+        Cutter, engagement and coefficients as the cutting file states them.
+    depth
+        Axial depth, m.
+    recordings
+        One or more cuts of this process, of at least 80 revolutions.
+    coefficient_error
+        One standard deviation of what a laboratory's coefficients are off, a share.
+    force_error
+        Share by which each line of a right force model is still off: what is smaller is not named.
+
+    Raises
+    ------
+    InputError
+        No recording, or a depth or an error that is not positive.
+    """
+    if not recordings:
+        raise InputError("no recording given; name one or more")
+    if not (math.isfinite(depth) and depth > 0):
+        raise InputError(f"depth = {depth!r} m must be positive; give --depth M in metres, for example 0.001")
+    if not 0 <= force_error < 1:
+        raise InputError(f"force error {force_error!r} must be a share from 0 to 1, for example 0.005")
+    lines = tuple(force_lines(recording, process.teeth) for recording in recordings)
+    setting = CutSetting(Belief(process, coefficient_error), depth, lines)
+    known = all(recording.motion is not None for recording in recordings)
+    causes, closed = _weighable(process, known)
+    start = started(setting, [(cause, cause.stated(process)) for cause in causes])
+    setting, start = _with_noise(setting, start, [cause.name for cause in causes], force_error)
+    base = fit_turned(setting, start, ())
+    final, rounds = _search(setting, start, base, [cause.name for cause in causes])
+    return _result(setting, start, base, final, rounds, closed, force_error)
+
+
+def _weighable(process: MillingProcess, known: bool) -> tuple[list[CutPhysics], list[Candidate]]:
+    """Causes that can be weighed, and the others with the reason."""
+    causes, closed = [], []
+    for name, cause in library().items():
+        why = cause.obstacle(process) or ("" if known or not cause.moves else "no motion at the tip is known")
+        if why:
+            closed.append(Candidate(name, 0.0, f"not weighed: {why}"))
+        else:
+            causes.append(cause)
+    return causes, closed
+
+
+def _with_noise(
+    setting: CutSetting, start: Attempt, names: Sequence[str], error: float
+) -> tuple[CutSetting, Attempt]:
+    """Noise as all causes together leave it, and the numbers as stated with the spindle as they show it."""
+    attempt = start
+    for _ in range(3):
+        noise = tuple(
+            noise_of(lines, lines.measured - setting.shown(k, attempt), setting.shown(k, attempt), error)
+            for k, lines in enumerate(setting.lines)
+        )
+        noisy = replace(setting, noise=noise)
+        attempt = fit_turned(noisy, attempt, names).attempt
+    return noisy, replace(attempt, deviations=np.zeros(6), acting=start.acting)
+
+
+def _search(
+    setting: CutSetting, start: Attempt, base: CutFit, names: Sequence[str]
+) -> tuple[CutFit, list[list[_Round]]]:
+    """Add the best cause as long as one is worth it; then let go of those that later ones have replaced."""
+    current, rounds = base, []
+    while True:
+        rest = [name for name in names if name not in current.freed]
+        ranked = sorted((_tried(setting, current, name) for name in rest), key=lambda one: -one.evidence)
+        rounds.append(ranked)
+        best = next((one for one in ranked if _worth_it(setting, start, current, one)), None)
+        if best is None:
+            return _pruned(setting, base, current), rounds
+        current = best.fitted
+
+
+def _tried(setting: CutSetting, current: CutFit, name: str) -> _Round:
+    fitted = fit_turned(setting, current.attempt, (*current.freed, name))
+    return _Round(name, current.score - fitted.score, fitted)
+
+
+def _worth_it(setting: CutSetting, start: Attempt, current: CutFit, option: _Round) -> bool:
+    """Evidence, a number that stands out, and a gain on blocks that were not fitted."""
+    if option.evidence < LEAST_EVIDENCE or not _clear(setting, option.fitted, option.name):
+        return False
+    here = fit_cut(setting, current.attempt, current.freed, part=FITTED)
+    there = fit_cut(setting, option.fitted.attempt, option.fitted.freed, part=FITTED)
+    return held_out_gain(here, there) > HELD_OUT
+
+
+def _pruned(setting: CutSetting, base: CutFit, current: CutFit) -> CutFit:
+    for name in current.freed[:-1]:
+        fewer = tuple(one for one in current.freed if one != name)
+        stated = next(cause for cause, _ in base.attempt.acting if cause.name == name).stated(
+            setting.belief.process
+        )
+        fitted = fit_turned(setting, current.attempt.with_values(name, stated), fewer)
+        if fitted.score - current.score < LEAST_EVIDENCE:
+            current = fitted
+    return current
+
+
+def _clear(setting: CutSetting, fitted: CutFit, name: str) -> bool:
+    """Whether a number of the cause differs from the stated one by four of its errors."""
+    cause = next(cause for cause, _ in fitted.attempt.acting if cause.name == name)
+    process = setting.belief.process
+    off = fitted.attempt.values(name) - cause.stated(process)
+    return bool(np.any(np.abs(off) > CLEAR * np.sqrt(np.diag(cause_covariance(setting, fitted, name)))))
+
+
+def cause_covariance(setting: CutSetting, fitted: CutFit, name: str) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """Covariance of one freed cause's numbers, SI."""
+    at, process = 6, setting.belief.process
+    for freed in fitted.freed:
+        cause = next(cause for cause, _ in fitted.attempt.acting if cause.name == freed)
+        units = np.array([parameter.unit_step for parameter in cause.parameters(process)])
+        if freed == name:
+            block = slice(at, at + len(units))
+            return np.asarray(fitted.covariance[block, block] * np.outer(units, units))
+        at += len(units)
+    raise InputError(f"{name} was not fitted; freed were {', '.join(fitted.freed) or 'none'}")
+
+
+def _result(
+    setting: CutSetting,
+    start: Attempt,
+    base: CutFit,
+    final: CutFit,
+    rounds: list[list[_Round]],
+    closed: list[Candidate],
+    error: float,
+) -> CutDiagnosis:
+    nominal = fit_cut(setting, start, (), refit=False)
+    before, after = (leftover(setting, one.attempt, error) for one in (base, final))
+    physics = [*_accepted(setting, final, rounds), *_coefficients(setting, final)]
+    verdict = "explained" if physics else "none"
+    if after.share > NOISE_LIKE and after.power > (1 - EXPLAINED) * before.power:
+        verdict, physics = "unexplained", []
+    elif after.share > NOISE_LIKE and not final.freed:
+        verdict, physics = "unexplained", []
+    parts = [
+        fit_cut(setting, one.attempt, one.freed, part=FITTED, refit=refit)
+        for one, refit in ((nominal, False), (base, True), (final, True))
+    ]
+    candidates = [Candidate(one.name, one.evidence, "fitted") for one in rounds[0]] + closed
+    return CutDiagnosis(
+        verdict, tuple(physics), tuple(candidates), _equivalents(final, rounds), improvement(setting, *parts),
+        after.share, _located(before), setting, nominal, base, final,
+    )  # fmt: skip
+
+
+def _accepted(setting: CutSetting, final: CutFit, rounds: list[list[_Round]]) -> list[AcceptedCause]:
+    evidence = {one.name: one.evidence for ranked in reversed(rounds) for one in ranked}
+    found = []
+    for number, name in enumerate(final.freed):
+        cause = next(cause for cause, _ in final.attempt.acting if cause.name == name)
+        values = final.attempt.values(name)
+        told = cause.told(values, cause_covariance(setting, final, name), setting.belief.process)
+        ranked = rounds[min(number, len(rounds) - 1)]
+        gained = next((one.evidence for one in ranked if one.name == name), evidence[name])
+        found.append(AcceptedCause(name, {}, *told, gained))
+    return found
+
+
+def _coefficients(setting: CutSetting, final: CutFit) -> list[AcceptedCause]:
+    """Coefficients that are off by several times a laboratory's error."""
+    off = final.attempt.deviations
+    errors = np.sqrt(np.diag(final.covariance)[:6])
+    odd = (np.abs(off) > ODD) & (np.abs(off) > CLEAR * errors)
+    if not odd.any():
+        return []
+    values, spread = setting.belief.told(off, errors)
+    fixed = fit_cut(setting, replace(final.attempt, deviations=np.zeros(6)), final.freed, refit=False)
+    location = {"coefficients": [name for name, one in zip(values, odd, strict=True) if one]}
+    return [AcceptedCause(COEFFICIENTS, location, values, spread, fixed.score - final.score)]
+
+
+def _equivalents(final: CutFit, rounds: list[list[_Round]]) -> tuple[str, ...]:
+    if not final.freed:
+        return ()
+    best = max(one.evidence for one in rounds[0])
+    return tuple(
+        one.name for one in rounds[0] if one.name not in final.freed and one.evidence > best - AS_GOOD
+    )
+
+
+def _located(before: CutLeftover) -> dict[str, object]:
+    return {"spindle_orders": list(before.orders), "channels": list(before.channels)}
