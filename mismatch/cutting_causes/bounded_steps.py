@@ -40,7 +40,7 @@ def least_squares_within(
     bounds: tuple[Real, Real],
     *,
     most: int = 15,
-    gain: float = 0.02,
+    gain: float = 0.1,
 ) -> Least:
     """Minimise ``sum residual(x)^2`` within bounds.
 

@@ -12,7 +12,7 @@ from foundation import InputError
 from ..acceptance import CLEAR, EXPLAINED, HELD_OUT, LEAST_EVIDENCE, NOISE_LIKE
 from ..diagnosis import AcceptedCause, Candidate
 from .cut_fit import CutFit, fit_cut
-from .cut_held_out import FITTED, held_out_gain, improvement
+from .cut_held_out import fit_halves, held_out_gain, improvement
 from .cut_leftover import CutLeftover, leftover
 from .cut_recording import CutRecording
 from .cut_results import COEFFICIENTS, CutDiagnosis
@@ -29,7 +29,7 @@ AS_GOOD = 6.0
 ODD = 3.0
 """Laboratory's errors by which a coefficient must be off to be named."""
 
-FORCE_ERROR = 0.005
+FORCE_ERROR = 0.01
 """Share by which each spectral line of a right computed force is still off."""
 
 
@@ -54,7 +54,7 @@ def diagnose_cut(
 
     Coefficients are refitted within ``coefficient_error`` first. A cause is accepted if it lowers the score
     ``2 sum |W r|^2 + |u|^2 + n ln N`` by 20, stands out of its own error by four, and, fitted to every other block of
-    time, lowers the misfit of the blocks between by 10. What is left and is neither noise nor usual error makes the
+    time, lowers the misfit of the blocks between by 10 (and the other way round, together). What is left and is neither noise nor usual error makes the
     verdict ``unexplained``, and then nothing is named.
 
     Parameters
@@ -82,14 +82,14 @@ def diagnose_cut(
     if not 0 <= force_error < 1:
         raise InputError(f"force error {force_error!r} must be a share from 0 to 1, for example 0.005")
     lines = tuple(force_lines(recording, process.teeth) for recording in recordings)
-    setting = CutSetting(Belief(process, coefficient_error), depth, lines)
+    setting = CutSetting(Belief(process, coefficient_error), depth, lines, force_error)
     known = all(recording.motion is not None for recording in recordings)
     causes, closed = _weighable(process, known)
     start = started(setting, [(cause, cause.stated(process)) for cause in causes])
-    setting, start = _with_noise(setting, start, [cause.name for cause in causes], force_error)
+    setting, start = _with_noise(setting, start, [cause.name for cause in causes])
     base = fit_turned(setting, start, ())
-    final, rounds = _search(setting, start, base, [cause.name for cause in causes])
-    return _result(setting, start, base, final, rounds, closed, force_error)
+    final, rounds = _search(setting, base, [cause.name for cause in causes])
+    return _result(setting, start, base, final, rounds, closed)
 
 
 def _weighable(process: MillingProcess, known: bool) -> tuple[list[CutPhysics], list[Candidate]]:
@@ -105,13 +105,13 @@ def _weighable(process: MillingProcess, known: bool) -> tuple[list[CutPhysics], 
 
 
 def _with_noise(
-    setting: CutSetting, start: Attempt, names: Sequence[str], error: float
+    setting: CutSetting, start: Attempt, names: Sequence[str]
 ) -> tuple[CutSetting, Attempt]:
     """Noise as all causes together leave it, and the numbers as stated with the spindle as they show it."""
     attempt = start
     for _ in range(3):
         noise = tuple(
-            noise_of(lines, lines.measured - setting.shown(k, attempt), setting.shown(k, attempt), error)
+            noise_of(lines, lines.measured - setting.shown(k, attempt), setting.shown(k, attempt), setting.force_error)
             for k, lines in enumerate(setting.lines)
         )
         noisy = replace(setting, noise=noise)
@@ -120,7 +120,7 @@ def _with_noise(
 
 
 def _search(
-    setting: CutSetting, start: Attempt, base: CutFit, names: Sequence[str]
+    setting: CutSetting, base: CutFit, names: Sequence[str]
 ) -> tuple[CutFit, list[list[_Round]]]:
     """Add the best cause as long as one is worth it; then let go of those that later ones have replaced."""
     current, rounds = base, []
@@ -128,7 +128,7 @@ def _search(
         rest = [name for name in names if name not in current.freed]
         ranked = sorted((_tried(setting, current, name) for name in rest), key=lambda one: -one.evidence)
         rounds.append(ranked)
-        best = next((one for one in ranked if _worth_it(setting, start, current, one)), None)
+        best = next((one for one in ranked if _worth_it(setting, current, one)), None)
         if best is None:
             return _pruned(setting, base, current), rounds
         current = best.fitted
@@ -139,13 +139,19 @@ def _tried(setting: CutSetting, current: CutFit, name: str) -> _Round:
     return _Round(name, current.score - fitted.score, fitted)
 
 
-def _worth_it(setting: CutSetting, start: Attempt, current: CutFit, option: _Round) -> bool:
+def _worth_it(setting: CutSetting, current: CutFit, option: _Round) -> bool:
     """Evidence, a number that stands out, and a gain on blocks that were not fitted."""
     if option.evidence < LEAST_EVIDENCE or not _clear(setting, option.fitted, option.name):
         return False
-    here = fit_cut(setting, current.attempt, current.freed, part=FITTED)
-    there = fit_cut(setting, option.fitted.attempt, option.fitted.freed, part=FITTED)
+    # both begin where the cause is absent: a half that says nothing of it must not know it from the whole
+    here = fit_halves(setting, current.attempt, current.freed)
+    there = fit_halves(setting, _renumbered(current, option), option.fitted.freed)
     return held_out_gain(here, there) > HELD_OUT
+
+
+def _renumbered(current: CutFit, option: _Round) -> Attempt:
+    """The current numbers, with teeth counted as the option does in each recording."""
+    return replace(current.attempt, laws=option.fitted.attempt.laws)
 
 
 def _pruned(setting: CutSetting, base: CutFit, current: CutFit) -> CutFit:
@@ -169,14 +175,19 @@ def _clear(setting: CutSetting, fitted: CutFit, name: str) -> bool:
 
 
 def cause_covariance(setting: CutSetting, fitted: CutFit, name: str) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
-    """Covariance of one freed cause's numbers, SI."""
+    """Covariance of one freed cause's numbers, SI.
+
+    Noise and the force model's usual error: as each line is off by its share, so may all be together, and a number that
+    scales with the force with them.
+    """
     at, process = 6, setting.belief.process
     for freed in fitted.freed:
         cause = next(cause for cause, _ in fitted.attempt.acting if cause.name == freed)
         units = np.array([parameter.unit_step for parameter in cause.parameters(process)])
         if freed == name:
             block = slice(at, at + len(units))
-            return np.asarray(fitted.covariance[block, block] * np.outer(units, units))
+            own = np.diag((setting.force_error * fitted.attempt.values(name)) ** 2)
+            return np.asarray(fitted.covariance[block, block] * np.outer(units, units) + own)
         at += len(units)
     raise InputError(f"{name} was not fitted; freed were {', '.join(fitted.freed) or 'none'}")
 
@@ -188,23 +199,20 @@ def _result(
     final: CutFit,
     rounds: list[list[_Round]],
     closed: list[Candidate],
-    error: float,
 ) -> CutDiagnosis:
     nominal = fit_cut(setting, start, (), refit=False)
-    before, after = (leftover(setting, one.attempt, error) for one in (base, final))
+    before, after = (leftover(setting, one.attempt) for one in (base, final))
     physics = [*_accepted(setting, final, rounds), *_coefficients(setting, final)]
     verdict = "explained" if physics else "none"
     if after.share > NOISE_LIKE and after.power > (1 - EXPLAINED) * before.power:
         verdict, physics = "unexplained", []
-    elif after.share > NOISE_LIKE and not final.freed:
-        verdict, physics = "unexplained", []
-    parts = [
-        fit_cut(setting, one.attempt, one.freed, part=FITTED, refit=refit)
+    halves = [
+        fit_halves(setting, one.attempt, one.freed, refit=refit)
         for one, refit in ((nominal, False), (base, True), (final, True))
     ]
     candidates = [Candidate(one.name, one.evidence, "fitted") for one in rounds[0]] + closed
     return CutDiagnosis(
-        verdict, tuple(physics), tuple(candidates), _equivalents(final, rounds), improvement(setting, *parts),
+        verdict, tuple(physics), tuple(candidates), _equivalents(final, rounds), improvement(setting, *halves),
         after.share, _located(before), setting, nominal, base, final,
     )  # fmt: skip
 

@@ -1,28 +1,37 @@
 """Error of a computed cutting force on blocks of time that it was not fitted to."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import t as student
 from scipy.stats import ttest_1samp
 
 from ..diagnosis import Improvement
-from .cut_fit import CutFit
+from .cut_fit import CutFit, fit_cut
 from .cut_setting import Attempt, CutSetting
 
 Real = NDArray[np.float64]
 
-FITTED, TESTED = slice(0, None, 2), slice(1, None, 2)
-"""Every other block is fitted, the ones between are tested."""
+FOLDS = (slice(0, None, 2), slice(1, None, 2))
+"""Every other block; each half is tested with numbers fitted to the other."""
+
+Halves = tuple[CutFit, CutFit]
 
 
-def held_out_gain(without: CutFit, with_it: CutFit) -> float:
-    """Gain in misfit on the tested blocks."""
-    pairs = zip(without.block_misfits, with_it.block_misfits, strict=True)
-    return float(sum(np.sum(one[TESTED] - other[TESTED]) for one, other in pairs))
+def fit_halves(setting: CutSetting, start: Attempt, freed: Sequence[str], *, refit: bool = True) -> Halves:
+    """The same fit to either half of the blocks."""
+    first, second = (fit_cut(setting, start, freed, part=part, refit=refit) for part in FOLDS)
+    return first, second
 
 
-def improvement(setting: CutSetting, nominal: CutFit, base: CutFit, final: CutFit) -> Improvement:
-    """Errors on the tested blocks, relative to the force; fits must have been made without these.
+def held_out_gain(without: Halves, with_it: Halves) -> float:
+    """Gain in misfit on the blocks that were not fitted, both halves together."""
+    return float(np.sum(_tested(without) - _tested(with_it)))
+
+
+def improvement(setting: CutSetting, nominal: Halves, base: Halves, final: Halves) -> Improvement:
+    """Errors on blocks that were not fitted, relative to the force.
 
     Parameters
     ----------
@@ -31,30 +40,38 @@ def improvement(setting: CutSetting, nominal: CutFit, base: CutFit, final: CutFi
     nominal, base, final
         As the file says, coefficients refitted, with causes.
     """
-    before, refitted, after = (_powers(setting, one.attempt) for one in (nominal, base, final))
-    forces = [np.abs(lines.measured[TESTED]) ** 2 for lines in setting.lines]
-    total = sum(float(one.sum()) for one in forces)
-    floors = [noise.floor.sum() * len(one) for noise, one in zip(setting.noise, forces, strict=True)]
-    pairs = zip(base.block_misfits, final.block_misfits, strict=True)
-    gains = np.concatenate([one[TESTED] - other[TESTED] for one, other in pairs])
+    before, refitted, after = (_powers(setting, one) for one in (nominal, base, final))
+    total = sum(float(np.sum(np.abs(lines.measured) ** 2)) for lines in setting.lines)
+    floor = sum(noise.floor.sum() * lines.blocks for noise, lines in zip(setting.noise, setting.lines, strict=True))
+    gains = _tested(base) - _tested(final)
     p_value = float(ttest_1samp(gains, 0.0, alternative="greater").pvalue) if np.ptp(gains) > 0 else 1.0
     names = ", ".join(lines.recording.name for lines in setting.lines)
     return Improvement(
-        f"{names}, every other block",
+        f"{names}: every other block of time",
         *(float(np.sqrt(one.sum() / total)) for one in (before, refitted, after)),
-        float(np.sqrt(sum(floors) / total)),
+        float(np.sqrt(floor / total)),
         p_value,
         _interval(np.sqrt(after / before)),
         float(gains.sum()),
     )
 
 
-def _powers(setting: CutSetting, attempt: Attempt) -> Real:
-    """Power of the residual in each tested block of all recordings."""
-    rests = [
-        lines.measured[TESTED] - setting.shown(k, attempt)[TESTED] for k, lines in enumerate(setting.lines)
+def _tested(halves: Halves) -> Real:
+    """Misfit of every block by the fit that did not see it."""
+    parts = [
+        one[part] for fitted, part in zip(halves, FOLDS[::-1], strict=True) for one in fitted.block_misfits
     ]
-    return np.concatenate([np.sum(np.abs(rest) ** 2, axis=(1, 2)) for rest in rests])
+    return np.concatenate(parts)
+
+
+def _powers(setting: CutSetting, halves: Halves) -> Real:
+    """Power of the residual in each block by the fit that did not see it."""
+    parts = []
+    for fitted, part in zip(halves, FOLDS[::-1], strict=True):
+        for k, lines in enumerate(setting.lines):
+            rest = (lines.measured - setting.shown(k, fitted.attempt))[part]
+            parts.append(np.sum(np.abs(rest) ** 2, axis=(1, 2)))
+    return np.concatenate(parts)
 
 
 def _interval(ratios: Real) -> tuple[float, float]:

@@ -41,7 +41,7 @@ class CutLeftover:
     channels: tuple[str, ...]
 
 
-def leftover(setting: CutSetting, attempt: Attempt, error: float) -> CutLeftover:
+def leftover(setting: CutSetting, attempt: Attempt) -> CutLeftover:
     """Lines with more power than noise has by chance, in a block or in the mean of all blocks.
 
     Parameters
@@ -50,8 +50,6 @@ def leftover(setting: CutSetting, attempt: Attempt, error: float) -> CutLeftover
         With its noise.
     attempt
         A fit's numbers.
-    error
-        Share by which a line of a right computed force is off.
     """
     power, total = 0.0, 0.0
     by_order: dict[float, float] = {}
@@ -59,7 +57,7 @@ def leftover(setting: CutSetting, attempt: Attempt, error: float) -> CutLeftover
     for k, lines in enumerate(setting.lines):
         shown = setting.shown(k, attempt)
         rest = np.abs(lines.measured - shown) ** 2
-        off = (ERRORS * error) ** 2 * np.abs(shown) ** 2
+        off = (ERRORS * setting.force_error) ** 2 * np.abs(shown) ** 2
         floor = setting.noise[k].floor
         alone = rest > gammainccinv(1, CHANCE) * floor + off
         mean = rest.mean(axis=0) > gammainccinv(lines.blocks, CHANCE) / lines.blocks * floor + off.mean(axis=0)

@@ -23,10 +23,10 @@ Real = NDArray[np.float64]
 
 TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 
-MOST_ORDERS = 12
+MOST_ORDERS = 8
 """Harmonics of the tooth passing up to which forces are compared."""
 
-FINE = 16
+FINE = 32
 """Instants a period of the highest frequency that is compared, at least: entry and exit are sharp."""
 
 LEAST_TURNS = 80

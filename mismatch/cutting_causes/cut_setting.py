@@ -56,6 +56,8 @@ class CutSetting:
         Axial depth, m.
     lines
         Recordings.
+    force_error
+        Share by which each line of a right computed force is still off.
     noise
         One a recording; empty before it is known.
     """
@@ -63,6 +65,7 @@ class CutSetting:
     belief: Belief
     depth: float
     lines: tuple[ForceLines, ...]
+    force_error: float
     noise: tuple[ForceNoise, ...] = ()
     _views: dict[tuple[int, SpindleLaw], CutView] = field(default_factory=dict, repr=False, compare=False)
 

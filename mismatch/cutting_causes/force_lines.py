@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import rfft
+from scipy.fft import prev_fast_len, rfft
 from scipy.signal.windows import tukey
 
 from .cut_recording import MOST_ORDERS, CutRecording
@@ -67,7 +67,7 @@ def force_lines(recording: CutRecording, teeth: int) -> ForceLines:
     margin = min(int(recording.rate / recording.corner), n // 16)
     kept = n - 2 * margin
     blocks = int(np.clip(kept * rotation / recording.rate // TURNS, 4, MOST_BLOCKS))
-    size = kept // blocks
+    size = prev_fast_len(kept // blocks, real=True)
     axis = np.arange(size // 2 + 1) * recording.rate / size
     top = min(0.4 * recording.rate, (MOST_ORDERS + 0.5) * teeth * rotation)
     band = np.flatnonzero((axis >= max(2.5 * recording.corner, 3 * recording.rate / size)) & (axis <= top))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import median_filter, uniform_filter1d
 
 from modal_fit import ModalModel
 
@@ -19,6 +19,9 @@ CORNER = 2.0
 
 QUIET_BELOW = 0.7
 """Share of half the sampling rate above which a filter may have taken the noise away."""
+
+STANDS_OUT = 12.0
+"""Power of a line over that around it from which it is a line of its own: noise reaches it once in 160,000."""
 
 
 @dataclass(frozen=True)
@@ -80,11 +83,13 @@ def computed(model: ModalModel, force: Real, rate: float, corner: float) -> tupl
 
 
 def _true_part(spectrum: Complex, frequencies: Real) -> Real:
-    """``1 - S / P`` of each line: P the power around it, S that of the quietest lines, as of a sensor's white noise."""
+    """``1 - S / P`` of each line: P the power around it or its own if it stands out, S that of the quietest lines."""
     power = np.abs(spectrum) ** 2
     heard = frequencies < QUIET_BELOW * frequencies[-1]
     quiet = np.quantile(uniform_filter1d(power[heard], 64, axis=0), 0.05, axis=0)
-    return np.asarray(np.maximum(1 - quiet / np.maximum(uniform_filter1d(power, 16, axis=0), 1e-300), 0.0))
+    around = median_filter(power, size=(17, 1)) / np.log(2)
+    own = np.where(power > STANDS_OUT * around, power, around)
+    return np.asarray(np.maximum(1 - quiet / np.maximum(own, 1e-300), 0.0))
 
 
 def _padded(samples: Real, rate: float, corner: float) -> tuple[Complex, Real]:
