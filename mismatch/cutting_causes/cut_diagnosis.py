@@ -53,9 +53,9 @@ def diagnose_cut(
     """Compare measured with computed cutting forces, and name what the computed ones leave out.
 
     Coefficients are refitted within ``coefficient_error`` first. A cause is accepted if it lowers the score
-    ``2 sum |W r|^2 + |u|^2 + n ln N`` by 20, stands out of its own error by four, and, fitted to every other block of
-    time, lowers the misfit of the blocks between by 10 (and the other way round, together). What is left and is neither noise nor usual error makes the
-    verdict ``unexplained``, and then nothing is named.
+    ``2 sum |W r|^2 + |u|^2 + n ln N`` by 20, stands out of its own error by four, and, fitted to either half of the
+    blocks of time, lowers the misfit of the other halves by 10 together. What is left and is neither noise nor usual
+    error makes the verdict ``unexplained``, and then nothing is named.
 
     Parameters
     ----------
@@ -104,9 +104,7 @@ def _weighable(process: MillingProcess, known: bool) -> tuple[list[CutPhysics], 
     return causes, closed
 
 
-def _with_noise(
-    setting: CutSetting, start: Attempt, names: Sequence[str]
-) -> tuple[CutSetting, Attempt]:
+def _with_noise(setting: CutSetting, start: Attempt, names: Sequence[str]) -> tuple[CutSetting, Attempt]:
     """Noise as all causes together leave it, and the numbers as stated with the spindle as they show it."""
     attempt = start
     for _ in range(3):
@@ -119,9 +117,7 @@ def _with_noise(
     return noisy, replace(attempt, deviations=np.zeros(6), acting=start.acting)
 
 
-def _search(
-    setting: CutSetting, base: CutFit, names: Sequence[str]
-) -> tuple[CutFit, list[list[_Round]]]:
+def _search(setting: CutSetting, base: CutFit, names: Sequence[str]) -> tuple[CutFit, list[list[_Round]]]:
     """Add the best cause as long as one is worth it; then let go of those that later ones have replaced."""
     current, rounds = base, []
     while True:
@@ -157,9 +153,7 @@ def _renumbered(current: CutFit, option: _Round) -> Attempt:
 def _pruned(setting: CutSetting, base: CutFit, current: CutFit) -> CutFit:
     for name in current.freed[:-1]:
         fewer = tuple(one for one in current.freed if one != name)
-        stated = next(cause for cause, _ in base.attempt.acting if cause.name == name).stated(
-            setting.belief.process
-        )
+        stated = next(cause for cause, _ in base.attempt.acting if cause.name == name).stated(setting.belief.process)
         fitted = fit_turned(setting, current.attempt.with_values(name, stated), fewer)
         if fitted.score - current.score < LEAST_EVIDENCE:
             current = fitted
@@ -174,7 +168,9 @@ def _clear(setting: CutSetting, fitted: CutFit, name: str) -> bool:
     return bool(np.any(np.abs(off) > CLEAR * np.sqrt(np.diag(cause_covariance(setting, fitted, name)))))
 
 
-def cause_covariance(setting: CutSetting, fitted: CutFit, name: str) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def cause_covariance(
+    setting: CutSetting, fitted: CutFit, name: str
+) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     """Covariance of one freed cause's numbers, SI.
 
     Noise and the force model's usual error: as each line is off by its share, so may all be together, and a number that
@@ -247,9 +243,7 @@ def _equivalents(final: CutFit, rounds: list[list[_Round]]) -> tuple[str, ...]:
     if not final.freed:
         return ()
     best = max(one.evidence for one in rounds[0])
-    return tuple(
-        one.name for one in rounds[0] if one.name not in final.freed and one.evidence > best - AS_GOOD
-    )
+    return tuple(one.name for one in rounds[0] if one.name not in final.freed and one.evidence > best - AS_GOOD)
 
 
 def _located(before: CutLeftover) -> dict[str, object]:

@@ -96,7 +96,7 @@ def fit_cut(
     begin = np.clip(unknowns.start(), unknowns.low, unknowns.high)
     found = least_squares_within(residual, slopes, begin, (unknowns.low, unknowns.high), most=most)
     attempt = unknowns.attempt(found.x)
-    covariance = np.linalg.pinv(found.information, hermitian=True)[: unknowns.physical, : unknowns.physical]
+    covariance: Real = np.linalg.pinv(found.information, hermitian=True)[: unknowns.physical, : unknowns.physical]
     blocks = tuple(block_misfits(setting, attempt))
     misfit = float(sum(one[part].sum() for one in blocks))
     count = sum(2 * lines.measured[part].size for lines in setting.lines)

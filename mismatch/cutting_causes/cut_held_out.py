@@ -46,9 +46,12 @@ def improvement(setting: CutSetting, nominal: Halves, base: Halves, final: Halve
     gains = _tested(base) - _tested(final)
     p_value = float(ttest_1samp(gains, 0.0, alternative="greater").pvalue) if np.ptp(gains) > 0 else 1.0
     names = ", ".join(lines.recording.name for lines in setting.lines)
+    errors = [float(np.sqrt(one.sum() / total)) for one in (before, refitted, after)]
     return Improvement(
         f"{names}: every other block of time",
-        *(float(np.sqrt(one.sum() / total)) for one in (before, refitted, after)),
+        errors[0],
+        errors[1],
+        errors[2],
         float(np.sqrt(floor / total)),
         p_value,
         _interval(np.sqrt(after / before)),
@@ -58,9 +61,7 @@ def improvement(setting: CutSetting, nominal: Halves, base: Halves, final: Halve
 
 def _tested(halves: Halves) -> Real:
     """Misfit of every block by the fit that did not see it."""
-    parts = [
-        one[part] for fitted, part in zip(halves, FOLDS[::-1], strict=True) for one in fitted.block_misfits
-    ]
+    parts = [one[part] for fitted, part in zip(halves, FOLDS[::-1], strict=True) for one in fitted.block_misfits]
     return np.concatenate(parts)
 
 

@@ -52,9 +52,13 @@ class CutDiagnosis:
     final: CutFit
 
     def improved_process(self) -> MillingProcess:
-        """The cutting file's process with refitted coefficients and the accepted causes that it has a place for."""
-        process = self.setting.belief.process_at(self.final.attempt.deviations)
-        for cause, values in self.final.attempt.acting:
-            if cause.name in self.final.freed:
+        """The cutting file's process with refitted coefficients and the accepted causes that it has a place for.
+
+        Nothing but coefficients changes where no cause is named.
+        """
+        shown = self.base if self.verdict == "unexplained" else self.final
+        process = self.setting.belief.process_at(shown.attempt.deviations)
+        for cause, values in shown.attempt.acting:
+            if cause.name in shown.freed:
                 process = cause.improved(process, values)
         return process

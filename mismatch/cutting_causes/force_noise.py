@@ -1,4 +1,4 @@
-"""Noise of force lines: a smooth floor under the orders, common to the channels, and what a right model is still off."""
+"""Noise of force lines: a smooth floor under the orders, and what a right model is still off."""
 
 from dataclasses import dataclass
 

@@ -62,7 +62,7 @@ class SpindleLaw:
         return np.asarray(self.speed + self.change * (times - self.middle))
 
     def lag(self, times: Real, turned: float) -> Real:
-        """Seconds since the spindle stood ``turned`` rad less far: the root of ``turned = speed s - change s^2 / 2``."""
+        """Seconds s since the spindle stood ``turned`` rad less far, ``turned = speed s - change s^2 / 2``."""
         speed = self.speeds(times)
         return np.asarray(2 * turned / (speed + np.sqrt(np.maximum(speed**2 - 2 * self.change * turned, 0.0))))
 
@@ -97,7 +97,9 @@ def stated_law(path: str | os.PathLike[str], speed: float | None = None) -> Spin
         return swept
     known = spindle_speed(path)
     if known is None:
-        raise InputError(f"{name} states no spindle speed that is constant or swept linearly; give a constant --speed RPM")
+        raise InputError(
+            f"{name} states no spindle speed that is constant or swept linearly; give a constant --speed RPM"
+        )
     rates = known.rpm * np.pi / 30
     if len(rates) < 3:
         return SpindleLaw(0.0, 0.0, float(rates.mean()))

@@ -77,7 +77,7 @@ def computed(model: ModalModel, force: Real, rate: float, corner: float) -> tupl
     spectrum, frequencies = _padded(force - force.mean(axis=0), rate, corner)
     spectrum = spectrum * _true_part(spectrum, frequencies)
     needed = frequencies < min(4.0 * float(model.natural_frequencies.max()), 0.5 * rate)
-    moved = np.zeros_like(spectrum)
+    moved = np.zeros((len(frequencies), len(model.responses)), dtype=complex)
     moved[needed] = np.einsum("kpq,kq->kp", receptance_at(model, frequencies[needed]), spectrum[needed])
     return _motion(moved, frequencies, corner, len(force))
 

@@ -1,4 +1,4 @@
-"""Physics that a computed cutting force may leave out: one small file each; a file with ``PHYSICS`` is found by itself."""
+"""Physics that a computed cutting force may leave out: one file each; a file with ``PHYSICS`` is found by itself."""
 
 import importlib
 import pkgutil

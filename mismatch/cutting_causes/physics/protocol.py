@@ -96,7 +96,9 @@ class CutPhysics:
         """Force on the tool beside shearing and edge, (m, 3), N per metre of depth, while a chip is cut."""
         return 0.0
 
-    def told(self, values: Real, covariance: Real, process: MillingProcess) -> tuple[dict[str, float], dict[str, float]]:
+    def told(
+        self, values: Real, covariance: Real, process: MillingProcess
+    ) -> tuple[dict[str, float], dict[str, float]]:
         """Numbers and standard errors by name, SI, as they stand in files."""
         names = [parameter.name for parameter in self.parameters(process)]
         errors = np.sqrt(np.diag(covariance))

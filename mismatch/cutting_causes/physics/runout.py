@@ -46,7 +46,9 @@ class Runout(CutPhysics):
         across = float(values[1]) if len(values) > 1 else 0.0
         return float(values[0] * np.cos(angle) + across * np.sin(angle)) * tooth.sine_edge
 
-    def told(self, values: Real, covariance: Real, process: MillingProcess) -> tuple[dict[str, float], dict[str, float]]:
+    def told(
+        self, values: Real, covariance: Real, process: MillingProcess
+    ) -> tuple[dict[str, float], dict[str, float]]:
         """Radius r, and the angle lambda where more than two teeth show it."""
         if len(values) == 1:
             size = {"radial_offset_m": abs(float(values[0]))}
