@@ -40,7 +40,7 @@ def cut_turn_figure(found: CutDiagnosis) -> Figure:
         low.set_xticks([0, 90, 180, 270, 360])
         low.set_xlim(0, 360)
     panels[0, 0].set_ylabel("force (N)")
-    panels[1, 0].set_ylabel("measured - computed (N)")
+    panels[1, 0].set_ylabel("difference (N)")
     figure.align_ylabels(panels[:, 0])
     legend_above(figure, panels[0, 0])
     return figure

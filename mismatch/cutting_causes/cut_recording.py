@@ -32,6 +32,9 @@ FINE = 32
 LEAST_TURNS = 80
 """Revolutions without which blocks to fit and blocks to test cannot both be had."""
 
+RUNG_OUT = 7.0
+"""Time constants of a model's slowest mode after which its unknown first motion has died out."""
+
 
 @dataclass(frozen=True)
 class CutRecording:
@@ -51,6 +54,8 @@ class CutRecording:
         At the tip; None where it is not known.
     law
         Spindle, its angle still unknown.
+    run_in
+        Seconds at the beginning in which the motion is not right yet: a filter's or a model's past is not known.
     """
 
     name: str
@@ -59,6 +64,7 @@ class CutRecording:
     axes: tuple[int, ...]
     motion: TipMotion | None
     law: SpindleLaw
+    run_in: float
 
     @property
     def times(self) -> Real:
@@ -175,11 +181,13 @@ def cut_recording(
     law = found_law(force, rate, stated, process.teeth)
     corner = corner_of(law.speed / (2 * np.pi))
     tip: TipMotion | None = None
+    run_in = 1 / corner
     if motion is not None:
         tip = _measured_motion(brought[:, force.shape[1] :], motion[1], motion[2], rate, corner)
     elif model is not None:
         tip = _modelled_motion(name, model, force, axes, rate, corner)
-    return CutRecording(name, rate, force, tuple(axes), tip, law)
+        run_in = max(run_in, RUNG_OUT / float((-model.poles.real).min()))
+    return CutRecording(name, rate, force, tuple(axes), tip, law, run_in)
 
 
 def _measured_motion(

@@ -55,7 +55,7 @@ class ForceLines:
 
 
 def force_lines(recording: CutRecording, teeth: int) -> ForceLines:
-    """Cut a recording: first and last second or so left out, where integration has no past or no future.
+    """Cut a recording: the run-in and the end, where an integral has no future, are left out.
 
     Parameters
     ----------
@@ -64,12 +64,13 @@ def force_lines(recording: CutRecording, teeth: int) -> ForceLines:
     """
     rotation = recording.law.speed / (2 * np.pi)
     n = len(recording.force)
+    run_in = min(int(recording.run_in * recording.rate), n // 4)
     margin = min(int(recording.rate / recording.corner), n // 16)
-    kept = n - 2 * margin
+    kept = n - run_in - margin
     blocks = int(np.clip(kept * rotation / recording.rate // TURNS, 4, MOST_BLOCKS))
     size = prev_fast_len(kept // blocks, real=True)
     axis = np.arange(size // 2 + 1) * recording.rate / size
     top = min(0.4 * recording.rate, (MOST_ORDERS + 0.5) * teeth * rotation)
     band = np.flatnonzero((axis >= max(2.5 * recording.corner, 3 * recording.rate / size)) & (axis <= top))
-    stub = ForceLines(recording, margin, size, blocks, band, axis[band], np.zeros((0, 0, 0), dtype=complex))
-    return ForceLines(recording, margin, size, blocks, band, axis[band], stub.cut(recording.force))
+    stub = ForceLines(recording, run_in, size, blocks, band, axis[band], np.zeros((0, 0, 0), dtype=complex))
+    return ForceLines(recording, run_in, size, blocks, band, axis[band], stub.cut(recording.force))
