@@ -67,8 +67,8 @@ def _around_the_turn(found: CutDiagnosis) -> Section:
         picture = as_data_uri(cut_turn_figure(found))
     caption = (
         f"Force on the tool around the turn of the spindle in {found.setting.lines[0].recording.name}, mean of all "
-        "turns, without its constant part, in the band that is compared (its upper end makes the ripple). Below: measured "
-        "less computed."
+        "turns, without its constant part, in the band that is compared (its upper end makes the ripple). Below: "
+        "measured less computed."
     )
     return Section("Around the turn", (), (), (Picture(picture, caption, "Measured and computed force"),))
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cutting import MillingProcess
 from foundation import InputError
@@ -22,6 +23,8 @@ from .force_coefficients import Belief
 from .force_lines import force_lines
 from .force_noise import noise_of
 from .physics import CutPhysics, library
+
+Real = NDArray[np.float64]
 
 AS_GOOD = 6.0
 """Evidence by which another cause may be worse and still not be told from the best: a likelihood ratio of 20."""
@@ -153,7 +156,7 @@ def _renumbered(current: CutFit, option: _Round) -> Attempt:
 def _pruned(setting: CutSetting, base: CutFit, current: CutFit) -> CutFit:
     for name in current.freed[:-1]:
         fewer = tuple(one for one in current.freed if one != name)
-        stated = next(cause for cause, _ in base.attempt.acting if cause.name == name).stated(setting.belief.process)
+        stated = _cause(base.attempt, name).stated(setting.belief.process)
         fitted = fit_turned(setting, current.attempt.with_values(name, stated), fewer)
         if fitted.score - current.score < LEAST_EVIDENCE:
             current = fitted
@@ -162,30 +165,27 @@ def _pruned(setting: CutSetting, base: CutFit, current: CutFit) -> CutFit:
 
 def _clear(setting: CutSetting, fitted: CutFit, name: str) -> bool:
     """Whether a number of the cause differs from the stated one by four of its errors."""
-    cause = next(cause for cause, _ in fitted.attempt.acting if cause.name == name)
-    process = setting.belief.process
-    off = fitted.attempt.values(name) - cause.stated(process)
-    return bool(np.any(np.abs(off) > CLEAR * np.sqrt(np.diag(cause_covariance(setting, fitted, name)))))
+    off = fitted.attempt.values(name) - _cause(fitted.attempt, name).stated(setting.belief.process)
+    return bool(np.any(np.abs(off) > CLEAR * np.sqrt(np.diag(_covariance(setting, fitted, name)))))
 
 
-def cause_covariance(
-    setting: CutSetting, fitted: CutFit, name: str
-) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def _covariance(setting: CutSetting, fitted: CutFit, name: str) -> Real:
     """Covariance of one freed cause's numbers, SI.
 
     Noise and the force model's usual error: as each line is off by its share, so may all be together, and a number that
     scales with the force with them.
     """
     at, process = 6, setting.belief.process
-    for freed in fitted.freed:
-        cause = next(cause for cause, _ in fitted.attempt.acting if cause.name == freed)
-        units = np.array([parameter.unit_step for parameter in cause.parameters(process)])
-        if freed == name:
-            block = slice(at, at + len(units))
-            own = np.diag((setting.force_error * fitted.attempt.values(name)) ** 2)
-            return np.asarray(fitted.covariance[block, block] * np.outer(units, units) + own)
-        at += len(units)
-    raise InputError(f"{name} was not fitted; freed were {', '.join(fitted.freed) or 'none'}")
+    for freed in fitted.freed[: fitted.freed.index(name)]:
+        at += len(_cause(fitted.attempt, freed).parameters(process))
+    units = np.array([parameter.unit_step for parameter in _cause(fitted.attempt, name).parameters(process)])
+    block = slice(at, at + len(units))
+    own = np.diag((setting.force_error * fitted.attempt.values(name)) ** 2)
+    return np.asarray(fitted.covariance[block, block] * np.outer(units, units) + own)
+
+
+def _cause(attempt: Attempt, name: str) -> CutPhysics:
+    return next(cause for cause, _ in attempt.acting if cause.name == name)
 
 
 def _result(
@@ -215,11 +215,15 @@ def _result(
 
 def _accepted(setting: CutSetting, final: CutFit, rounds: list[list[_Round]]) -> list[AcceptedCause]:
     evidence = {one.name: one.evidence for ranked in reversed(rounds) for one in ranked}
+    moving = any(_cause(final.attempt, name).moves for name in final.freed)
+    # what noise of the motion does a second time it has done a first time: the error that no residual shows
+    again = fit_cut(setting.noisier(), final.attempt, final.freed) if moving else final
     found = []
     for number, name in enumerate(final.freed):
-        cause = next(cause for cause, _ in final.attempt.acting if cause.name == name)
         values = final.attempt.values(name)
-        told = cause.told(values, cause_covariance(setting, final, name), setting.belief.process)
+        shifted = np.diag((again.attempt.values(name) - values) ** 2)
+        covariance = _covariance(setting, final, name) + shifted
+        told = _cause(final.attempt, name).told(values, covariance, setting.belief.process)
         ranked = rounds[min(number, len(rounds) - 1)]
         gained = next((one.evidence for one in ranked if one.name == name), evidence[name])
         found.append(AcceptedCause(name, {}, *told, gained))

@@ -96,7 +96,8 @@ def fit_cut(
     begin = np.clip(unknowns.start(), unknowns.low, unknowns.high)
     found = least_squares_within(residual, slopes, begin, (unknowns.low, unknowns.high), most=most)
     attempt = unknowns.attempt(found.x)
-    covariance: Real = np.linalg.pinv(found.information, hermitian=True)[: unknowns.physical, : unknowns.physical]
+    spread = np.linalg.pinv(found.information, hermitian=True)[: unknowns.physical, : unknowns.physical]
+    covariance = np.asarray(spread, dtype=np.float64)
     blocks = tuple(block_misfits(setting, attempt))
     misfit = float(sum(one[part].sum() for one in blocks))
     count = sum(2 * lines.measured[part].size for lines in setting.lines)

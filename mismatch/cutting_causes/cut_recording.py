@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from modal_fit import ModalModel
 
 from ..trial import POWERS
 from .spindle_law import SpindleLaw, found_law, stated_law
-from .tip_motion import TipMotion, computed, corner_of, integrated
+from .tip_motion import TipMotion, computed, corner_of, integrated, integrated_noise
 
 Real = NDArray[np.float64]
 
@@ -70,6 +70,10 @@ class CutRecording:
     def times(self) -> Real:
         """(n_samples,), s."""
         return np.asarray(np.arange(len(self.force)) / self.rate)
+
+    def noisier(self) -> "CutRecording":
+        """With the noise of its motion a second time."""
+        return self if self.motion is None else replace(self, motion=self.motion.noisier())
 
     @property
     def corner(self) -> float:
@@ -193,11 +197,12 @@ def cut_recording(
 def _measured_motion(
     samples: Real, axes: Sequence[int], powers: Sequence[int], rate: float, corner: float
 ) -> TipMotion:
-    displacement, velocity = np.zeros((len(samples), 3)), np.zeros((len(samples), 3))
+    moved, noise = np.zeros((2, len(samples), 3)), np.zeros((2, len(samples), 3))
     for column, (axis, power) in enumerate(zip(axes, powers, strict=True)):
-        moved, speed = integrated(samples[:, column : column + 1], power, rate, corner)
-        displacement[:, axis], velocity[:, axis] = moved[:, 0], speed[:, 0]
-    return TipMotion(displacement, velocity, "measured")
+        one = samples[:, column : column + 1]
+        moved[:, :, axis] = np.stack(integrated(one, power, rate, corner))[:, :, 0]
+        noise[:, :, axis] = np.stack(integrated_noise(one, power, rate, corner, axis))[:, :, 0]
+    return TipMotion(moved[0], moved[1], "measured", noise)
 
 
 def _modelled_motion(

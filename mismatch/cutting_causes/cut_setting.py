@@ -73,6 +73,11 @@ class CutSetting:
         """The same with one of the recordings."""
         return replace(self, lines=self.lines[number : number + 1], noise=self.noise[number : number + 1], _views={})
 
+    def noisier(self) -> "CutSetting":
+        """With the noise of the tip's motion a second time."""
+        lines = tuple(replace(one, recording=one.recording.noisier()) for one in self.lines)
+        return replace(self, lines=lines, _views={})
+
     def view(self, number: int, law: SpindleLaw) -> CutView:
         """Teeth of one recording; the last few are kept."""
         key = (number, law)

@@ -24,6 +24,9 @@ HARMONICS = 3
 LEAST_CONTRAST = 5.0
 """Power of the comb at the found speed over its median at other speeds."""
 
+LEAST_SHARE = 0.1
+"""Of the forces' power that the comb must hold: another line's skirt holds less."""
+
 
 @dataclass(frozen=True)
 class SpindleLaw:
@@ -156,7 +159,8 @@ def found_law(force: Real, rate: float, stated: SpindleLaw, teeth: int) -> Spind
     changes = bend * np.arange(-np.ceil(wide), np.ceil(wide) + 1)
     powers = np.array([[_power(slow, centre, teeth, dw, da) for dw in speeds] for da in changes])
     row, column = np.unravel_index(int(np.argmax(powers)), powers.shape)
-    if powers.max() < LEAST_CONTRAST * np.median(powers[row]):
+    share = 2 * powers.max() / slow.shape[1] ** 2 / float(np.sum(np.var(force, axis=0)))
+    if powers.max() < LEAST_CONTRAST * np.median(powers[row]) or share < LEAST_SHARE:
         raise InputError(
             f"no tooth passing within {100 * WITHIN:g} % of {law.speed * 30 / np.pi:.4g} rpm stands out of the forces; "
             "give the right --speed RPM, and a cut of constant engagement"

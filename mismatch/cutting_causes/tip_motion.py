@@ -34,11 +34,23 @@ class TipMotion:
         X, Y, Z; m and m/s. Zero in a direction that was not measured.
     origin
         ``measured`` or ``model``.
+    noise : (2, n_samples, 3)
+        A draw of the noise that is in displacement and velocity; None where it is not known.
     """
 
     displacement: Real
     velocity: Real
     origin: str
+    noise: Real | None = None
+
+    def noisier(self) -> "TipMotion":
+        """With the noise a second time: what it does to a fit is seen by what it does once more.
+
+        Cook & Stefanski, Journal of the American Statistical Association 89, 1994.
+        """
+        if self.noise is None:
+            return self
+        return TipMotion(self.displacement + self.noise[0], self.velocity + self.noise[1], self.origin)
 
 
 def corner_of(rotation: float) -> float:
@@ -53,8 +65,9 @@ def integrated(samples: Real, power: int, rate: float, corner: float) -> tuple[R
     """Displacement and velocity from displacement (power 0), velocity (1) or acceleration (2), in frequency.
 
     ``X = S / (i w)^power``, faded in from ``corner`` to 2.5 times it. A regression on noisy motion comes out too small;
-    lines are weighed by what they say of the true motion (:func:`_true_part`), on which it does not (Carroll, Ruppert,
-    Stefanski & Crainiceanu, Measurement Error in Nonlinear Models, 2nd ed., chapter 4).
+    lines are weighed by what they say of the true motion, ``1 - S / P`` with P the power around a line and S that of
+    the quietest lines, on which it does not (Carroll, Ruppert, Stefanski & Crainiceanu, Measurement Error in Nonlinear
+    Models, 2nd ed., chapter 4).
 
     Parameters
     ----------
@@ -65,8 +78,15 @@ def integrated(samples: Real, power: int, rate: float, corner: float) -> tuple[R
         Hz.
     """
     spectrum, frequencies = _padded(samples - samples.mean(axis=0), rate, corner)
-    spectrum = spectrum * _true_part(spectrum, frequencies)
-    return _motion(spectrum / _s(frequencies)[:, None] ** power, frequencies, corner, len(samples))
+    trusted = spectrum * _true_part(spectrum, _quiet(spectrum, frequencies))
+    return _motion(trusted / _s(frequencies)[:, None] ** power, frequencies, corner, len(samples))
+
+
+def integrated_noise(samples: Real, power: int, rate: float, corner: float, seed: int) -> tuple[Real, Real]:
+    """A draw of the noise that :func:`integrated` leaves in displacement and velocity."""
+    spectrum, frequencies = _padded(samples - samples.mean(axis=0), rate, corner)
+    drawn = _drawn(spectrum, frequencies, seed)
+    return _motion(drawn / _s(frequencies)[:, None] ** power, frequencies, corner, len(samples))
 
 
 def computed(model: ModalModel, force: Real, rate: float, corner: float) -> tuple[Real, Real]:
@@ -75,21 +95,33 @@ def computed(model: ModalModel, force: Real, rate: float, corner: float) -> tupl
     Noise of the forces would come back as motion that moves with them: lines are weighed as above.
     """
     spectrum, frequencies = _padded(force - force.mean(axis=0), rate, corner)
-    spectrum = spectrum * _true_part(spectrum, frequencies)
+    spectrum = spectrum * _true_part(spectrum, _quiet(spectrum, frequencies))
     needed = frequencies < min(4.0 * float(model.natural_frequencies.max()), 0.5 * rate)
     moved = np.zeros((len(frequencies), len(model.responses)), dtype=complex)
     moved[needed] = np.einsum("kpq,kq->kp", receptance_at(model, frequencies[needed]), spectrum[needed])
     return _motion(moved, frequencies, corner, len(force))
 
 
-def _true_part(spectrum: Complex, frequencies: Real) -> Real:
-    """``1 - S / P`` of each line: P the power around it or its own if it stands out, S that of the quietest lines."""
-    power = np.abs(spectrum) ** 2
+def _quiet(spectrum: Complex, frequencies: Real) -> Real:
+    """Power of the quietest lines, (n_channels,), as of a sensor's white noise."""
     heard = frequencies < QUIET_BELOW * frequencies[-1]
-    quiet = np.quantile(uniform_filter1d(power[heard], 64, axis=0), 0.05, axis=0)
+    power = np.abs(spectrum[heard]) ** 2
+    return np.asarray(np.quantile(uniform_filter1d(power, 64, axis=0), 0.05, axis=0))
+
+
+def _true_part(spectrum: Complex, quiet: Real) -> Real:
+    """``1 - S / P`` of each line: P the power around it, or its own if it stands out."""
+    power = np.abs(spectrum) ** 2
     around = median_filter(power, size=(17, 1)) / np.log(2)
     own = np.where(power > STANDS_OUT * around, power, around)
     return np.asarray(np.maximum(1 - quiet / np.maximum(own, 1e-300), 0.0))
+
+
+def _drawn(spectrum: Complex, frequencies: Real, seed: int) -> Complex:
+    """Spectrum of noise as strong as the quietest lines, weighed as the signal is."""
+    rng, quiet = np.random.default_rng(seed), _quiet(spectrum, frequencies)
+    both = rng.standard_normal((2, *spectrum.shape))
+    return np.asarray(np.sqrt(quiet / 2) * (both[0] + 1j * both[1]) * _true_part(spectrum, quiet))
 
 
 def _padded(samples: Real, rate: float, corner: float) -> tuple[Complex, Real]:
