@@ -29,7 +29,7 @@ def cut_turn_figure(found: CutDiagnosis) -> Figure:
     degrees = (np.arange(BINS) + 0.5) * 360 / BINS
     for column, label in enumerate(channels):
         top, low = panels[0, column], panels[1, column]
-        top.plot(degrees, measured[:, column], color="0.6", linewidth=2.4, label="measured")
+        top.plot(degrees, measured[:, column], color="0.75", linewidth=2.8, label="measured")
         look = {"color": COLOURS[2], "linestyle": (0, (4, 1.5))}
         top.plot(degrees, before[:, column], label="computed, cutting file", **look)
         low.plot(degrees, measured[:, column] - before[:, column], **look)
@@ -53,7 +53,7 @@ def cut_orders_figure(found: CutDiagnosis) -> Figure:
     orders = lines.frequencies / (law.speed / (2 * np.pi))
     figure = new_figure(62.0)
     axes: Axes = figure.subplots()
-    scale = np.sqrt(2 / lines.size)
+    scale = 2 / np.sqrt(lines.size)  # a sine's amplitude
     _draw(axes, orders, scale * _size(lines.measured), {"color": "0.75", "linewidth": 2.0, "label": "measured force"})
     look = {"color": COLOURS[2], "linestyle": (0, (4, 1.0)), "linewidth": 0.9, "label": "left, cutting file"}
     _draw(axes, orders, scale * _size(_rest(found, found.nominal)), look)

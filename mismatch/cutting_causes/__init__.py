@@ -2,7 +2,8 @@
 
 from .cut_diagnosis import FORCE_ERROR, diagnose_cut
 from .cut_diagnosis_file import cut_diagnosis_content, write_cut_diagnosis, write_improved_cut
-from .cut_recording import CutRecording, cut_recording, read_cut_recording
+from .cut_reading import read_cut_recording
+from .cut_recording import CutRecording, cut_recording
 from .cut_results import COEFFICIENTS, CutDiagnosis
 from .spindle_law import SpindleLaw
 

@@ -2,29 +2,27 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cutting import MillingProcess
 from foundation import InputError
 
-from ..acceptance import CLEAR, EXPLAINED, HELD_OUT, LEAST_EVIDENCE, NOISE_LIKE
+from ..acceptance import CLEAR, EXPLAINED, NOISE_LIKE
 from ..diagnosis import AcceptedCause, Candidate
 from .cut_fit import CutFit, fit_cut
-from .cut_held_out import fit_halves, held_out_gain, improvement
+from .cut_held_out import fit_halves, improvement
 from .cut_leftover import CutLeftover, leftover
 from .cut_recording import CutRecording
 from .cut_results import COEFFICIENTS, CutDiagnosis
+from .cut_search import Round, cause_of, covariance_of, search
 from .cut_setting import Attempt, CutSetting
 from .cut_start import fit_turned, started
 from .force_coefficients import Belief
 from .force_lines import force_lines
 from .force_noise import noise_of
 from .physics import CutPhysics, library
-
-Real = NDArray[np.float64]
 
 AS_GOOD = 6.0
 """Evidence by which another cause may be worse and still not be told from the best: a likelihood ratio of 20."""
@@ -34,15 +32,6 @@ ODD = 3.0
 
 FORCE_ERROR = 0.01
 """Share by which each spectral line of a right computed force is still off."""
-
-
-@dataclass(frozen=True)
-class _Round:
-    """One cause fitted beside those accepted before."""
-
-    name: str
-    evidence: float
-    fitted: CutFit
 
 
 def diagnose_cut(
@@ -91,7 +80,7 @@ def diagnose_cut(
     start = started(setting, [(cause, cause.stated(process)) for cause in causes])
     setting, start = _with_noise(setting, start, [cause.name for cause in causes])
     base = fit_turned(setting, start, ())
-    final, rounds = _search(setting, base, [cause.name for cause in causes])
+    final, rounds = search(setting, base, [cause.name for cause in causes])
     return _result(setting, start, base, final, rounds, closed)
 
 
@@ -120,80 +109,12 @@ def _with_noise(setting: CutSetting, start: Attempt, names: Sequence[str]) -> tu
     return noisy, replace(attempt, deviations=np.zeros(6), acting=start.acting)
 
 
-def _search(setting: CutSetting, base: CutFit, names: Sequence[str]) -> tuple[CutFit, list[list[_Round]]]:
-    """Add the best cause as long as one is worth it; then let go of those that later ones have replaced."""
-    current, rounds = base, []
-    while True:
-        rest = [name for name in names if name not in current.freed]
-        ranked = sorted((_tried(setting, current, name) for name in rest), key=lambda one: -one.evidence)
-        rounds.append(ranked)
-        best = next((one for one in ranked if _worth_it(setting, current, one)), None)
-        if best is None:
-            return _pruned(setting, base, current), rounds
-        current = best.fitted
-
-
-def _tried(setting: CutSetting, current: CutFit, name: str) -> _Round:
-    fitted = fit_turned(setting, current.attempt, (*current.freed, name))
-    return _Round(name, current.score - fitted.score, fitted)
-
-
-def _worth_it(setting: CutSetting, current: CutFit, option: _Round) -> bool:
-    """Evidence, a number that stands out, and a gain on blocks that were not fitted."""
-    if option.evidence < LEAST_EVIDENCE or not _clear(setting, option.fitted, option.name):
-        return False
-    # both begin where the cause is absent: a half that says nothing of it must not know it from the whole
-    here = fit_halves(setting, current.attempt, current.freed)
-    there = fit_halves(setting, _renumbered(current, option), option.fitted.freed)
-    return held_out_gain(here, there) > HELD_OUT
-
-
-def _renumbered(current: CutFit, option: _Round) -> Attempt:
-    """The current numbers, with teeth counted as the option does in each recording."""
-    return replace(current.attempt, laws=option.fitted.attempt.laws)
-
-
-def _pruned(setting: CutSetting, base: CutFit, current: CutFit) -> CutFit:
-    for name in current.freed[:-1]:
-        fewer = tuple(one for one in current.freed if one != name)
-        stated = _cause(base.attempt, name).stated(setting.belief.process)
-        fitted = fit_turned(setting, current.attempt.with_values(name, stated), fewer)
-        if fitted.score - current.score < LEAST_EVIDENCE:
-            current = fitted
-    return current
-
-
-def _clear(setting: CutSetting, fitted: CutFit, name: str) -> bool:
-    """Whether a number of the cause differs from the stated one by four of its errors."""
-    off = fitted.attempt.values(name) - _cause(fitted.attempt, name).stated(setting.belief.process)
-    return bool(np.any(np.abs(off) > CLEAR * np.sqrt(np.diag(_covariance(setting, fitted, name)))))
-
-
-def _covariance(setting: CutSetting, fitted: CutFit, name: str) -> Real:
-    """Covariance of one freed cause's numbers, SI.
-
-    Noise and the force model's usual error: as each line is off by its share, so may all be together, and a number that
-    scales with the force with them.
-    """
-    at, process = 6, setting.belief.process
-    for freed in fitted.freed[: fitted.freed.index(name)]:
-        at += len(_cause(fitted.attempt, freed).parameters(process))
-    units = np.array([parameter.unit_step for parameter in _cause(fitted.attempt, name).parameters(process)])
-    block = slice(at, at + len(units))
-    own = np.diag((setting.force_error * fitted.attempt.values(name)) ** 2)
-    return np.asarray(fitted.covariance[block, block] * np.outer(units, units) + own)
-
-
-def _cause(attempt: Attempt, name: str) -> CutPhysics:
-    return next(cause for cause, _ in attempt.acting if cause.name == name)
-
-
 def _result(
     setting: CutSetting,
     start: Attempt,
     base: CutFit,
     final: CutFit,
-    rounds: list[list[_Round]],
+    rounds: list[list[Round]],
     closed: list[Candidate],
 ) -> CutDiagnosis:
     nominal = fit_cut(setting, start, (), refit=False)
@@ -213,17 +134,17 @@ def _result(
     )  # fmt: skip
 
 
-def _accepted(setting: CutSetting, final: CutFit, rounds: list[list[_Round]]) -> list[AcceptedCause]:
+def _accepted(setting: CutSetting, final: CutFit, rounds: list[list[Round]]) -> list[AcceptedCause]:
     evidence = {one.name: one.evidence for ranked in reversed(rounds) for one in ranked}
-    moving = any(_cause(final.attempt, name).moves for name in final.freed)
+    moving = any(cause_of(final.attempt, name).moves for name in final.freed)
     # what noise of the motion does a second time it has done a first time: the error that no residual shows
     again = fit_cut(setting.noisier(), final.attempt, final.freed) if moving else final
     found = []
     for number, name in enumerate(final.freed):
         values = final.attempt.values(name)
         shifted = np.diag((again.attempt.values(name) - values) ** 2)
-        covariance = _covariance(setting, final, name) + shifted
-        told = _cause(final.attempt, name).told(values, covariance, setting.belief.process)
+        covariance = covariance_of(setting, final, name) + shifted
+        told = cause_of(final.attempt, name).told(values, covariance, setting.belief.process)
         ranked = rounds[min(number, len(rounds) - 1)]
         gained = next((one.evidence for one in ranked if one.name == name), evidence[name])
         found.append(AcceptedCause(name, {}, *told, gained))
@@ -243,7 +164,7 @@ def _coefficients(setting: CutSetting, final: CutFit) -> list[AcceptedCause]:
     return [AcceptedCause(COEFFICIENTS, location, values, spread, fixed.score - final.score)]
 
 
-def _equivalents(final: CutFit, rounds: list[list[_Round]]) -> tuple[str, ...]:
+def _equivalents(final: CutFit, rounds: list[list[Round]]) -> tuple[str, ...]:
     if not final.freed:
         return ()
     best = max(one.evidence for one in rounds[0])
