@@ -99,5 +99,7 @@ def _coefficients(found: CutDiagnosis) -> Section:
 
 def _candidates(found: CutDiagnosis) -> Section:
     rows = tuple((one.name, one.stage, f"{one.evidence:.1f}") for one in found.candidates)
-    table = Table("Evidence of each cause alone", ("cause", "how far it was taken", "evidence"), rows)
+    table = Table(
+        "Evidence of each cause, beside those accepted before it", ("cause", "how far it was taken", "evidence"), rows
+    )
     return Section("What was weighed", (), (table,))

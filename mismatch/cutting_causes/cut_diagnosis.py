@@ -9,7 +9,7 @@ import numpy as np
 from cutting import MillingProcess
 from foundation import InputError
 
-from ..acceptance import CLEAR, EXPLAINED, NOISE_LIKE
+from ..acceptance import CLEAR, EXPLAINED, LEAST_EVIDENCE, NOISE_LIKE
 from ..diagnosis import AcceptedCause, Candidate
 from .cut_fit import CutFit, fit_cut
 from .cut_held_out import fit_halves, improvement
@@ -26,6 +26,9 @@ from .physics import CutPhysics, library
 
 AS_GOOD = 6.0
 """Evidence by which another cause may be worse and still not be told from the best: a likelihood ratio of 20."""
+
+UNCONFIRMED = "fitted, but not confirmed: within its own error, or no gain on blocks held out"
+"""Stage of a cause with evidence that was not accepted."""
 
 ODD = 3.0
 """Laboratory's errors by which a coefficient must be off to be named."""
@@ -127,27 +130,35 @@ def _result(
         fit_halves(setting, one.attempt, one.freed, refit=refit)
         for one, refit in ((nominal, False), (base, True), (final, True))
     ]
-    candidates = [Candidate(one.name, one.evidence, "fitted") for one in rounds[0]] + closed
+    candidates = _weighed(final, rounds) + closed
     return CutDiagnosis(
         verdict, tuple(physics), tuple(candidates), _equivalents(final, rounds), improvement(setting, *halves),
         after.share, _located(before), setting, nominal, base, final,
     )  # fmt: skip
 
 
+def _weighed(final: CutFit, rounds: list[list[Round]]) -> list[Candidate]:
+    """Every fitted cause as it was last weighed, beside those accepted before it; best first."""
+    last = {one.name: one.evidence for ranked in rounds for one in ranked}
+    found = []
+    for name in sorted(last, key=lambda name: -last[name]):
+        strange = last[name] > LEAST_EVIDENCE and name not in final.freed
+        found.append(Candidate(name, last[name], UNCONFIRMED if strange else "fitted"))
+    return found
+
+
 def _accepted(setting: CutSetting, final: CutFit, rounds: list[list[Round]]) -> list[AcceptedCause]:
-    evidence = {one.name: one.evidence for ranked in reversed(rounds) for one in ranked}
+    last = {one.name: one.evidence for ranked in rounds for one in ranked}
     moving = any(cause_of(final.attempt, name).moves for name in final.freed)
     # what noise of the motion does a second time it has done a first time: the error that no residual shows
     again = fit_cut(setting.noisier(), final.attempt, final.freed) if moving else final
     found = []
-    for number, name in enumerate(final.freed):
+    for name in final.freed:
         values = final.attempt.values(name)
         shifted = np.diag((again.attempt.values(name) - values) ** 2)
         covariance = covariance_of(setting, final, name) + shifted
         told = cause_of(final.attempt, name).told(values, covariance, setting.belief.process)
-        ranked = rounds[min(number, len(rounds) - 1)]
-        gained = next((one.evidence for one in ranked if one.name == name), evidence[name])
-        found.append(AcceptedCause(name, {}, *told, gained))
+        found.append(AcceptedCause(name, {}, *told, last[name]))
     return found
 
 

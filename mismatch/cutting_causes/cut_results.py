@@ -24,7 +24,8 @@ class CutDiagnosis:
     physics
         Accepted causes in the order found, then ``force_coefficients`` if they are odd.
     candidates
-        All causes with their evidence in the first round; ``stage`` says which could not be weighed, and why.
+        All causes with their evidence when last weighed, beside those accepted before; ``stage`` says which could not
+        be weighed, and why.
     equivalents
         Causes that explain as much as the first accepted one.
     improvement

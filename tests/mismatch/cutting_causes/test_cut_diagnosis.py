@@ -144,6 +144,14 @@ def test_a_wrong_engagement_is_in_no_library_and_left_unexplained() -> None:
     assert found.improved_process().runout == 0
 
 
+def test_feedback_that_one_block_alone_shows_is_not_named() -> None:
+    """Without runout a cut regenerates only while its entry dies out: nothing confirms it, and something is left."""
+    found = diagnose_cut(CUT, DEPTH, [_of_mill(Mill())])
+    assert (found.verdict, found.physics) == ("unexplained", ())
+    assert found.candidates[0].name == "regenerative_feedback"
+    assert found.candidates[0].stage.startswith("fitted, but not confirmed")
+
+
 def test_recordings_that_number_the_teeth_differently_agree() -> None:
     """The second begins half a turn later: its tooth 0 is the other one."""
     mill = Mill(offsets=(12e-6, -12e-6))
