@@ -1,6 +1,7 @@
 """Milling and drilling forces, and directional coefficients: knows nothing of structures."""
 
 from .cutting_file import read_cutting_process
+from .cutting_writer import write_cutting_process
 from .directional import (
     average_directional_matrix,
     chip_direction,
@@ -39,4 +40,5 @@ __all__ = [
     "read_cutting_process",
     "refuse_varied",
     "turn_harmonics",
+    "write_cutting_process",
 ]

@@ -9,6 +9,7 @@ import typer
 from foundation import InputError, MillfrfError
 
 from .commands import COMMANDS
+from .cut.commands import cut_app
 from .robot.commands import robot_app
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -26,6 +27,7 @@ app = typer.Typer(
 for _function in COMMANDS:
     app.command()(_function)
 app.add_typer(robot_app)
+app.add_typer(cut_app)
 
 
 def run(arguments: Sequence[str]) -> int:

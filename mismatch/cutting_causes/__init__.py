@@ -1,0 +1,22 @@
+"""Which physics a computed cutting force leaves out: measured forces of a cut against those of a cutting process."""
+
+from .cut_diagnosis import FORCE_ERROR, diagnose_cut
+from .cut_diagnosis_file import cut_diagnosis_content, write_cut_diagnosis, write_improved_cut
+from .cut_reading import read_cut_recording
+from .cut_recording import CutRecording, cut_recording
+from .cut_results import COEFFICIENTS, CutDiagnosis
+from .spindle_law import SpindleLaw
+
+__all__ = [
+    "COEFFICIENTS",
+    "FORCE_ERROR",
+    "CutDiagnosis",
+    "CutRecording",
+    "SpindleLaw",
+    "cut_diagnosis_content",
+    "cut_recording",
+    "diagnose_cut",
+    "read_cut_recording",
+    "write_cut_diagnosis",
+    "write_improved_cut",
+]
