@@ -11,7 +11,7 @@ from modal_fit import ModalModel
 from .acceptance import LEAST_EVIDENCE, Option, holds_elsewhere, unexplained, worth_it
 from .diagnosis import AcceptedCause, Candidate, Diagnosis, Improvement
 from .explanation import Explanation
-from .fault_repair import repair_plain_faults
+from .fault_repair import repair_plain_faults, standing_tones
 from .fitting import Fit, fit
 from .held_out import held_out_improvement
 from .leftover import Leftover, leftover
@@ -86,11 +86,13 @@ def diagnose(
     base = fit(lines, nominal)
     lines, base = _with_true_forces(lines, base)
     tell("tones and clipping")
+    whole = lines
     lines, base, faults = repair_plain_faults(lines, base, decay)
     search = _search(lines, base, faults, causes, tell)
     tell("held-out recording")
     search, improvement = _that_hold_elsewhere(search, lines)
     current, accepted, candidates = search.steps[-1], search.accepted, search.candidates
+    accepted = standing_tones(current, whole, accepted) if len(search.steps) > 1 else accepted
     tell("what is left")
     deviation = _deviation(lines, current)
     if deviation is not None:

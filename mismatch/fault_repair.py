@@ -6,7 +6,7 @@ from .acceptance import LEAST_EVIDENCE
 from .clipping import Clipping, find_clipping, mended
 from .diagnosis import AcceptedCause
 from .fitting import Fit, fit
-from .tones import Tone, find_tone, without_tone
+from .tones import Tone, find_tone, stands_out, without_tone
 from .tones_beyond import tones_beyond
 from .windowed_lines import WindowedLines
 
@@ -31,6 +31,27 @@ def repair_plain_faults(
         base, lines, clipping = mended(base, lines, clipping)
         found.append(_clipping_cause(clipping, lines[0]))
     return lines, base, found
+
+
+def standing_tones(fitted: Fit, lines: list[WindowedLines], accepted: list[AcceptedCause]) -> list[AcceptedCause]:
+    """Accepted causes without tones that stood out only until the other causes were known.
+
+    Parameters
+    ----------
+    fitted
+        With all causes.
+    lines
+        Recordings before tones were taken out.
+    accepted
+        Plain faults and causes.
+    """
+    top = max(float(one.frequencies[-1]) for one in lines)
+    kept = []
+    for cause in accepted:
+        frequency = cause.parameters["frequency_hz"] if cause.name == "unmeasured_excitation" else np.inf
+        if frequency > top or stands_out(fitted, lines, frequency):
+            kept.append(cause)
+    return kept
 
 
 def _tone_cause(tone: Tone, lines: WindowedLines) -> AcceptedCause:

@@ -87,6 +87,16 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
     return None
 
 
+def stands_out(fitted: Fit, lines: list[WindowedLines], frequency: float) -> bool:
+    """Whether a line (Hz) of recordings that still hold it is a tone beside what a fit leaves."""
+    total = 0.0
+    for one, noise in zip(lines, fitted.noises, strict=True):
+        power = _whitened_power(fitted, one, noise)
+        contrast = np.minimum(above_neighbours(power, NEAR), above_neighbours(power, BESIDE))
+        total += float(contrast[np.abs(one.frequencies - frequency) < 1.5 * _step(one)].max(initial=0.0))
+    return total > TONE_CONTRAST
+
+
 def _rests(fitted: Fit, lines: list[WindowedLines]) -> list[Real]:
     """Windowed residuals in time, (n_kept, n_responses) each."""
     rests = [one.trial.response - shown_signal(fitted, one) for one in lines]

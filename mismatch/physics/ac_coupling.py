@@ -1,4 +1,4 @@
-"""Responses behind a first-order high-pass."""
+"""Responses behind a high-pass of one stage, or of two alike."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,19 +10,21 @@ from .protocol import Chain, Parameter
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
+TWO_STAGES = "two stages"
+
 
 class AcCoupling:
     """An IEPE sensor or an amplifier with too high a corner frequency."""
 
     name = "ac_coupling"
-    equation = "C(s) = s / (s + 2 pi f_c)"
+    equation = "C(s) = (s / (s + 2 pi f_c))^n, n = 1 or 2 stages"
     source = "Ewins, Modal Testing, 2nd ed., section 3.5"
     parameters = (Parameter("corner_hz", "Hz", 0.05, 1e-3, 50.0, logarithmic=True),)
     confusable_with = ("channel_delay",)
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
-        """One place: the whole measuring chain."""
-        return ("",)
+        """The whole measuring chain, with one stage (sensor or amplifier) or two (both)."""
+        return ("", TWO_STAGES)
 
     def start(self, model: ModalModel) -> Real:
         """A corner so low that it is all but absent, Hz."""
@@ -30,7 +32,7 @@ class AcCoupling:
 
     def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
         """Matrices at ``s``, rad/s."""
-        passed = s / (s + 2 * np.pi * values[0])
+        passed = (s / (s + 2 * np.pi * values[0])) ** (2 if place == TWO_STAGES else 1)
         return Chain(response=passed[:, None, None] * np.eye(len(model.responses)))
 
 
