@@ -18,6 +18,9 @@ Real = NDArray[np.float64]
 BLOCK = 2.0
 """Length of a block for the test of significance, s."""
 
+ITERATIONS = 30
+"""At most: without the causes the modes may have far to go."""
+
 
 def held_out_improvement(lines: list[WindowedLines], final: Explanation, noises: tuple[NoiseModel, ...]) -> Improvement:
     """Fit on all recordings but one, compare errors on that one.
@@ -37,8 +40,8 @@ def held_out_improvement(lines: list[WindowedLines], final: Explanation, noises:
     nominal = zero_of(final.shape)
     kept = (len(lines) - 1) // 2
     others = [one for k, one in enumerate(lines) if k != kept] or lines
-    linear = fit(others, nominal, iterations=6).explanation
-    improved = fit(others, final, iterations=6).explanation if final.causes or final.shape.added else linear
+    linear = fit(others, nominal, iterations=ITERATIONS).explanation
+    improved = fit(others, final, iterations=ITERATIONS).explanation if final.causes or final.shape.added else linear
     here = lines[kept]
     blocks = [_block_errors(explanation, here) for explanation in (nominal, linear, improved)]
     power = float(np.sum(np.abs(here.measured) ** 2))

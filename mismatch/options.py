@@ -16,6 +16,7 @@ from .leftover import Leftover, leftover
 from .linear_floor import Floor, linear_floor, noise_floor
 from .missing_mode import SightedMode, find_mode
 from .physics import ChainPhysics, JointPhysics, Physics, answer_name
+from .settling import with_chain
 from .windowed_lines import WindowedLines
 
 MOST_CHAINS = 3
@@ -78,8 +79,8 @@ def _linear_options(
     largest = max([one.gain for one in chains] + [mode.gain, 0.0])
     for one in chains[:MOST_CHAINS]:
         if one.gain > max(least, one.cause.size * cost, 0.03 * largest):
-            start = _added(current.explanation, one.cause)
-            options.append(Option(answer_name(one.cause.physics), _place(one.cause), fit(lines, start, current.noises)))
+            fitted = with_chain(lines, current, one.cause)
+            options.append(Option(answer_name(one.cause.physics), _place(one.cause), fitted))
     numbers = current.explanation.shape.per_mode - 2
     if not current.explanation.causes and mode.gain > max(least, numbers * cost, 0.03 * largest):
         shape = current.explanation.shape.with_mode(mode.pole, mode.right, mode.left)

@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 
+from .explanation import Cause, Explanation
 from .fitting import Fit, fit
+from .physics import ChainPhysics
 from .reporting_numbers import modal_deviation
 from .windowed_lines import WindowedLines
 
-ITERATIONS = 60
+ITERATIONS, FROM_BELIEF = 60, 20
 
 
 def settled(lines: list[WindowedLines], fitted: Fit) -> Fit:
@@ -25,8 +27,35 @@ def settled(lines: list[WindowedLines], fitted: Fit) -> Fit:
     rested = fit(lines, fitted.explanation, fitted.noises, iterations=ITERATIONS)
     if modal_deviation(rested) is None or not rested.explanation.causes:
         return rested
-    believed = rested.explanation.u.copy()
-    shape = rested.explanation.shape
-    believed[: shape.per_mode * (len(shape.nominal.poles) - shape.added)] = 0.0
-    again = fit(lines, replace(rested.explanation, u=believed), rested.noises, iterations=ITERATIONS)
+    again = fit(lines, believed(rested.explanation), rested.noises, iterations=ITERATIONS)
     return min(rested, again, key=lambda one: one.score)
+
+
+def with_chain(lines: list[WindowedLines], current: Fit, cause: Cause) -> Fit:
+    """Fit a linear cause together with the modes: from where they are and, if they look odd, from the lab's model.
+
+    Modes that have taken up all that a cause does leave it nothing to begin with.
+
+    Parameters
+    ----------
+    lines
+        Recordings.
+    current
+        Without the cause.
+    cause
+        With numbers to begin with.
+    """
+    explanation = current.explanation
+    fitted = fit(lines, replace(explanation, causes=(*explanation.causes, cause)), current.noises)
+    if modal_deviation(current) is None or not isinstance(cause.physics, ChainPhysics):
+        return fitted
+    absent = replace(cause, values=cause.physics.start(explanation.shape.nominal))
+    fresh = replace(believed(explanation), causes=(*explanation.causes, absent))
+    return min(fitted, fit(lines, fresh, iterations=FROM_BELIEF), key=lambda one: one.score)
+
+
+def believed(explanation: Explanation) -> Explanation:
+    """The same causes and added modes on the lab's own model."""
+    shape, u = explanation.shape, explanation.u.copy()
+    u[: shape.per_mode * (len(shape.nominal.poles) - shape.added)] = 0.0
+    return replace(explanation, u=u)
