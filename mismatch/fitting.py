@@ -123,7 +123,8 @@ def _descended(
     for _ in range(iterations):
         cost = _cost(seen, explanation)
         step = _solved(matrix + damping * np.diag(np.diag(matrix)), gradient)
-        if step @ gradient < 0.1 * tolerance:
+        # where a law is stiffer than its derivatives can follow there is no step either
+        if not step @ gradient >= 0.1 * tolerance or not np.isfinite(step).all():
             break
         trial, again, trial_cost = _downhill(pool, lines, explanation, (step, float(step @ gradient)), seen)
         if not trial_cost < cost:

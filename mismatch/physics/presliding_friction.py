@@ -11,6 +11,9 @@ Real = NDArray[np.float64]
 ELEMENTS = 6
 """In parallel, yields spread evenly in their logarithm, the same force each."""
 
+LEAST_PRESLIDING = 2e-3
+"""Of the typical deflection: less is friction without presliding, and as stiff as no time step can follow."""
+
 
 class PreslidingFriction:
     """Asperities act as springs until they break away: sliding begins after some micrometres, not at once.
@@ -39,7 +42,8 @@ class PreslidingFriction:
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
         """The joint's force."""
         steps = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
-        yields = min(values[1], DRY * motion.deflection) * np.exp(1.6 * (steps - 0.5))
+        presliding = np.clip(values[1], LEAST_PRESLIDING * motion.deflection, DRY * motion.deflection)
+        yields = presliding * np.exp(1.6 * (steps - 0.5))
         return JointLaw(springs=values[0] / ELEMENTS / yields, yields=yields)
 
 
