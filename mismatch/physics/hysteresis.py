@@ -31,7 +31,7 @@ class Hysteresis:
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
         """Shapes to try, amplitude 1."""
-        return tuple(np.array([1.0, k * motion.deflection, 0.8]) for k in (0.1, 0.3, 1.0, 2.5))
+        return tuple(np.array([1.0, k * motion.deflection, 0.8]) for k in (0.15, 0.3, 1.0, 2.5))
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
         """The joint's force."""

@@ -34,14 +34,16 @@ def _explanation(model: ModalModel, lines: WindowedLines, name: str) -> Explanat
 
 
 @pytest.mark.parametrize(
-    "name", ["stiffness_hardening", "coulomb_friction", "hysteresis", "quadratic_damping", "pose_drift"]
+    "name",
+    ["stiffness_hardening", "coulomb_friction", "presliding_friction", "hysteresis", "quadratic_damping", "pose_drift"],
 )
 def test_the_tangent_is_that_of_whole_simulations(
     small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], Trial], name: str
 ) -> None:
     """By frequency, damping, shapes, the law's own numbers and the angle.
 
-    Derivatives of the linear part leave leakage out; damping is made so high here that a window's edge hides it.
+    Derivatives of the linear part leave leakage out; damping is made so high here that a window's edge hides it. The
+    largest difference is 0.16; without the tangent the first two and the law's own numbers differ by 0.6 to 1.9.
     """
     omega = np.abs(small_model.poles)
     damped = replace(small_model, poles=omega * (-0.1 + 1j * np.sqrt(1 - 0.01)))
