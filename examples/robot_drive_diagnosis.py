@@ -229,7 +229,7 @@ def picture(drives: dict[str, Drive], train: Record, test: Record) -> Figure:
     law.plot(1e3 * velocity, left, ".", ms=2, color="#999999", label="measured, training record")
     line = np.linspace(velocity.min(), velocity.max(), 600)
     law.plot(1e3 * line, named.friction * np.tanh(line / named.smooth), color=COLOURS[1], label="named law")
-    law.set(xlabel="velocity, mm/s", ylabel="force, N", title="what the rigid mass leaves out", ylim=(-35, 45))
+    law.set(xlabel="velocity (mm/s)", ylabel="force (N)", title="what the rigid mass leaves out", ylim=(-35, 45))
     filters, part = butter(4, 2 * 20.0 * STEP), slice(1500, 11000)
     time = np.arange(len(test.force)) * STEP
     measured = filtfilt(*filters, test.force)
@@ -237,7 +237,7 @@ def picture(drives: dict[str, Drive], train: Record, test: Record) -> Figure:
         rest = filtfilt(*filters, closed_loop(drives[name], test)[1]) - measured
         force.plot(time[part], rest[part], color=colour, lw=0.7, label=f"error, {name}")
     title = "test record, closed loop simulated from the reference"
-    force.set(xlabel="s", ylabel="motor force, N", title=title, ylim=(-26, 34))
+    force.set(xlabel="time (s)", ylabel="motor force (N)", title=title, ylim=(-26, 34))
     for axes in (law, force):
         axes.legend(loc="upper left", fontsize=7)
     return figure

@@ -122,7 +122,7 @@ def picture(signals: Signals, nominal: ModalModel, found: Diagnosis) -> Figure:
         errors.plot(
             time, 1e3 * (free_run(model, signals, part) - measured), color=colour, lw=0.4, label=f"error, {name}"
         )
-    errors.set(xlabel="s", ylabel="mV", title="arrowhead test, simulated from rest")
+    errors.set(xlabel="time (s)", ylabel="output (mV)", title="arrowhead test, simulated from rest")
     cause = next(cause for cause in found.final.explanation.causes if cause.physics.name == "stiffness_hardening")
     assert cause.direction is not None
     linear = replace(found.final, explanation=replace(found.final.explanation, causes=()))
@@ -135,7 +135,7 @@ def picture(signals: Signals, nominal: ModalModel, found: Diagnosis) -> Figure:
     force = cause.law()
     table = np.interp(line, np.linspace(-force.reach, force.reach, len(force.stiffness)), force.stiffness)
     law.plot(1e3 * line, 1e3 * table, color=COLOURS[1], label="named law")
-    law.set(xlabel="deflection (output), mV", ylabel="force (input), mV", title="what the linear model leaves out")
+    law.set(xlabel="deflection: output (mV)", ylabel="force: input (mV)", title="what the linear model leaves out")
     for axes in (errors, law):
         axes.legend(loc="upper left", fontsize=7)
     return figure

@@ -11,7 +11,7 @@ from modal_fit import ModalModel
 from .acceptance import LEAST_EVIDENCE, Option, holds_elsewhere, unexplained, worth_it
 from .diagnosis import AcceptedCause, Candidate, Diagnosis, Improvement
 from .explanation import Explanation
-from .fault_repair import repair_plain_faults, standing_tones
+from .fault_repair import repair_plain_faults, with_tones_settled
 from .fitting import Fit, fit
 from .held_out import held_out_improvement
 from .leftover import Leftover, leftover
@@ -92,7 +92,7 @@ def diagnose(
     tell("held-out recording")
     search, improvement = _that_hold_elsewhere(search, lines)
     current, accepted, candidates = search.steps[-1], search.accepted, search.candidates
-    accepted = standing_tones(current, whole, accepted) if len(search.steps) > 1 else accepted
+    accepted = with_tones_settled(current, whole, accepted, decay)
     tell("what is left")
     deviation = _deviation(lines, current)
     if deviation is not None:

@@ -25,7 +25,6 @@ def repair_plain_faults(
         lines = [without_tone(base, one, tone) for one in lines]
         base = fit(lines, base.explanation, iterations=4)
         found.append(_tone_cause(tone, lines[0]))
-    found += [_tone_cause(tone, lines[0]) for tone in tones_beyond(lines, decay, MOST_TONES - len(found))]
     clipping = find_clipping(base, lines)
     if clipping is not None:
         base, lines, clipping = mended(base, lines, clipping)
@@ -33,8 +32,10 @@ def repair_plain_faults(
     return lines, base, found
 
 
-def standing_tones(fitted: Fit, lines: list[WindowedLines], accepted: list[AcceptedCause]) -> list[AcceptedCause]:
-    """Accepted causes without tones that stood out only until the other causes were known.
+def with_tones_settled(
+    fitted: Fit, lines: list[WindowedLines], accepted: list[AcceptedCause], decay: float
+) -> list[AcceptedCause]:
+    """Accepted causes without tones that stood out only until the others were known, and with those above the band.
 
     Parameters
     ----------
@@ -44,14 +45,13 @@ def standing_tones(fitted: Fit, lines: list[WindowedLines], accepted: list[Accep
         Recordings before tones were taken out.
     accepted
         Plain faults and causes.
+    decay
+        Of the slowest mode, 1/s.
     """
-    top = max(float(one.frequencies[-1]) for one in lines)
-    kept = []
-    for cause in accepted:
-        frequency = cause.parameters["frequency_hz"] if cause.name == "unmeasured_excitation" else np.inf
-        if frequency > top or stands_out(fitted, lines, frequency):
-            kept.append(cause)
-    return kept
+    tones = [cause for cause in accepted if cause.name == "unmeasured_excitation"]
+    gone = [one for one in tones if not stands_out(fitted, lines, one.parameters["frequency_hz"])]
+    beyond = tones_beyond(fitted.explanation, lines, decay, MOST_TONES - len(tones) + len(gone))
+    return [cause for cause in accepted if cause not in gone] + [_tone_cause(tone, lines[0]) for tone in beyond]
 
 
 def _tone_cause(tone: Tone, lines: WindowedLines) -> AcceptedCause:

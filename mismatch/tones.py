@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft
-from scipy.ndimage import median_filter
+from scipy.ndimage import maximum_filter, median_filter
 
 from .assessment import levels, through_structure
 from .explanation import predict_lines
@@ -28,6 +28,9 @@ NEAR = np.ones(41, dtype=bool)
 BESIDE = np.array([abs(k) > 3 for k in range(-10, 11)])
 """Lines beside a line, without those that a tone reaches: a narrow resonance is as high there."""
 
+
+MOST_LINES = 8
+"""That may stand out, tones and their harmonics; more are a comb."""
 
 REACH = 10
 """Lines on each side that a tone reaches through the window."""
@@ -70,12 +73,15 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
         ]
     )
     again = np.sort(together, axis=0)[-min(2, len(lines))]
-    together = np.where(again > SEEN_AGAIN, together.sum(axis=0), 0.0)
+    pushed = [np.interp(axis, one.frequencies, force_contrast(one)) > FORCED for one in lines]
+    together = np.where((again > SEEN_AGAIN) & ~np.any(pushed, axis=0), together.sum(axis=0), 0.0)
+    if is_comb(together):
+        return None
     for k in np.argsort(-together)[:20]:
         if together[k] < TONE_CONTRAST:
             return None
         frequency = float(axis[k])
-        if any(force_contrast(one, frequency) > FORCED for one in lines) or _too_few_left(lines, frequency):
+        if _too_few_left(lines, frequency):
             continue
         # how strong it is does not depend on how far it leaks
         shown = [
@@ -85,6 +91,20 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
         exact = sharp_frequency(_rests(fitted, lines), [one.trial.rate for one in lines], frequency)
         return Tone(exact, _amplitudes(fitted, lines, exact), 2 * float(np.sum(shown)))
     return None
+
+
+def is_comb(contrast: Real) -> bool:
+    """Whether more lines stand out than a machine nearby makes.
+
+    Forces that repeat within the record put all that they cause, errors of the model included, on a comb of lines.
+
+    Parameters
+    ----------
+    contrast : (n_lines,)
+        Summed over recordings.
+    """
+    lines = np.flatnonzero(contrast > TONE_CONTRAST / 3)
+    return int(np.sum(np.diff(lines, prepend=-REACH) > 2)) > MOST_LINES
 
 
 def stands_out(fitted: Fit, lines: list[WindowedLines], frequency: float) -> bool:
@@ -177,12 +197,10 @@ def _too_few_left(lines: list[WindowedLines], frequency: float) -> bool:
     return any(near.sum() > 0.25 * len(near) for near in reach)
 
 
-def force_contrast(lines: WindowedLines, frequency: float) -> float:
-    """Power of the forces at a line and beside it against the median of its neighbourhood."""
+def force_contrast(lines: WindowedLines) -> Real:
+    """Power of the forces at each line or beside it against the median of its neighbourhood, (n_lines,)."""
     power = np.sum(np.abs(lines.force_here / levels(lines)[1]) ** 2, axis=1)
-    k = int(np.argmin(np.abs(lines.frequencies - frequency)))
-    near = power[max(0, k - len(NEAR) // 2) : k + len(NEAR) // 2 + 1]
-    return float(power[max(0, k - 1) : k + 2].max() / max(float(np.median(near)), 1e-300))
+    return np.asarray(maximum_filter(above_neighbours(power, NEAR), 3))
 
 
 def _amplitudes(fitted: Fit, lines: list[WindowedLines], frequency: float) -> Real:

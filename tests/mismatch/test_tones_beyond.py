@@ -5,6 +5,8 @@ import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 from numpy.typing import NDArray
 
+from mismatch import Explanation, LabError, ModelShape
+from mismatch.tones import Tone
 from mismatch.tones_beyond import tones_beyond
 from mismatch.trial import Trial, band_of
 from mismatch.windowed_lines import WindowedLines, windowed_lines
@@ -33,6 +35,11 @@ def prepared(one: Trial) -> WindowedLines:
     return windowed_lines(one, band_of(structure(), one.rate), DECAY)
 
 
+def found_in(lines: list[WindowedLines]) -> list[Tone]:
+    shape = ModelShape(structure(), LabError())
+    return tones_beyond(Explanation(shape, np.zeros(shape.size)), lines, DECAY, 4)
+
+
 def noise_of(lines: list[WindowedLines]) -> NDArray[np.float64]:
     """About what 2 % noise is, a response, of the middle recording."""
     return np.asarray(0.02 * lines[1].trial.response.std(axis=0))
@@ -42,20 +49,20 @@ def test_a_tone_below_the_noise_is_found_with_frequency_and_size() -> None:
     size = float(noise_of(recordings(5))[0])
     lines = recordings(5, (0.7 * size, 0.7 * size, 0.7 * size))
     assert lines[0].frequencies[-1] < TONE - 20
-    (tone,) = tones_beyond(lines, DECAY, 4)
+    (tone,) = found_in(lines)
     assert tone.frequency == pytest.approx(TONE, abs=0.002)
     assert tone.amplitudes == pytest.approx([0.7 * size, 0.28 * size], rel=0.2)
 
 
 def test_a_line_of_the_cut_is_no_tone() -> None:
-    assert tones_beyond(recordings(6, forced=0.02), DECAY, 4) == []
+    assert found_in(recordings(6, forced=0.02)) == []
 
 
 def test_a_line_in_one_recording_only_is_no_tone() -> None:
     size = float(noise_of(recordings(7))[0])
-    assert tones_beyond(recordings(7, (0.0, 2 * size, 0.0)), DECAY, 4) == []
+    assert found_in(recordings(7, (0.0, 2 * size, 0.0))) == []
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_noise_has_no_tones(seed: int) -> None:
-    assert tones_beyond(recordings(100 + seed), DECAY, 4) == []
+    assert found_in(recordings(100 + seed)) == []

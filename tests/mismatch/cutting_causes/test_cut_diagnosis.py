@@ -152,6 +152,7 @@ def test_feedback_that_one_block_alone_shows_is_not_named() -> None:
     assert found.candidates[0].stage.startswith("fitted, but not confirmed")
 
 
+@pytest.mark.slow
 def test_recordings_that_number_the_teeth_differently_agree() -> None:
     """The second begins half a turn later: its tooth 0 is the other one."""
     mill = Mill(offsets=(12e-6, -12e-6))
