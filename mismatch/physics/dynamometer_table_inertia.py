@@ -3,10 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import DegreeOfFreedom
 from modal_fit import ModalModel
 
-from .protocol import Chain, Parameter
+from .protocol import Chain, Parameter, axes_of
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -23,7 +22,7 @@ class DynamometerTableInertia:
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
         """One place, if every force has a response along its axis."""
-        return ("",) if set(_axes(model.excitations)) <= set(_axes(model.responses)) else ()
+        return ("",) if set(axes_of(model.excitations)) <= set(axes_of(model.responses)) else ()
 
     def start(self, model: ModalModel) -> Real:
         """Absent."""
@@ -31,15 +30,11 @@ class DynamometerTableInertia:
 
     def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
         """Matrices at ``s``, rad/s."""
-        rows = _axes(model.responses)
+        rows = axes_of(model.responses)
         moved = np.zeros((len(model.excitations), len(model.responses)))
-        for column, axis in enumerate(_axes(model.excitations)):
+        for column, axis in enumerate(axes_of(model.excitations)):
             moved[column, rows.index(axis)] = values[0]
         return Chain(feedback=s[:, None, None] ** 2 * moved)
-
-
-def _axes(labels: tuple[str, ...]) -> list[str]:
-    return [DegreeOfFreedom.parse(label).axis for label in labels]
 
 
 PHYSICS = DynamometerTableInertia()

@@ -3,10 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import DegreeOfFreedom
 from modal_fit import ModalModel
 
-from .protocol import Chain, Parameter
+from .protocol import Chain, Parameter, axes_of
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -46,7 +45,7 @@ class GyroscopicCoupling:
 def _triads(model: ModalModel) -> tuple[str, ...]:
     found = []
     for labels in (model.excitations, model.responses):
-        axes = [DegreeOfFreedom.parse(label).axis for label in labels]
+        axes = axes_of(labels)
         if any(axes.count(axis) != 1 for axis in "XYZ"):
             return ()
         found.append(" ".join(str(axes.index(axis)) for axis in "XYZ"))

@@ -3,10 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import DegreeOfFreedom
 from modal_fit import ModalModel
 
-from .protocol import Chain, Parameter
+from .protocol import Chain, Parameter, axes_of
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -25,7 +24,7 @@ class NonProportionalDamping:
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
         """One place, if forces and responses both have X, Y and Z once."""
-        return ("",) if all(sorted(_axes(labels)) == ["X", "Y", "Z"] for labels in _sides(model)) else ()
+        return ("",) if all(sorted(axes_of(labels)) == ["X", "Y", "Z"] for labels in _sides(model)) else ()
 
     def start(self, model: ModalModel) -> Real:
         """Absent."""
@@ -36,16 +35,12 @@ class NonProportionalDamping:
         damping = np.zeros((3, 3))
         for value, (i, j) in zip(values, PLACES, strict=True):
             damping[i, j] = damping[j, i] = value
-        columns, rows = (["XYZ".index(axis) for axis in _axes(labels)] for labels in _sides(model))
+        columns, rows = (["XYZ".index(axis) for axis in axes_of(labels)] for labels in _sides(model))
         return Chain(feedback=s[:, None, None] * damping[np.ix_(columns, rows)])
 
 
 def _sides(model: ModalModel) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return model.excitations, model.responses
-
-
-def _axes(labels: tuple[str, ...]) -> list[str]:
-    return [DegreeOfFreedom.parse(label).axis for label in labels]
 
 
 PHYSICS = NonProportionalDamping()

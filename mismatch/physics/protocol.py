@@ -6,6 +6,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from foundation import DegreeOfFreedom
 from modal_fit import ModalModel
 
 from ..joint_law import JointLaw, JointMotion
@@ -122,3 +123,8 @@ Physics = ChainPhysics | JointPhysics
 def answer_name(physics: Physics) -> str:
     """Name under which a cause is reported: its own, or that of the cause it is a form of (``answers_as``)."""
     return str(getattr(physics, "answers_as", physics.name))
+
+
+def axes_of(labels: tuple[str, ...]) -> list[str]:
+    """Axis (X, Y or Z) of each degree of freedom."""
+    return [DegreeOfFreedom.parse(label).axis for label in labels]
