@@ -7,7 +7,7 @@ import numpy as np
 
 from foundation import DegreeOfFreedom
 from mismatch import AcceptedCause, Diagnosis
-from mismatch.physics import library
+from mismatch.physics import form_of
 
 from .next_tests import next_test
 
@@ -141,10 +141,9 @@ def _orders(located: Mapping[str, Any]) -> list[str]:
 
 def what(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Equation and source of each cause, and how the residual grows with the level."""
-    known = library()
     said = []
     for cause in diagnosis.physics:
-        physics = known.get(cause.name)
+        physics = form_of(cause.name, cause.parameters)
         equation = f": {physics.equation} ({physics.source})" if physics is not None else ""
         said.append(f"{first_word(cause.name)}{equation}.")
     growth = diagnosis.located.get("growth", {})
@@ -199,10 +198,10 @@ def what_else(diagnosis: Diagnosis) -> tuple[str, ...]:
         said.append(f"The nearest rival that was fitted is {words(name)} with evidence {evidence:.0f}, {ending}.")
     elif others:
         said.append(f"Nearest, but not accepted: {words(others[0][0])} with evidence {others[0][1]:.0f}.")
-    known = library()
     for cause in diagnosis.physics[:1]:
-        if cause.name in known and known[cause.name].confusable_with:
-            names = ", ".join(words(name) for name in known[cause.name].confusable_with)
+        physics = form_of(cause.name, cause.parameters)
+        if physics is not None and physics.confusable_with:
+            names = ", ".join(words(name) for name in physics.confusable_with)
             said.append(f"In general it is easily taken for {names}.")
     return tuple(said) or ("No other cause of the library came near.",)
 

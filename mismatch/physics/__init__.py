@@ -2,10 +2,11 @@
 
 import importlib
 import pkgutil
+from collections.abc import Collection
 
 from .protocol import Chain, ChainPhysics, JointPhysics, Parameter, Physics, answer_name
 
-__all__ = ["Chain", "ChainPhysics", "JointPhysics", "Parameter", "Physics", "answer_name", "library"]
+__all__ = ["Chain", "ChainPhysics", "JointPhysics", "Parameter", "Physics", "answer_name", "form_of", "library"]
 
 
 def library() -> dict[str, Physics]:
@@ -22,3 +23,17 @@ def library() -> dict[str, Physics]:
         if cause is not None:
             found[cause.name] = cause
     return found
+
+
+def form_of(answer: str, numbers: Collection[str]) -> Physics | None:
+    """The file that is reported under a name and has these numbers; None for what is no file of this folder.
+
+    Examples
+    --------
+    >>> form_of("coulomb_friction", ["friction_n", "presliding_m"]).name
+    'presliding_friction'
+    """
+    for physics in library().values():
+        if answer_name(physics) == answer and {one.name for one in physics.parameters} == set(numbers):
+            return physics
+    return None

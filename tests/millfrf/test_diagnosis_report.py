@@ -11,7 +11,7 @@ from acquisition import Channel, RecordingWriter, StreamDescription
 from millfrf.__main__ import run
 from millfrf.report.next_tests import next_test
 from mismatch.diagnosis import VERDICTS
-from mismatch.physics import library
+from mismatch.physics import answer_name, library
 from modal_fit import ModalModel, write_modal_model
 
 RATE, SECONDS, DELAY = 128.0, 40.0, 0.005
@@ -71,5 +71,12 @@ def test_report_says_what_was_found(tmp_path: Path, model: ModalModel) -> None:
 
 def test_every_physics_has_its_own_next_test() -> None:
     other = next_test("a physics that somebody adds").test
-    named = [*library(), *VERDICTS[::2], "modal_parameters", "missing_mode", "unmeasured_excitation", "clipping"]
+    named = [
+        *map(answer_name, library().values()),
+        *VERDICTS[::2],
+        "modal_parameters",
+        "missing_mode",
+        "unmeasured_excitation",
+        "clipping",
+    ]
     assert [name for name in named if next_test(name).test == other] == []
