@@ -1,9 +1,12 @@
 """Fitted coordinates as parameters with standard errors, in the units of files."""
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .diagnosis import AcceptedCause
+from .explanation import Cause
 from .fitting import Fit
 from .physics import answer_name
 
@@ -19,7 +22,26 @@ def accepted_cause(fitted: Fit, location: dict[str, object], evidence: float) ->
     for parameter, value, error in zip(cause.physics.parameters, cause.values, spread, strict=False):
         parameters[parameter.name] = float(value)
         errors[parameter.name] = float(error * parameter.unit_step * (abs(value) if parameter.logarithmic else 1.0))
+    derived, their_errors = _derived(cause, fitted.covariance[first:, first:])
+    parameters, errors = parameters | derived, errors | their_errors
     return AcceptedCause(answer_name(cause.physics), dict(location), parameters, errors, evidence)
+
+
+def _derived(cause: Cause, covariance: Real) -> tuple[dict[str, float], dict[str, float]]:
+    """Numbers that a laboratory knows better than those of the equation, if the physics has a ``derived``."""
+    numbers: Callable[[Real], dict[str, float]] | None = getattr(cause.physics, "derived", None)
+    if numbers is None:
+        return {}, {}
+    here, at = numbers(cause.values), cause.coordinates()
+    count = len(cause.values)
+    slopes: dict[str, Real] = {name: np.zeros(count) for name in here}
+    for k in range(count):
+        step = 1e-4 * max(1.0, abs(float(at[k])))
+        aside = [numbers(cause.moved(at + sign * step * np.eye(len(at))[k]).values) for sign in (1, -1)]
+        for name in here:
+            slopes[name][k] = (aside[0].get(name, here[name]) - aside[1].get(name, here[name])) / (2 * step)
+    own = covariance[:count, :count]
+    return here, {name: float(np.sqrt(np.maximum(slope @ own @ slope, 0.0))) for name, slope in slopes.items()}
 
 
 def accepted_mode(fitted: Fit, evidence: float) -> AcceptedCause:

@@ -34,6 +34,6 @@ def form_of(answer: str, numbers: Collection[str]) -> Physics | None:
     'presliding_friction'
     """
     for physics in library().values():
-        if answer_name(physics) == answer and {one.name for one in physics.parameters} == set(numbers):
+        if answer_name(physics) == answer and {one.name for one in physics.parameters} <= set(numbers):
             return physics
     return None

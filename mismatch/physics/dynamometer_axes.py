@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
-from .protocol import Chain, Parameter, axes_of
+from .protocol import Chain, Parameter, axes_of, resonance_of
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -39,6 +39,11 @@ class DynamometerAxes:
         squared = np.array([values["XYZ".index(axis)] for axis in axes_of(model.excitations)])
         own = 1 + values[3] * s[:, None] + squared * s[:, None] ** 2
         return Chain(force=own[:, :, None] * np.eye(len(squared)))
+
+    def derived(self, values: Real) -> dict[str, float]:
+        """Resonance and damping ratio of each axis."""
+        found = {axis: resonance_of(float(values[k]), float(values[3])) for k, axis in enumerate("xyz")}
+        return {f"{axis}_{name}": value for axis, one in found.items() for name, value in one.items()}
 
 
 PHYSICS = DynamometerAxes()

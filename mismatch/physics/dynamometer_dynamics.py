@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
-from .protocol import Chain, Parameter
+from .protocol import Chain, Parameter, resonance_of
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -35,6 +35,10 @@ class DynamometerDynamics:
         """Matrices at ``s``, rad/s."""
         whole = 1 + values[1] * s + values[0] * s**2
         return Chain(force=whole[:, None, None] * np.eye(len(model.excitations)))
+
+    def derived(self, values: Real) -> dict[str, float]:
+        """Resonance and damping ratio."""
+        return resonance_of(float(values[0]), float(values[1]))
 
 
 PHYSICS = DynamometerDynamics()

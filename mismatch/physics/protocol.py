@@ -125,6 +125,14 @@ def answer_name(physics: Physics) -> str:
     return str(getattr(physics, "answers_as", physics.name))
 
 
+def resonance_of(squared_period: float, damping_time: float) -> dict[str, float]:
+    """Frequency and damping ratio of ``1 + c s + T2 s^2``, c in s and T2 in s^2; nothing where T2 is none."""
+    if squared_period <= 0:
+        return {}
+    root = float(np.sqrt(squared_period))
+    return {"resonance_hz": 1 / (2 * np.pi * root), "damping_ratio": damping_time / (2 * root)}
+
+
 def axes_of(labels: tuple[str, ...]) -> list[str]:
     """Axis (X, Y or Z) of each degree of freedom."""
     return [DegreeOfFreedom.parse(label).axis for label in labels]
