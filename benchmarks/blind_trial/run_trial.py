@@ -42,7 +42,8 @@ def run_case(spec: CaseSpec, out: Path, tool: list[str], timeout: float, keep: b
     seconds = time.perf_counter() - began
     improved, prediction = answers / "improved_model.json", answers / "prediction.h5"
     errors = None
-    if improved.exists():
+    # a control has no error to remove
+    if improved.exists() and spec.effect != "none":
         _call([*tool, "predict", str(improved), str(folder / "unseen.h5"), "--out", str(prediction)], timeout)
     if prediction.exists():
         errors = held_out_errors(folder, prediction)
