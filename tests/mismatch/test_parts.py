@@ -8,9 +8,12 @@ import pytest
 
 from mismatch import Explanation, JointLaw, LabError, ModelShape, Trial, band_of, windowed_lines
 from mismatch import physics as physics_folder
+from mismatch.explanation import Cause
+from mismatch.fitting import Fit
 from mismatch.joint_law import POINTS
 from mismatch.joint_simulation import driven_force, joint_response
 from mismatch.noise_model import _cost, fit_noise, whitening
+from mismatch.reporting_numbers import accepted_cause
 from mismatch.windowed_lines import WindowedLines, receptance_at
 from modal_fit import ModalModel, Residuals
 
@@ -168,3 +171,23 @@ def test_a_residual_inertia_says_nothing_below_the_band(model: ModalModel) -> No
     found = receptance_at(heavy, frequencies)
     np.testing.assert_allclose(found[:3], model.receptance(frequencies[:3]), rtol=1e-12)
     np.testing.assert_allclose(found[3:], heavy.receptance(frequencies[3:]), rtol=1e-12)
+
+
+def test_numbers_a_laboratory_knows_better_with_their_errors(model: ModalModel) -> None:
+    """Resonance and damping ratio of a dynamometer, and errors by hand: df/f = dT2 / (2 T2)."""
+    shape = ModelShape(model, LabError())
+    physics = physics_folder.library()["dynamometer_dynamics"]
+    squared, damping = 4e-6, 1e-4
+    cause = Cause(physics, np.array([squared, damping]), "")
+    explanation = Explanation(shape, np.zeros(shape.size), (cause,))
+    covariance = np.zeros((explanation.size, explanation.size))
+    covariance[-2, -2], covariance[-1, -1] = 0.25, 4.0
+    fitted = Fit(explanation, (), 0.0, 0.0, 0.0, covariance)
+    found = accepted_cause(fitted, {}, 1.0)
+    frequency, ratio = 1 / (2 * np.pi * np.sqrt(squared)), damping / (2 * np.sqrt(squared))
+    spread, other = found.standard_errors["squared_period_s2"], found.standard_errors["damping_time_s"]
+    assert found.parameters["resonance_hz"] == pytest.approx(frequency)
+    assert found.parameters["damping_ratio"] == pytest.approx(ratio)
+    assert found.standard_errors["resonance_hz"] == pytest.approx(frequency * spread / (2 * squared), rel=1e-4)
+    expected = ratio * np.hypot(spread / (2 * squared), other / damping)
+    assert found.standard_errors["damping_ratio"] == pytest.approx(expected, rel=1e-4)
