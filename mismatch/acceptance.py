@@ -73,7 +73,8 @@ def holds_elsewhere(improvement: Improvement, current: Fit, base: Fit) -> bool:
 def worth_it(option: Option, current: Fit, base: Fit) -> bool:
     """Enough evidence; and if it lies in the lab's belief alone, most of what the belief found odd."""
     gain = current.score - option.fitted.score
-    if option.name != "missing_mode" and not _measured(option.fitted):
+    clear = _mode_measured(option.fitted) if option.name == "missing_mode" else _measured(option.fitted)
+    if not clear:
         return False
     if gain < evidence_needed(current, base):
         return False
@@ -82,6 +83,13 @@ def worth_it(option: Option, current: Fit, base: Fit) -> bool:
     size = current.explanation.shape.size
     odd = max(current.deviation - size, 1.0)
     return current.deviation - option.fitted.deviation > 0.6 * odd
+
+
+def _mode_measured(fitted: Fit) -> bool:
+    """Whether the damping of the mode added last stands out of its error: else no resonance was seen."""
+    shape = fitted.explanation.shape
+    place = shape.per_mode * (len(shape.nominal.poles) - 1) + 1
+    return float(np.sqrt(np.maximum(fitted.covariance[place, place], 0.0))) * shape.lab.damping < 1 / CLEAR
 
 
 def _measured(fitted: Fit) -> bool:

@@ -187,7 +187,8 @@ def _whitened_power(fitted: Fit, lines: WindowedLines, noise: NoiseModel) -> Rea
 
 def above_neighbours(power: Real, footprint: NDArray[np.bool_]) -> Real:
     """Each line of a power (n_lines,) over the median of the lines about it that the footprint holds."""
-    around = median_filter(power, footprint=footprint, mode="nearest")
+    # mirrored at its ends: a weak last line repeated would make its neighbours stand out
+    around = median_filter(power, footprint=footprint, mode="mirror")
     return np.asarray(power / np.maximum(around, 1e-3 * power.mean() + 1e-300))
 
 

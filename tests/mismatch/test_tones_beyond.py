@@ -6,7 +6,7 @@ from concealed_recordings import RATE, forces, linear_acceleration, structure, t
 from numpy.typing import NDArray
 
 from mismatch import Explanation, LabError, ModelShape
-from mismatch.tones import Tone
+from mismatch.tones import NEAR, TONE_CONTRAST, Tone, above_neighbours
 from mismatch.tones_beyond import tones_beyond
 from mismatch.trial import Trial, band_of
 from mismatch.windowed_lines import WindowedLines, windowed_lines
@@ -66,3 +66,10 @@ def test_a_line_in_one_recording_only_is_no_tone() -> None:
 @pytest.mark.parametrize("seed", range(10))
 def test_noise_has_no_tones(seed: int) -> None:
     assert found_in(recordings(100 + seed)) == []
+
+
+def test_the_ends_of_a_band_stand_out_no_more_than_its_middle() -> None:
+    """White noise, 200 lines a time: a weak last line must not make its neighbours look strong."""
+    rng = np.random.default_rng(11)
+    highest = [above_neighbours(rng.exponential(size=200), NEAR) for _ in range(1000)]
+    assert max(float(one.max()) for one in highest) < TONE_CONTRAST / 2
