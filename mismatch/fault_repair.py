@@ -66,5 +66,7 @@ def _tone_cause(tone: Tone, lines: WindowedLines) -> AcceptedCause:
 def _clipping_cause(clipping: Clipping, lines: WindowedLines) -> AcceptedCause:
     name = lines.trial.channels[clipping.response - lines.measured.shape[1]]
     found = clipping.saturation
-    parameters = {"limit": found.limit} | ({} if np.isinf(found.sharpness) else {"sharpness": found.sharpness})
-    return AcceptedCause("clipping", {"channel": name}, parameters, {"limit": found.error}, clipping.gain)
+    parameters, errors = {"limit": found.limit}, {"limit": found.error}
+    if np.isfinite(found.sharpness):
+        parameters["sharpness"], errors["sharpness"] = found.sharpness, found.sharpness_error
+    return AcceptedCause("clipping", {"channel": name}, parameters, errors, clipping.gain)

@@ -1,6 +1,6 @@
 """The characteristic of a channel that saturates: sharply, or rounding off before its limit."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +26,14 @@ class Saturation:
     ----------
     limit, error
         l in the channel's unit, and its standard error.
-    sharpness
-        n.
+    sharpness, sharpness_error
+        n, and its standard error.
     """
 
     limit: float
     error: float
     sharpness: float = np.inf
+    sharpness_error: float = 0.0
 
 
 def saturated(signal: Real, limit: float, sharpness: float = np.inf) -> Real:
@@ -86,4 +87,17 @@ def rounded(measured: Real, shown: Real, sharp: Saturation) -> Saturation:
     gain = len(seen) * float(np.log(left(np.array([1.0, 0.0])) / max(float(best.fun), 1e-300)))
     if inverse <= 1 / SHARPEST or gain < LEAST_GAIN:
         return sharp
-    return Saturation(sharp.limit * float(best.x[0]), sharp.error, 1 / inverse)
+    found = Saturation(sharp.limit * float(best.x[0]), sharp.error, 1 / inverse)
+    return _with_errors(found, due, float(best.fun) / len(seen))
+
+
+def _with_errors(found: Saturation, due: Real, variance: float) -> Saturation:
+    """Standard errors to first order, for noise of that variance on what is shown of ``due``."""
+    steps = 1e-4 * np.array([found.limit, found.sharpness])
+    slopes = []
+    for k in range(2):
+        above, below = (np.array([found.limit, found.sharpness]) + sign * steps * np.eye(2)[k] for sign in (1, -1))
+        slopes.append((saturated(due, *above) - saturated(due, *below)) / (2 * steps[k]))
+    slope = np.array(slopes)
+    spread = np.sqrt(variance * np.diag(np.linalg.pinv(slope @ slope.T)))
+    return replace(found, error=float(spread[0]), sharpness_error=float(spread[1]))
