@@ -77,9 +77,10 @@ def _linear_options(
     options = []
     cost = float(np.log(2 * sum(one.measured.size for one in lines)))
     largest = max([one.gain for one in chains] + [mode.gain, 0.0])
-    for one in chains[:MOST_CHAINS]:
+    for place, one in enumerate(chains[:MOST_CHAINS]):
         if one.gain > max(least, one.cause.size * cost, 0.03 * largest):
-            fitted = with_chain(lines, current, one.cause)
+            again = with_chain if place == 0 else _fit_with
+            fitted = again(lines, current, one.cause)
             options.append(Option(answer_name(one.cause.physics), _place(one.cause), fitted))
     numbers = current.explanation.shape.per_mode - 2
     if not current.explanation.causes and mode.gain > max(least, numbers * cost, 0.03 * largest):
@@ -89,6 +90,10 @@ def _linear_options(
         if _is_resolved(fitted, lines):
             options.append(Option("missing_mode", {}, fitted))
     return options
+
+
+def _fit_with(lines: list[WindowedLines], current: Fit, cause: Cause) -> Fit:
+    return fit(lines, _added(current.explanation, cause), current.noises)
 
 
 def _is_resolved(fitted: Fit, lines: list[WindowedLines]) -> bool:
