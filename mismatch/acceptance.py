@@ -14,8 +14,10 @@ LEAST_EVIDENCE = 20.0
 """Gain in score below which nothing is accepted: odds of some twenty thousand to one."""
 
 NOISE_LIKE = 0.08
-"""Share of a residual that may seem to move with the signal by chance, hum or force noise: of 112 recorded controls of the
-blind trial (seeds 401 and 402, and 203) two were above 0.053, at 0.061 and 0.071."""
+"""Share of a residual that may seem to move with the signal by chance, hum or force noise.
+
+Of some 190 controls of the blind trial (seeds 203, 401 and 402) two left more than 0.053: 0.061 and 0.071.
+"""
 
 EXPLAINED = 0.95
 """Share of what moved with the signal that causes must have taken away, if what is left is not noise-like."""
