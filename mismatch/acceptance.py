@@ -16,7 +16,7 @@ LEAST_EVIDENCE = 20.0
 NOISE_LIKE = 0.08
 """Share of a residual that may seem to move with the signal by chance, hum or force noise.
 
-Of some 190 controls of the blind trial (seeds 203, 401 and 402) two left more than 0.053: 0.061 and 0.071.
+Of 203 controls of the blind trial (seeds 203, 401 and 402) two left more than 0.053: 0.061 and 0.071.
 """
 
 EXPLAINED = 0.95

@@ -71,11 +71,14 @@ def find_clipping(fitted: Fit, lines: list[WindowedLines]) -> Clipping | None:
     lines
         Recordings, responses as measured.
     """
-    predicted = [shown_signal(fitted, one) for one in lines]
+    return _found([shown_signal(fitted, one) for one in lines], lines)
+
+
+def _found(predicted: list[Real], lines: list[WindowedLines]) -> Clipping | None:
+    """The clearest limit of any response, its prediction in time known."""
     best: Clipping | None = None
     for p in range(lines[0].measured.shape[1]):
-        measured = np.concatenate([one.trial.response[one.start :, p] for one in lines])
-        shown = np.concatenate([signal[one.start :, p] for one, signal in zip(lines, predicted, strict=True)])
+        measured, shown = _channel(predicted, lines, p)
         plain = float(np.sum((measured - shown) ** 2))
         for limit in float(np.abs(measured).max()) * LIMITS:
             pile = _held(measured, shown, limit)
@@ -124,21 +127,23 @@ def mended(fitted: Fit, lines: list[WindowedLines], clipping: Clipping) -> tuple
     fitted, lines, clipping
         Settled.
     """
-    start, tried, reached = fitted, list[Real](), list[Real]()
-    error = np.inf
+    start, shown = fitted, [shown_signal(fitted, one) for one in lines]
+    tried, reached, error = list[Real](), list[Real](), np.inf
     for _ in range(ROUNDS):
-        repaired = _repaired(start, lines, clipping)
         tried.append(start.explanation.u)
-        fitted = fit(repaired, start.explanation, start.noises, iterations=4)
+        fitted = fit(_repaired(shown, lines, clipping), start.explanation, start.noises, iterations=4)
         reached.append(fitted.explanation.u)
-        clipping = _again(fitted, lines, clipping)
-        before, error = error, _error(fitted, lines, clipping)
+        start, shown = fitted, [shown_signal(fitted, one) for one in lines]
+        clipping = _again(shown, lines, clipping)
+        before, error = error, _error(shown, lines, clipping)
         if abs(before - error) < SETTLED * error:
             break
         ahead = replace(fitted, explanation=replace(fitted.explanation, u=_extrapolated(tried, reached)))
-        start = ahead if _error(ahead, lines, clipping) < error else fitted
-    repaired = _repaired(fitted, lines, clipping)
-    return fit(repaired, fitted.explanation, fitted.noises, iterations=4), repaired, clipping
+        farther = [shown_signal(ahead, one) for one in lines]
+        if _error(farther, lines, clipping) < error:
+            start, shown = ahead, farther
+    repaired = _repaired(shown, lines, clipping)
+    return fit(repaired, start.explanation, start.noises, iterations=4), repaired, clipping
 
 
 def _extrapolated(tried: list[Real], reached: list[Real]) -> Real:
@@ -151,33 +156,32 @@ def _extrapolated(tried: list[Real], reached: list[Real]) -> Real:
     return np.asarray(ends[-1] + weights @ (ends[:-1] - ends[-1]))
 
 
-def _error(fitted: Fit, lines: list[WindowedLines], clipping: Clipping) -> float:
+def _error(predicted: list[Real], lines: list[WindowedLines], clipping: Clipping) -> float:
     """Power of what the clipped prediction leaves of the response as measured."""
-    measured, shown = _channel(fitted, lines, clipping.response)
+    measured, shown = _channel(predicted, lines, clipping.response)
     return float(np.sum((measured - clipping.of(shown)) ** 2))
 
 
-def _repaired(fitted: Fit, lines: list[WindowedLines], clipping: Clipping) -> list[WindowedLines]:
+def _repaired(predicted: list[Real], lines: list[WindowedLines], clipping: Clipping) -> list[WindowedLines]:
     """Recordings with what the limit cut off taken from the prediction."""
     p = clipping.response
     whole = []
-    for one in lines:
-        shown = shown_signal(fitted, one)[:, p]
+    for one, signal in zip(lines, predicted, strict=True):
         response = one.trial.response.copy()
-        response[:, p] += shown - clipping.of(shown)
+        response[:, p] += signal[:, p] - clipping.of(signal[:, p])
         whole.append(replace(one, trial=replace(one.trial, response=response), measured=one.cut(response)))
     return whole
 
 
-def _again(fitted: Fit, lines: list[WindowedLines], clipping: Clipping) -> Clipping:
+def _again(predicted: list[Real], lines: list[WindowedLines], clipping: Clipping) -> Clipping:
     """The same channel's limit as the better prediction shows it."""
-    again = find_clipping(fitted, lines)
+    again = _found(predicted, lines)
     found = again if again is not None and again.response == clipping.response else clipping
     sharp = replace(found.saturation, sharpness=np.inf)
-    return replace(found, saturation=rounded(*_channel(fitted, lines, found.response), sharp))
+    return replace(found, saturation=rounded(*_channel(predicted, lines, found.response), sharp))
 
 
-def _channel(fitted: Fit, lines: list[WindowedLines], p: int) -> tuple[Real, Real]:
+def _channel(predicted: list[Real], lines: list[WindowedLines], p: int) -> tuple[Real, Real]:
     """One response as measured and as predicted, all recordings, run-in left out."""
     measured = np.concatenate([one.trial.response[one.start :, p] for one in lines])
-    return measured, np.concatenate([shown_signal(fitted, one)[one.start :, p] for one in lines])
+    return measured, np.concatenate([signal[one.start :, p] for one, signal in zip(lines, predicted, strict=True)])

@@ -87,7 +87,7 @@ def diagnose(
     lines, base = _with_true_forces(lines, base)
     tell("tones and clipping")
     whole = lines
-    lines, base, faults = repair_plain_faults(lines, base, decay)
+    lines, base, faults = repair_plain_faults(lines, base)
     search = _search(lines, base, faults, causes, tell)
     tell("held-out recording")
     search, improvement = _that_hold_elsewhere(search, lines)

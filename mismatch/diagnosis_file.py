@@ -3,20 +3,39 @@
 import json
 import os
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Protocol
 
 from foundation import writing_whole_file
 from modal_fit import ModalModel
 
-from .diagnosis import Diagnosis
+from .diagnosis import AcceptedCause, Candidate, Diagnosis, Improvement
 from .physics_terms import improved_model
 
 FORMAT = "millfrf.diagnosis"
 FORMAT_VERSION = 1
 
 
-def diagnosis_content(diagnosis: Diagnosis) -> dict[str, Any]:
-    """What the file holds; every number is a plain one."""
+class Told(Protocol):
+    """What every diagnosis tells, whatever was compared; fields as of :class:`Diagnosis`."""
+
+    @property
+    def verdict(self) -> str: ...
+    @property
+    def physics(self) -> tuple[AcceptedCause, ...]: ...
+    @property
+    def candidates(self) -> tuple[Candidate, ...]: ...
+    @property
+    def equivalents(self) -> tuple[str, ...]: ...
+    @property
+    def located(self) -> dict[str, Any]: ...
+    @property
+    def leftover(self) -> float: ...
+    @property
+    def improvement(self) -> Improvement: ...
+
+
+def diagnosis_content(diagnosis: Told) -> dict[str, Any]:
+    """What the file of any diagnosis holds; every number is a plain one."""
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
@@ -38,8 +57,20 @@ def write_diagnosis(path: str | os.PathLike[str], diagnosis: Diagnosis) -> None:
     InputError
         The folder cannot be written to.
     """
+    write_content(path, diagnosis_content(diagnosis))
+
+
+def write_content(path: str | os.PathLike[str], content: dict[str, Any]) -> None:
+    """Write what a diagnosis' file holds whole.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+    """
+    text = json.dumps(content, indent=1, allow_nan=False)
     with writing_whole_file(path) as temporary:
-        temporary.write_text(json.dumps(diagnosis_content(diagnosis), indent=1, allow_nan=False), encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8")
 
 
 def improved_model_of(diagnosis: Diagnosis) -> ModalModel:

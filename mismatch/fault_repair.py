@@ -13,9 +13,7 @@ from .windowed_lines import WindowedLines
 MOST_TONES = 4
 
 
-def repair_plain_faults(
-    lines: list[WindowedLines], base: Fit, decay: float
-) -> tuple[list[WindowedLines], Fit, list[AcceptedCause]]:
+def repair_plain_faults(lines: list[WindowedLines], base: Fit) -> tuple[list[WindowedLines], Fit, list[AcceptedCause]]:
     """Take out tones and mend clipping, refitting each time."""
     found: list[AcceptedCause] = []
     for _ in range(MOST_TONES):

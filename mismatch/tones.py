@@ -28,7 +28,6 @@ NEAR = np.ones(41, dtype=bool)
 BESIDE = np.array([abs(k) > 3 for k in range(-10, 11)])
 """Lines beside a line, without those that a tone reaches: a narrow resonance is as high there."""
 
-
 MOST_LINES = 8
 """That may stand out, tones and their harmonics; more are a comb."""
 
@@ -64,17 +63,8 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
     if len(lines) == 0:
         return None
     powers = [_whitened_power(fitted, one, noise) for one, noise in zip(lines, fitted.noises, strict=True)]
-    contrasts = [np.minimum(above_neighbours(power, NEAR), above_neighbours(power, BESIDE)) for power in powers]
+    together = seen_together([sharp_contrast(power) for power in powers], lines, FORCED)
     axis = lines[0].frequencies
-    together = np.array(
-        [
-            np.max([np.interp(axis + shift * _step(one), one.frequencies, c) for shift in (-1, 0, 1)], axis=0)
-            for one, c in zip(lines, contrasts, strict=True)
-        ]
-    )
-    again = np.sort(together, axis=0)[-min(2, len(lines))]
-    pushed = [np.interp(axis, one.frequencies, force_contrast(one)) > FORCED for one in lines]
-    together = np.where((again > SEEN_AGAIN) & ~np.any(pushed, axis=0), together.sum(axis=0), 0.0)
     if is_comb(together):
         return None
     for k in np.argsort(-together)[:20]:
@@ -91,6 +81,31 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
         exact = sharp_frequency(_rests(fitted, lines), [one.trial.rate for one in lines], frequency)
         return Tone(exact, _amplitudes(fitted, lines, exact), 2 * float(np.sum(shown)))
     return None
+
+
+def seen_together(contrasts: list[Real], lines: list[WindowedLines], forced: float) -> Real:
+    """Contrast of each line of the first recording (n_lines,), summed over recordings; 0 where it is no tone's.
+
+    A line of another recording counts with those beside it. Two recordings must show it (the only one, where there is
+    one), and no force with a contrast above ``forced``.
+
+    Parameters
+    ----------
+    contrasts : each (n_lines,)
+        Of the recordings.
+    lines
+        They themselves.
+    forced
+        Contrast of a force.
+    """
+    axis = lines[0].frequencies
+    each = [
+        np.max([np.interp(axis + shift * _step(one), one.frequencies, c) for shift in (-1, 0, 1)], axis=0)
+        for one, c in zip(lines, contrasts, strict=True)
+    ]
+    again = np.sort(each, axis=0)[-min(2, len(lines))]
+    pushed = [np.interp(axis, one.frequencies, force_contrast(one)) > forced for one in lines]
+    return np.where((again > SEEN_AGAIN) & ~np.any(pushed, axis=0), np.sum(each, axis=0), 0.0)
 
 
 def is_comb(contrast: Real) -> bool:
@@ -112,7 +127,7 @@ def stands_out(fitted: Fit, lines: list[WindowedLines], frequency: float) -> boo
     total = 0.0
     for one, noise in zip(lines, fitted.noises, strict=True):
         power = _whitened_power(fitted, one, noise)
-        contrast = np.minimum(above_neighbours(power, NEAR), above_neighbours(power, BESIDE))
+        contrast = sharp_contrast(power)
         total += float(contrast[np.abs(one.frequencies - frequency) < 1.5 * _step(one)].max(initial=0.0))
     return total > TONE_CONTRAST
 
@@ -183,6 +198,11 @@ def _whitened_power(fitted: Fit, lines: WindowedLines, noise: NoiseModel) -> Rea
     rest = lines.measured - predict_lines(fitted.explanation, lines).response
     own = noise.covariance(lines.frequencies, through_structure(fitted.explanation, lines))
     return np.asarray(np.sum(np.abs(np.einsum("kij,kj->ki", whitening(own), rest)) ** 2, axis=1) / rest.shape[1])
+
+
+def sharp_contrast(power: Real) -> Real:
+    """Each line of a power (n_lines,) over its neighbourhood and over the lines just beside it, the smaller of both."""
+    return np.minimum(above_neighbours(power, NEAR), above_neighbours(power, BESIDE))
 
 
 def above_neighbours(power: Real, footprint: NDArray[np.bool_]) -> Real:

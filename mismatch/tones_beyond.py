@@ -4,18 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .explanation import Explanation, predict_lines
-from .tones import (
-    BESIDE,
-    NEAR,
-    REACH,
-    SEEN_AGAIN,
-    TONE_CONTRAST,
-    Tone,
-    above_neighbours,
-    force_contrast,
-    is_comb,
-    sharp_frequency,
-)
+from .tones import NEAR, REACH, TONE_CONTRAST, Tone, is_comb, seen_together, sharp_contrast, sharp_frequency
 from .windowed_lines import WindowedLines, windowed_lines
 
 Complex = NDArray[np.complex128]
@@ -53,17 +42,10 @@ def tones_beyond(explanation: Explanation, lines: list[WindowedLines], decay: fl
     above = [_above(one, decay) for one in lines]
     if not above or min(len(one.frequencies) for one in above) < 4 * len(NEAR):
         return []
-    axis = above[0].frequencies
     rests = [one.measured - predict_lines(explanation, one).response for one in above]
-    contrasts = [_contrast(rest) for rest in rests]
-    nearest = [np.searchsorted(one.frequencies, axis).clip(1, len(one.frequencies) - 2) for one in above]
-    shown = np.array(
-        [np.max([c[at + shift] for shift in (-1, 0, 1)], axis=0) for c, at in zip(contrasts, nearest, strict=True)]
-    )
-    again = np.sort(shown, axis=0)[-min(2, len(shown))]
-    pushed = [np.interp(axis, one.frequencies, force_contrast(one)) > QUIET_FORCE for one in above]
-    together = np.where((again > SEEN_AGAIN) & ~np.any(pushed, axis=0), shown.sum(axis=0), 0.0)
-    found: list[Tone] = []
+    contrasts = [np.mean([sharp_contrast(column) for column in (np.abs(rest) ** 2).T], axis=0) for rest in rests]
+    together = seen_together(contrasts, above, QUIET_FORCE)
+    axis, found = above[0].frequencies, list[Tone]()
     if is_comb(together):
         return found
     while len(found) < most and together.max() > TONE_CONTRAST:
@@ -78,12 +60,6 @@ def _above(lines: WindowedLines, decay: float) -> WindowedLines:
     return windowed_lines(
         lines.trial, (float(lines.frequencies[-1]) + REACH / lines.trial.duration, HIGHEST * rate), decay
     )
-
-
-def _contrast(rest: Complex) -> Real:
-    power = np.abs(rest) ** 2
-    each = [np.minimum(above_neighbours(column, NEAR), above_neighbours(column, BESIDE)) for column in power.T]
-    return np.asarray(np.mean(each, axis=0))
 
 
 def _tone(above: list[WindowedLines], rests: list[Complex], near: float, contrast: float) -> Tone:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from cutting import MillingProcess
-from foundation import InputError
 from mismatch import Diagnosis, Settings, diagnose, read_trials
 from mismatch.diagnosis_file import improved_model_of, write_diagnosis
 from mismatch.spindle_orders import SpindleSpeed, spindle_speed
@@ -15,6 +14,7 @@ from modal_fit import read_modal_model, write_modal_model
 
 from ..progress import Watch, silent
 from ..report.diagnosis_page import with_location, write_diagnosis_report
+from ..result_folder import refuse_file
 from .fit import SUBSPACE, FitOptions, fit_recordings
 
 
@@ -45,8 +45,7 @@ def diagnose_files(
         Files that cannot be used together, or a folder that cannot be made.
     """
     folder = Path(out)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder} is a file; name a folder with --out")
+    refuse_file(folder)
     whole = read_modal_model(model_path)
     model = measured_part(whole, recordings, stream=stream)
     trials = read_trials(recordings, model, stream=stream)

@@ -20,6 +20,7 @@ from modal_fit import read_modal_model
 
 from ..progress import bar
 from ..report.cut_diagnosis_page import write_cut_report
+from ..result_folder import refuse_file
 from ..tables import with_error
 
 UNITS = {"radial_offset_m": ("µm", 1e6), "angle_rad": ("deg", 180 / math.pi), "coefficient_n_per_m": ("kN/m", 1e-3)}
@@ -46,8 +47,7 @@ def diagnose_cut_files(cutting: Path, paths: Sequence[Path], out: Path, asking: 
     InputError
         Files that cannot be used together, or a folder that cannot be made.
     """
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out} is a file; name a folder with --out")
+    refuse_file(out)
     names = [path.stem for path in paths]
     if len(set(names)) < len(names):
         raise InputError(f"recordings need different names to tell their results apart, not {', '.join(names)}")

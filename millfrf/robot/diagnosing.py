@@ -23,6 +23,7 @@ from robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read
 from ..commands.options import check_band
 from ..progress import bar
 from ..report.robot_diagnosis_page import write_robot_report
+from ..result_folder import refuse_file
 from .postures import Asked, posture_of, spatial
 
 Real = NDArray[np.float64]
@@ -53,8 +54,7 @@ def diagnose_robot_files(robot: str, paths: Sequence[Path], out: Path, asking: A
     InputError
         Files that cannot be used together, or a folder that cannot be made.
     """
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out} is a file; name a folder with --out")
+    refuse_file(out)
     case = spatial(read_robot(robot))
     recordings = _recordings(case, paths, asking)
     with bar("diagnosing"):

@@ -1,16 +1,13 @@
 """Files of a cutting diagnosis: JSON, format ``millfrf.diagnosis`` version 1, and the improved cutting file."""
 
-import json
 import os
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from cutting import write_cutting_process
-from foundation import writing_whole_file
 
-from ..diagnosis_file import FORMAT, FORMAT_VERSION
+from ..diagnosis_file import diagnosis_content, write_content
 from .cut_results import CutDiagnosis
 
 
@@ -18,16 +15,7 @@ def cut_diagnosis_content(diagnosis: CutDiagnosis) -> dict[str, Any]:
     """What the file holds: the fields of every diagnosis, and under ``cut`` what was compared."""
     setting = diagnosis.setting
     laws = diagnosis.final.attempt.laws
-    return {
-        "format": FORMAT,
-        "format_version": FORMAT_VERSION,
-        "verdict": diagnosis.verdict,
-        "physics": [asdict(cause) for cause in diagnosis.physics],
-        "candidates": [asdict(candidate) for candidate in diagnosis.candidates],
-        "equivalents": list(diagnosis.equivalents),
-        "located": diagnosis.located,
-        "leftover_share": diagnosis.leftover,
-        "improvement": asdict(diagnosis.improvement),
+    return diagnosis_content(diagnosis) | {
         "cut": {
             "compared": "cutting force",
             "depth_m": setting.depth,
@@ -56,9 +44,7 @@ def write_cut_diagnosis(path: str | os.PathLike[str], diagnosis: CutDiagnosis) -
     InputError
         The folder cannot be written to.
     """
-    text = json.dumps(cut_diagnosis_content(diagnosis), indent=1, allow_nan=False)
-    with writing_whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_content(path, cut_diagnosis_content(diagnosis))
 
 
 def write_improved_cut(path: str | os.PathLike[str], diagnosis: CutDiagnosis) -> None:

@@ -1,14 +1,12 @@
 """Robot diagnosis files: JSON, format ``millfrf.robot_diagnosis`` version 1."""
 
-import json
 import os
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from foundation import writing_whole_file
-
+from ..diagnosis_file import write_content
 from .robot_results import RobotCause, RobotDiagnosis
 
 FORMAT = "millfrf.robot_diagnosis"
@@ -56,6 +54,4 @@ def write_robot_diagnosis(path: str | os.PathLike[str], diagnosis: RobotDiagnosi
     InputError
         The folder cannot be written to.
     """
-    text = json.dumps(robot_diagnosis_content(diagnosis), indent=1, allow_nan=False)
-    with writing_whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_content(path, robot_diagnosis_content(diagnosis))

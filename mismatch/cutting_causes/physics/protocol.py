@@ -1,5 +1,6 @@
 """What a hypothesis about left-out cutting physics has to say: `CutPhysics`, and the `ToothView` that it is given."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,7 +57,7 @@ class ToothView:
         return np.stack([self.sine * self.sine_edge, self.cosine * self.sine_edge, along], axis=-1)
 
 
-class CutPhysics:
+class CutPhysics(ABC):
     """A cause: a subclass says what it adds to the chip or to the force; what it leaves as it is adds nothing.
 
     Attributes
@@ -76,9 +77,9 @@ class CutPhysics:
         """Why it cannot be weighed for this cutter; empty where it can."""
         return ""
 
+    @abstractmethod
     def parameters(self, process: MillingProcess) -> tuple[Parameter, ...]:
         """Its numbers, as they are fitted."""
-        raise NotImplementedError
 
     def stated(self, process: MillingProcess) -> Real:
         """The numbers that the cutting file states: what is computed before anything is blamed."""

@@ -49,7 +49,16 @@ def simulated(mill: Mill, seconds: float, noise: float, seed: int) -> tuple[Real
 
 
 @njit(cache=True)
-def _march(n, step, per_tooth, offsets, natural, inverse_mass, ratio, cut):  # type: ignore[no-untyped-def]
+def _march(
+    n: int,
+    step: float,
+    per_tooth: int,
+    offsets: Real,
+    natural: Real,
+    inverse_mass: Real,
+    ratio: float,
+    cut: tuple[float, ...],
+) -> tuple[Real, Real]:
     start, leave, feed, depth, ktc, krc, kac, feedback, rub = cut
     teeth = len(offsets)
     x, v, a = np.zeros(3), np.zeros(3), np.zeros(3)
