@@ -44,7 +44,7 @@ def assess(lines: WindowedLines, explanation: Explanation, noise: NoiseModel) ->
     try:
         predicted = predict_lines(explanation, lines)
         rest = lines.measured - predicted.response
-        return misfit_of(lines, explanation, predicted, rest, noise)
+        return misfit_of(lines, predicted, rest, through_structure(explanation, lines), noise)
     except np.linalg.LinAlgError:
         nothing = np.zeros((0, 0), dtype=complex)
         return Assessed(Predicted(nothing, nothing, nothing, ()), nothing, nothing, np.inf, noise)
@@ -58,7 +58,7 @@ def with_noise(
     rest = lines.measured - predicted.response
     through = through_structure(explanation, lines)
     found = fit_noise(lines.frequencies, rest, through, levels(lines), noise)
-    return misfit_of(lines, explanation, predicted, rest, found)
+    return misfit_of(lines, predicted, rest, through, found)
 
 
 def least_misfit(explanation: Explanation, lines: WindowedLines) -> float:
@@ -91,12 +91,12 @@ def whitened(white: Complex, lines: Complex) -> Real:
 
 
 def misfit_of(
-    lines: WindowedLines, explanation: Explanation, predicted: Predicted, rest: Complex, noise: NoiseModel
+    lines: WindowedLines, predicted: Predicted, rest: Complex, through: Complex, noise: NoiseModel
 ) -> Assessed:
     """Misfit of a residual under a given noise; infinite where it is not finite."""
     if not np.isfinite(rest).all():
         return Assessed(predicted, rest, rest, np.inf, noise)
-    covariance = noise.covariance(lines.frequencies, through_structure(explanation, lines))
+    covariance = noise.covariance(lines.frequencies, through)
     white, log_determinant = whitening_and_determinant(covariance)
     small = whitened(white, rest[:, :, None])
     misfit = 2 * float(log_determinant + np.vdot(small, small))

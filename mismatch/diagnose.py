@@ -9,15 +9,15 @@ from numpy.typing import NDArray
 from modal_fit import ModalModel
 
 from .acceptance import LEAST_EVIDENCE, Option, holds_elsewhere, unexplained, worth_it
-from .diagnosis import AcceptedCause, Candidate, Diagnosis, Improvement
+from .diagnosis import AcceptedCause, Candidate, Diagnosis
 from .explanation import Explanation
 from .fault_repair import repair_plain_faults, with_tones_settled
 from .fitting import Fit, fit
-from .held_out import held_out_improvement
+from .held_out import HeldOut, held_out_improvement
 from .leftover import Leftover, leftover
 from .linear_part import with_linear_part
 from .options import fitted_options
-from .physics import Physics, library
+from .physics import ChainPhysics, Physics, library
 from .pruning import pruned
 from .reporting_numbers import accepted_cause, accepted_mode, modal_deviation
 from .settling import settled
@@ -30,6 +30,9 @@ Real = NDArray[np.float64]
 Progress = Callable[[str], None]
 
 MOST_CAUSES = 3
+
+AGAIN = 0.7
+"""Of what moved with the signal when joint laws were tried in vain: they are tried again when no more is left."""
 
 MOSTLY = 0.5
 """Share of a force's power that must be left when its noise is taken out."""
@@ -90,7 +93,7 @@ def diagnose(
     lines, base, faults = repair_plain_faults(lines, base)
     search = _search(lines, base, faults, causes, tell)
     tell("held-out recording")
-    search, improvement = _that_hold_elsewhere(search, lines)
+    search, held_out = _that_hold_elsewhere(search, lines)
     current, accepted, candidates = search.steps[-1], search.accepted, search.candidates
     accepted = with_tones_settled(current, whole, accepted, decay)
     tell("what is left")
@@ -102,11 +105,20 @@ def diagnose(
     if abstains:
         candidates += [Candidate(one.name, one.evidence, "rejected", one.location) for one in accepted]
         accepted, current, left = [], base, search.before
-        improvement = held_out_improvement(lines, base.explanation, base.noises)
+        held_out = held_out_improvement(lines, base.explanation, base.noises)
     verdict = "unexplained" if abstains else "explained" if accepted else "none"
     ranked = tuple(sorted(candidates, key=lambda one: -one.evidence))
     return Diagnosis(
-        verdict, tuple(accepted), ranked, search.equivalents, improvement, left.share, base, current, tuple(lines)
+        verdict,
+        tuple(accepted),
+        ranked,
+        search.equivalents,
+        held_out.improvement,
+        left.share,
+        base,
+        current,
+        tuple(lines),
+        (held_out.linear, held_out.improved),
     )
 
 
@@ -150,35 +162,44 @@ def _search(
     current, accepted, steps = base, list(faults), [base]
     candidates: list[Candidate] = []
     equivalents: tuple[str, ...] = ()
-    before = leftover(base.explanation, lines)
+    moving = before = leftover(base.explanation, lines)
+    in_vain = np.inf
     while len(steps) <= MOST_CAUSES:
         tell(f"causes, round {len(steps)}")
-        options, weighed = fitted_options(lines, current, base, causes, before)
-        candidates += weighed
-        best = min(options, key=lambda option: option.fitted.score, default=None)
+        worth_trying = causes if moving.power < AGAIN * in_vain else _linear(causes)
+        one = fitted_options(lines, current, base, worth_trying, (moving, before))
+        candidates += one.weighed
+        best = min(one.options, key=lambda option: option.fitted.score, default=None)
         if best is None or best.fitted.score > current.score - LEAST_EVIDENCE:
             break
         best = replace(best, fitted=settled(lines, best.fitted))
         if not worth_it(best, current, base):
             break
         line = best.fitted.score + LEAST_EVIDENCE / 2
-        rivals = [option.name for option in options if option.name != best.name and option.fitted.score < line]
+        rivals = [option.name for option in one.options if option.name != best.name and option.fitted.score < line]
         equivalents = equivalents or tuple(dict.fromkeys(rivals))
         accepted.append(_describe(best, current))
         current = best.fitted
+        if one.sighted and all(cause.direction is None for cause in current.explanation.causes):
+            in_vain = moving.power
+        moving = leftover(current.explanation, lines)
         steps.append(current)
     tell("causes made needless")
     steps, accepted, rejected = pruned(lines, steps, accepted)
     return _Search(steps, accepted, candidates + rejected, equivalents, before)
 
 
-def _that_hold_elsewhere(search: _Search, lines: list[WindowedLines]) -> tuple[_Search, Improvement]:
+def _linear(causes: dict[str, Physics]) -> dict[str, Physics]:
+    return {name: one for name, one in causes.items() if isinstance(one, ChainPhysics)}
+
+
+def _that_hold_elsewhere(search: _Search, lines: list[WindowedLines]) -> tuple[_Search, HeldOut]:
     """Let go of causes, the last first, until those left are seen on a held-out recording too."""
     steps, accepted, candidates = list(search.steps), list(search.accepted), list(search.candidates)
     while True:
-        improvement = held_out_improvement(lines, steps[-1].explanation, steps[-1].noises)
-        if len(steps) == 1 or len(lines) == 1 or holds_elsewhere(improvement, steps[-1], steps[0]):
-            return replace(search, steps=steps, accepted=accepted, candidates=candidates), improvement
+        held_out = held_out_improvement(lines, steps[-1].explanation, steps[-1].noises)
+        if len(steps) == 1 or len(lines) == 1 or holds_elsewhere(held_out.improvement, steps[-1], steps[0]):
+            return replace(search, steps=steps, accepted=accepted, candidates=candidates), held_out
         steps.pop()
         last = accepted.pop()
         candidates.append(Candidate(last.name, last.evidence, "rejected", last.location))

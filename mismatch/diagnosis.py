@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .explanation import Explanation
 from .fitting import Fit
 from .windowed_lines import WindowedLines
 
@@ -99,6 +100,8 @@ class Diagnosis:
         Fits before and after.
     lines
         The recordings.
+    elsewhere
+        Modal parameters alone, and the final explanation, fitted without the recording held out.
     """
 
     verdict: str
@@ -110,4 +113,5 @@ class Diagnosis:
     base: Fit
     final: Fit
     lines: tuple[WindowedLines, ...]
+    elsewhere: tuple[Explanation, Explanation]
     located: dict[str, Any] = field(default_factory=dict)

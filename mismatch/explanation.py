@@ -21,6 +21,9 @@ Real = NDArray[np.float64]
 TURN_STEP = 0.02
 """Of a direction in a fit, rad."""
 
+LONGEST_STEP = 15.0
+"""Of a cause's coordinate in one step of a fit; a number on a linear scale may also change by half of itself."""
+
 
 @dataclass(frozen=True)
 class Cause:
@@ -59,6 +62,12 @@ class Cause:
         """What the fit starts from, (size,); angles are zero."""
         values = [p.to_fit(float(v)) for p, v in zip(self.physics.parameters, self.values, strict=True)]
         return np.array(values + [0.0] * (self.size - len(values)))
+
+    def longest_steps(self) -> Real:
+        """How far each coordinate may move in one step of a fit, (size,)."""
+        numbers = zip(self.coordinates(), self.physics.parameters, strict=False)
+        own = [max(LONGEST_STEP, 0.0 if p.logarithmic else 0.5 * abs(float(c))) for c, p in numbers]
+        return np.array(own + [LONGEST_STEP] * (self.size - len(own)))
 
     def moved(self, coordinates: Real) -> "Cause":
         """The cause at other coordinates; angles turn the direction from where it was."""

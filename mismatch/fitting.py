@@ -214,7 +214,8 @@ def _moved(explanation: Explanation, step: Real) -> Explanation:
     moved = replace(explanation, u=explanation.u + step[:size])
     if not explanation.causes:
         return moved
-    return moved.with_causes(explanation.coordinates() + np.clip(step[size:], -15, 15))
+    longest = np.concatenate([cause.longest_steps() for cause in explanation.causes])
+    return moved.with_causes(explanation.coordinates() + np.clip(step[size:], -longest, longest))
 
 
 def _cost(seen: list[Assessed], explanation: Explanation) -> float:

@@ -1,5 +1,8 @@
 """What an explanation is worth on a recording that it was not fitted to."""
 
+from dataclasses import dataclass
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft
@@ -11,6 +14,7 @@ from .explanation import Explanation, predict_lines
 from .fitting import fit
 from .noise_model import NoiseModel
 from .pruning import zero_of
+from .side_by_side import side_by_side
 from .windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
@@ -22,7 +26,24 @@ ITERATIONS = 30
 """At most: without the causes the modes may have far to go."""
 
 
-def held_out_improvement(lines: list[WindowedLines], final: Explanation, noises: tuple[NoiseModel, ...]) -> Improvement:
+@dataclass(frozen=True)
+class HeldOut:
+    """What an explanation is worth elsewhere.
+
+    Parameters
+    ----------
+    improvement
+        Errors on the recording held out.
+    linear, improved
+        Modal parameters alone, and the whole explanation, fitted to the other recordings.
+    """
+
+    improvement: Improvement
+    linear: Explanation
+    improved: Explanation
+
+
+def held_out_improvement(lines: list[WindowedLines], final: Explanation, noises: tuple[NoiseModel, ...]) -> HeldOut:
     """Fit on all recordings but one, compare errors on that one.
 
     The middle level is held out (of two, the weaker), so that the others bracket it. With a single recording nothing
@@ -40,8 +61,10 @@ def held_out_improvement(lines: list[WindowedLines], final: Explanation, noises:
     nominal = zero_of(final.shape)
     kept = (len(lines) - 1) // 2
     others = [one for k, one in enumerate(lines) if k != kept] or lines
-    linear = fit(others, nominal, iterations=ITERATIONS).explanation
-    improved = fit(others, final, iterations=ITERATIONS).explanation if final.causes or final.shape.added else linear
+    starts = [nominal, final] if final.causes or final.shape.added else [nominal]
+    tasks = [partial(fit, others, start, iterations=ITERATIONS) for start in starts]
+    fitted = [one.explanation for one in side_by_side(tasks)]
+    linear, improved = fitted[0], fitted[-1]
     here = lines[kept]
     blocks = [_block_errors(explanation, here) for explanation in (nominal, linear, improved)]
     power = float(np.sum(np.abs(here.measured) ** 2))
@@ -51,7 +74,7 @@ def held_out_improvement(lines: list[WindowedLines], final: Explanation, noises:
     if len(lines) > 1 and improved is not linear:
         p_value = float(wilcoxon(blocks[1] - blocks[2], alternative="greater").pvalue)
         evidence = least_misfit(linear, here) - least_misfit(improved, here)
-    return Improvement(
+    improvement = Improvement(
         here.trial.name,
         errors[0],
         errors[1],
@@ -61,6 +84,7 @@ def held_out_improvement(lines: list[WindowedLines], final: Explanation, noises:
         _interval(blocks[0], blocks[2]),
         evidence,
     )
+    return HeldOut(improvement, linear, improved)
 
 
 def _line_error(explanation: Explanation, lines: WindowedLines) -> float:

@@ -7,9 +7,7 @@ from numpy.typing import NDArray
 
 from .assessment import through_structure
 from .diagnosis import Diagnosis
-from .explanation import Explanation, predict_lines
-from .fitting import fit
-from .noise_model import NoiseModel
+from .explanation import predict_lines
 from .residual_maps import band_edges
 from .windowed_lines import WindowedLines
 
@@ -52,12 +50,8 @@ def held_out_spectra(diagnosis: Diagnosis) -> HeldOutSpectra:
     lines = list(diagnosis.lines)
     names = [one.trial.name for one in lines]
     kept = names.index(diagnosis.improvement.held_out)
-    others = [k for k in range(len(lines)) if k != kept] or [kept]
     here, final = lines[kept], diagnosis.final
-    before, after = (
-        _refitted([lines[k] for k in others], start.explanation, tuple(start.noises[k] for k in others))
-        for start in (diagnosis.base, diagnosis.final)
-    )
+    before, after = diagnosis.elsewhere
     shown = predict_lines(after, here).response
     covariance = final.noises[kept].covariance(here.frequencies, through_structure(final.explanation, here))
     edges = band_edges([here], BANDS_PER_OCTAVE, 3)
@@ -72,10 +66,6 @@ def held_out_spectra(diagnosis: Diagnosis) -> HeldOutSpectra:
     channels = here.trial.channels[-here.measured.shape[1] :]
     middle = np.sqrt(edges[1:] * edges[:-1])
     return HeldOutSpectra(here.trial.name, middle, channels, here.trial.powers, *densities)
-
-
-def _refitted(lines: list[WindowedLines], start: Explanation, noises: tuple[NoiseModel, ...]) -> Explanation:
-    return fit(lines, start, noises, iterations=2, tolerance=10.0).explanation
 
 
 def _density(power: Real, lines: WindowedLines, edges: Real) -> Real:

@@ -1,4 +1,4 @@
-"""Loops over lines with one small covariance matrix each: whitening, likelihood of noise. Compiled."""
+"""Loops over lines with small matrices: whitening, and modal models with their derivatives. Compiled."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,98 +86,6 @@ def whitened_columns(white: Complex, lines: Complex, out: Real) -> None:
                     value += white[k, i, j] * lines[k, j, c]
                 out[0, k, i, c] = value.real
                 out[1, k, i, c] = value.imag
-
-
-@compiled
-def noise_likelihood(
-    counts: Real, sample: Complex, through: Complex, own: Real, pushed: Real, by_own: Real, by_force: Real
-) -> float:
-    """``sum_b n_b (ln det V_b + tr V_b^-1 S_b)``, ``V = diag(own) + sum_q pushed_q T_q``, and its slopes.
-
-    Parameters
-    ----------
-    counts : (n_bands,)
-    sample : (n_bands, n, n)
-        Covariance of the residual in each band.
-    through : (n_bands, n_excitations, n, n)
-        What unit noise of each force leaves in the responses.
-    own : (n_bands, n)
-    pushed : (n_excitations,)
-    by_own : (n_bands, n)
-        Receives the slope by ln own.
-    by_force : (n_excitations,)
-        Receives the slope by ln pushed.
-    """
-    n = own.shape[1]
-    cost = 0.0
-    by_force[:] = 0.0
-    v = np.empty((n, n), dtype=np.complex128)
-    inverse = np.empty((n, n), dtype=np.complex128)
-    for b in range(len(counts)):
-        _covariance(through[b], own[b], pushed, v)
-        log_determinant = whiten_in_place(v)
-        if not np.isfinite(log_determinant):
-            return np.inf
-        _product_of_inverse(v, inverse)
-        misfit = _slope(inverse, sample[b], v)
-        cost += counts[b] * (log_determinant + misfit)
-        for i in range(n):
-            by_own[b, i] = counts[b] * v[i, i].real * own[b, i]
-        for q in range(len(pushed)):
-            by_force[q] += counts[b] * pushed[q] * _trace_of_product(v, through[b, q])
-    return cost
-
-
-@compiled
-def _covariance(through: Complex, own: Real, pushed: Real, out: Complex) -> None:
-    """``diag(own) + sum_q pushed_q T_q``, and a trace of itself that keeps it positive definite."""
-    out[:] = 0.0
-    for q in range(len(pushed)):
-        out += pushed[q] * through[q]
-    ridge = 1e-12 * np.trace(out).real
-    for i in range(len(out)):
-        out[i, i] += own[i] + ridge
-
-
-@compiled
-def _slope(inverse: Complex, sample: Complex, out: Complex) -> float:
-    """Write ``V^-1 - V^-1 S V^-1``; return ``tr V^-1 S``."""
-    n = len(inverse)
-    trace = 0.0
-    for i in range(n):
-        for j in range(n):
-            out[i, j] = inverse[i, j]
-        for k in range(n):
-            weighed = 0.0 + 0.0j
-            for j in range(n):
-                weighed += inverse[i, j] * sample[j, k]
-            if i == k:
-                trace += weighed.real
-            for j in range(n):
-                out[i, j] -= weighed * inverse[k, j]
-    return trace
-
-
-@compiled
-def _trace_of_product(one: Complex, other: Complex) -> float:
-    """Real part of ``tr A B``."""
-    total = 0.0
-    for i in range(len(one)):
-        for j in range(len(one)):
-            total += (one[i, j] * other[j, i]).real
-    return total
-
-
-@compiled
-def _product_of_inverse(white: Complex, inverse: Complex) -> None:
-    """``V^-1 = W^H W``."""
-    n = len(white)
-    for i in range(n):
-        for j in range(n):
-            value = 0.0 + 0.0j
-            for k in range(max(i, j), n):
-                value += white[k, i].conjugate() * white[k, j]
-            inverse[i, j] = value
 
 
 @compiled

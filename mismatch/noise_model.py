@@ -1,13 +1,13 @@
 """Noise of responses and forces, inferred from what a model leaves over: no share, colour or silent band is assumed."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
-from .line_loops import noise_likelihood, whiten_lines
+from .line_loops import whiten_lines
+from .noise_loops import line_covariances
+from .noise_scoring import lumped, most_likely
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -20,6 +20,9 @@ STIFFNESS = 1.0
 
 FORCE_SHARE = (-0.7, 1.0)
 """Mean and standard deviation of ln(force noise share / response noise share): forces are measured no worse."""
+
+WARM, COLD = 12, 60
+"""Steps at most from a noise that was fitted before, and from none."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +47,9 @@ class NoiseModel:
     def covariance(self, frequencies: Real, through: Complex) -> Complex:
         """V at lines, (n_lines, n_responses, n_responses); ``through`` is G, (n_lines, n_responses, n_excitations)."""
         own = np.exp(_hat(self.knots, frequencies) @ self.responses.T)
-        passed = through * np.exp(0.5 * self.forces)
-        result = passed @ passed.conj().swapaxes(1, 2)
-        diagonal = np.arange(own.shape[1])
-        result[:, diagonal, diagonal] += own + 1e-12 * np.trace(result, axis1=1, axis2=2).real[:, None]
-        return np.asarray(result)
+        result = np.empty((*own.shape, own.shape[1]), dtype=complex)
+        line_covariances(own, np.ascontiguousarray(through), np.exp(self.forces), result)
+        return result
 
     def response_level(self) -> Real:
         """Root mean square noise of each response over the band's knots, (n_responses,)."""
@@ -80,7 +81,8 @@ def fit_noise(
 ) -> NoiseModel:
     """Most likely noise of residual lines that are Gaussian, outlying lines weighted down.
 
-    Maximises ``-sum ln det V + r^H V^-1 r`` over narrow bands with analytic gradient (Whittle's likelihood).
+    Maximises ``-sum ln det V + r^H V^-1 r`` over narrow bands by scoring (Whittle's likelihood, its information as
+    curvature).
 
     Parameters
     ----------
@@ -99,28 +101,19 @@ def fit_noise(
         level = np.log(np.maximum(np.median(np.abs(residual) ** 2, axis=0) / np.log(2), 1e-30))
         share = np.mean(level - 2 * np.log(levels[0]))
         start = NoiseModel(knots, np.tile(level[:, None], KNOTS) - 1.0, share - 2.0 + 2 * np.log(levels[1]))
-    bands = _bands(len(frequencies))
+    hat = _hat(knots, frequencies)
     weights = np.ones(len(frequencies))
+    belief = _belief(n, m, levels)
     noise = start
     for _ in range(1 if warm else 2):
-        lumps = _lumped(frequencies, residual, through, weights, bands, knots)
+        lumps = lumped(residual, through, weights, hat)
         first = np.concatenate([noise.responses.ravel(), noise.forces])
-        answer = minimize(
-            _cost, first, (lumps, n, m, levels), jac=True, method="L-BFGS-B", options={"maxiter": 12 if warm else 150}
-        )
-        noise = NoiseModel(knots, answer.x[: n * KNOTS].reshape(n, KNOTS), answer.x[n * KNOTS :])
+        best = most_likely(first, lumps, belief, WARM if warm else COLD)
+        noise = NoiseModel(knots, best[: n * KNOTS].reshape(n, KNOTS), best[n * KNOTS :])
         white = whitening(noise.covariance(frequencies, through))
         size = np.sum(np.abs(np.einsum("kij,kj->ki", white, residual)) ** 2, axis=1)
         weights = np.minimum(1.0, (4.0 * n + 6.0) / np.maximum(size, 1e-12))
     return noise
-
-
-@dataclass(frozen=True)
-class _Lumps:
-    counts: Real
-    covariance: Complex
-    through: Complex
-    hats: Real
 
 
 def _hat(knots: Real, frequencies: Real) -> Real:
@@ -129,41 +122,15 @@ def _hat(knots: Real, frequencies: Real) -> Real:
     return np.asarray(np.maximum(0.0, 1.0 - np.abs(place[:, None] - np.arange(len(knots)))))
 
 
-def _bands(count: int) -> list[slice]:
-    """Some 150 narrow bands of lines."""
-    edges = np.unique(np.linspace(0, count, min(150, max(2, count // 12)) + 1).astype(int))
-    return [slice(int(a), int(b)) for a, b in pairwise(edges)]
-
-
-def _lumped(
-    frequencies: Real, residual: Complex, through: Complex, weights: Real, bands: list[slice], knots: Real
-) -> _Lumps:
-    counts, covariances, passed, hats = [], [], [], []
-    hat = _hat(knots, frequencies)
-    for band in bands:
-        r = residual[band]
-        counts.append(float(len(r)))
-        covariances.append((r * weights[band, None]).T @ r.conj() / len(r))
-        passed.append(np.einsum("kiq,kjq->qij", through[band], through[band].conj()) / len(r))
-        hats.append(hat[band].mean(axis=0))
-    return _Lumps(np.array(counts), np.array(covariances), np.array(passed), np.array(hats))
-
-
-def _cost(x: Real, lumps: _Lumps, n: int, m: int, levels: tuple[Real, Real]) -> tuple[float, Real]:
-    """Negative log likelihood with the weak priors, and its gradient."""
-    responses, forces = x[: n * KNOTS].reshape(n, KNOTS), x[n * KNOTS :]
-    own = np.exp(np.clip(lumps.hats @ responses.T, -80, 80))
-    pushed = np.exp(np.clip(forces, -80, 80))
-    by_own, gradient_force = np.empty_like(own), np.empty(m)
-    cost = noise_likelihood(lumps.counts, lumps.covariance, lumps.through, own, pushed, by_own, gradient_force)
-    gradient_own = by_own.T @ lumps.hats
-    steps = np.diff(responses, axis=1) / STIFFNESS
-    cost += 0.5 * np.sum(steps**2)
-    gradient_own[:, 1:] += steps / STIFFNESS
-    gradient_own[:, :-1] -= steps / STIFFNESS
-    share = np.mean(responses, axis=1).mean() - 2 * np.log(levels[0]).mean()
-    off = (0.5 * (forces - 2 * np.log(levels[1]) - share) - FORCE_SHARE[0]) / FORCE_SHARE[1]
-    cost += 0.5 * np.sum(off**2)
-    gradient_force += 0.5 * off / FORCE_SHARE[1]
-    gradient_own -= 0.5 * off.sum() / FORCE_SHARE[1] / responses.size
-    return float(cost), np.concatenate([gradient_own.ravel(), gradient_force])
+def _belief(n: int, m: int, levels: tuple[Real, Real]) -> tuple[Real, Real]:
+    """Weak prior ``0.5 |A x + b|^2`` of the knots' ln variances and the forces': A and b."""
+    size = n * KNOTS + m
+    smooth = np.zeros((n * (KNOTS - 1), size))
+    for row in range(len(smooth)):
+        first = row // (KNOTS - 1) * KNOTS + row % (KNOTS - 1)
+        smooth[row, first : first + 2] = -1 / STIFFNESS, 1 / STIFFNESS
+    share = np.zeros((m, size))
+    share[:, : n * KNOTS] = -0.5 / (n * KNOTS)
+    share[np.arange(m), n * KNOTS + np.arange(m)] = 0.5
+    off = np.log(levels[0]).mean() - np.log(levels[1]) - FORCE_SHARE[0]
+    return np.vstack([smooth, share / FORCE_SHARE[1]]), np.concatenate([np.zeros(len(smooth)), off / FORCE_SHARE[1]])

@@ -19,12 +19,19 @@ def accepted_cause(fitted: Fit, location: dict[str, object], evidence: float) ->
     first = fitted.explanation.size - cause.size
     spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[first:], 0.0))
     parameters, errors = {}, {}
-    for parameter, value, error in zip(cause.physics.parameters, cause.values, spread, strict=False):
+    # beyond a limit that the motion sets a number changes nothing, and its error says so
+    for parameter, value, error in zip(cause.physics.parameters, _held(cause), spread, strict=False):
         parameters[parameter.name] = float(value)
         errors[parameter.name] = float(error * parameter.unit_step * (abs(value) if parameter.logarithmic else 1.0))
     derived, their_errors = _derived(cause, fitted.covariance[first:, first:])
     parameters, errors = parameters | derived, errors | their_errors
     return AcceptedCause(answer_name(cause.physics), dict(location), parameters, errors, evidence)
+
+
+def _held(cause: Cause) -> Real:
+    """The numbers that a law goes by, where its physics keeps them within limits that the motion sets (``held``)."""
+    limits: Callable[[Real, object], Real] | None = getattr(cause.physics, "held", None)
+    return cause.values if limits is None or cause.motion is None else limits(cause.values, cause.motion)
 
 
 def _derived(cause: Cause, covariance: Real) -> tuple[dict[str, float], dict[str, float]]:

@@ -200,13 +200,13 @@ def _record(
 
 def _truth(spec: CaseSpec, scene: Scene, changes: list[Change], facts: dict[str, dict[str, Any]]) -> dict[str, Any]:
     effects = [name for name in (spec.effect, spec.second) if name and name != "none"]
-    foreign = [name for name in effects if name in FOREIGN]
+    foreign = [name for name in effects if name in FOREIGN and not ALL[name].answer]
     also = ["missing_mode"] if spec.condition == "small_modes" else []
     if spec.nominal_off > 1.5 and spec.effect != "modal_parameters":
         also.append("modal_parameters")
     return {
         "spec": spec.to_json(),
-        "effects": ["unexplained"] if foreign else effects,
+        "effects": ["unexplained"] if foreign else [ALL[name].answer or name for name in effects],
         "accepted_also": also,
         "joint_direction_at_tcp": scene.direction.tolist() if effects and ALL[spec.effect].directional else None,
         "parameters": [change.parameters for change in changes],

@@ -45,7 +45,7 @@ def targets(scores: Sequence[Score]) -> Rows:
         _rate("right, residual half the noise", half, _right, ">= 80 %"),
         _rate("right, what no linear refit takes >= noise", [s for s in listed if s.beyond >= 0.9], _right, "-"),
         _rate("foreign effects named wrongly", foreign, _wrong, "<= 10 %"),
-        _rate("foreign effects: unexplained", foreign, _right, "-"),
+        _rate("foreign effects: unexplained, or named where it has a name", foreign, _right, "-"),
         _rate("pairs: both named", _group(scores, "pair"), _right, "-"),
         _rate("pairs: one or both, nothing false", _group(scores, "pair"), _partly, "-"),
         _share("joint direction within 10 degrees", sum(a <= 10 for a in angles), len(angles), ">= 95 %"),

@@ -1,9 +1,10 @@
 """The page that an engineer reads after a diagnosis."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from foundation import writing_whole_file
 from mismatch import Diagnosis, Trial
 from mismatch.locate import located
 from mismatch.residual_view import ResidualView, residual_view
+from mismatch.side_by_side import side_by_side
 from mismatch.spindle_orders import SpindleSpeed
 
 from ..provenance import versions
@@ -28,6 +30,7 @@ from .diagnosis_sections import (
     location_section,
     number_section,
 )
+from .section import Section
 
 
 def with_location(
@@ -75,18 +78,24 @@ def write_diagnosis_report(
         Path(temporary).write_text(text, encoding="utf-8")
 
 
+def _drawn_sections(view: ResidualView, process: MillingProcess | None) -> list[Section]:
+    """Sections with figures, drawn side by side, the longest first."""
+    diagnosis = view.diagnosis
+    makers: list[Callable[[], Section]] = [
+        lambda: if_possible(lambda: held_out_section(diagnosis), "On data that was not fitted"),
+        partial(location_section, view),
+        lambda: if_possible(lambda: diagnosis_lobes_section(diagnosis, process), "What it does to the lobes"),
+        lambda: if_possible(lambda: law_section(diagnosis), "The measured force of the joint"),
+        partial(growth_section, diagnosis),
+    ]
+    held_out, location, lobes, law, growth = side_by_side(makers)
+    return [law, held_out, lobes, location, growth]
+
+
 def report_text(view: ResidualView, model_name: str = "", process: MillingProcess | None = None) -> str:
     """The page as text."""
     diagnosis = view.diagnosis
-    sections = (
-        number_section(diagnosis),
-        if_possible(lambda: law_section(diagnosis), "The measured force of the joint"),
-        if_possible(lambda: held_out_section(diagnosis), "On data that was not fitted"),
-        if_possible(lambda: diagnosis_lobes_section(diagnosis, process), "What it does to the lobes"),
-        location_section(view),
-        growth_section(diagnosis),
-        candidate_section(diagnosis),
-    )
+    sections = (number_section(diagnosis), *_drawn_sections(view, process), candidate_section(diagnosis))
     names = ", ".join(one.trial.name for one in diagnosis.lines)
     environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
     return environment.get_template("diagnosis.html.j2").render(

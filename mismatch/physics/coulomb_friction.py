@@ -30,9 +30,12 @@ class CoulombFriction:
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
         """The joint's force."""
-        v = motion.velocities
-        smooth = min(max(values[1], 4e-4 * motion.speed), DRY * motion.velocity)
-        return JointLaw(speed=motion.speed, damping=values[0] * np.tanh(v / smooth))
+        friction, smooth = self.held(values, motion)
+        return JointLaw(speed=motion.speed, damping=friction * np.tanh(motion.velocities / smooth))
+
+    def held(self, values: Real, motion: JointMotion) -> Real:
+        """The numbers that the law goes by: dry friction gives way within a small part of the motion."""
+        return np.array([values[0], np.clip(values[1], 4e-4 * motion.speed, DRY * motion.velocity)])
 
 
 PHYSICS = CoulombFriction()

@@ -36,8 +36,13 @@ class Hysteresis:
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
         """The joint's force."""
         steps = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
-        yields = max(values[1], DRY * motion.deflection) * np.exp(values[2] * 2 * (steps - 0.5))
-        return JointLaw(springs=np.full(ELEMENTS, values[0] / ELEMENTS), yields=yields)
+        stiffness, typical, spread = self.held(values, motion)
+        yields = typical * np.exp(spread * 2 * (steps - 0.5))
+        return JointLaw(springs=np.full(ELEMENTS, stiffness / ELEMENTS), yields=yields)
+
+    def held(self, values: Real, motion: JointMotion) -> Real:
+        """The numbers that the law goes by: what yields in less of the motion is dry friction."""
+        return np.array([values[0], max(values[1], DRY * motion.deflection), values[2]])
 
 
 PHYSICS = Hysteresis()

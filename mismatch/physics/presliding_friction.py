@@ -42,9 +42,14 @@ class PreslidingFriction:
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
         """The joint's force."""
         steps = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
-        presliding = np.clip(values[1], LEAST_PRESLIDING * motion.deflection, DRY * motion.deflection)
+        friction, presliding = self.held(values, motion)
         yields = presliding * np.exp(1.6 * (steps - 0.5))
-        return JointLaw(springs=values[0] / ELEMENTS / yields, yields=yields)
+        return JointLaw(springs=friction / ELEMENTS / yields, yields=yields)
+
+    def held(self, values: Real, motion: JointMotion) -> Real:
+        """The numbers that the law goes by: sliding begins within a small part of the motion."""
+        least, most = LEAST_PRESLIDING * motion.deflection, DRY * motion.deflection
+        return np.array([values[0], np.clip(values[1], least, most)])
 
 
 PHYSICS = PreslidingFriction()

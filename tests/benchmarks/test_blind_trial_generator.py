@@ -26,6 +26,7 @@ from benchmarks.blind_trial.scoring import angle_between, excess_removed, outcom
 from benchmarks.blind_trial.sealed_case import case_name, open_truth, write_case
 from benchmarks.blind_trial.simulation import build_case
 from benchmarks.blind_trial.structures import Structure, draw_structure
+from mismatch.physics import library
 from modal_fit import read_modal_model
 
 SPEC = CaseSpec(3, 12345, "main", "none", "none", 0.0, 0.02, "sweeps", 1, 0.0)
@@ -190,6 +191,13 @@ def test_a_truth_changed_after_sealing_is_refused(tmp_path: Path) -> None:
     sealed.write_text(json.dumps({**truth, "effects": ["backlash"]}), encoding="utf-8")
     with pytest.raises(ValueError, match="changed after it had been sealed"):
         open_truth(tmp_path, name)
+
+
+def test_effects_that_a_tool_may_name_otherwise_are_listed_under_that_name() -> None:
+    assert {name: effect.answer for name, effect in FOREIGN.items() if effect.answer} == {
+        "square_speed_damping": "quadratic_damping"
+    }
+    assert set(library()) >= {effect.answer for effect in FOREIGN.values() if effect.answer}
 
 
 def test_draw_is_stratified_and_repeatable() -> None:

@@ -93,4 +93,4 @@ def _hand_made(model: ModalModel, trials: list[Trial]) -> Diagnosis:
     explanation = Explanation(shape, np.zeros(shape.size))
     fitted = Fit(explanation, (noise,) * len(lines), 0.0, 0.0, 0.0, 1e-6 * np.eye(shape.size))
     gain = Improvement(trials[len(trials) // 2].name, 0.3, 0.2, 0.1, 0.09, 0.01, (0.2, 0.4))
-    return Diagnosis("none", (), (), (), gain, 0.0, fitted, fitted, lines)
+    return Diagnosis("none", (), (), (), gain, 0.0, fitted, fitted, lines, (explanation, explanation))

@@ -12,7 +12,7 @@ from mismatch.explanation import Cause
 from mismatch.fitting import Fit
 from mismatch.joint_law import POINTS
 from mismatch.joint_simulation import driven_force, joint_response
-from mismatch.noise_model import _cost, fit_noise, whitening
+from mismatch.noise_model import fit_noise, whitening
 from mismatch.reporting_numbers import accepted_cause
 from mismatch.windowed_lines import WindowedLines, receptance_at
 from modal_fit import ModalModel, Residuals
@@ -63,24 +63,6 @@ def test_noise_of_responses_and_forces_is_told_apart(model: ModalModel, lines: W
     np.testing.assert_allclose(np.real(covariance[:, 0, 0]), own[middle], rtol=0.35)
     white = np.einsum("kij,kj->ki", whitening(found.covariance(frequencies, through)), rest)
     assert np.mean(np.abs(white) ** 2) == pytest.approx(1.0, abs=0.03)
-
-
-def test_gradient_of_the_noise_likelihood(model: ModalModel) -> None:
-    from mismatch.noise_model import _bands, _lumped
-
-    rng = np.random.default_rng(2)
-    frequencies = np.linspace(3, 40, 300)
-    through = model.receptance(frequencies) * 1e4
-    rest = rng.normal(size=(300, 2)) + 1j * rng.normal(size=(300, 2))
-    lumps = _lumped(frequencies, rest, through, np.ones(300), _bands(300), np.linspace(np.log(3), np.log(40), 4))
-    levels = (np.full(2, 10.0), np.full(2, 10.0))
-    x = rng.normal(size=10)
-    _, gradient = _cost(x, lumps, 2, 2, levels)
-    for k in range(10):
-        aside = np.zeros(10)
-        aside[k] = 1e-5
-        slope = (_cost(x + aside, lumps, 2, 2, levels)[0] - _cost(x - aside, lumps, 2, 2, levels)[0]) / 2e-5
-        assert gradient[k] == pytest.approx(slope, rel=1e-5, abs=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["spring", "damper", "elements"])

@@ -11,7 +11,7 @@ from mismatch.explanation import Cause
 from mismatch.jacobian import jacobian
 from mismatch.joint_law import JointMotion
 from mismatch.joint_simulation import driven_force
-from mismatch.line_loops import noise_likelihood, whiten_lines
+from mismatch.line_loops import whiten_lines
 from mismatch.physics import JointPhysics, library
 from mismatch.windowed_lines import WindowedLines, displacement_at
 from modal_fit import ModalModel
@@ -75,16 +75,3 @@ def test_whitening_of_lines() -> None:
     assert total == pytest.approx(np.linalg.slogdet(covariance)[1].sum(), rel=1e-12)
     np.testing.assert_allclose(white.conj().swapaxes(1, 2) @ white, np.linalg.inv(covariance), atol=1e-9)
     assert whiten_lines(-covariance) == np.inf
-
-
-def test_likelihood_of_noise_is_gaussian() -> None:
-    """Against NumPy's determinant and inverse."""
-    rng = np.random.default_rng(6)
-    root = rng.normal(size=(3, 2, 2, 2)) + 1j * rng.normal(size=(3, 2, 2, 2))
-    sample, through = root[:, 0] @ root[:, 0].conj().swapaxes(1, 2), root @ root.conj().swapaxes(2, 3)
-    counts, own, pushed = np.array([4.0, 9.0, 2.0]), rng.uniform(0.5, 2, (3, 2)), np.array([0.3, 0.8])
-    by_own, by_force = np.empty((3, 2)), np.empty(2)
-    cost = noise_likelihood(counts, sample, through, own, pushed, by_own, by_force)
-    covariance = np.einsum("q,bqij->bij", pushed, through) + own[:, :, None] * np.eye(2)
-    traces = np.trace(np.linalg.solve(covariance, sample), axis1=1, axis2=2).real
-    assert cost == pytest.approx(float(counts @ (np.linalg.slogdet(covariance)[1] + traces)), rel=1e-10)

@@ -92,6 +92,8 @@ class Effect:
         Dial to begin the search of a strength with, and the largest that makes sense.
     directional
         Whether a joint direction is to be found.
+    answer
+        What a tool may call it, if that is not its name.
     """
 
     name: str
@@ -100,6 +102,7 @@ class Effect:
     start: float = 0.1
     largest: float = 1e4
     directional: bool = False
+    answer: str = ""
 
 
 def fixed(*elements: Element) -> Joint:

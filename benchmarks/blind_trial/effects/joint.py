@@ -97,5 +97,7 @@ EFFECTS = (
 FOREIGN = (
     Effect("parametric_stiffness", ("once", "twice"), parametric, 0.1, 0.7),
     Effect("root_speed_damping", ("root",), partial(speed_law, laws.ROOT_SPEED), 0.05, 10),
-    Effect("square_speed_damping", ("square",), partial(speed_law, laws.SQUARE_SPEED), 0.05, 10),
+    Effect(
+        "square_speed_damping", ("square",), partial(speed_law, laws.SQUARE_SPEED), 0.05, 10, answer="quadratic_damping"
+    ),
 )

@@ -1,0 +1,81 @@
+"""Independent work in copies of this process, one a core: threads would wait for the interpreter's lock."""
+
+import multiprocessing
+import os
+import sys
+from collections.abc import Callable, Sequence
+from multiprocessing.connection import Connection, wait
+from multiprocessing.sharedctypes import Synchronized
+from typing import Any, TypeVar
+
+Result = TypeVar("Result")
+
+
+def side_by_side(tasks: Sequence[Callable[[], Result]]) -> list[Result]:
+    """Results of all tasks, in their order.
+
+    Where a process can be copied with its memory (Linux) and more than one core is free to it, the tasks run in copies
+    that hand their results back; otherwise, and for what a copy could not hand back, they run here one after the other.
+
+    Parameters
+    ----------
+    tasks
+        Without side effects; what they return can be pickled.
+
+    Raises
+    ------
+    Exception
+        Whatever the first failing task raises.
+    """
+    workers = min(_cores(), len(tasks))
+    found: dict[int, Result] = _in_copies(tasks, workers) if workers > 1 else {}
+    return [found[k] if k in found else task() for k, task in enumerate(tasks)]
+
+
+def _cores() -> int:
+    """Cores that this process may use; one where it cannot be copied, or is itself a copy."""
+    if not sys.platform.startswith("linux") or multiprocessing.parent_process() is not None:
+        return 1
+    return len(os.sched_getaffinity(0))
+
+
+def _in_copies(tasks: Sequence[Callable[[], Result]], workers: int) -> dict[int, Result]:
+    """Results by the task's number; a task that failed is missing and fails again where it can be seen."""
+    context = multiprocessing.get_context("fork")
+    turn = context.Value("i", 0)
+    pipes: list[Connection] = []
+    copies = []
+    for _ in range(workers):
+        here, there = context.Pipe(duplex=False)
+        copy = context.Process(target=_work, args=(tasks, turn, there), daemon=True)
+        copy.start()
+        there.close()
+        pipes.append(here)
+        copies.append(copy)
+    found: dict[int, Result] = {}
+    while pipes:
+        for pipe in wait(pipes):
+            assert isinstance(pipe, Connection)
+            try:
+                number, result = pipe.recv()
+                found[number] = result
+            except EOFError:
+                pipes.remove(pipe)
+    for copy in copies:
+        copy.join()
+    return found
+
+
+def _work(tasks: Sequence[Callable[[], Any]], turn: "Synchronized[int]", pipe: Connection) -> None:
+    """Take the next task until none is left; runs in a copy."""
+    while True:
+        with turn.get_lock():
+            number = turn.value
+            turn.value += 1
+        if number >= len(tasks):
+            return
+        try:
+            pipe.send((number, tasks[number]()))
+        except Exception:
+            # it is run again by the caller, whose traceback then tells
+            continue
