@@ -1,23 +1,26 @@
 """When a fitted cause is worth accepting, and when so much is left that none is named."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .diagnosis import Improvement
+from .explanation import Cause, Explanation
 from .fitting import Fit
 from .leftover import Leftover
 from .physics import ChainPhysics
+from .windowed_lines import WindowedLines
+
+Real = NDArray[np.float64]
 
 LEAST_EVIDENCE = 20.0
 """Gain in score below which nothing is accepted: odds of some twenty thousand to one."""
 
-NOISE_LIKE = 0.08
-"""Share of a residual that may seem to move with the signal by chance, hum or force noise.
-
-Of 203 controls of the blind trial (seeds 203, 401 and 402) two left more than 0.053: 0.061 and 0.071.
-"""
+NOISE_LIKE = 0.05
+"""Share of a residual that may seem to move with the signal by chance, hum or force noise."""
 
 EXPLAINED = 0.95
 """Share of what moved with the signal that causes must have taken away, if what is left is not noise-like."""
@@ -44,9 +47,20 @@ class Option:
     fitted: Fit
 
 
-def unexplained(left: Leftover, before: Leftover) -> bool:
-    """Whether too much still moves with the signal for the causes found, if any."""
-    return left.share > NOISE_LIKE and left.power > (1 - EXPLAINED) * before.power
+def unexplained(explanation: Explanation, left: Leftover, before: Leftover) -> bool:
+    """Whether too much still moves with the signal for the causes found, if any.
+
+    A law that had to be held within what its name means may leave nothing: it is another law.
+    """
+    if left.share <= NOISE_LIKE:
+        return False
+    return left.power > (1 - EXPLAINED) * before.power or any(_strained(cause) for cause in explanation.causes)
+
+
+def _strained(cause: Cause) -> bool:
+    """Whether the data ask of a law what its name excludes (``strained`` of its physics)."""
+    asked: Callable[[Real, object], bool] | None = getattr(cause.physics, "strained", None)
+    return asked is not None and cause.motion is not None and asked(cause.values, cause.motion)
 
 
 def evidence_needed(current: Fit, base: Fit) -> float:
@@ -73,8 +87,11 @@ def holds_elsewhere(improvement: Improvement, current: Fit, base: Fit) -> bool:
     return base.misfit - current.misfit < LEAST_EVIDENCE or improvement.evidence > HELD_OUT
 
 
-def worth_it(option: Option, current: Fit, base: Fit) -> bool:
-    """Enough evidence; and if it lies in the lab's belief alone, most of what the belief found odd."""
+def worth_it(option: Option, current: Fit, base: Fit, lines: list[WindowedLines]) -> bool:
+    """Enough evidence; and if it lies in the lab's belief alone, most of what the belief found odd.
+
+    It must then be more likely, too, than that the lab was wrong in nothing but all dampings, or all frequencies.
+    """
     gain = current.score - option.fitted.score
     clear = _mode_measured(option.fitted) if option.name == "missing_mode" else _measured(option.fitted)
     if not clear:
@@ -85,7 +102,17 @@ def worth_it(option: Option, current: Fit, base: Fit) -> bool:
         return True
     size = current.explanation.shape.size
     odd = max(current.deviation - size, 1.0)
-    return current.deviation - option.fitted.deviation > 0.6 * odd
+    if current.deviation - option.fitted.deviation <= 0.6 * odd:
+        return False
+    return gain > _plainer_gain(current, lines)
+
+
+def _plainer_gain(current: Fit, lines: list[WindowedLines]) -> float:
+    """What the score would gain if nothing were believed of the dampings, or of the frequencies."""
+    shape = current.explanation.shape
+    rows = current.explanation.u.reshape(-1, shape.per_mode)[: len(shape.nominal.poles) - shape.added]
+    cost = float(np.log(2 * sum(one.measured.size for one in lines)))
+    return max(float(np.sum(rows[:, k] ** 2 - cost)) for k in (0, 1))
 
 
 def _mode_measured(fitted: Fit) -> bool:

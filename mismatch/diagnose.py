@@ -31,6 +31,9 @@ Progress = Callable[[str], None]
 
 MOST_CAUSES = 3
 
+FIRST_FIT = 30
+"""Steps at most of the modal parameters: a nominal model may be far off."""
+
 AGAIN = 0.7
 """Of what moved with the signal when joint laws were tried in vain: they are tried again when no more is left."""
 
@@ -86,7 +89,7 @@ def diagnose(
     lines = [windowed_lines(trial, band_of(model, trial.rate), decay) for trial in trials]
     tell("modal parameters")
     nominal = Explanation(ModelShape(model, settings.lab), np.zeros(ModelShape(model, settings.lab).size))
-    base = fit(lines, nominal)
+    base = fit(lines, nominal, iterations=FIRST_FIT)
     lines, base = _with_true_forces(lines, base)
     tell("tones and clipping")
     whole = lines
@@ -101,7 +104,7 @@ def diagnose(
     if deviation is not None:
         accepted.append(deviation)
     left = leftover(current.explanation, lines)
-    abstains = unexplained(left, search.before)
+    abstains = unexplained(current.explanation, left, search.before)
     if abstains:
         candidates += [Candidate(one.name, one.evidence, "rejected", one.location) for one in accepted]
         accepted, current, left = [], base, search.before
@@ -173,7 +176,7 @@ def _search(
         if best is None or best.fitted.score > current.score - LEAST_EVIDENCE:
             break
         best = replace(best, fitted=settled(lines, best.fitted))
-        if not worth_it(best, current, base):
+        if not worth_it(best, current, base, lines):
             break
         line = best.fitted.score + LEAST_EVIDENCE / 2
         rivals = [option.name for option in one.options if option.name != best.name and option.fitted.score < line]

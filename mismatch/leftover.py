@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft
-from scipy.optimize import nnls
 from scipy.signal import ShortTimeFFT
 from scipy.signal.windows import hann
 
+from .cell_regression import moving_power
 from .explanation import Explanation, predict_lines
 from .windowed_lines import WindowedLines
 
@@ -20,6 +20,10 @@ SEGMENT = 2.0
 BINS = 12
 """Neighbouring bins that share one noise level."""
 
+SHIFTS, CHANCE = 14, 0.8
+"""Times that the prediction is shifted against the residual, and the quantile of what it then carries: the noise of a
+force rings in lightly damped modes, and so few independent swells are easily matched by chance."""
+
 
 @dataclass(frozen=True)
 class Leftover:
@@ -28,9 +32,9 @@ class Leftover:
     Parameters
     ----------
     share
-        Of the residual's power, 0 (noise) to 1.
+        Of the residual's power, 0 (noise) to 1, beyond what chance may well make of noise.
     power
-        The same power as a share of the response's, mean over channels and recordings.
+        As a share of the response's, mean over channels and recordings, beyond what chance makes on average.
     """
 
     share: float
@@ -42,8 +46,8 @@ def leftover(explanation: Explanation, lines: list[WindowedLines]) -> Leftover:
 
     In cells of time and frequency the residual's power is regressed, with non-negative factors, on a constant (noise of
     that band), on the predicted power in the same cell and on the predicted power of all frequencies at the same time
-    (what a nonlinearity spreads). The share is what the last two carry, less what they carry when the prediction is
-    shifted in time against the residual, as chance does.
+    (what a nonlinearity spreads). The share is what the last two carry, less what they carry by chance, when the
+    prediction is shifted in time against the residual.
 
     Parameters
     ----------
@@ -61,16 +65,17 @@ def leftover(explanation: Explanation, lines: list[WindowedLines]) -> Leftover:
         shown = shown[one.start : n - int(one.trial.rate) // 2]
         for p in range(rest.shape[1]):
             r, s = _powers(rest[:, p], one), _powers(shown[:, p], one)
-            own = _moving(r, s)
-            chance = np.median([_moving(r, np.roll(s, shift, axis=1)) for shift in _shifts(s.shape[1])])
-            moving = min(max(own - float(chance), 0.0), float(np.sum(r)))
-            shares.append(moving / float(np.sum(r)))
-            powers.append(moving / float(np.sum(s)))
+            own = moving_power(r, s, BINS)
+            shifted = [moving_power(r, np.roll(s, shift, axis=1), BINS) for shift in _shifts(s.shape[1])]
+            whole, size = float(np.sum(r)), float(np.sum(s))
+            shares.append(np.clip(own - np.quantile(shifted, CHANCE), 0.0, whole) / whole)
+            powers.append(np.clip(own - np.median(shifted), 0.0, whole) / size)
     return Leftover(float(np.mean(shares)), float(np.mean(powers)))
 
 
 def _shifts(count: int) -> list[int]:
-    return [max(1, round(count * share)) for share in (0.29, 0.43, 0.61, 0.77)]
+    """Segments by which a prediction is turned in time."""
+    return sorted({max(1, round(count * share)) for share in np.linspace(0.12, 0.88, SHIFTS)})
 
 
 def _powers(signal: Real, lines: WindowedLines) -> Real:
@@ -80,23 +85,3 @@ def _powers(signal: Real, lines: WindowedLines) -> Real:
     power = np.abs(transform.stft(signal, p0=1, p1=len(signal) // (length // 2))) ** 2
     inside = (transform.f >= lines.frequencies[0]) & (transform.f <= lines.frequencies[-1])
     return np.asarray(power[inside])
-
-
-def _moving(rest: Real, shown: Real) -> float:
-    """Power of the residual that the prediction's power accounts for."""
-    moving = 0.0
-    together = shown.mean(axis=0)
-    for start in range(0, len(rest), BINS):
-        cells, same = rest[start : start + BINS], shown[start : start + BINS]
-        broad = np.broadcast_to(together, cells.shape)
-        columns = np.stack([np.ones(cells.size), same.ravel(), broad.ravel()], axis=1)
-        scale = np.maximum(columns.mean(axis=0), 1e-300)
-        # cells of noise scatter like their level: weigh by it, once from the mean and once from the first fit
-        weight = np.full(cells.size, 1 / max(float(cells.mean()), 1e-300))
-        factors = np.zeros(3)
-        for _ in range(3):
-            factors = nnls(columns / scale * weight[:, None], cells.ravel() * weight)[0]
-            fitted = columns / scale @ factors
-            weight = 1 / np.maximum(fitted, 0.1 * float(cells.mean()))
-        moving += cells.size * float(factors[1] + factors[2])
-    return moving

@@ -104,7 +104,9 @@ def _best(options: list[Option], current: Fit) -> Option | None:
 
 def _explains(best: Option | None, lines: list[WindowedLines], before: Leftover) -> bool:
     """Whether an option leaves too little that moves with the signal to look further."""
-    return best is not None and not unexplained(leftover(best.fitted.explanation, lines), before)
+    if best is None:
+        return False
+    return not unexplained(best.fitted.explanation, leftover(best.fitted.explanation, lines), before)
 
 
 def _joints_are_due(

@@ -37,5 +37,9 @@ class CoulombFriction:
         """The numbers that the law goes by: dry friction gives way within a small part of the motion."""
         return np.array([values[0], np.clip(values[1], 4e-4 * motion.speed, DRY * motion.velocity)])
 
+    def strained(self, values: Real, motion: JointMotion) -> bool:
+        """Whether a force was asked for that still rises with the speed: damping of another kind."""
+        return bool(values[1] > DRY * motion.velocity)
+
 
 PHYSICS = CoulombFriction()

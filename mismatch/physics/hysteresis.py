@@ -44,5 +44,9 @@ class Hysteresis:
         """The numbers that the law goes by: what yields in less of the motion is dry friction."""
         return np.array([values[0], max(values[1], DRY * motion.deflection), values[2]])
 
+    def strained(self, values: Real, motion: JointMotion) -> bool:
+        """Whether elements were asked for that yield in no time: dry friction."""
+        return bool(values[1] < DRY * motion.deflection)
+
 
 PHYSICS = Hysteresis()

@@ -51,5 +51,9 @@ class PreslidingFriction:
         least, most = LEAST_PRESLIDING * motion.deflection, DRY * motion.deflection
         return np.array([values[0], np.clip(values[1], least, most)])
 
+    def strained(self, values: Real, motion: JointMotion) -> bool:
+        """Whether much presliding was asked for: hysteresis."""
+        return bool(values[1] > DRY * motion.deflection)
+
 
 PHYSICS = PreslidingFriction()
