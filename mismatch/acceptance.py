@@ -47,6 +47,16 @@ class Option:
     fitted: Fit
 
 
+def plainest(options: list[Option]) -> Option | None:
+    """The option with the best score, or the form of the same cause that is as good with fewer numbers."""
+    best = min(options, key=lambda option: option.fitted.score, default=None)
+    if best is None:
+        return None
+    line = best.fitted.score + LEAST_EVIDENCE / 2
+    forms = [option for option in options if option.name == best.name and option.fitted.score < line]
+    return min(forms, key=lambda option: (option.fitted.explanation.size, option.fitted.score))
+
+
 def unexplained(explanation: Explanation, left: Leftover, before: Leftover) -> bool:
     """Whether too much still moves with the signal for the causes found, if any.
 

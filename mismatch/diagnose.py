@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
-from .acceptance import LEAST_EVIDENCE, Option, holds_elsewhere, unexplained, worth_it
+from .acceptance import LEAST_EVIDENCE, Option, holds_elsewhere, plainest, unexplained, worth_it
 from .diagnosis import AcceptedCause, Candidate, Diagnosis
 from .explanation import Explanation
 from .fault_repair import repair_plain_faults, with_tones_settled
@@ -172,7 +172,7 @@ def _search(
         worth_trying = causes if moving.power < AGAIN * in_vain else _linear(causes)
         one = fitted_options(lines, current, base, worth_trying, (moving, before))
         candidates += one.weighed
-        best = min(one.options, key=lambda option: option.fitted.score, default=None)
+        best = plainest(one.options)
         if best is None or best.fitted.score > current.score - LEAST_EVIDENCE:
             break
         best = replace(best, fitted=settled(lines, best.fitted))

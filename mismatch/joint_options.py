@@ -20,8 +20,8 @@ from .windowed_lines import WindowedLines
 PROMISING = 0.15
 """Screened gain, as a share of the best law's, from which a law is fitted."""
 
-MOST_LAWS = 4
-"""Laws that are fitted to the motion seen; the two best are then simulated freely."""
+MOST_LAWS, MOST_SIMULATED = 4, 2
+"""Laws that are fitted to the motion seen, and the best of them that are then simulated freely."""
 
 RIVAL = 0.3
 """Gain of a law driven by the motion seen, as a share of the best linear cause's, from which it is simulated."""
@@ -82,9 +82,14 @@ def joint_options(
     promising = [one for one in sighted.screened if one.gain > max(60.0, least, PROMISING * sighted.gain)]
     driven = side_by_side([partial(_driven, lines, current, one) for one in promising[:MOST_LAWS]])
     driven.sort(key=lambda one: one.score)
-    gains = [current.score - one.score for one in driven[:2]]
+    gains = [current.score - one.score for one in driven]
     enough = max([LEAST_EVIDENCE / 2, RIVAL * gained, *(0.6 * gain for gain in gains[:1])])
-    near = [one for one, gain in zip(driven, gains, strict=False) if gain >= enough]
+    # forms of different causes may differ by a linear spring alone: all that are as good are simulated
+    near = [
+        one
+        for place, (one, gain) in enumerate(zip(driven, gains, strict=True))
+        if gain >= enough and (place < MOST_SIMULATED or gain > gains[0] - LEAST_EVIDENCE)
+    ]
     return side_by_side([partial(_simulated, lines, one) for one in near])
 
 

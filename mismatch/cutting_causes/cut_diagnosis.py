@@ -9,7 +9,7 @@ import numpy as np
 from cutting import MillingProcess
 from foundation import InputError
 
-from ..acceptance import CLEAR, EXPLAINED, LEAST_EVIDENCE, NOISE_LIKE
+from ..acceptance import CLEAR, EXPLAINED, LEAST_EVIDENCE
 from ..diagnosis import AcceptedCause, Candidate
 from .cut_fit import CutFit, fit_cut
 from .cut_held_out import fit_halves, improvement
@@ -32,6 +32,9 @@ UNCONFIRMED = "fitted, but not confirmed: within its own error, or no gain on bl
 
 ODD = 3.0
 """Laboratory's errors by which a coefficient must be off to be named."""
+
+NOISE_LIKE = 0.08
+"""Share of a residual force that may stand out of noise and usual error by chance."""
 
 FORCE_ERROR = 0.01
 """Share by which each spectral line of a right computed force is still off."""

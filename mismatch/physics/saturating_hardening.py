@@ -1,0 +1,44 @@
+"""Stiffness that is gained beyond a knee, and no more: contacts that close, a preloaded gear on its second flank."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint_law import JointLaw, JointMotion
+from .protocol import Parameter
+
+Real = NDArray[np.float64]
+
+
+class SaturatingHardening:
+    """Hardening that ends: from one stiffness at small deflections to another at large ones.
+
+    It differs from :mod:`smooth backlash <mismatch.physics.smooth_backlash>` by a linear spring alone: here the model
+    that is believed holds at small deflections, there at large ones. How odd the modes would have to be decides.
+    """
+
+    name = "saturating_hardening"
+    answers_as = "stiffness_hardening"
+    equation = "g = k (x - x / (1 + |x / x0|^n)^(1/n)): stiffness k is gained beyond the knee x0"
+    source = "Worden & Tomlinson, Nonlinearity in Structural Dynamics, section 2.2"
+    parameters = (
+        Parameter("stiffness_gain_n_per_m", "N/m", 0.1, 0.0, 1e12, logarithmic=True),
+        Parameter("knee_m", "m", 0.1, 1e-9, 1.0, logarithmic=True),
+        Parameter("sharpness", "", 0.3, 1.0, 12.0),
+    )
+    confusable_with = (
+        "backlash",
+        "stiffness_softening",
+    )
+
+    def starts(self, motion: JointMotion) -> tuple[Real, ...]:
+        """Shapes to try, amplitude 1."""
+        return tuple(np.array([1.0, k * motion.deflection, 2.0]) for k in (0.5, 1.0, 2.0))
+
+    def law(self, values: Real, motion: JointMotion) -> JointLaw:
+        """The joint's force."""
+        x, knee, n = motion.deflections, values[1], values[2]
+        kept = x / (1 + np.abs(x / knee) ** n) ** (1 / n)
+        return JointLaw(reach=motion.reach, stiffness=values[0] * (x - kept))
+
+
+PHYSICS = SaturatingHardening()

@@ -1,0 +1,43 @@
+"""Play with soft corners: flanks that bend, bearings whose rollers take up load one after the other."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..joint_law import JointLaw, JointMotion
+from .protocol import Parameter
+
+Real = NDArray[np.float64]
+
+
+class SmoothBacklash:
+    """Backlash whose gap closes little by little; sharp corners are :mod:`backlash <mismatch.physics.backlash>`.
+
+    It differs from :mod:`saturating hardening <mismatch.physics.saturating_hardening>` by a linear spring alone: how
+    odd the modes would have to be decides between them, and where that says nothing both are told.
+    """
+
+    name = "smooth_backlash"
+    answers_as = "backlash"
+    equation = "g = -k x / (1 + |x / b|^n)^(1/n): stiffness k is missing inside about |x| < b"
+    source = "Worden & Tomlinson, Nonlinearity in Structural Dynamics, section 2.2"
+    parameters = (
+        Parameter("stiffness_loss_n_per_m", "N/m", 0.1, 0.0, 1e12, logarithmic=True),
+        Parameter("half_gap_m", "m", 0.1, 1e-9, 1.0, logarithmic=True),
+        Parameter("sharpness", "", 0.3, 1.0, 12.0),
+    )
+    confusable_with = (
+        "stiffness_hardening",
+        "stiffness_softening",
+    )
+
+    def starts(self, motion: JointMotion) -> tuple[Real, ...]:
+        """Shapes to try, amplitude 1."""
+        return tuple(np.array([1.0, k * motion.deflection, 2.0]) for k in (0.3, 0.6, 1.2))
+
+    def law(self, values: Real, motion: JointMotion) -> JointLaw:
+        """The joint's force."""
+        x, gap, n = motion.deflections, values[1], values[2]
+        return JointLaw(reach=motion.reach, stiffness=-values[0] * x / (1 + np.abs(x / gap) ** n) ** (1 / n))
+
+
+PHYSICS = SmoothBacklash()
