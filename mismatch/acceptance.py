@@ -1,20 +1,16 @@
 """When a fitted cause is worth accepting, and when so much is left that none is named."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .diagnosis import Improvement
 from .explanation import Cause, Explanation
 from .fitting import Fit
 from .leftover import Leftover
-from .physics import ChainPhysics
+from .physics import ChainPhysics, LimitedPhysics
 from .windowed_lines import WindowedLines
-
-Real = NDArray[np.float64]
 
 LEAST_EVIDENCE = 20.0
 """Gain in score below which nothing is accepted: odds of some twenty thousand to one."""
@@ -68,9 +64,13 @@ def unexplained(explanation: Explanation, left: Leftover, before: Leftover) -> b
 
 
 def _strained(cause: Cause) -> bool:
-    """Whether the data ask of a law what its name excludes (``strained`` of its physics)."""
-    asked: Callable[[Real, object], bool] | None = getattr(cause.physics, "strained", None)
-    return asked is not None and cause.motion is not None and asked(cause.values, cause.motion)
+    """Whether the data ask of a law what its name excludes."""
+    limited = cause.physics
+    return (
+        isinstance(limited, LimitedPhysics)
+        and cause.motion is not None
+        and limited.strained(cause.values, cause.motion)
+    )
 
 
 def evidence_needed(current: Fit, base: Fit) -> float:

@@ -1,6 +1,6 @@
 """Score test of linear causes: what each would gain from where the refitted model stands, without a fit."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +36,7 @@ def screen_chains(floor: Floor, explanation: Explanation, causes: list[ChainPhys
 
 
 def _gain(floor: Floor, explanation: Explanation, cause: Cause) -> tuple[float, Real]:
-    with_it = replace(explanation, causes=(*explanation.causes, cause))
+    with_it = explanation.with_cause(cause)
     here = with_it.coordinates()
     own = np.zeros((cause.size, cause.size))
     shared = np.zeros((len(floor.gradient), cause.size))

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from modal_fit import ModalModel
 
@@ -82,8 +83,13 @@ def diagnose(
     InputError
         Recordings that the model cannot be compared with.
     """
-    settings = settings or Settings()
-    tell = watch or (lambda text: None)
+    # matrices are small: threads inside the linear algebra only get in each other's way
+    with threadpool_limits(1, user_api="blas"):
+        return _diagnosed(model, trials, settings or Settings(), watch or (lambda text: None))
+
+
+def _diagnosed(model: ModalModel, trials: Sequence[Trial], settings: Settings, tell: Progress) -> Diagnosis:
+    """One step after the other."""
     causes = settings.causes if settings.causes is not None else library()
     decay = float((-model.poles.real).min())
     lines = [windowed_lines(trial, band_of(model, trial.rate), decay) for trial in trials]

@@ -120,6 +120,10 @@ class Explanation:
         """Numbers that are fitted."""
         return self.shape.size + sum(cause.size for cause in self.causes)
 
+    def with_cause(self, cause: Cause) -> "Explanation":
+        """The explanation with one more cause, the last."""
+        return replace(self, causes=(*self.causes, cause))
+
     def with_causes(self, coordinates: Real) -> "Explanation":
         """The explanation with all causes at other coordinates, one after the other."""
         moved, at = [], 0

@@ -23,6 +23,12 @@ PROMISING = 0.15
 MOST_LAWS, MOST_SIMULATED = 4, 2
 """Laws that are fitted to the motion seen, and the best of them that are then simulated freely."""
 
+LEAST_GAIN = 60.0
+"""Screened gain below which no law is fitted."""
+
+NEARLY = 0.6
+"""Gain of a law driven by the motion seen, as a share of the best law's, from which it is simulated."""
+
 RIVAL = 0.3
 """Gain of a law driven by the motion seen, as a share of the best linear cause's, from which it is simulated."""
 
@@ -79,11 +85,11 @@ def joint_options(
     gained
         Score that the best linear cause gains.
     """
-    promising = [one for one in sighted.screened if one.gain > max(60.0, least, PROMISING * sighted.gain)]
+    promising = [one for one in sighted.screened if one.gain > max(LEAST_GAIN, least, PROMISING * sighted.gain)]
     driven = side_by_side([partial(_driven, lines, current, one) for one in promising[:MOST_LAWS]])
     driven.sort(key=lambda one: one.score)
     gains = [current.score - one.score for one in driven]
-    enough = max([LEAST_EVIDENCE / 2, RIVAL * gained, *(0.6 * gain for gain in gains[:1])])
+    enough = max([LEAST_EVIDENCE / 2, RIVAL * gained, *(NEARLY * gain for gain in gains[:1])])
     # forms of different causes may differ by a linear spring alone: all that are as good are simulated
     near = [
         one
@@ -95,11 +101,9 @@ def joint_options(
 
 def _driven(lines: list[WindowedLines], current: Fit, screened: Screened) -> Fit:
     """A law fitted to the motion seen, from the better of its two best shapes."""
-    explanation = current.explanation
     rough = [one.thinned(FEW) for one in lines]
     starts = [
-        fit(rough, replace(explanation, causes=(*explanation.causes, cause)), current.noises, iterations=2)
-        for cause in screened.causes[:2]
+        fit(rough, current.explanation.with_cause(cause), current.noises, iterations=2) for cause in screened.causes[:2]
     ]
     best = min(starts, key=lambda start: start.score)
     return fit(lines, best.explanation, best.noises, iterations=4)

@@ -1,7 +1,6 @@
 """Linear causes of one round: those of the measuring chain that promise most, and a further mode, fitted."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -62,8 +61,7 @@ def _chain_option(lines: list[WindowedLines], current: Fit, cause: Cause, *, lik
     if likeliest:
         fitted = with_chain(lines, current, cause)
     else:
-        explanation = current.explanation
-        fitted = fit(lines, replace(explanation, causes=(*explanation.causes, cause)), current.noises)
+        fitted = fit(lines, current.explanation.with_cause(cause), current.noises)
     return Option(answer_name(cause.physics), channel_of(cause), fitted)
 
 

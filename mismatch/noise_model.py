@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from .line_loops import whiten_lines
 from .noise_loops import line_covariances
-from .noise_scoring import lumped, most_likely
+from .noise_search import lumped, most_likely
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -81,8 +81,7 @@ def fit_noise(
 ) -> NoiseModel:
     """Most likely noise of residual lines that are Gaussian, outlying lines weighted down.
 
-    Maximises ``-sum ln det V + r^H V^-1 r`` over narrow bands by scoring (Whittle's likelihood, its information as
-    curvature).
+    Maximises ``-sum ln det V + r^H V^-1 r`` over narrow bands by Newton's method (Whittle's likelihood).
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from .diagnosis import AcceptedCause
 from .explanation import Cause
 from .fitting import Fit
-from .physics import answer_name
+from .physics import LimitedPhysics, answer_name
 
 Real = NDArray[np.float64]
 
@@ -29,9 +29,10 @@ def accepted_cause(fitted: Fit, location: dict[str, object], evidence: float) ->
 
 
 def _held(cause: Cause) -> Real:
-    """The numbers that a law goes by, where its physics keeps them within limits that the motion sets (``held``)."""
-    limits: Callable[[Real, object], Real] | None = getattr(cause.physics, "held", None)
-    return cause.values if limits is None or cause.motion is None else limits(cause.values, cause.motion)
+    """The numbers that a law goes by."""
+    if isinstance(cause.physics, LimitedPhysics) and cause.motion is not None:
+        return cause.physics.held(cause.values, cause.motion)
+    return cause.values
 
 
 def _derived(cause: Cause, covariance: Real) -> tuple[dict[str, float], dict[str, float]]:

@@ -46,11 +46,11 @@ def with_chain(lines: list[WindowedLines], current: Fit, cause: Cause) -> Fit:
         With numbers to begin with.
     """
     explanation = current.explanation
-    fitted = fit(lines, replace(explanation, causes=(*explanation.causes, cause)), current.noises)
+    fitted = fit(lines, explanation.with_cause(cause), current.noises)
     if modal_deviation(current) is None or not isinstance(cause.physics, ChainPhysics):
         return fitted
     absent = replace(cause, values=cause.physics.start(explanation.shape.nominal))
-    fresh = replace(believed(explanation), causes=(*explanation.causes, absent))
+    fresh = believed(explanation).with_cause(absent)
     return min(fitted, fit(lines, fresh, iterations=FROM_BELIEF), key=lambda one: one.score)
 
 

@@ -5,8 +5,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from threadpoolctl import threadpool_limits
-
 from cutting import MillingProcess
 from mismatch import Diagnosis, Settings, diagnose, read_trials
 from mismatch.diagnosis_file import improved_model_of, write_diagnosis
@@ -46,20 +44,7 @@ def diagnose_files(
     InputError
         Files that cannot be used together, or a folder that cannot be made.
     """
-    # matrices are small here: threads inside the linear algebra only get in each other's way
-    with threadpool_limits(1, user_api="blas"):
-        return _diagnose_files(model_path, recordings, Path(out), settings or Settings(), stream, process, watch)
-
-
-def _diagnose_files(
-    model_path: str | os.PathLike[str],
-    recordings: Sequence[str | os.PathLike[str]],
-    folder: Path,
-    settings: Settings,
-    stream: str | None,
-    process: MillingProcess | None,
-    watch: Watch,
-) -> DiagnosisFiles:
+    folder = Path(out)
     refuse_file(folder)
     whole = read_modal_model(model_path)
     model = measured_part(whole, recordings, stream=stream)

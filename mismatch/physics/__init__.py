@@ -4,9 +4,19 @@ import importlib
 import pkgutil
 from collections.abc import Collection
 
-from .protocol import Chain, ChainPhysics, JointPhysics, Parameter, Physics, answer_name
+from .protocol import Chain, ChainPhysics, JointPhysics, LimitedPhysics, Parameter, Physics, answer_name
 
-__all__ = ["Chain", "ChainPhysics", "JointPhysics", "Parameter", "Physics", "answer_name", "form_of", "library"]
+__all__ = [
+    "Chain",
+    "ChainPhysics",
+    "JointPhysics",
+    "LimitedPhysics",
+    "Parameter",
+    "Physics",
+    "answer_name",
+    "form_of",
+    "library",
+]
 
 
 def library() -> dict[str, Physics]:
@@ -32,8 +42,13 @@ def form_of(answer: str, numbers: Collection[str]) -> Physics | None:
     --------
     >>> form_of("coulomb_friction", ["friction_n", "presliding_m"]).name
     'presliding_friction'
+    >>> form_of("backlash", ["stiffness_loss_n_per_m", "half_gap_m", "sharpness"]).name
+    'smooth_backlash'
     """
-    for physics in library().values():
-        if answer_name(physics) == answer and {one.name for one in physics.parameters} <= set(numbers):
-            return physics
-    return None
+    forms = [
+        physics
+        for physics in library().values()
+        if answer_name(physics) == answer and {one.name for one in physics.parameters} <= set(numbers)
+    ]
+    # one form may have all numbers of another, and more
+    return max(forms, key=lambda physics: len(physics.parameters), default=None)

@@ -117,6 +117,19 @@ class JointPhysics(Protocol):
         ...
 
 
+@runtime_checkable
+class LimitedPhysics(Protocol):
+    """A joint's law whose name holds only within limits that the motion sets; beyond them it is another law."""
+
+    def held(self, values: Real, motion: JointMotion) -> Real:
+        """The numbers that the law goes by: those given, brought within the limits."""
+        ...
+
+    def strained(self, values: Real, motion: JointMotion) -> bool:
+        """Whether the numbers ask for what the name excludes."""
+        ...
+
+
 Physics = ChainPhysics | JointPhysics
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joint_law import JointLaw, JointMotion
+from ..joint_law import JointLaw, JointMotion, saturated
 from .protocol import Parameter
 
 Real = NDArray[np.float64]
@@ -36,8 +36,8 @@ class SmoothBacklash:
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
         """The joint's force."""
-        x, gap, n = motion.deflections, values[1], values[2]
-        return JointLaw(reach=motion.reach, stiffness=-values[0] * x / (1 + np.abs(x / gap) ** n) ** (1 / n))
+        kept = saturated(motion.deflections, values[1], values[2])
+        return JointLaw(reach=motion.reach, stiffness=-values[0] * kept)
 
 
 PHYSICS = SmoothBacklash()

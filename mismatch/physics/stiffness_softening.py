@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joint_law import JointLaw, JointMotion
+from ..joint_law import JointLaw, JointMotion, saturated
 from .protocol import Parameter
 
 Real = NDArray[np.float64]
@@ -32,9 +32,8 @@ class StiffnessSoftening:
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
         """The joint's force."""
-        x, knee, n = motion.deflections, values[1], values[2]
-        kept = x / (1 + np.abs(x / knee) ** n) ** (1 / n)
-        return JointLaw(reach=motion.reach, stiffness=values[0] * (kept - x))
+        x = motion.deflections
+        return JointLaw(reach=motion.reach, stiffness=values[0] * (saturated(x, values[1], values[2]) - x))
 
 
 PHYSICS = StiffnessSoftening()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mismatch.joint_law import JointMotion
-from mismatch.physics import JointPhysics, library
+from mismatch.physics import JointPhysics, LimitedPhysics, library
 from mismatch.physics.protocol import DRY
 
 MOTION = JointMotion(reach=1e-3, speed=0.1, deflection=2e-4, velocity=0.02, stiffness=1e6)
@@ -21,7 +21,10 @@ MOTION = JointMotion(reach=1e-3, speed=0.1, deflection=2e-4, velocity=0.02, stif
 def test_beyond_its_limit_a_number_changes_nothing(name: str, values: list[float], place: int, limit: float) -> None:
     physics = library()[name]
     assert isinstance(physics, JointPhysics)
-    held = physics.held(np.array(values), MOTION)  # type: ignore[attr-defined]
+    assert isinstance(physics, LimitedPhysics)
+    held = physics.held(np.array(values), MOTION)
+    assert physics.strained(np.array(values), MOTION)
+    assert not physics.strained(held, MOTION)
     assert held[place] == pytest.approx(limit)
     farther = np.array(values)
     farther[place] *= 3 if values[place] > limit else 1 / 3
