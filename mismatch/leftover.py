@@ -47,7 +47,9 @@ def leftover(explanation: Explanation, lines: list[WindowedLines]) -> Leftover:
     In cells of time and frequency the residual's power is regressed, with non-negative factors, on a constant (noise of
     that band), on the predicted power in the same cell and on the predicted power of all frequencies at the same time
     (what a nonlinearity spreads). The share is what the last two carry, less what they carry by chance, when the
-    prediction is shifted in time against the residual.
+    prediction is shifted in time against the residual. Where forces were replaced by what they say of the true ones,
+    the forces as measured are tried too, and what moves with both counts: the replaced ones lack force where it swells
+    from little, the measured ones bring their noise.
 
     Parameters
     ----------
@@ -56,21 +58,33 @@ def leftover(explanation: Explanation, lines: list[WindowedLines]) -> Leftover:
     lines
         Recordings.
     """
-    shares, powers = [], []
+    found = []
     for one in lines:
-        predicted = predict_lines(explanation, one)
-        n = len(one.trial.force)
-        shown = irfft(predicted.spectrum, n=one.padded, axis=0)[:n]
-        rest = (one.trial.response - shown)[one.start : n - int(one.trial.rate) // 2]
-        shown = shown[one.start : n - int(one.trial.rate) // 2]
-        for p in range(rest.shape[1]):
-            r, s = _powers(rest[:, p], one), _powers(shown[:, p], one)
-            own = moving_power(r, s, BINS)
-            shifted = [moving_power(r, np.roll(s, shift, axis=1), BINS) for shift in _shifts(s.shape[1])]
-            whole, size = float(np.sum(r)), float(np.sum(s))
-            shares.append(np.clip(own - np.quantile(shifted, CHANCE), 0.0, whole) / whole)
-            powers.append(np.clip(own - np.median(shifted), 0.0, whole) / size)
-    return Leftover(float(np.mean(shares)), float(np.mean(powers)))
+        moving = _moving(explanation, one)
+        measured = one.with_measured_forces()
+        if not np.array_equal(measured.force_here, one.force_here):
+            moving = np.minimum(moving, _moving(explanation, measured))
+        found.append(moving)
+    share, power = np.concatenate(found).mean(axis=0)
+    return Leftover(float(share), float(power))
+
+
+def _moving(explanation: Explanation, one: WindowedLines) -> Real:
+    """Share of the residual's power and of the response's that moves with the signal, (n_responses, 2)."""
+    predicted = predict_lines(explanation, one)
+    n = len(one.trial.force)
+    shown = irfft(predicted.spectrum, n=one.padded, axis=0)[:n]
+    rest = (one.trial.response - shown)[one.start : n - int(one.trial.rate) // 2]
+    shown = shown[one.start : n - int(one.trial.rate) // 2]
+    found = []
+    for p in range(rest.shape[1]):
+        r, s = _powers(rest[:, p], one), _powers(shown[:, p], one)
+        own = moving_power(r, s, BINS)
+        shifted = [moving_power(r, np.roll(s, shift, axis=1), BINS) for shift in _shifts(s.shape[1])]
+        whole, size = float(np.sum(r)), float(np.sum(s))
+        share = np.clip(own - np.quantile(shifted, CHANCE), 0.0, whole) / whole
+        found.append([share, np.clip(own - np.median(shifted), 0.0, whole) / size])
+    return np.array(found)
 
 
 def _shifts(count: int) -> list[int]:

@@ -13,17 +13,14 @@ from .windowed_lines import WindowedLines, padded_force
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
-NEIGHBOURS = 61
-"""Lines over which the spectral matrix of the forces is averaged."""
+SCALES = (301, 101, 31, 11)
+"""Lines over which the spectral matrix of the forces is averaged, from wide to narrow."""
 
-CLOSEST = 7
-"""The same, to see where there is less force than around."""
+CHANCE = 3.0
+"""Standard deviations by which the power over fewer lines must differ to be believed; wholly so at two more."""
 
 WIDELY, QUIETEST = 201, 0.05
-"""The same, so wide that chance hardly counts, to find the share of lines whose power bounds the forces' noise."""
-
-LEAST_POWER = 2.0
-"""Power over noise below which a direction of force is taken for noise alone, as chance leaves that much."""
+"""Lines so many that chance hardly counts, and the share of them whose power bounds the forces' noise."""
 
 
 def without_force_noise(lines: WindowedLines, variance: Real) -> WindowedLines:
@@ -32,7 +29,8 @@ def without_force_noise(lines: WindowedLines, variance: Real) -> WindowedLines:
     P is the measured forces' spectral matrix around a line and S the variance of their noise (Wiener, 1949). Where a
     spectrum holds little but noise, as between the harmonics of a steady cut or above the band of the cutting force,
     the structure was not pushed by what was measured: predicted from it, a response would be missing and a mode would
-    seem to cancel it. The same holds across forces that rise and fall together.
+    seem to cancel it. The same holds across forces that rise and fall together. P is averaged as widely as the spectrum
+    is smooth: from few lines, those that noise makes strong by chance would be taken for force.
 
     Parameters
     ----------
@@ -48,15 +46,12 @@ def without_force_noise(lines: WindowedLines, variance: Real) -> WindowedLines:
     wide = min(WIDELY, len(own) // 5)
     quiet = np.quantile(_around(own, wide)[wide:-wide], QUIETEST, axis=0)
     deviation = np.sqrt(np.maximum(np.minimum(variance, quiet), 1e-12 * own.mean(axis=0)))
-    count = min(NEIGHBOURS, wide)
-    whitened = products / np.outer(deviation, deviation)
-    total = np.einsum("kqq->kq", whitened).real.sum(axis=1)
-    # beside a harmonic or the end of a band, less is there than around
-    less = np.minimum(_around(total, CLOSEST) / np.maximum(_around(total, count), 1e-300), 1.0)
-    values, vectors = np.linalg.eigh(np.maximum(less, 0.0)[:, None, None] * _around(whitened, count))
-    share = np.where(values > LEAST_POWER, 1 - 1 / np.maximum(values, 1.0), 0.0)
+    power, chance = _smoothed(products / np.outer(deviation, deviation))
+    values, vectors = np.linalg.eigh(power)
+    # less by what chance may have added, or noise that looks strong passes for force
+    share = 1 - 1 / np.maximum(values / (1 + np.sqrt(chance))[:, None], 1.0)
     # which directions these are is itself known from some lines only
-    unsure = np.maximum(1 - 1 / np.maximum(values, 1.0), np.sum(_weights(count) ** 2))
+    unsure = np.maximum(1 - 1 / np.maximum(values, 1.0), chance[:, None])
     whole, root = (
         deviation[:, None] * (vectors * weight[:, None, :]) @ vectors.conj().swapaxes(1, 2) / deviation
         for weight in (share, np.sqrt(unsure))
@@ -71,6 +66,22 @@ def without_force_noise(lines: WindowedLines, variance: Real) -> WindowedLines:
         force_here=np.einsum("kij,kj->ki", whole[lines.band], spectrum[lines.band]),
         trust=root[lines.band],
     )
+
+
+def _smoothed(products: Complex) -> tuple[Complex, Real]:
+    """Mean of matrices over as many neighbours as differ by no more than chance does, and its relative variance."""
+    widest = min(SCALES[0], len(products) // 5)
+    mean, chance = _around(products, widest), np.full(len(products), float(np.sum(_weights(widest) ** 2)))
+    for count in SCALES[1:]:
+        if count >= widest:
+            continue
+        closer, variance = _around(products, count), float(np.sum(_weights(count) ** 2))
+        power, around = (np.maximum(np.einsum("kqq->k", one).real, 1e-300) for one in (closer, mean))
+        beyond = np.abs(np.log(power / around)) / np.sqrt(variance) - CHANCE
+        believed = np.clip(beyond / 2.0, 0.0, 1.0)
+        mean = mean + believed[:, None, None] * (closer - mean)
+        chance = chance + believed * (variance - chance)
+    return mean, chance
 
 
 def _around(power: Complex, count: int) -> Complex:

@@ -77,6 +77,16 @@ class WindowedLines:
             trust=self.trust[::every],
         )
 
+    def with_measured_forces(self) -> "WindowedLines":
+        """Forces as they were measured, where they were replaced."""
+        n = len(self.window) + self.start
+        return replace(
+            self,
+            force_lines=padded_force(self),
+            force_here=self.cut(self.trial.force[:n]),
+            trust=_full_trust(self.trial, len(self.band)),
+        )
+
     def cut(self, signal: NDArray[np.floating]) -> Complex:
         """Windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the record."""
         kept = signal[self.start : self.start + len(self.window)]
@@ -124,14 +134,14 @@ def windowed_lines(trial: Trial, band: tuple[float, float], decay: float) -> Win
     window /= np.sqrt(np.sum(window**2))
     axis = np.arange(kept // 2 + 1) * trial.rate / kept
     lines = np.flatnonzero((axis >= max(band[0], 3 * trial.rate / kept)) & (axis <= band[1]))
-    none, trust = np.zeros(0, dtype=complex), np.tile(np.eye(trial.force.shape[1], dtype=complex), (len(lines), 1, 1))
+    none, trust = np.zeros(0, dtype=complex), _full_trust(trial, len(lines))
     stub = WindowedLines(trial, padded, run_in, window, lines, axis[lines], none, none, none, trust)
-    return replace(
-        stub,
-        force_lines=padded_force(stub),
-        force_here=stub.cut(trial.force),
-        measured=stub.cut(trial.response),
-    )
+    return replace(stub.with_measured_forces(), measured=stub.cut(trial.response))
+
+
+def _full_trust(trial: Trial, count: int) -> Complex:
+    """That of forces as measured."""
+    return np.tile(np.eye(trial.force.shape[1], dtype=complex), (count, 1, 1))
 
 
 def _rising(trial: Trial) -> int:
