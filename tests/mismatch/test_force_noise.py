@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from scipy.signal import firwin, lfilter
 
 from mismatch import Explanation, LabError, ModelShape, Trial, band_of, diagnose, predict_lines, windowed_lines
+from mismatch.acceptance import NOISE_LIKE
+from mismatch.leftover import leftover
 from mismatch.true_forces import without_force_noise
 from mismatch.windowed_lines import WindowedLines
 from modal_fit import ModalModel
@@ -74,3 +76,45 @@ def test_a_recording_too_short_for_wide_means(small_model: ModalModel) -> None:
     short = replace(trial, force=trial.force[: 6 * int(RATE)], response=trial.response[: 6 * int(RATE)])
     prepared = windowed_lines(short, band_of(small_model, RATE), 2.0)
     assert np.isfinite(without_force_noise(prepared, np.ones(2)).force_here).all()
+
+
+def test_a_smooth_spectrum_is_averaged_widely_and_a_harmonic_is_kept(lines: WindowedLines) -> None:
+    """Noise of two newtons a line with a harmonic: nearly nothing is left beside it, nearly all of it at its line."""
+    trial, rng = lines.trial, np.random.default_rng(6)
+    time = np.arange(len(trial.force)) / RATE
+    harmonic = 20.0 * np.sin(2 * np.pi * 11.0 * time)
+    noise = 2.0 * rng.normal(size=trial.force.shape)
+    mixed = replace(lines, trial=replace(trial, force=harmonic[:, None] * [1.0, -0.6] + noise))
+    weighed = without_force_noise(mixed.with_measured_forces(), np.full(2, 4.0))
+    beside = np.abs(lines.frequencies - 11.0) > 1.0
+    assert np.mean(np.abs(weighed.force_here[beside]) ** 2) < 0.03 * 4.0
+    true, peak = lines.cut(harmonic[:, None] * [1.0, -0.6]), np.abs(lines.frequencies - 11.0) < 0.1
+    assert np.abs(weighed.force_here - true)[peak].max() < 0.1 * np.abs(true[peak]).max()
+
+
+def _swelling(model: ModalModel) -> WindowedLines:
+    """Forces with noise, which push the second mode for three seconds of two minutes; responses with hardly any."""
+    rng = np.random.default_rng(7)
+    n = int(120 * RATE)
+    low, high = (
+        lfilter(firwin(257, band, fs=RATE, pass_zero=False), 1.0, rng.normal(size=(n, 2)), axis=0)
+        for band in ((2.0, 9.0), (11.0, 17.0))
+    )
+    force = 20.0 * low + 20.0 * high * (np.abs(np.arange(n) / RATE - 70.0) < 1.5)[:, None]
+    trial = Trial("t", RATE, force, np.zeros((n, 2)), np.array([2, 2]), ("fx", "fy", "ax", "ay"))
+    lines = windowed_lines(trial, band_of(model, RATE), 1.0)
+    shape = ModelShape(model, LabError())
+    response = lines.signal(predict_lines(Explanation(shape, np.zeros(shape.size)), lines).spectrum)
+    measured = response + 0.005 * response.std(axis=0) * rng.normal(size=response.shape)
+    noisy = replace(trial, force=force + rng.normal(size=force.shape), response=measured)
+    return without_force_noise(windowed_lines(noisy, band_of(model, RATE), 1.0), np.ones(2))
+
+
+def test_force_that_swells_from_little_leaves_nothing(small_model: ModalModel) -> None:
+    """Taken for noise where it is weak on average, it would leave a residual that comes and goes with the signal."""
+    lines = _swelling(small_model)
+    shape = ModelShape(small_model, LabError())
+    known = Explanation(shape, np.zeros(shape.size))
+    only = windowed_lines(replace(lines.trial, force=lines.signal(lines.force_lines)), band_of(small_model, RATE), 1.0)
+    assert leftover(known, [only]).share > 10 * NOISE_LIKE
+    assert leftover(known, [lines]).share < NOISE_LIKE
