@@ -1,13 +1,13 @@
 """When a fitted cause is worth accepting, and when so much is left that none is named."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from .diagnosis import Improvement
 from .explanation import Cause, Explanation
-from .fitting import Fit
+from .fitting import Fit, fit
 from .leftover import Leftover
 from .physics import ChainPhysics, LimitedPhysics
 from .windowed_lines import WindowedLines
@@ -32,6 +32,9 @@ SMALL = 0.01
 
 AFTER_A_LAW = 0.1
 """The same once a joint's law was accepted, whose form is never quite the true one."""
+
+TO_REST = 60
+"""Iterations at most for modes to make up for a cause that is taken away."""
 
 
 @dataclass(frozen=True)
@@ -103,10 +106,11 @@ def worth_it(option: Option, current: Fit, base: Fit, lines: list[WindowedLines]
     It must then be more likely, too, than that the lab was wrong in nothing but all dampings, or all frequencies.
     """
     gain = current.score - option.fitted.score
-    clear = _mode_measured(option.fitted) if option.name == "missing_mode" else _measured(option.fitted)
-    if not clear:
-        return False
-    if gain < evidence_needed(current, base):
+    needed = evidence_needed(current, base)
+    if option.name == "missing_mode":
+        if gain < needed + _places_of_a_mode(option.fitted, lines) or not _mode_measured(option.fitted):
+            return False
+    elif gain < needed or not (_measured(option.fitted) or _is_missed(option.fitted, lines, needed)):
         return False
     if current.misfit - option.fitted.misfit > LEAST_EVIDENCE:
         return True
@@ -123,6 +127,25 @@ def _plainer_gain(current: Fit, lines: list[WindowedLines]) -> float:
     rows = current.explanation.u.reshape(-1, shape.per_mode)[: len(shape.nominal.poles) - shape.added]
     cost = float(np.log(2 * sum(one.measured.size for one in lines)))
     return max(float(np.sum(rows[:, k] ** 2 - cost)) for k in (0, 1))
+
+
+def _places_of_a_mode(fitted: Fit, lines: list[WindowedLines]) -> float:
+    """Evidence that chance finds for the mode added last among all the places where one as narrow might lie."""
+    pole = fitted.explanation.model.poles[-1]
+    band = max(one.frequencies[-1] for one in lines) - min(one.frequencies[0] for one in lines)
+    return 2 * float(np.log(max(band / (-float(pole.real) / np.pi), 1.0)))
+
+
+def _is_missed(fitted: Fit, lines: list[WindowedLines], needed: float) -> bool:
+    """Whether modes, from where they are with the last cause, cannot make up for it; if it is a linear one.
+
+    A delay is taken up by real modes to first order: its number has a wide error, and still it is not none.
+    """
+    explanation = fitted.explanation
+    if not explanation.causes or not isinstance(explanation.causes[-1].physics, ChainPhysics):
+        return False
+    without = replace(explanation, causes=explanation.causes[:-1])
+    return fit(lines, without, fitted.noises, iterations=TO_REST).score - fitted.score > needed
 
 
 def _mode_measured(fitted: Fit) -> bool:

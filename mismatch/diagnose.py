@@ -188,14 +188,22 @@ def _search(
         rivals = [option.name for option in one.options if option.name != best.name and option.fitted.score < line]
         equivalents = equivalents or tuple(dict.fromkeys(rivals))
         accepted.append(_describe(best, current))
+        failed = one.sighted and not any(_gaining_law(option, current) for option in one.options)
         current = best.fitted
-        if one.sighted and all(cause.direction is None for cause in current.explanation.causes):
+        if failed and all(cause.direction is None for cause in current.explanation.causes):
             in_vain = moving.power
         moving = leftover(current.explanation, lines)
         steps.append(current)
     tell("causes made needless")
     steps, accepted, rejected = pruned(lines, steps, accepted)
     return _Search(steps, accepted, candidates + rejected, equivalents, before)
+
+
+def _gaining_law(option: Option, current: Fit) -> bool:
+    """Whether a joint's law gained something, though another cause may have gained more."""
+    causes = option.fitted.explanation.causes
+    law = bool(causes) and causes[-1].direction is not None
+    return law and option.fitted.score < current.score - LEAST_EVIDENCE
 
 
 def _linear(causes: dict[str, Physics]) -> dict[str, Physics]:
