@@ -53,17 +53,28 @@ def assess(lines: WindowedLines, explanation: Explanation, noise: NoiseModel) ->
 def with_noise(
     lines: WindowedLines, explanation: Explanation, noise: NoiseModel | None, seen: Assessed | None = None
 ) -> Assessed:
-    """Misfit under the noise that fits the residual best."""
+    """Misfit under the noise that fits the residual best.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The explanation predicts no finite response: simulated freely, it runs away.
+    """
     predicted = seen.predicted if seen is not None else predict_lines(explanation, lines)
     rest = lines.measured - predicted.response
+    if not np.isfinite(rest).all():
+        raise np.linalg.LinAlgError(f"the response predicted for {lines.trial.name} is not finite")
     through = through_structure(explanation, lines)
     found = fit_noise(lines.frequencies, rest, through, levels(lines), noise)
     return misfit_of(lines, predicted, rest, through, found)
 
 
 def least_misfit(explanation: Explanation, lines: WindowedLines) -> float:
-    """Misfit of an explanation to one recording under the noise that fits its residual best."""
-    return with_noise(lines, explanation, None).misfit
+    """Misfit of an explanation to one recording under its likeliest noise; infinite where it runs away."""
+    try:
+        return with_noise(lines, explanation, None).misfit
+    except np.linalg.LinAlgError:
+        return np.inf
 
 
 def through_structure(explanation: Explanation, lines: WindowedLines) -> Complex:

@@ -17,7 +17,7 @@ from .fitting import Fit, fit
 from .held_out import HeldOut, held_out_improvement
 from .leftover import Leftover, leftover
 from .linear_part import with_linear_part
-from .options import fitted_options
+from .options import Round, fitted_options
 from .physics import ChainPhysics, Physics, library
 from .pruning import pruned
 from .reporting_numbers import accepted_cause, accepted_mode, modal_deviation
@@ -36,7 +36,8 @@ FIRST_FIT = 30
 """Steps at most of the modal parameters: a nominal model may be far off."""
 
 AGAIN = 0.7
-"""Of what moved with the signal when joint laws were tried in vain: they are tried again when no more is left."""
+"""Of what moved with the signal when joint laws were tried in vain: they are tried again when no more is left, or when
+nothing else explains more."""
 
 MOSTLY = 0.5
 """Share of a force's power that must be left when its noise is taken out."""
@@ -175,11 +176,13 @@ def _search(
     in_vain = np.inf
     while len(steps) <= MOST_CAUSES:
         tell(f"causes, round {len(steps)}")
-        worth_trying = causes if moving.power < AGAIN * in_vain else _linear(causes)
-        one = fitted_options(lines, current, base, worth_trying, (moving, before))
+        spared = moving.power >= AGAIN * in_vain
+        one = fitted_options(lines, current, base, _linear(causes) if spared else causes, (moving, before))
+        if spared and _best(one, current) is None:
+            one = fitted_options(lines, current, base, causes, (moving, before))
         candidates += one.weighed
-        best = plainest(one.options)
-        if best is None or best.fitted.score > current.score - LEAST_EVIDENCE:
+        best = _best(one, current)
+        if best is None:
             break
         best = replace(best, fitted=settled(lines, best.fitted))
         if not worth_it(best, current, base, lines):
@@ -197,6 +200,11 @@ def _search(
     tell("causes made needless")
     steps, accepted, rejected = pruned(lines, steps, accepted)
     return _Search(steps, accepted, candidates + rejected, equivalents, before)
+
+
+def _best(one: Round, current: Fit) -> Option | None:
+    best = plainest(one.options)
+    return best if best is not None and best.fitted.score <= current.score - LEAST_EVIDENCE else None
 
 
 def _gaining_law(option: Option, current: Fit) -> bool:

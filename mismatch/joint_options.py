@@ -96,7 +96,8 @@ def joint_options(
         for place, (one, gain) in enumerate(zip(driven, gains, strict=True))
         if gain >= enough and (place < MOST_SIMULATED or gain > gains[0] - LEAST_EVIDENCE)
     ]
-    return side_by_side([partial(_simulated, lines, one) for one in near])
+    simulated = side_by_side([partial(_simulated, lines, one) for one in near])
+    return [option for option in simulated if option is not None]
 
 
 def _driven(lines: list[WindowedLines], current: Fit, screened: Screened) -> Fit:
@@ -109,12 +110,15 @@ def _driven(lines: list[WindowedLines], current: Fit, screened: Screened) -> Fit
     return fit(lines, best.explanation, best.noises, iterations=4)
 
 
-def _simulated(lines: list[WindowedLines], near: Fit) -> Option:
-    """The law of a driven fit, now free to move as it makes the structure move."""
+def _simulated(lines: list[WindowedLines], near: Fit) -> Option | None:
+    """The law of a driven fit, now free to move as it makes the structure move; None if that runs away."""
     last = near.explanation.causes[-1]
     free = replace(near.explanation, causes=(*near.explanation.causes[:-1], replace(last, seen=None)))
     # the one that is accepted is fitted to the end
-    fitted = fit(lines, free, near.noises, iterations=10, tolerance=10.0)
+    try:
+        fitted = fit(lines, free, near.noises, iterations=10, tolerance=10.0)
+    except np.linalg.LinAlgError:
+        return None
     return Option(answer_name(last.physics), direction_of(fitted.explanation.causes[-1]), fitted)
 
 
