@@ -35,7 +35,7 @@ def test_a_delay_that_modes_nearly_take_up_is_named(
 
 
 def test_laws_tried_in_vain_are_tried_again_behind_a_delay(model: ModalModel) -> None:
-    """Simulated with the delay unknown, every law runs away; and what moves with the signal hardly falls with the delay."""
+    """Simulated with the delay unknown every law runs away, and the delay hardly lessens what moves with the signal."""
     rng, direction = np.random.default_rng(11), np.array([0.8, -0.6])
     made = []
     for name, level in (("low", 20.0), ("high", 60.0)):
