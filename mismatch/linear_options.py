@@ -47,22 +47,17 @@ def linear_options(
     cost = float(np.log(2 * sum(one.measured.size for one in lines)))
     largest = max([one.gain for one in chains] + [mode.gain, 0.0])
     tasks: list[Callable[[], Option | None]] = []
-    for place, one in enumerate(chains[:MOST_CHAINS]):
+    for one in chains[:MOST_CHAINS]:
         if one.gain > max(least, one.cause.size * cost, PROMISING * largest):
-            tasks.append(partial(_chain_option, lines, current, one.cause, likeliest=place == 0))
+            tasks.append(partial(_chain_option, lines, current, one.cause))
     numbers = current.explanation.shape.per_mode - 2
     if not current.explanation.causes and mode.gain > max(least, numbers * cost, PROMISING * largest):
         tasks.append(partial(_mode_option, lines, current, mode))
     return [option for option in side_by_side(tasks) if option is not None]
 
 
-def _chain_option(lines: list[WindowedLines], current: Fit, cause: Cause, *, likeliest: bool) -> Option:
-    """The likeliest cause is sought from the lab's own model too."""
-    if likeliest:
-        fitted = with_chain(lines, current, cause)
-    else:
-        fitted = fit(lines, current.explanation.with_cause(cause), current.noises)
-    return Option(answer_name(cause.physics), channel_of(cause), fitted)
+def _chain_option(lines: list[WindowedLines], current: Fit, cause: Cause) -> Option:
+    return Option(answer_name(cause.physics), channel_of(cause), with_chain(lines, current, cause))
 
 
 def _mode_option(lines: list[WindowedLines], current: Fit, mode: SightedMode) -> Option | None:
