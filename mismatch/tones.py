@@ -73,12 +73,9 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
         frequency = float(axis[k])
         if _too_few_left(lines, frequency):
             continue
-        # how strong it is does not depend on how far it leaks
-        shown = [
-            np.interp(frequency, one.frequencies, above_neighbours(power, NEAR))
-            for one, power in zip(lines, powers, strict=True)
-        ]
         exact = sharp_frequency(_rests(fitted, lines), [one.trial.rate for one in lines], frequency)
+        # the lines beside it seemed to stand out as much; how strong it is does not depend on how far it leaks
+        shown = [_at(above_neighbours(power, NEAR), one, exact) for one, power in zip(lines, powers, strict=True)]
         return Tone(exact, _amplitudes(fitted, lines, exact), 2 * float(np.sum(shown)))
     return None
 
@@ -127,9 +124,13 @@ def stands_out(fitted: Fit, lines: list[WindowedLines], frequency: float) -> boo
     total = 0.0
     for one, noise in zip(lines, fitted.noises, strict=True):
         power = _whitened_power(fitted, one, noise)
-        contrast = sharp_contrast(power)
-        total += float(contrast[np.abs(one.frequencies - frequency) < 1.5 * _step(one)].max(initial=0.0))
+        total += _at(sharp_contrast(power), one, frequency)
     return total > TONE_CONTRAST
+
+
+def _at(contrast: Real, lines: WindowedLines, frequency: float) -> float:
+    """The largest of the lines (n_lines,) about a frequency, Hz."""
+    return float(contrast[np.abs(lines.frequencies - frequency) < 1.5 * _step(lines)].max(initial=0.0))
 
 
 def _rests(fitted: Fit, lines: list[WindowedLines]) -> list[Real]:
