@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mismatch import Diagnosis, Explanation, Trial, diagnose
 from mismatch.acceptance import LEAST_EVIDENCE, Option, worth_it
 from mismatch.fitting import Fit
+from mismatch.tones import find_tone
 from modal_fit import ModalModel
 
 
@@ -62,3 +63,22 @@ def test_a_narrow_mode_must_outdo_chance_in_all_its_places(
     gained = LEAST_EVIDENCE + 5.0
     fitted = Fit(Explanation(shape, np.zeros(shape.size)), base.noises, -200.0, 0.0, -gained, 1e-6 * np.eye(shape.size))
     assert worth_it(Option("missing_mode", {}, fitted), base, base, list(known.lines)) is named
+
+
+def test_the_gain_of_a_tone_is_that_of_its_own_line(
+    small_model: ModalModel,
+    trial_of: Callable[[ModalModel, str, float, int], Trial],
+    hand_made: Callable[[ModalModel, list[Trial]], Diagnosis],
+) -> None:
+    """A tone in the middle of a line leaves nothing on the lines beside it, which look as if they stood out as much."""
+    made = [trial_of(small_model, "low", 20.0, 1), trial_of(small_model, "high", 60.0, 2)]
+    lines = hand_made(small_model, made).lines[0]
+    frequency = float(lines.frequencies[len(lines.frequencies) // 3])
+    wave = 0.02 * np.cos(2 * np.pi * frequency * np.arange(len(made[0].response)) / made[0].rate)
+    humming = hand_made(small_model, [replace(one, response=one.response + wave[:, None]) for one in made])
+    found = find_tone(humming.base, list(humming.lines))
+    assert found is not None
+    assert found.frequency == pytest.approx(frequency, abs=0.2 / 40.0)
+    # a line of a wave of amplitude a over n samples has the power a^2 n / 4, two channels, two recordings
+    expected = 2 * 2 * (0.02**2 * len(lines.window) / 4) / 0.02**2
+    assert found.gain == pytest.approx(expected, rel=0.5)
