@@ -22,7 +22,7 @@ from benchmarks.blind_trial.effects import ALL, FOREIGN, LISTED
 from benchmarks.blind_trial.excitation import KEPT, milling_test
 from benchmarks.blind_trial.integrator import Element, linear_response, respond, tip_motion
 from benchmarks.blind_trial.noise import COLOURS, measurement_noise
-from benchmarks.blind_trial.scoring import angle_between, excess_removed, outcome_of, wilson
+from benchmarks.blind_trial.scoring import angle_between, excess_removed, outcome_of, score_case, wilson
 from benchmarks.blind_trial.sealed_case import case_name, open_truth, write_case
 from benchmarks.blind_trial.simulation import build_case
 from benchmarks.blind_trial.structures import Structure, draw_structure
@@ -263,6 +263,17 @@ def test_reading_direction_interval_and_improvement(tmp_path: Path) -> None:
     assert answer.parameters == (("delay_s", 1e-3, 1e-5),)
     assert answer.removed == pytest.approx(0.9)
     assert read_answer(tmp_path / "nothing.json").verdict == "failed"
+
+
+def test_an_interval_is_held_against_the_nearest_number_of_its_kind() -> None:
+    """A mode at 7 Hz and a tone at 17 Hz, both told as frequencies, and the tone's harmonic that was not counted."""
+    truth = _truth("missing_mode", "unmeasured_excitation")
+    truth |= {"parameters": [{"fn": 7.0, "zeta": 0.03}, {"hz": 17.0}], "joint_direction_at_tcp": None}
+    truth |= {"residual_over_noise": 2.0, "residual_after_refit_over_noise": 2.0}
+    told = (("frequency_hz", 7.1, 0.01), ("damping_ratio", 0.031, 0.001), ("frequency_hz", 17.001, 0.001))
+    answer = Answer("explained", ("missing_mode", "unmeasured_excitation"), (), None, (*told, ("frequency_hz", 34, 1)))
+    score = score_case("case", truth, answer, {"seconds": 1.0})
+    assert score.covered == (("fn", False), ("zeta", True), ("hz", True))
 
 
 def test_excess_and_wilson() -> None:
