@@ -268,8 +268,8 @@ def test_reading_direction_interval_and_improvement(tmp_path: Path) -> None:
 def test_an_interval_is_held_against_the_nearest_number_of_its_kind() -> None:
     """A mode at 7 Hz and a tone at 17 Hz, both told as frequencies, and the tone's harmonic that was not counted."""
     truth = _truth("missing_mode", "unmeasured_excitation")
-    truth |= {"parameters": [{"fn": 7.0, "zeta": 0.03}, {"hz": 17.0}], "joint_direction_at_tcp": None}
-    truth |= {"residual_over_noise": 2.0, "residual_after_refit_over_noise": 2.0}
+    truth.update(parameters=[{"fn": 7.0, "zeta": 0.03}, {"hz": 17.0}], joint_direction_at_tcp=None)
+    truth.update(residual_over_noise=2.0, residual_after_refit_over_noise=2.0)
     told = (("frequency_hz", 7.1, 0.01), ("damping_ratio", 0.031, 0.001), ("frequency_hz", 17.001, 0.001))
     answer = Answer("explained", ("missing_mode", "unmeasured_excitation"), (), None, (*told, ("frequency_hz", 34, 1)))
     score = score_case("case", truth, answer, {"seconds": 1.0})
