@@ -33,6 +33,9 @@ SMALL = 0.01
 AFTER_A_LAW = 0.1
 """The same once a joint's law was accepted, whose form is never quite the true one."""
 
+UNCLEAR = 5.0
+"""Times the evidence that a linear cause needs whose number does not stand out of its error."""
+
 TO_REST = 60
 """Iterations at most for modes to make up for a cause that is taken away."""
 
@@ -110,7 +113,9 @@ def worth_it(option: Option, current: Fit, base: Fit, lines: list[WindowedLines]
     if option.name == "missing_mode":
         if gain < needed + _places_of_a_mode(option.fitted, lines) or not _mode_measured(option.fitted):
             return False
-    elif gain < needed or not (_measured(option.fitted) or _is_missed(option.fitted, lines, needed)):
+    elif gain < needed or not (
+        _measured(option.fitted) or (gain > UNCLEAR * needed and _is_missed(option.fitted, lines, UNCLEAR * needed))
+    ):
         return False
     if current.misfit - option.fitted.misfit > LEAST_EVIDENCE:
         return True
