@@ -49,6 +49,11 @@ class Option:
     fitted: Fit
 
 
+def gains(option: Option, current: Fit) -> bool:
+    """Whether an option has the least evidence that counts."""
+    return option.fitted.score <= current.score - LEAST_EVIDENCE
+
+
 def plainest(options: list[Option]) -> Option | None:
     """The option with the best score, or the form of the same cause that is as good with fewer numbers."""
     best = min(options, key=lambda option: option.fitted.score, default=None)
@@ -111,11 +116,11 @@ def worth_it(option: Option, current: Fit, base: Fit, lines: list[WindowedLines]
     gain = current.score - option.fitted.score
     needed = evidence_needed(current, base)
     if option.name == "missing_mode":
-        if gain < needed + _places_of_a_mode(option.fitted, lines) or not _mode_measured(option.fitted):
-            return False
-    elif gain < needed or not (
-        _measured(option.fitted) or (gain > UNCLEAR * needed and _is_missed(option.fitted, lines, UNCLEAR * needed))
-    ):
+        needed, clear = needed + _places_of_a_mode(option.fitted, lines), _mode_measured(option.fitted)
+    else:
+        clear = _measured(option.fitted)
+        needed *= 1.0 if clear else UNCLEAR
+    if gain < needed or not (clear or _is_missed(option, lines, needed)):
         return False
     if current.misfit - option.fitted.misfit > LEAST_EVIDENCE:
         return True
@@ -141,13 +146,13 @@ def _places_of_a_mode(fitted: Fit, lines: list[WindowedLines]) -> float:
     return 2 * float(np.log(max(band / (-float(pole.real) / np.pi), 1.0)))
 
 
-def _is_missed(fitted: Fit, lines: list[WindowedLines], needed: float) -> bool:
-    """Whether modes, from where they are with the last cause, cannot make up for it; if it is a linear one.
+def _is_missed(option: Option, lines: list[WindowedLines], needed: float) -> bool:
+    """Whether modes, from where they are with a cause of the measuring chain, cannot make up for it.
 
     A delay is taken up by real modes to first order: its number has a wide error, and still it is not none.
     """
-    explanation = fitted.explanation
-    if not explanation.causes or not isinstance(explanation.causes[-1].physics, ChainPhysics):
+    fitted, explanation = option.fitted, option.fitted.explanation
+    if option.name == "missing_mode" or not isinstance(explanation.causes[-1].physics, ChainPhysics):
         return False
     without = replace(explanation, causes=explanation.causes[:-1])
     return fit(lines, without, fitted.noises, iterations=TO_REST).score - fitted.score > needed

@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from modal_fit import ModalModel
 
-from .acceptance import LEAST_EVIDENCE, Option, holds_elsewhere, plainest, unexplained, worth_it
+from .acceptance import LEAST_EVIDENCE, Option, gains, holds_elsewhere, plainest, unexplained, worth_it
 from .diagnosis import AcceptedCause, Candidate, Diagnosis
 from .explanation import Explanation
 from .fault_repair import repair_plain_faults, with_tones_settled
@@ -18,7 +18,7 @@ from .held_out import HeldOut, held_out_improvement
 from .leftover import Leftover, leftover
 from .linear_part import with_linear_part
 from .options import Round, fitted_options
-from .physics import ChainPhysics, Physics, library
+from .physics import ChainPhysics, JointPhysics, Physics, library
 from .pruning import pruned
 from .reporting_numbers import accepted_cause, accepted_mode, modal_deviation
 from .settling import settled
@@ -178,9 +178,10 @@ def _search(
         tell(f"causes, round {len(steps)}")
         spared = moving.power >= AGAIN * in_vain
         one = fitted_options(lines, current, base, _linear(causes) if spared else causes, (moving, before))
-        if spared and _best(one, current) is None:
-            one = fitted_options(lines, current, base, causes, (moving, before))
         candidates += one.weighed
+        if spared and _best(one, current) is None:
+            one = fitted_options(lines, current, base, _laws(causes), (moving, before))
+            candidates += one.weighed
         best = _best(one, current)
         if best is None:
             break
@@ -204,18 +205,21 @@ def _search(
 
 def _best(one: Round, current: Fit) -> Option | None:
     best = plainest(one.options)
-    return best if best is not None and best.fitted.score <= current.score - LEAST_EVIDENCE else None
+    return best if best is not None and gains(best, current) else None
 
 
 def _gaining_law(option: Option, current: Fit) -> bool:
     """Whether a joint's law gained something, though another cause may have gained more."""
     causes = option.fitted.explanation.causes
-    law = bool(causes) and causes[-1].direction is not None
-    return law and option.fitted.score < current.score - LEAST_EVIDENCE
+    return bool(causes) and causes[-1].direction is not None and gains(option, current)
 
 
 def _linear(causes: dict[str, Physics]) -> dict[str, Physics]:
     return {name: one for name, one in causes.items() if isinstance(one, ChainPhysics)}
+
+
+def _laws(causes: dict[str, Physics]) -> dict[str, Physics]:
+    return {name: one for name, one in causes.items() if isinstance(one, JointPhysics)}
 
 
 def _that_hold_elsewhere(search: _Search, lines: list[WindowedLines]) -> tuple[_Search, HeldOut]:

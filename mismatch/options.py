@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from .acceptance import LEAST_EVIDENCE, NOISE_LIKE, SMALL, Option, evidence_needed, unexplained
+from .acceptance import NOISE_LIKE, SMALL, Option, evidence_needed, gains, unexplained
 from .chain_screening import ScreenedChain, screen_chains
 from .diagnosis import Candidate
 from .fitting import Fit
@@ -99,7 +99,7 @@ def _screened(
 
 def _best(options: list[Option], current: Fit) -> Option | None:
     best = min(options, key=lambda option: option.fitted.score, default=None)
-    return best if best is not None and best.fitted.score <= current.score - LEAST_EVIDENCE else None
+    return best if best is not None and gains(best, current) else None
 
 
 def _explains(best: Option | None, lines: list[WindowedLines], before: Leftover) -> bool:

@@ -87,3 +87,10 @@ def linear_acceleration(model: ModalModel, force: Real) -> Real:
     frequencies = np.fft.rfftfreq(2 * n, 1 / RATE)
     spectrum = np.einsum("kpq,kq->kp", model.receptance(frequencies), np.fft.rfft(force, n=2 * n, axis=0))
     return np.asarray(np.fft.irfft(-((2 * np.pi * frequencies[:, None]) ** 2) * spectrum, n=2 * n, axis=0)[:n])
+
+
+def late(response: Real, rate: float, delay: float) -> Real:
+    """The response ``delay`` seconds later, by a padded Fourier transform."""
+    n = 2 * len(response)
+    shift = np.exp(-2j * np.pi * np.fft.rfftfreq(n, 1 / rate) * delay)[:, None]
+    return np.asarray(np.fft.irfft(np.fft.rfft(response, n=n, axis=0) * shift, n=n, axis=0)[: len(response)])

@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from concealed_recordings import RATE, Concealed, forces, trial
-from numpy.typing import NDArray
+from concealed_recordings import RATE, Concealed, forces, late, trial
 
 from mismatch import Diagnosis, Explanation, Trial, diagnose
 from mismatch.acceptance import LEAST_EVIDENCE, Option, worth_it
@@ -15,20 +14,14 @@ from mismatch.tones import find_tone
 from modal_fit import ModalModel
 
 
-def _late(response: NDArray[np.float64], rate: float, delay: float) -> NDArray[np.float64]:
-    n = 2 * len(response)
-    shift = np.exp(-2j * np.pi * np.fft.rfftfreq(n, 1 / rate) * delay)[:, None]
-    return np.fft.irfft(np.fft.rfft(response, n=n, axis=0) * shift, n=n, axis=0)[: len(response)]
-
-
 def test_a_delay_that_modes_nearly_take_up_is_named(
     small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], Trial]
 ) -> None:
     """Real modes follow a delay of 0.3 ms to first order: its number has a wide error, and yet it is not none."""
     levels = ("low", 20.0), ("mid", 40.0), ("high", 80.0)
     made = [trial_of(small_model, name, level, k) for k, (name, level) in enumerate(levels)]
-    late = [replace(one, response=_late(one.response, one.rate, 3e-4)) for one in made]
-    found = diagnose(small_model, late)
+    delayed = [replace(one, response=late(one.response, one.rate, 3e-4)) for one in made]
+    found = diagnose(small_model, delayed)
     assert [cause.name for cause in found.physics] == ["channel_delay"]
     cause = found.physics[0]
     assert cause.parameters["delay_s"] == pytest.approx(3e-4, rel=0.15)
@@ -42,7 +35,7 @@ def test_laws_tried_in_vain_are_tried_again_behind_a_delay(model: ModalModel) ->
     for name, level in (("low", 20.0), ("high", 60.0)):
         force = forces(rng, level, 24.0)
         moved = Concealed(lambda x, v: 5e9 * x**3, direction).acceleration(model, force)
-        made.append(trial(name, force, _late(moved, RATE, 3e-3), rng))
+        made.append(trial(name, force, late(moved, RATE, 3e-3), rng))
     found = diagnose(model, made)
     assert {cause.name for cause in found.physics} == {"channel_delay", "stiffness_hardening"}
 

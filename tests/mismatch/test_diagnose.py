@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from concealed_recordings import Concealed, Law, forces, linear_acceleration, trial
+from concealed_recordings import RATE, Concealed, Law, forces, late, linear_acceleration, trial
 
 from mismatch import Diagnosis, Settings, Trial, diagnose
 from mismatch.diagnosis_file import improved_model_of, write_diagnosis
@@ -59,10 +59,7 @@ def test_a_delay_is_found_and_ends_in_files(model: ModalModel, tmp_path: Path) -
     made = []
     for name, level in (("low", 20.0), ("high", 60.0)):
         force = forces(rng, level, 24.0)
-        late = linear_acceleration(model, force)
-        shift = np.exp(-2j * np.pi * np.fft.rfftfreq(2 * len(late), 1 / 256.0) * 3e-3)
-        late = np.fft.irfft(np.fft.rfft(late, n=2 * len(late), axis=0) * shift[:, None], axis=0)[: len(late)]
-        made.append(trial(name, force, late, rng))
+        made.append(trial(name, force, late(linear_acceleration(model, force), RATE, 3e-3), rng))
     found = diagnose(model, made)
     assert [cause.name for cause in found.physics] == ["channel_delay"]
     cause = found.physics[0]

@@ -111,7 +111,10 @@ def _swelling(model: ModalModel) -> WindowedLines:
 
 
 def test_force_that_swells_from_little_leaves_nothing(small_model: ModalModel) -> None:
-    """Taken for noise where it is weak on average, it would leave a residual that comes and goes with the signal."""
+    """Taken for noise where it is weak on average, it would leave a residual that comes and goes with the signal.
+
+    So it is with a loud swell; a faint one, which noise of the force outlasts in the same mode, still seems to.
+    """
     lines = _swelling(small_model)
     shape = ModelShape(small_model, LabError())
     known = Explanation(shape, np.zeros(shape.size))
