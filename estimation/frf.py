@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
+from foundation import Band, InputError, checked_band
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,8 @@ class Frf:
         step leaves those lines out. Values there are zero.
     multiple_coherence : (n_frequencies, n_responses) or None
     covariance : FrfCovariance or None
+    band
+        Lowest and highest frequency (Hz) between which the FRF holds; None: not known. Whoever uses it outside says so.
 
     Raises
     ------
@@ -67,8 +69,10 @@ class Frf:
     valid: NDArray[np.bool_]
     multiple_coherence: NDArray[np.float64] | None = None
     covariance: FrfCovariance | None = None
+    band: Band | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "band", checked_band(self.band, "FRF"))
         expected = (len(self.frequencies), len(self.responses), len(self.excitations))
         if self.values.shape != expected:
             raise InputError(

@@ -20,8 +20,8 @@ def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", proven
     """Write an FRF whole.
 
     Root attributes ``format, format_version, title, provenance, quantity, unit, responses, excitations`` (JSON
-    lists); datasets ``frequencies`` (Hz), ``values`` (complex), ``valid``, and where known ``multiple_coherence``,
-    ``covariance/response``, ``covariance/excitation``.
+    lists), and where the band is known ``band_hz`` (two numbers); datasets ``frequencies`` (Hz), ``values``
+    (complex), ``valid``, and where known ``multiple_coherence``, ``covariance/response``, ``covariance/excitation``.
 
     Raises
     ------
@@ -35,6 +35,8 @@ def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", proven
         file.attrs["excitations"] = json.dumps(list(frf.excitations))
         for name in ("frequencies", "values", "valid"):
             file[name] = getattr(frf, name)
+        if frf.band is not None:
+            file.attrs["band_hz"] = list(frf.band)
         if frf.multiple_coherence is not None:
             file["multiple_coherence"] = frf.multiple_coherence
         if frf.covariance is not None:
@@ -94,4 +96,5 @@ def _read(file: h5py.File) -> Frf:
         np.asarray(file["valid"][:], dtype=bool),
         coherence,
         covariance,
+        tuple(file.attrs["band_hz"]) if "band_hz" in file.attrs else None,
     )

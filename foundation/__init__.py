@@ -7,13 +7,17 @@ from foundation.atomic_files import writing_whole_file
 from foundation.degrees_of_freedom import DegreeOfFreedom
 from foundation.errors import FileFormatError, InputError, MillfrfError
 from foundation.units import SI_UNITS, si_factor
+from foundation.valid_band import Band, checked_band, shared_band
 
 __all__ = [
     "SI_UNITS",
+    "Band",
     "DegreeOfFreedom",
     "FileFormatError",
     "InputError",
     "MillfrfError",
+    "checked_band",
+    "shared_band",
     "si_factor",
     "writing_whole_file",
 ]

@@ -53,7 +53,7 @@ def _text_kind(file: Path) -> str | None:
     if text.lstrip().startswith("{"):
         return _json_kind(text)
     rows = [line for line in text.splitlines() if line and not line.startswith("#")]
-    if rows and next(csv.reader(rows[:1])) == _LOBES_COLUMNS:
+    if rows and next(csv.reader(rows[:1]))[: len(_LOBES_COLUMNS)] == _LOBES_COLUMNS:
         return LOBES
     try:
         return CUTTING if "cutting" in tomllib.loads(text) else None

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf
-from foundation import InputError
+from foundation import Band, InputError, checked_band
 
 
 @dataclass(frozen=True)
@@ -92,6 +92,9 @@ class ModalModel:
     delay
         Pure delay of the measuring chain, s: the whole expression times ``exp(-i w delay)``. Of a ``transfer`` only,
         whose input passes converters and amplifiers; a structure has none.
+    band
+        Lowest and highest frequency (Hz) between which the model holds, as a rule those of its fit; None: not known.
+        Whoever uses the model outside says so.
 
     Raises
     ------
@@ -110,8 +113,10 @@ class ModalModel:
     covariance: NDArray[np.float64] | None = None
     physics: tuple[dict[str, Any], ...] = ()
     delay: float = 0.0
+    band: Band | None = None
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "band", checked_band(self.band, "modal model"))
         n_modes = len(self.poles)
         if self.delay and self.quantity != "transfer":
             raise InputError(
@@ -164,4 +169,13 @@ class ModalModel:
         """The model's FRF as an :class:`estimation.Frf`, valid on every line."""
         axis = np.asarray(frequencies, dtype=float)
         valid = np.ones(len(axis), dtype=bool)
-        return Frf(axis, self.receptance(axis), self.responses, self.excitations, self.quantity, self.unit, valid)
+        return Frf(
+            axis,
+            self.receptance(axis),
+            self.responses,
+            self.excitations,
+            self.quantity,
+            self.unit,
+            valid,
+            band=self.band,
+        )

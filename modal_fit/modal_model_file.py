@@ -44,6 +44,8 @@ def write_modal_model(path: str | os.PathLike[str], model: ModalModel) -> None:
         content["covariance"] = model.covariance.tolist()
     if model.delay:
         content["delay_s"] = model.delay
+    if model.band is not None:
+        content["band_hz"] = list(model.band)
     if model.physics:
         content["physics"] = list(model.physics)
     with writing_whole_file(path) as temporary:
@@ -110,7 +112,14 @@ def _model(content: dict[str, Any]) -> ModalModel:
         covariance=None if covariance is None else np.asarray(covariance, dtype=float),
         physics=tuple(content.get("physics", ())),
         delay=float(content.get("delay_s", 0.0)),
+        band=_band(content),
     )
+
+
+def _band(content: dict[str, Any]) -> tuple[float, float] | None:
+    """As the file states it; files written before models carried a band state that of the fit they come from."""
+    stored = content.get("band_hz") or (content.get("provenance") or {}).get("band_hz")
+    return None if stored is None else (float(stored[0]), float(stored[1]))
 
 
 def _pairs(array: NDArray[np.complex128]) -> list[Any]:

@@ -1,6 +1,7 @@
 """Stability lobes from modal models and measured FRFs: knows nothing of acquisition hardware."""
 
 from .boundary import StabilityBoundary, StabilityGrid, stability_grid, trace_boundary
+from .certified import certified_lobes
 from .chatter import ChatterVerdict, classify_cut
 from .collocation import collocation, collocation_limits, lowest_limits
 from .delay_system import DelaySystem, delay_system
@@ -27,6 +28,7 @@ __all__ = [
     "StabilityLimits",
     "StabilityLobes",
     "ToolReceptance",
+    "certified_lobes",
     "classify_cut",
     "collocation",
     "collocation_limits",

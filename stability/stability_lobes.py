@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 BIFURCATIONS = ("hopf", "period-doubling", "fold", "none")
+STATUSES = ("verified", "not-verified", "lower-bound", "unresolved")
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class StabilityLobes:
     ----------
     spindle_speeds : (n_speeds,), rad/s
     depth_limits : (n_speeds,), m
-        Infinite where the cut is stable at every depth that was asked for.
+        Infinite where the cut is stable at every depth that was asked for; NaN where ``status`` is ``unresolved``.
     chatter_frequencies : (n_speeds,), Hz
         At the limit; NaN exactly where ``bifurcations`` is ``none``.
     bifurcations
@@ -27,6 +28,11 @@ class StabilityLobes:
         Solver's name: ``zero-order``, ``nyquist`` ...
     warnings
         What a user should know before trusting the lines; one sentence each.
+    status
+        One a speed. ``verified``: Floquet multipliers agree below, above and on a ladder beneath the limit (or up to
+        the largest depth, where there is no limit). ``not-verified``: the solver's word alone. ``lower-bound``: cuts
+        up to the depth given are stable, the limit itself was not found. ``unresolved``: the depth is NaN, nothing is
+        known. Empty when made: ``not-verified`` at every speed.
     """
 
     spindle_speeds: NDArray[np.float64]
@@ -35,16 +41,22 @@ class StabilityLobes:
     bifurcations: tuple[str, ...]
     method: str
     warnings: tuple[str, ...] = ()
+    status: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
+        if not self.status:
+            object.__setattr__(self, "status", ("not-verified",) * len(self.spindle_speeds))
         lengths = {
             len(self.spindle_speeds),
             len(self.depth_limits),
             len(self.chatter_frequencies),
             len(self.bifurcations),
+            len(self.status),
         }
         if len(lengths) != 1:
             raise InputError(f"stability lobes: columns of unequal lengths {sorted(lengths)}")
+        if foreign := set(self.status) - set(STATUSES):
+            raise InputError(f"stability lobes: unknown status {sorted(foreign)}; use one of {STATUSES}")
         unknown = set(self.bifurcations) - set(BIFURCATIONS)
         if unknown:
             raise InputError(f"stability lobes: unknown bifurcation {sorted(unknown)}; use one of {BIFURCATIONS}")
