@@ -8,7 +8,7 @@ from .frf import Frf, FrfCovariance
 from .frf_file import read_frf, write_frf
 from .h1 import h1, h1_side_by_side
 from .hammer import Tap, exponential_window, find_taps, force_window, without_added_damping
-from .independence import InputIndependence, input_independence
+from .independence import RANK_TOLERANCE, InputIndependence, bands_text, input_independence
 from .integration import displacement_from_acceleration
 from .local_polynomial import local_polynomial
 from .order_tracking import excitation_map, spectrogram, track_order
@@ -22,6 +22,7 @@ from .usable_samples import usable_samples
 from .windows import effective_averages, settings_for
 
 __all__ = [
+    "RANK_TOLERANCE",
     "BandDecimator",
     "BandRecord",
     "CrossSpectra",
@@ -34,6 +35,7 @@ __all__ = [
     "SweepPlan",
     "Tap",
     "band_record",
+    "bands_text",
     "choose_channels",
     "correct_high_pass",
     "cross_spectra",

@@ -81,6 +81,7 @@ def modal_model_from(
         unit=unit,
         residuals=residuals_from(model.outside, band),
         covariance=covariance[np.ix_(index, index)],
+        band=band,
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf, FrfCovariance, to_receptance
-from foundation import InputError
+from foundation import InputError, shared_band
 
 from .modal_model import ModalModel, Residuals
 from .polyreference import ModalFit, fit_polyreference
@@ -88,7 +88,12 @@ def calibrate_to_tip(
     covariance = _covariance(model, fit.model, chosen, ratios)
     residuals = None if model.residuals is None else _scaled(model.residuals, model, ratios)
     calibrated = replace(
-        model, right=model.right * ratios, responses=tip.responses, residuals=residuals, covariance=covariance
+        model,
+        right=model.right * ratios,
+        responses=tip.responses,
+        residuals=residuals,
+        covariance=covariance,
+        band=shared_band(model.band, shared_band(tip.band, sensor.band)),
     )
     return TipCalibration(calibrated, ratios, errors, chosen, fit, tuple(warnings))
 

@@ -6,9 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from acquisition import Recording
 from estimation import (
     CrossSpectra,
@@ -27,11 +24,9 @@ from estimation import (
 )
 from foundation import InputError
 
+from ..gate import check_inputs
 from ..progress import Watch, silent
 from ..provenance import sources, versions
-
-DRIVEN = 1e-4
-"""A line is driven where the inputs' power is above this share of their largest."""
 
 STACKS = ("sum", "side-by-side")
 ESTIMATORS: dict[str, Callable[[CrossSpectra], Frf]] = {"h1": h1, "h2": h2, "hv": hv}
@@ -136,18 +131,15 @@ def estimate_recordings(
         raise InputError(f"estimator {options.estimator} takes summed tests only; use --stack sum")
     tests = spectra_of_tests(paths, options, watch)
     total = sum_tests(tests)
-    driven = _driven(total)
-    independence = input_independence(total, _range(total.frequencies[driven]))
-    _require_independence(total, independence, driven)
+    warnings = check_inputs(total)
     frf = ESTIMATORS[options.estimator](total) if options.stack == "sum" else h1_side_by_side(tests)
     frf = correct_high_pass(frf, [channel.high_pass_hz for channel in total.responses])
-    warnings = list(independence.warnings)
     if total.n_excluded:
         warnings.append(
             f"{total.n_excluded} of {total.n_excluded + total.n_segments} segments hold overload, clipping or dropped "
             "samples and were left out"
         )
-    return Estimate(frf, tests, independence, tuple(warnings))
+    return Estimate(frf, tests, input_independence(total), tuple(warnings))
 
 
 def write_estimate(
@@ -220,28 +212,3 @@ def lines_of(spectra: CrossSpectra, band: tuple[float, float]) -> CrossSpectra:
         cross_spectra=spectra.cross_spectra[inside],
         output_spectra=spectra.output_spectra[inside],
     )
-
-
-def _driven(spectra: CrossSpectra) -> NDArray[np.bool_]:
-    """Lines above 0 Hz on which the inputs have power at all, each input weighed by its own largest."""
-    power = np.real(np.einsum("kii->ki", spectra.input_spectra))
-    largest = power.max(axis=0)
-    share = np.max(power / np.where(largest > 0, largest, 1.0), axis=1)
-    return np.asarray((share > DRIVEN) & (spectra.frequencies > 0))
-
-
-def _range(frequencies: NDArray[np.float64]) -> tuple[float, float] | None:
-    return (float(frequencies[0]), float(frequencies[-1])) if len(frequencies) else None
-
-
-def _require_independence(total: CrossSpectra, independence: InputIndependence, driven: NDArray[np.bool_]) -> None:
-    if not driven.any():
-        raise InputError("the inputs have no power on any line; check the excitation channels")
-    if not (independence.independent & driven).any():
-        n_inputs = len(total.excitations)
-        lines = total.frequencies[driven]
-        raise InputError(
-            f"the {n_inputs} inputs are dependent on every line they drive ({lines[0]:.4g} to {lines[-1]:.4g} Hz) in "
-            f"{total.n_tests} test{'s' if total.n_tests != 1 else ''} of {total.n_segments} segments: give at least "
-            f"{n_inputs} tests with different immersions, porous material, or shorter segments"
-        )

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from modal_fit import (
     write_modal_model,
 )
 
+from ..gate import check_records
 from ..progress import Watch, silent
 from ..provenance import add_to_json, sources, versions
 
@@ -87,15 +88,17 @@ def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions,
     Raises
     ------
     InputError
-        A method that needs an FRF, or recordings that cannot be stacked.
+        A method that needs an FRF, recordings that cannot be stacked, or dependent inputs.
     MillfrfError
         No stable pole was found.
     """
     if options.method != SUBSPACE:
         raise InputError(f"method {options.method!r} does not fit recordings; use {SUBSPACE}, or estimate an FRF first")
     records = [_band_record(path, options, watch) for path in paths]
+    doubts = check_records(records, options.band)
     with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
-        return fit_subspace(records, options.band, max_order=options.order, n_modes=options.n_modes)
+        fit = fit_subspace(records, options.band, max_order=options.order, n_modes=options.n_modes)
+    return replace(fit, warnings=(*doubts, *fit.warnings))
 
 
 def _band_record(path: str | os.PathLike[str], options: FitOptions, watch: Watch) -> BandRecord:
