@@ -13,8 +13,8 @@ from estimation import read_frf
 from modal_fit import read_modal_model
 from stability import read_lobes
 
-from .channel_levels import channel_levels, level_table
 from .file_kinds import CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
+from .gate.signals import level_table, look
 from .progress import Watch, silent
 from .tables import Table, mode_table
 from .tap_concerns import tap_concerns
@@ -72,10 +72,9 @@ def _recording(path: str | os.PathLike[str], watch: Watch) -> Findings:
             if stream.n_samples == 0:
                 concerns.append(f"stream {stream.name} holds no sample")
                 continue
-            levels = channel_levels(stream, watch)
-            tables.append(level_table(stream, levels))
-            concerns += [concern for level in levels for concern in level.concerns()]
-            concerns += tap_concerns(stream, levels)
+            seen = look(stream, watch=watch)
+            tables.append(level_table(stream, seen.levels))
+            concerns += [*seen.concerns(stream.sample_rate), *tap_concerns(stream, seen.levels)]
         title = recording.title or "untitled"
         summary = f"recording, {title}, {recording.recorded_at or 'no date'}"
         if recording.events:

@@ -7,7 +7,7 @@ import numpy as np
 from acquisition import Stream
 from estimation import find_taps
 
-from .channel_levels import ChannelLevel
+from .gate.signals import ChannelLevel
 
 IMPULSIVE = 12.0
 """Peak over standard deviation above which a force is taken for taps of a hammer; a cut has less than 6."""

@@ -24,7 +24,7 @@ from estimation import (
 )
 from foundation import InputError
 
-from ..gate import check_inputs
+from ..gate import check_inputs, check_recordings
 from ..progress import Watch, silent
 from ..provenance import sources, versions
 
@@ -129,9 +129,17 @@ def estimate_recordings(
         raise InputError(f"unknown estimator {options.estimator!r}; use one of {', '.join(ESTIMATORS)}")
     if options.stack != "sum" and options.estimator != "h1":
         raise InputError(f"estimator {options.estimator} takes summed tests only; use --stack sum")
+    doubts = check_recordings(
+        paths,
+        stream=options.stream,
+        excitations=options.excitations,
+        responses=options.responses,
+        excluding=options.exclude,
+        watch=watch,
+    )
     tests = spectra_of_tests(paths, options, watch)
     total = sum_tests(tests)
-    warnings = check_inputs(total)
+    warnings = [*doubts, *check_inputs(total)]
     frf = ESTIMATORS[options.estimator](total) if options.stack == "sum" else h1_side_by_side(tests)
     frf = correct_high_pass(frf, [channel.high_pass_hz for channel in total.responses])
     if total.n_excluded:

@@ -20,7 +20,7 @@ from modal_fit import (
     write_modal_model,
 )
 
-from ..gate import check_records
+from ..gate import check_recordings, check_records
 from ..progress import Watch, silent
 from ..provenance import add_to_json, sources, versions
 
@@ -94,8 +94,11 @@ def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions,
     """
     if options.method != SUBSPACE:
         raise InputError(f"method {options.method!r} does not fit recordings; use {SUBSPACE}, or estimate an FRF first")
+    doubts = check_recordings(
+        paths, stream=options.stream, excitations=options.excitations, responses=options.responses, watch=watch
+    )
     records = [_band_record(path, options, watch) for path in paths]
-    doubts = check_records(records, options.band)
+    doubts += check_records(records, options.band)
     with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
         fit = fit_subspace(records, options.band, max_order=options.order, n_modes=options.n_modes)
     return replace(fit, warnings=(*doubts, *fit.warnings))

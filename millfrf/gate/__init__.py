@@ -5,5 +5,6 @@ be done with what is given, and returns doubts: sentences that a command prints 
 """
 
 from .inputs import check_inputs, check_records, driven_lines
+from .recordings import check_recordings
 
-__all__ = ["check_inputs", "check_records", "driven_lines"]
+__all__ = ["check_inputs", "check_recordings", "check_records", "driven_lines"]

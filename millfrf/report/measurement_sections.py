@@ -5,9 +5,9 @@ from typing import Any
 
 from acquisition import Recording
 
-from ..channel_levels import channel_levels, level_table
 from ..figures.embed import as_data_uri
 from ..figures.time_figure import time_figure
+from ..gate.signals import level_table, look
 from ..progress import Watch
 from ..tables import Table
 from ..tap_concerns import tap_concerns
@@ -76,10 +76,10 @@ def channel_section(collected: Collected, watch: Watch) -> tuple[Section, list[s
             for stream in recording.streams.values():
                 if not stream.n_samples:
                     continue
-                levels = channel_levels(stream, watch)
-                table = level_table(stream, levels)
+                seen = look(stream, watch=watch)
+                table = level_table(stream, seen.levels)
                 tables.append(Table(f"{file.path.name}, {table.title}", table.columns, table.rows))
-                looks = [text for level in levels for text in level.concerns()] + tap_concerns(stream, levels)
+                looks = [*seen.concerns(stream.sample_rate), *tap_concerns(stream, seen.levels)]
                 concerns += [f"{file.path.name}: {text}" for text in looks]
                 if number < MOST_OVERVIEWS:
                     pictures.append(_overview(file, stream))

@@ -6,11 +6,14 @@ import numpy as np
 
 from acquisition import Channel, Stream
 
-from .progress import Watch, silent
-from .tables import Table
+from ...tables import Table
+from .extremes import Extreme
 
 NEAR_FULL_SCALE = 0.999
 """Samples above this share of full scale count as overloaded."""
+
+TWO_LEVELS = 0.5
+"""Share of samples at the two extremes above which a channel is a switch or a commanded step, not a clipped signal."""
 
 
 @dataclass
@@ -32,6 +35,8 @@ class ChannelLevel:
     n_missing: int = 0
     n_overloaded: int = 0
     _origin: float | None = None
+    _top: Extreme = field(default_factory=Extreme)
+    _bottom: Extreme = field(default_factory=Extreme)
 
     def add(self, samples: np.ndarray) -> None:
         """Take in the next samples (n,); those that are not finite are counted and left out."""
@@ -47,6 +52,8 @@ class ChannelLevel:
         self.squares += float(centred @ centred)
         self.lowest = min(self.lowest, float(finite.min()))
         self.highest = max(self.highest, float(finite.max()))
+        self._top.add(finite)
+        self._bottom.add(-finite)
         if self.channel.full_scale:
             self.n_overloaded += int(np.sum(np.abs(finite) >= NEAR_FULL_SCALE * self.channel.full_scale))
 
@@ -66,6 +73,18 @@ class ChannelLevel:
         """Largest magnitude."""
         return max(abs(self.lowest), abs(self.highest)) if self.n_samples else 0.0
 
+    @property
+    def clipped(self) -> tuple[int, float] | None:
+        """Samples that pile up at the largest or smallest value, and that value; None where none do.
+
+        A channel that takes few values only (a commanded step, a switch) is not clipped.
+        """
+        piled = [end for end in (self._top, self._bottom) if end.piled(self.peak)]
+        count = sum(end.count for end in piled)
+        if not piled or self._top.count + self._bottom.count > TWO_LEVELS * self.n_samples:
+            return None
+        return count, self._top.value if piled[0] is self._top else -self._bottom.value
+
     def concerns(self) -> list[str]:
         """What looks wrong with this channel."""
         name, found = self.channel.name, []
@@ -73,25 +92,18 @@ class ChannelLevel:
             found.append(f"{name}: {self.n_missing} samples are NaN or infinite; record anew or cut them out")
         if self.n_overloaded:
             found.append(f"{name}: {self.n_overloaded} samples at full scale (overload); choose a larger range")
+        clipped = self.clipped
+        if clipped and not self.n_overloaded:
+            found.append(
+                f"{name}: {clipped[0]} samples pile up at {clipped[1]:.4g} {self.channel.unit} (clipped, though no "
+                "full scale is known); choose a larger range, or leave these segments out with --exclude"
+            )
         if self.n_samples and self.deviation == 0:
             found.append(f"{name}: every sample is {self.mean:g} (dead channel); check cable and supply")
         full_scale = self.channel.full_scale
         if full_scale and self.n_samples and 0 < self.peak < 1e-3 * full_scale:
             found.append(f"{name}: peak is {100 * self.peak / full_scale:.2g} % of full scale; choose a smaller range")
         return found
-
-
-def channel_levels(stream: Stream, watch: Watch = silent) -> tuple[ChannelLevel, ...]:
-    """Levels of every channel, in one pass over the file."""
-    levels = tuple(ChannelLevel(channel) for channel in stream.channels)
-    done = 0
-    with watch(f"levels of {stream.name}", stream.n_samples) as update:
-        for block in stream.blocks():
-            for column, level in enumerate(levels):
-                level.add(block[:, column])
-            done += len(block)
-            update(done)
-    return levels
 
 
 def level_table(stream: Stream, levels: tuple[ChannelLevel, ...]) -> Table:

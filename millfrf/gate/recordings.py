@@ -1,0 +1,126 @@
+"""Recordings that a job uses: signals that are alive, whole, of this world and each their own."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from acquisition import Channel, Recording, Stream
+from estimation import choose_channels
+from foundation import InputError
+
+from ..progress import Watch, silent
+from .signals import ChannelLevel, Look, look
+
+BELIEVED = {
+    "force": 1e7,
+    "moment": 1e7,
+    "acceleration": 1e7,
+    "velocity": 1e5,
+    "displacement": 1e3,
+    "voltage": 1e6,
+    "angular_velocity": 1e6,
+}
+"""Largest magnitude that a channel of each quantity may hold, SI: beyond what any sensor on a machine gives (shock
+accelerometers end at 1e6 m/s^2, dynamometers at 1e6 N)."""
+
+
+def check_recordings(
+    paths: Sequence[str | os.PathLike[str]],
+    *,
+    stream: str | None = None,
+    excitations: Sequence[str] = (),
+    responses: Sequence[str] = (),
+    excluding: bool = False,
+    watch: Watch = silent,
+) -> list[str]:
+    """Judge the channels that a job takes from its recordings, file by file.
+
+    Parameters
+    ----------
+    paths
+        Recordings.
+    stream
+        Sample clock; None: the only one.
+    excitations, responses
+        Channel names; empty: chosen by quantity as :func:`estimation.choose_channels` does.
+    excluding
+        The job leaves out segments with missing, clipped or repeated samples: they are neither refused nor doubted.
+    watch
+        Progress bar.
+
+    Returns
+    -------
+    list of str
+        Doubts, each with the name of its file: clipped, held or repeated samples, proportional channels, a recording
+        that was not closed in order.
+
+    Raises
+    ------
+    InputError
+        A dead channel (an excitation: dead in every file), samples that are not finite or beyond what a sensor gives,
+        or a channel that copies another.
+    """
+    doubts, silent_in, alive = [], {}, set()
+    for path in paths:
+        with Recording(path) as recording:
+            source = recording.stream(stream)
+            chosen = choose_channels(source, excitations or None, responses or None)
+            seen = _look(source, [*chosen[0], *chosen[1]], watch)
+            idle = [level.channel.name for level in seen.levels[: len(chosen[0])] if level.n_samples and not level.peak]
+            silent_in.update({name: Path(path).name for name in idle})
+            alive |= {channel.name for channel in chosen[0]} - set(idle)
+            found = _check_stream(source, seen, set(idle), excluding)
+            if recording.complete is False:
+                how = f" ({recording.ending})" if recording.ending else ""
+                found.append(f"the recording was not closed in order{how}: its end may be missing")
+        doubts += [f"{Path(path).name}: {doubt}" for doubt in found]
+    for name, file in silent_in.items():
+        if name not in alive:
+            raise InputError(_dead(file, name, "every sample is 0"))
+    return doubts
+
+
+def _look(stream: Stream, channels: Sequence[Channel], watch: Watch) -> Look:
+    if stream.n_samples == 0:
+        raise InputError(f"{stream.path.name}: stream {stream.name} holds no sample; record again")
+    return look(stream, [channel.name for channel in channels], watch)
+
+
+def _check_stream(stream: Stream, seen: Look, idle: set[str], excluding: bool) -> list[str]:
+    """One stream; ``idle`` excitations are zero throughout, which another test of the job may make good."""
+    for level in [level for level in seen.levels if level.channel.name not in idle]:
+        _refuse(level, stream.path.name, excluding)
+    for one, other in seen.copies.equal_pairs():
+        raise InputError(
+            f"{stream.path.name}: channel {other} holds the same samples as {one}; check the cables and the mapping, "
+            "or name the channels that were measured with --excitation and --response"
+        )
+    if excluding:
+        return []
+    return [text for text in seen.concerns(stream.sample_rate) if "(dead channel)" not in text]
+
+
+def _refuse(level: ChannelLevel, file: str, excluding: bool) -> None:
+    """Refuse a channel that gives nothing or nothing that can be."""
+    name, unit = level.channel.name, level.channel.unit
+    if level.n_missing and not excluding:
+        raise InputError(
+            f"{file}: channel {name} holds {level.n_missing} samples that are NaN or infinite; cut them out, or leave "
+            "their segments out with --exclude"
+        )
+    most = BELIEVED.get(level.channel.quantity)
+    if most is not None and level.peak > most:
+        raise InputError(
+            f"{file}: channel {name} reaches {level.peak:.3g} {unit}, more than {most:g} {unit}: no sensor gives that; "
+            "check its unit and sensitivity"
+        )
+    if level.n_samples == 0 or level.deviation <= 1e-12 * level.peak:
+        value = f"every sample is {level.mean:g}" if level.n_samples else "no sample is finite"
+        raise InputError(_dead(file, name, value))
+
+
+def _dead(file: str, name: str, value: str) -> str:
+    return (
+        f"{file}: channel {name} is dead ({value}); check cable and supply, or name the other channels with "
+        "--excitation and --response"
+    )
