@@ -10,6 +10,8 @@ from threadpoolctl import threadpool_limits
 from modal_fit import ModalModel
 
 from .acceptance import LEAST_EVIDENCE, Option, gains, holds_elsewhere, plainest, unexplained, worth_it
+from .beyond_model import beyond_model
+from .compared_band import compared_band
 from .diagnosis import AcceptedCause, Candidate, Diagnosis
 from .explanation import Explanation
 from .fault_repair import repair_plain_faults, with_tones_settled
@@ -23,7 +25,7 @@ from .pruning import pruned
 from .reporting_numbers import accepted_cause, accepted_mode, modal_deviation
 from .settling import settled
 from .shape_of_model import LabError, ModelShape
-from .trial import Trial, band_of
+from .trial import Trial
 from .true_forces import without_force_noise
 from .windowed_lines import WindowedLines, windowed_lines
 
@@ -93,7 +95,8 @@ def _diagnosed(model: ModalModel, trials: Sequence[Trial], settings: Settings, t
     """One step after the other."""
     causes = settings.causes if settings.causes is not None else library()
     decay = float((-model.poles.real).min())
-    lines = [windowed_lines(trial, band_of(model, trial.rate), decay) for trial in trials]
+    bands = [compared_band(model, trial.rate) for trial in trials]
+    lines = [windowed_lines(trial, band.edges, decay) for trial, band in zip(trials, bands, strict=True)]
     tell("modal parameters")
     nominal = Explanation(ModelShape(model, settings.lab), np.zeros(ModelShape(model, settings.lab).size))
     base = fit(lines, nominal, iterations=FIRST_FIT)
@@ -129,6 +132,8 @@ def _diagnosed(model: ModalModel, trials: Sequence[Trial], settings: Settings, t
         current,
         tuple(lines),
         (held_out.linear, held_out.improved),
+        band=max(bands, key=lambda band: band.high),
+        doubts=beyond_model(base.explanation, lines),
     )
 
 

@@ -6,13 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .compared_band import ComparedBand
 from .explanation import Explanation
 from .fitting import Fit
 from .windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
 
-VERDICTS = ("none", "explained", "unexplained")
+VERDICTS = ("none", "explained", "partly explained", "unexplained")
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,8 @@ class Diagnosis:
     Parameters
     ----------
     verdict
-        ``none``, ``explained`` or ``unexplained``.
+        ``none``, ``explained``, ``partly explained`` (the causes help on held-out data and leave more than their
+        share) or ``unexplained``.
     physics
         Accepted causes in the order found.
     candidates
@@ -102,6 +104,10 @@ class Diagnosis:
         The recordings.
     elsewhere
         Modal parameters alone, and the final explanation, fitted without the recording held out.
+    band
+        In which model and recordings were compared, and why; None: not stated.
+    doubts
+        Sentences that a reader must see beside the verdict.
     """
 
     verdict: str
@@ -115,3 +121,5 @@ class Diagnosis:
     lines: tuple[WindowedLines, ...]
     elsewhere: tuple[Explanation, Explanation]
     located: dict[str, Any] = field(default_factory=dict)
+    band: ComparedBand | None = None
+    doubts: tuple[str, ...] = ()

@@ -57,7 +57,8 @@ def write_diagnosis(path: str | os.PathLike[str], diagnosis: Diagnosis) -> None:
     InputError
         The folder cannot be written to.
     """
-    write_content(path, diagnosis_content(diagnosis))
+    band = {} if diagnosis.band is None else {"compared_band": asdict(diagnosis.band)}
+    write_content(path, diagnosis_content(diagnosis) | band | {"warnings": list(diagnosis.doubts)})
 
 
 def write_content(path: str | os.PathLike[str], content: dict[str, Any]) -> None:

@@ -8,11 +8,14 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import resample_poly
+from scipy.integrate import cumulative_trapezoid
+from scipy.signal import detrend, resample_poly
 
 from acquisition import Channel, Recording, Stream, aligned_samples
 from foundation import DegreeOfFreedom, InputError
 from modal_fit import ModalModel
+
+from .compared_band import compared_band, reach_of
 
 Real = NDArray[np.float64]
 
@@ -40,6 +43,8 @@ class Trial:
         0 displacement, 1 velocity, 2 acceleration.
     channels
         Names of the excitation channels, then of the response channels.
+    corners
+        Of each response's known first-order high-pass, Hz; 0: none. Empty: none of them has one.
     """
 
     name: str
@@ -48,6 +53,25 @@ class Trial:
     response: Real
     powers: NDArray[np.int64]
     channels: tuple[str, ...]
+    corners: tuple[float, ...] = ()
+
+    def kinematic(self, frequencies: Real) -> NDArray[np.complex128]:
+        """Factor from displacement to each measured quantity, ``(i w)^power i w / (i w + w_corner)``.
+
+        Parameters
+        ----------
+        frequencies : (n,), Hz
+
+        Returns
+        -------
+        (n, n_responses)
+        """
+        s = 2j * np.pi * np.asarray(frequencies, dtype=float)[:, None]
+        factor = s**self.powers
+        for column, corner in enumerate(self.corners):
+            if corner > 0:
+                factor[:, column] *= s[:, 0] / (s[:, 0] + 2 * np.pi * corner)
+        return np.asarray(factor)
 
     @property
     def duration(self) -> float:
@@ -61,21 +85,14 @@ class Trial:
 
 
 def band_of(model: ModalModel, rate: float) -> tuple[float, float]:
-    """Band (Hz) in which a model and a recording are compared: a third of the lowest to three times the highest mode.
+    """Band (Hz) in which a model and a recording are compared: both edges of :func:`compared_band`.
 
     Raises
     ------
     InputError
-        The recording is sampled too slowly for the model's highest mode.
+        The recording is sampled too slowly for the model.
     """
-    natural = model.natural_frequencies
-    high = min(3.0 * float(natural.max()), 0.42 * rate)
-    if high < 1.1 * natural.max():
-        raise InputError(
-            f"sampled at {rate:g} Hz, too slowly for a mode at {natural.max():.4g} Hz; "
-            f"record at {4 * natural.max():.0f} Hz or more"
-        )
-    return float(natural.min()) / 3, high
+    return compared_band(model, rate).edges
 
 
 def read_trial(path: str | os.PathLike[str], model: ModalModel, *, stream: str | None = None) -> Trial:
@@ -107,8 +124,8 @@ def read_trial(path: str | os.PathLike[str], model: ModalModel, *, stream: str |
     if bad.any():
         name = names[int(np.argmax(bad))]
         raise InputError(f"{Path(path).name}: channel {name} holds values that are not finite; cut them out first")
-    _, high = band_of(model, rate)
-    needed = 6.0 * high
+    # what lies above the model's band stays: tones are looked for there, and doubts
+    needed = 6.0 * max(reach_of(model, rate)[1], band_of(model, rate)[1])
     if rate > 1.5 * needed:
         ratio = Fraction(needed / rate).limit_denominator(200)
         samples = resample_poly(samples, ratio.numerator, ratio.denominator, axis=0)
@@ -120,7 +137,22 @@ def read_trial(path: str | os.PathLike[str], model: ModalModel, *, stream: str |
         )
     powers = np.array([POWERS[channel.quantity] for channel in responses])
     count = len(forces)
-    return Trial(Path(path).stem, rate, samples[:, :count], samples[:, count:], powers, names)
+    corners = tuple(channel.high_pass_hz or 0.0 for channel in responses)
+    force = _without_high_pass(samples[:, :count], rate, [channel.high_pass_hz or 0.0 for channel in forces])
+    return Trial(Path(path).stem, rate, force, samples[:, count:], powers, names, corners)
+
+
+def _without_high_pass(force: Real, rate: float, corners: Sequence[float]) -> Real:
+    """Forces (n_samples, n) before their channels' known first-order high-passes, ``f + w_corner int f dt``.
+
+    The straight drift that the integral leaves lies below every band and is taken out.
+    """
+    whole = force.copy()
+    for column, corner in enumerate(corners):
+        if corner > 0:
+            seen = force[:, column] - force[:, column].mean()
+            whole[:, column] += detrend(2 * np.pi * corner * cumulative_trapezoid(seen, dx=1 / rate, initial=0.0))
+    return whole
 
 
 def measured_part(

@@ -99,12 +99,12 @@ class WindowedLines:
     @cached_property
     def padded_kinematic(self) -> Complex:
         """Factor (padded // 2 + 1, n_responses) from displacement to each response's quantity."""
-        return np.asarray((2j * np.pi * self.padded_frequencies[:, None]) ** self.trial.powers)
+        return self.trial.kinematic(self.padded_frequencies)
 
     @cached_property
     def kinematic(self) -> Complex:
         """The same at the lines that are compared, (n_lines, n_responses)."""
-        return np.asarray((2j * np.pi * self.frequencies[:, None]) ** self.trial.powers)
+        return self.trial.kinematic(self.frequencies)
 
     def from_force(self, receptance: Complex, force_lines: Complex) -> Complex:
         """Windowed response lines (n_lines, n_responses) of padded force lines through padded receptance lines."""
