@@ -134,7 +134,7 @@ def worth_it(option: Option, current: Fit, base: Fit, lines: list[WindowedLines]
 def _plainer_gain(current: Fit, lines: list[WindowedLines]) -> float:
     """What the score would gain if nothing were believed of the dampings, or of the frequencies."""
     shape = current.explanation.shape
-    rows = current.explanation.u.reshape(-1, shape.per_mode)[: len(shape.nominal.poles) - shape.added]
+    rows = shape.modal_rows(current.explanation.u)[: len(shape.nominal.poles) - shape.added]
     cost = float(np.log(2 * sum(one.measured.size for one in lines)))
     return max(float(np.sum(rows[:, k] ** 2 - cost)) for k in (0, 1))
 

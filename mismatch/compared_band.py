@@ -52,8 +52,8 @@ def compared_band(model: ModalModel, rate: float) -> ComparedBand:
     """Band in which a model and a recording are compared.
 
     That is the band in which the model holds, where the model states one: outside, modes that the model does not have
-    would look like left-out physics. A model that states none is compared from a third of its lowest mode to three times
-    its highest.
+    would look like left-out physics. A model that states none is compared from a third of its lowest mode to three
+    times its highest.
 
     Parameters
     ----------
@@ -77,7 +77,9 @@ def compared_band(model: ModalModel, rate: float) -> ComparedBand:
     """
     edges = reach_of(model, rate)
     if model.band is None:
-        return ComparedBand(*edges, "a third of the lowest to three times the highest mode, as the model states no band")
+        return ComparedBand(
+            *edges, "a third of the lowest to three times the highest mode, as the model states no band"
+        )
     low, high = model.band
     if high <= SAMPLED * rate:
         return ComparedBand(low, high, "the band in which the model holds")

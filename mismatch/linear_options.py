@@ -61,8 +61,10 @@ def _chain_option(lines: list[WindowedLines], current: Fit, cause: Cause) -> Opt
 
 
 def _mode_option(lines: list[WindowedLines], current: Fit, mode: SightedMode) -> Option | None:
-    shape = current.explanation.shape.with_mode(mode.pole, mode.right, mode.left)
-    start = Explanation(shape, np.concatenate([current.explanation.u, np.zeros(shape.per_mode)]))
+    before, u = current.explanation.shape, current.explanation.u
+    shape = before.with_mode(mode.pole, mode.right, mode.left)
+    own, outside = u[: before.modal_size], u[before.modal_size :]
+    start = Explanation(shape, np.concatenate([own, np.zeros(shape.per_mode), outside]))
     fitted = fit(lines, start, current.noises, iterations=12)
     return Option("missing_mode", {}, fitted) if _is_resolved(fitted, lines) else None
 

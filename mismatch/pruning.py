@@ -54,8 +54,9 @@ def pruned(
 
 def _without(explanation: Explanation, cause: AcceptedCause) -> Explanation:
     if cause.name == "missing_mode":
-        shape = without_added(explanation.shape)
-        return replace(explanation, shape=shape, u=explanation.u[: shape.size])
+        shape, u = without_added(explanation.shape), explanation.u
+        kept_u = np.concatenate([u[: shape.modal_size], u[explanation.shape.modal_size :]])
+        return replace(explanation, shape=shape, u=kept_u)
     kept = list(explanation.causes)
     kept.pop(next(k for k, one in enumerate(kept) if answer_name(one.physics) == cause.name))
     return replace(explanation, causes=tuple(kept))

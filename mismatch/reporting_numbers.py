@@ -80,12 +80,12 @@ def modal_deviation(fitted: Fit) -> AcceptedCause | None:
     """
     shape = fitted.explanation.shape
     count = len(shape.nominal.poles) - shape.added
-    rows = fitted.explanation.u.reshape(-1, shape.per_mode)[:count]
+    rows = shape.modal_rows(fitted.explanation.u)[:count]
     n = count * (shape.per_mode - 2)
     size = float(np.sum(rows**2))
     if size < n + 4 * np.sqrt(2 * n):
         return None
-    spread = np.sqrt(np.diag(fitted.covariance)[: shape.size]).reshape(-1, shape.per_mode)[:count]
+    spread = np.sqrt(shape.modal_rows(np.diag(fitted.covariance)))[:count]
     model, nominal = fitted.explanation.model, shape.nominal
     modes = [k for k in range(count) if np.sum(rows[k] ** 2) > shape.per_mode + 3 * np.sqrt(2 * shape.per_mode)]
     parameters, errors = {}, {}

@@ -1,6 +1,7 @@
 """The nominal model's numbers as deviations in units of what a lab's own fit may be off."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from modal_fit import ModalModel
 
 from .line_loops import modal_slopes
+from .outside_band import OutsideBand, outside_band
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -38,7 +40,8 @@ class LabError:
 class ModelShape:
     """Parameters u of a modal model, all zero at the nominal one, in units of :class:`LabError`.
 
-    Order, mode by mode: ln frequency, ln damping ratio, Re right, Im right, Re left, Im left.
+    Order, mode by mode: ln frequency, ln damping ratio, Re right, Im right, Re left, Im left. Behind them, where the
+    nominal model states its band, what modes outside it leave inside (:class:`OutsideBand`).
 
     Parameters
     ----------
@@ -59,8 +62,30 @@ class ModelShape:
         """Precision of the belief that u is zero, (size,): 1, and all but nothing for added modes."""
         precision = np.ones(self.size)
         if self.added:
-            precision[-self.added * self.per_mode :] = 1e-4
+            precision[self.modal_size - self.added * self.per_mode : self.modal_size] = 1e-4
         return precision
+
+    @cached_property
+    def outside(self) -> OutsideBand | None:
+        """Terms for modes outside the nominal model's band; None where it states none."""
+        believed = len(self.nominal.poles) - self.added
+        bare = replace(
+            self.nominal,
+            poles=self.nominal.poles[:believed],
+            right=self.nominal.right[:believed],
+            left=self.nominal.left[:believed],
+            covariance=None,
+        )
+        return outside_band(bare, self.lab.shape)
+
+    @property
+    def modal_size(self) -> int:
+        """Parameters of the modes."""
+        return int(self.per_mode * len(self.nominal.poles))
+
+    def modal_rows(self, values: Real) -> Real:
+        """Those of ``values`` (size,) that belong to the modes, (n_modes, per_mode)."""
+        return values[: self.modal_size].reshape(-1, self.per_mode)
 
     def with_mode(self, pole: complex, right: Complex, left: Complex) -> "ModelShape":
         """The same with one more mode at the end."""
@@ -81,7 +106,7 @@ class ModelShape:
     @property
     def size(self) -> int:
         """Parameters altogether."""
-        return int(self.per_mode * len(self.nominal.poles))
+        return self.modal_size + (self.outside.size if self.outside is not None else 0)
 
     def _scales(self) -> tuple[Real, Real]:
         """Unit of a right and of a left entry, each (n_modes,)."""
@@ -90,7 +115,7 @@ class ModelShape:
 
     def model(self, u: Real) -> ModalModel:
         """The modal model at ``u``, (size,)."""
-        rows = u.reshape(len(self.nominal.poles), self.per_mode)
+        rows = self.modal_rows(u)
         omega = np.abs(self.nominal.poles) * np.exp(self.lab.frequency * rows[:, 0])
         damping = np.clip(self.nominal.damping_ratios * np.exp(self.lab.damping * rows[:, 1]), 1e-5, 0.95)
         poles = omega * (-damping + 1j * np.sqrt(1 - damping**2))
@@ -99,7 +124,10 @@ class ModelShape:
         right = self.nominal.right + right_unit[:, None] * (rows[:, 2 : 2 + n] + 1j * rows[:, 2 + n : 2 + 2 * n])
         rest = rows[:, 2 + 2 * n :]
         left = self.nominal.left + left_unit[:, None] * (rest[:, :m] + 1j * rest[:, m:])
-        return replace(self.nominal, poles=poles, right=right, left=left, covariance=None)
+        residuals = self.nominal.residuals
+        if self.outside is not None and u[self.modal_size :].any():
+            residuals = self.outside.added(residuals, u[self.modal_size :])
+        return replace(self.nominal, poles=poles, right=right, left=left, residuals=residuals, covariance=None)
 
     def jacobian(self, u: Real, frequencies: Real, force: Complex, factor: Complex | None = None) -> Complex:
         """Derivative of the displacement lines by u for force lines, (n_lines, n_responses, size).
@@ -119,12 +147,15 @@ class ModelShape:
         if factor is None:
             factor = np.ones((len(frequencies), model.right.shape[1]), dtype=complex)
         result = np.empty((*factor.shape, self.size), dtype=complex)
+        s = np.asarray(2j * np.pi * frequencies, dtype=complex)
         modal_slopes(
-            np.asarray(2j * np.pi * frequencies, dtype=complex),
+            s,
             np.ascontiguousarray(force),
             (poles, model.right, model.left),
             (poles * self.lab.frequency, along, *self._scales()),
             factor,
             result,
         )
+        if self.outside is not None:
+            result[:, :, self.modal_size :] = self.outside.slopes(s, force, factor)
         return result

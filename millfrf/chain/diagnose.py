@@ -95,6 +95,9 @@ def _speeds(recordings: Sequence[str | os.PathLike[str]]) -> dict[str, SpindleSp
 def summary(diagnosis: Diagnosis) -> list[str]:
     """A few lines for the terminal: verdict, causes with numbers, error before and after."""
     lines = [f"verdict: {diagnosis.verdict}"]
+    if diagnosis.band is not None:
+        lines.append(diagnosis.band.sentence)
+    lines += [f"warning: {doubt}" for doubt in diagnosis.doubts]
     for cause in diagnosis.physics:
         numbers = ", ".join(
             f"{name} {value:.4g}" + (f" ± {cause.standard_errors[name]:.2g}" if name in cause.standard_errors else "")

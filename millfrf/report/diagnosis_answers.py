@@ -80,6 +80,8 @@ def answers(diagnosis: Diagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
 def where(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Place of each cause, then what the maps located."""
     said = [f"{first_word(cause.name)}: {place(diagnosis, cause)}." for cause in diagnosis.physics]
+    if diagnosis.band is not None:
+        said.append(f"Model and recordings are {diagnosis.band.sentence}.")
     located = diagnosis.located
     bands = located.get("frequency_bands", [])
     if not bands:
@@ -217,7 +219,7 @@ def which_test(diagnosis: Diagnosis) -> tuple[str, ...]:
 
 def warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
     """What should make a reader careful."""
-    gain, said = diagnosis.improvement, []
+    gain, said = diagnosis.improvement, [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in diagnosis.doubts]
     final = diagnosis.final.explanation
     improved = final.causes or final.shape.added
     if len(diagnosis.lines) < 2:

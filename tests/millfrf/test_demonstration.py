@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from estimation import read_frf
+from millfrf.chain.diagnose import diagnose_files
 from millfrf.demonstration import FIT_BAND, DemoOptions, DemoResult, comparison_tables, nearest_modes, run_demo
 from modal_fit import read_modal_model
 from replay_data import default_structure, table_one_model, tip_model
@@ -49,6 +50,20 @@ def test_tap_calibrated_frf_matches_the_tip_around_the_modes(demo: DemoResult) -
 def test_true_model_is_the_structure_that_was_milled(demo: DemoResult) -> None:
     stored = read_modal_model(demo.report.parent / "true_model_tip.json")
     np.testing.assert_array_equal(stored.poles, tip_model(default_structure()).poles)
+
+
+def test_its_own_model_explains_its_own_recordings(demo: DemoResult, tmp_path: Path) -> None:
+    """The structure has a mode at 52 Hz, and the sensors a high-pass: neither is missing from 13 to 25 Hz."""
+    folder = demo.report.parent
+    sweeps = sorted((folder / "recordings").glob("sweep_*.h5"))
+    found = diagnose_files(folder / "model_housing.json", sweeps, tmp_path / "out")
+    assert found.diagnosis.verdict == "none"
+    assert found.diagnosis.physics == ()
+    assert found.diagnosis.band is not None
+    assert found.diagnosis.band.edges == FIT_BAND
+    assert found.diagnosis.improvement.before < 1.1 * found.diagnosis.improvement.noise_floor
+    assert any("13 to 25 Hz" in line for line in found.summary)
+    assert "13 to 25 Hz" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 def test_tables_and_files_are_there(demo: DemoResult) -> None:

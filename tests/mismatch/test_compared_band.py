@@ -11,7 +11,7 @@ from scipy.signal import bilinear, lfilter
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from foundation import InputError
-from mismatch import Trial, diagnose, read_trial
+from mismatch import LabError, ModelShape, Trial, diagnose, read_trial
 from mismatch.compared_band import compared_band
 from mismatch.diagnosis_file import write_diagnosis
 from modal_fit import ModalModel, Residuals
@@ -69,6 +69,20 @@ def test_a_model_is_compared_in_its_band(shaken: list[Trial], tmp_path: Path) ->
     write_diagnosis(tmp_path / "diagnosis.json", replace(found, located={}))
     content = json.loads((tmp_path / "diagnosis.json").read_text())
     assert (content["compared_band"]["low"], content["compared_band"]["high"]) == BAND
+
+
+def test_derivative_by_what_lies_outside_the_band() -> None:
+    """Against central differences of the receptance that the model then has."""
+    shape, frequencies = ModelShape(fitted_to_band(), LabError()), np.linspace(5, 24, 13)
+    rng = np.random.default_rng(2)
+    u, force = rng.normal(size=shape.size), rng.normal(size=(13, 2)) + 1j * rng.normal(size=(13, 2))
+    slopes = shape.jacobian(u, frequencies, force)
+    assert shape.size == shape.modal_size + 12
+    for k in range(shape.modal_size, shape.size):
+        aside = 1e-3 * np.eye(shape.size)[k]
+        change = shape.model(u + aside).receptance(frequencies) - shape.model(u - aside).receptance(frequencies)
+        numeric = np.einsum("kpq,kq->kp", change, force) / 2e-3
+        np.testing.assert_allclose(slopes[:, :, k], numeric, atol=1e-6 * np.abs(numeric).max())
 
 
 def test_a_model_without_a_band_is_doubted_where_it_knows_nothing(shaken: list[Trial]) -> None:
