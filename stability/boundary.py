@@ -98,32 +98,24 @@ def trace_boundary(
     lowest = solver is collocation_limits and not every_limit
     threads = threads or os.cpu_count() or 1
 
-    def solved(speeds: Real, expected: Real | None) -> StabilityLimits:
+    def solved(speeds: Real) -> StabilityLimits:
         if lowest:
-            return lowest_limits(structure, process, speeds, max_depth, expected=expected, threads=threads)
+            return lowest_limits(structure, process, speeds, max_depth, threads=threads)
         if solver is collocation_limits:
             return collocation_limits(structure, process, speeds, max_depth, threads=threads)
         return solver(structure, process, speeds, max_depth)
 
-    limits = solved(first, None)
+    limits = solved(first)
     waiting = np.column_stack([first[:-1], first[1:]])
     while len(waiting):
         middle = waiting.mean(axis=1)
-        limits = joined(limits, solved(middle, _deepest_end(limits, waiting)))
+        limits = joined(limits, solved(middle))
         straight = _straight(limits, waiting, middle, tolerance, every_limit)
         wide = waiting[:, 1] - waiting[:, 0] > NARROWEST * waiting[:, 1]
         left, right = waiting.copy(), waiting.copy()
         left[:, 1] = right[:, 0] = middle
         waiting = np.concatenate([half[~straight & wide] for half in (left, right)])
     return StabilityBoundary(limits, tolerance, len(limits.spindle_speeds))
-
-
-def _deepest_end(limits: StabilityLimits, intervals: Real) -> Real:
-    """The larger of the lowest limits at the two ends of each interval, infinite where there is none."""
-    depths = np.full(len(limits.spindle_speeds), np.inf)
-    present, first = np.unique(limits.speed, return_index=True)
-    depths[present] = limits.depth[first]
-    return np.asarray(depths[np.searchsorted(limits.spindle_speeds, intervals)].max(axis=1))
 
 
 def _first_count(structure: Frf | ModalModel, process: MillingProcess, lowest: float, highest: float) -> int:
@@ -156,6 +148,7 @@ def joined(one: StabilityLimits, other: StabilityLimits) -> StabilityLimits:
         change=np.concatenate([one.change, other.change])[rows],
         error=np.concatenate([one.error, other.error])[rows],
         warnings=tuple(dict.fromkeys(one.warnings + other.warnings)),
+        resolved=np.concatenate([one.resolved, other.resolved])[order],
     )
 
 

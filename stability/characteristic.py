@@ -244,6 +244,8 @@ def newton(
         Sign of d|mu|/da: positive where the multiplier leaves the circle with growing depth.
     """
     first_theta, first_depth = theta, depth
+    by_theta, by_depth = 1.0 + 0j, 0j
+    step_theta, step_depth = 1.0, 1.0
     for _ in range(30):
         by_theta, by_depth = slopes(series, radius, theta, depth)
         if theta == math.pi:
@@ -260,4 +262,6 @@ def newton(
         if abs(step_theta) < 1e-10 and abs(step_depth) < 1e-10 * depth:
             # F is analytic in log mu = rho + i theta: d rho / da = Im(F_a / F_theta)
             return True, theta, depth, (by_depth / by_theta).imag
-    return False, theta, depth, 0.0
+    # rounding can keep the steps from dying out altogether
+    settled = abs(step_theta) < 1e-7 and abs(step_depth) < 1e-7 * depth
+    return settled, theta, depth, (by_depth / by_theta).imag

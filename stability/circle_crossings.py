@@ -1,31 +1,57 @@
 """Crossings of the unit circle of a discretised tooth period: by power series, or by eigenvalues where these fail."""
 
-from dataclasses import replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .characteristic_roots import all_roots
+from foundation import InputError
+
+from .characteristic_roots import all_roots, refined
 from .chatter_frequency import strongest_lines
 from .critical_lines import critical_lines
 from .crossings import Crossings, find_crossings
 from .delay_system import DelaySystem
+from .depth_stages import row_edges, safe_depth, stages
 from .loop_gain import LoopGain
 from .period_operator import period_operator, piece_nodes
 from .polish import polished
-from .transition_series import series_windows, transition_series
+from .transition_series import Windows, series_windows, transition_series
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 MOST_ROOTS = 256
-"""At one speed."""
+"""At one speed and in one stage of depths."""
 
 
-def circle_crossings(
-    system: DelaySystem, periods: Real, max_depth: float, *, lowest: bool = False
-) -> tuple[Crossings, Real, Real]:
-    """All crossings up to ``max_depth`` (m) at several tooth periods, with frequency and error.
+@dataclass(frozen=True)
+class CircleCrossings:
+    """Crossings with what belongs to them, and how far down the search can be trusted.
+
+    Parameters
+    ----------
+    crossings
+        By speed and then by depth.
+    frequency : (n_crossings,), Hz
+        Of the strongest line of the tool's motion.
+    error : (n_crossings,), m
+        What more nodes change.
+    resolved : (n_speeds,), m
+        Depth below which no cell of the search was left unresolved; infinite where all were resolved.
+    """
+
+    crossings: Crossings
+    frequency: Real
+    error: Real
+    resolved: Real
+
+
+def circle_crossings(system: DelaySystem, periods: Real, max_depth: float, *, lowest: bool = False) -> CircleCrossings:
+    """All crossings up to ``max_depth`` (m) at several tooth periods.
+
+    Depths are searched in stages that begin where the small-gain theorem ends and do not depend on ``max_depth``.
 
     Parameters
     ----------
@@ -38,31 +64,58 @@ def circle_crossings(
     lowest
         The lowest crossing at each speed will do.
 
-    Returns
-    -------
-    crossings
-    frequency : (n_crossings,), Hz
-        Of the strongest line of the tool's motion.
-    error : (n_crossings,), m
-        What more nodes change.
+    Raises
+    ------
+    InputError
+        The structure turns so often in a period that too many nodes would be needed.
     """
     if system.upper.any() or _many_modes(system, periods):
         return _by_eigenvalues(system, periods, max_depth)
-    (found, frequency, error), lost = _by_series(system, periods, max_depth, lowest)
-    if not lost.any():
-        return found, frequency, error
-    rest, rest_frequency, rest_error = _by_eigenvalues(system, periods[lost], max_depth)
-    rest = replace(rest, speed=np.flatnonzero(lost)[rest.speed])
-    order = np.lexsort([np.concatenate([found.depth, rest.depth]), np.concatenate([found.speed, rest.speed])])
-    columns = (
-        np.concatenate([getattr(found, name), getattr(rest, name)])[order]
+    parts: list[CircleCrossings] = []
+    resolved = np.full(len(periods), np.inf)
+    live = np.arange(len(periods))
+    for bottom, top in stages(safe_depth(system), max_depth):
+        try:
+            found, reach, lost = _by_series(system, periods[live], (bottom, top), lowest)
+        except InputError:
+            if not parts:
+                raise
+            resolved[live] = np.minimum(resolved[live], bottom)
+            break
+        parts.append(_renumbered(found, live))
+        resolved[live] = np.minimum(resolved[live], reach)
+        if lost.any():
+            rest = _by_eigenvalues(system, periods[live[lost]], max_depth)
+            parts.append(_chosen(rest, rest.crossings.depth > bottom, live[lost][rest.crossings.speed]))
+        done = lost.copy()
+        if lowest:
+            done[np.unique(found.crossings.speed)] = True
+        live = live[~done]
+        if not len(live):
+            break
+    return _together(parts, resolved, max_depth)
+
+
+def _together(parts: list[CircleCrossings], resolved: Real, max_depth: float) -> CircleCrossings:
+    columns = [
+        np.concatenate([getattr(part.crossings, name) for part in parts])
         for name in ("speed", "depth", "theta", "outward")
-    )
-    return (
-        Crossings(*columns),
-        np.concatenate([frequency, rest_frequency])[order],
-        np.concatenate([error, rest_error])[order],
-    )
+    ]
+    frequency, error = (np.concatenate([getattr(part, name) for part in parts]) for name in ("frequency", "error"))
+    order = np.lexsort([columns[1], columns[0]])
+    order = order[columns[1][order] <= max_depth]
+    return CircleCrossings(Crossings(*(column[order] for column in columns)), frequency[order], error[order], resolved)
+
+
+def _chosen(part: CircleCrossings, chosen: NDArray[np.bool_], speed: Index) -> CircleCrossings:
+    """Some crossings only, with other numbers of their speeds."""
+    found = part.crossings
+    kept = Crossings(speed[chosen], found.depth[chosen], found.theta[chosen], found.outward[chosen])
+    return CircleCrossings(kept, part.frequency[chosen], part.error[chosen], part.resolved)
+
+
+def _renumbered(part: CircleCrossings, speeds: Index) -> CircleCrossings:
+    return _chosen(part, np.ones(len(part.error), dtype=bool), speeds[part.crossings.speed])
 
 
 def _many_modes(system: DelaySystem, periods: Real) -> bool:
@@ -75,29 +128,46 @@ def _many_modes(system: DelaySystem, periods: Real) -> bool:
 
 
 def _by_series(
-    system: DelaySystem, periods: Real, max_depth: float, lowest: bool
-) -> tuple[tuple[Crossings, Real, Real], NDArray[np.bool_]]:
-    """Crossings, and at which speeds rounding leaves too little of the series."""
-    windows = series_windows(system, float(periods.max()), max_depth)
+    system: DelaySystem, periods: Real, stage: tuple[float, float], lowest: bool
+) -> tuple[CircleCrossings, Real, NDArray[np.bool_]]:
+    """Crossings between two depths, how far they are resolved, and where rounding leaves too little of the series."""
+    bottom, top = stage
+    windows = series_windows(system, float(periods.max()), top)
     series = transition_series(system, periods, windows)
-    finer = transition_series(system, periods, windows, extra=4, chips=True)
-    rows = max(12 if lowest else 24, int(np.ceil(0.8 * windows.total_growth)))
-    angles = first_angles(system.poles, periods, count=max(24, rows))
-    table = np.empty((len(periods), MOST_ROOTS, 4))
-    counts = all_roots(
-        series.coefficients, finer.coefficients, series.needed, series.radius, max_depth, angles, rows, lowest, table
-    )
-    lost = (counts < 0) | (not (series.complete and finer.complete))
+    edges = row_edges(bottom, top, windows.total_growth)
+    angles = first_angles(system.poles, periods, count=max(24, int(np.ceil(0.8 * windows.total_growth))))
+    table, reach = np.empty((len(periods), MOST_ROOTS, 3)), np.empty(len(periods))
+    counts = all_roots(series.coefficients, series.needed, series.radius, edges, angles, lowest, table, reach)
+    lost = (counts < 0) | (counts == MOST_ROOTS) | (not series.complete)
     counts = np.where(lost, 0, counts)
-    together = np.concatenate([rows[:count] for rows, count in zip(table, counts, strict=True)])
+    rows = np.concatenate([part[:count] for part, count in zip(table, counts, strict=True)])
     speed = np.repeat(np.arange(len(periods)), counts)
-    order = np.lexsort([together[:, 1], speed])
-    theta, depth, growth, error = together[order].T.copy()
-    found = Crossings(speed[order], depth, theta, growth > 0)
-    return (found, critical_lines(system, finer, found), error), lost
+    inside = (rows[:, 1] > bottom) & (rows[:, 1] <= top)
+    rows, speed = rows[inside], speed[inside]
+    order = np.lexsort([rows[:, 1], speed])
+    theta, depth, growth = rows[order].T.copy()
+    found, complete = _on_finer(system, periods, windows, (speed[order], theta, depth, growth))
+    return found, reach, lost | (not complete)
 
 
-def _by_eigenvalues(system: DelaySystem, periods: Real, max_depth: float) -> tuple[Crossings, Real, Real]:
+def _on_finer(
+    system: DelaySystem, periods: Real, windows: Windows, roots: tuple[Index, Real, Real, Real]
+) -> tuple[CircleCrossings, bool]:
+    """Roots (speed, theta, depth, growth) refined with more nodes, at the speeds that have any; whether that worked."""
+    speed, theta, depth, growth = roots
+    error = np.zeros(len(speed))
+    present, place = np.unique(speed, return_inverse=True)
+    if not len(present):
+        nothing = Crossings(speed, depth, theta, growth > 0)
+        return CircleCrossings(nothing, error, error, np.full(len(periods), np.inf)), True
+    finer = transition_series(system, periods[present], windows, extra=4, chips=True)
+    refined(finer.coefficients, finer.radius, place, theta, depth, growth, error)
+    frequency = critical_lines(system, finer, Crossings(place, depth, theta, growth > 0))
+    found = Crossings(speed, depth, theta, growth > 0)
+    return CircleCrossings(found, frequency, error, np.full(len(periods), np.inf)), finer.complete
+
+
+def _by_eigenvalues(system: DelaySystem, periods: Real, max_depth: float) -> CircleCrossings:
     operator = period_operator(system, periods)
     finer = period_operator(system, periods, extra=5)
     angles = first_angles(system.poles, periods)
@@ -107,7 +177,8 @@ def _by_eigenvalues(system: DelaySystem, periods: Real, max_depth: float) -> tup
     theta = np.where(settled, final.theta, found.theta)
     error = np.where(settled, np.abs(final.depth - found.depth) + 1e-9 * final.depth, found.depth)
     crossings = Crossings(found.speed, depth, theta, found.outward)
-    return crossings, strongest_lines(system, finer, crossings), error
+    frequency = strongest_lines(system, finer, crossings)
+    return CircleCrossings(crossings, frequency, error, np.full(len(periods), np.inf))
 
 
 def first_angles(poles: Complex, periods: Real, *, count: int = 24) -> Real:

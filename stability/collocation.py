@@ -10,7 +10,7 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .circle_crossings import circle_crossings
+from .circle_crossings import CircleCrossings, circle_crossings
 from .delay_system import DelaySystem, delay_system
 from .stability_limits import StabilityLimits
 from .stability_lobes import StabilityLobes
@@ -87,20 +87,17 @@ def lowest_limits(
     spindle_speeds: Real,
     max_depth: float,
     *,
-    expected: Real | None = None,
     threads: int = 1,
 ) -> StabilityLimits:
     """The lowest limit alone at each speed, several times faster than :func:`collocation_limits`.
 
-    Depths are searched from zero up; at or just above an expected limit the search ends, and only where nothing has
-    been found it goes on up to ``max_depth``. Islands below the limit are seen.
+    Depths are searched from zero up, and the search ends with the row of cells in which a limit has been found.
+    Islands below the limit are seen.
 
     Parameters
     ----------
     structure, process, spindle_speeds, max_depth, threads
         As :func:`collocation_limits`.
-    expected : (n_speeds,), m
-        Limits at speeds nearby, infinite where not known.
 
     Raises
     ------
@@ -110,22 +107,12 @@ def lowest_limits(
     speeds, system = _checked(structure, process, spindle_speeds, max_depth)
     if not process.is_plain:
         return varied_limits(system, speeds, float(max_depth))
-    first = np.full(len(speeds), np.inf) if expected is None else np.asarray(expected, dtype=float)
-    caps = np.minimum(1.2 * first, max_depth)
-    jobs = [(chunk, float(caps[chunk].max())) for chunk in _chunks(speeds, caps)]
-    parts = _in_parallel(system, speeds, jobs, True, threads)
-    seen = np.zeros(len(speeds), dtype=bool)
-    for part, (chunk, cap) in zip(parts, jobs, strict=True):
-        seen[part[0]] = True
-        seen[chunk] |= cap >= max_depth
-    if not seen.all():
-        rest = np.flatnonzero(~seen)
-        parts += _in_parallel(system, speeds, [(rest[k], max_depth) for k in _chunks(speeds[rest])], True, threads)
+    parts = _in_parallel(system, speeds, [(chunk, max_depth) for chunk in _chunks(speeds)], True, threads)
     return _together(system, speeds, max_depth, parts)
 
 
-_Part = tuple[Index, Real, Real, NDArray[np.bool_], Index, Real]
-"""Index of the speed, depth, frequency, whether at pi, change and error of some crossings."""
+_Part = tuple[Index, CircleCrossings]
+"""Indices of some speeds, and their crossings."""
 
 
 def _checked(
@@ -145,31 +132,34 @@ def _in_parallel(
 
 
 def _together(system: DelaySystem, speeds: Real, max_depth: float, parts: list[_Part]) -> StabilityLimits:
-    speed, depth, frequency, at_pi, change, error = (np.concatenate(column) for column in zip(*parts, strict=True))
+    speed = np.concatenate([chunk[part.crossings.speed] for chunk, part in parts])
+    depth, theta, outward = (
+        np.concatenate([getattr(part.crossings, name) for _, part in parts]) for name in ("depth", "theta", "outward")
+    )
+    frequency, error = (np.concatenate([getattr(part, name) for _, part in parts]) for name in ("frequency", "error"))
+    resolved = np.empty(len(speeds))
+    for chunk, part in parts:
+        resolved[chunk] = part.resolved
     order = np.lexsort([depth, speed])
-    kinds = tuple(np.where(at_pi[order], "period-doubling", "hopf").tolist())
+    at_pi = theta[order] == np.pi
     return StabilityLimits(
         speeds,
         float(max_depth),
         speed[order],
         depth[order],
         frequency[order],
-        kinds,
-        change[order],
+        tuple(np.where(at_pi, "period-doubling", "hopf").tolist()),
+        np.where(outward[order], 1, -1) * np.where(at_pi, 1, 2),
         error[order],
         "collocation",
         system.warnings,
+        resolved,
     )
 
 
-def _chunks(speeds: Real, depths: Real | None = None) -> list[Index]:
-    """Indices of speeds, up to 32 together, that can share nodes.
-
-    Their tooth periods differ by less than two fifths, and the depths of interest by less than a factor of 2.
-    """
+def _chunks(speeds: Real) -> list[Index]:
+    """Indices of speeds, up to 32 together, whose tooth periods differ by less than two fifths: they share nodes."""
     octave = np.floor(np.log(speeds / speeds.min()) / np.log(1.4)).astype(int)
-    if depths is not None:
-        octave = 64 * octave + np.minimum(np.log2(depths.max() / depths), 63).astype(int)
     order = np.lexsort([speeds, octave])
     groups = np.split(order, np.flatnonzero(np.diff(octave[order])) + 1)
     return [part for group in groups for part in np.array_split(group, max(1, len(group) // 32))]
@@ -177,7 +167,4 @@ def _chunks(speeds: Real, depths: Real | None = None) -> list[Index]:
 
 def _limits_of(system: DelaySystem, speeds: Real, chunk: Index, max_depth: float, lowest: bool) -> _Part:
     periods = 2 * np.pi / (system.process.teeth * speeds[chunk])
-    found, frequency, error = circle_crossings(system, periods, max_depth, lowest=lowest)
-    at_pi = found.theta == np.pi
-    change = np.where(found.outward, 1, -1) * np.where(at_pi, 1, 2)
-    return chunk[found.speed], found.depth, frequency, at_pi, change, error
+    return chunk, circle_crossings(system, periods, max_depth, lowest=lowest)

@@ -11,10 +11,11 @@ from foundation import InputError
 from modal_fit import ModalModel
 
 from .delay_system import delay_system
-from .period_operator import period_operator
+from .period_operator import PeriodOperator, period_operator
 from .varied_edges import varied_cut
 
 Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -89,12 +90,17 @@ def multipliers(
         return Multipliers(np.asarray(values[np.argsort(-np.abs(values))], dtype=complex), cut.period)
     period = 2 * np.pi / (process.teeth * spindle_speed)
     operator = period_operator(delay_system(model, process), np.array([period]), extra=extra_nodes)
-    within, motion, impulse = depth * operator.within[0], operator.motion[0], depth * operator.impulse[0]
-    chip = np.linalg.solve(np.eye(len(within)) - within, np.concatenate([motion, -within], axis=1))
-    size = motion.shape[1]
-    structure = np.concatenate([operator.free[0], np.zeros((size, len(within)))], axis=1)
-    change = chip.copy()
-    change[:, size:] -= np.eye(len(within))
-    monodromy = np.concatenate([structure + impulse @ change, chip])
-    values = np.linalg.eigvals(monodromy)
+    values = np.linalg.eigvals(monodromies(operator, np.zeros(1, dtype=np.int64), np.array([depth]))[0])
     return Multipliers(np.asarray(values[np.argsort(-np.abs(values))], dtype=complex), period)
+
+
+def monodromies(operator: PeriodOperator, speeds: NDArray[np.int64], depths: Real) -> Real:
+    """The operator of :func:`multipliers` at pairs of speed index and depth (m), shape (n_pairs, n, n)."""
+    factor = depths[:, None, None]
+    within, motion = factor * operator.within[speeds], operator.motion[speeds]
+    nodes, size = motion.shape[1:]
+    chip = np.linalg.solve(np.eye(nodes) - within, np.concatenate([motion, -within], axis=2))
+    structure = np.concatenate([operator.free[speeds], np.zeros((len(depths), size, nodes))], axis=2)
+    change = chip.copy()
+    change[:, :, size:] -= np.eye(nodes)
+    return np.concatenate([structure + factor * operator.impulse[speeds] @ change, chip], axis=1)

@@ -64,10 +64,11 @@ def semi_discretised_multipliers(
     system = delay_system(model, process)
     if system.upper.any():
         raise InputError("semi-discretisation cannot take a residual flexibility; use collocation or multi-frequency")
-    return _multipliers(system, spindle_speed, depth, steps, order)
+    return semi_discretised(system, spindle_speed, depth, steps=steps, order=order)
 
 
-def _multipliers(system: DelaySystem, speed: float, depth: float, steps: int, order: int) -> Multipliers:
+def semi_discretised(system: DelaySystem, speed: float, depth: float, *, steps: int, order: int) -> Multipliers:
+    """As :func:`semi_discretised_multipliers`, for a system without residual flexibility and values that are good."""
     moving = np.flatnonzero(np.abs(system.right).any(axis=0))
     output = system.output_matrix[moving]
     pieces = engagement_pieces(system.process)

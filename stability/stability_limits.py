@@ -1,6 +1,6 @@
 """`StabilityLimits`: every depth at which a cut gains or loses stability, islands included."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,9 @@ class StabilityLimits:
         Solver's name.
     warnings
         One sentence each.
+    resolved : (n_speeds,), m
+        Depth below which the search left nothing unresolved; infinite where that is so up to ``max_depth``. Empty when
+        made: infinite everywhere.
     """
 
     spindle_speeds: Real
@@ -48,9 +51,18 @@ class StabilityLimits:
     error: Real
     method: str
     warnings: tuple[str, ...] = ()
+    resolved: Real = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        if not len(self.resolved):
+            object.__setattr__(self, "resolved", np.full(len(self.spindle_speeds), np.inf))
 
     def lowest(self) -> StabilityLobes:
-        """The lowest limit at each speed: below it every cut is stable."""
+        """The lowest limit at each speed: below it every cut is stable.
+
+        Where the search left something unresolved below it, the depth down to which nothing was left stands in its
+        place, as a lower bound.
+        """
         depths = np.full(len(self.spindle_speeds), np.inf)
         frequencies = np.full(len(self.spindle_speeds), np.nan)
         kinds = ["none"] * len(self.spindle_speeds)
@@ -58,7 +70,16 @@ class StabilityLimits:
         depths[present], frequencies[present] = self.depth[first], self.frequency[first]
         for speed, limit in zip(present, first, strict=True):
             kinds[speed] = self.bifurcation[limit]
-        return StabilityLobes(self.spindle_speeds, depths, frequencies, tuple(kinds), self.method, self.warnings)
+        bounded = (self.resolved < depths) & (self.resolved < self.max_depth)
+        depths, frequencies = np.where(bounded, self.resolved, depths), np.where(bounded, np.nan, frequencies)
+        status = np.where(bounded, "lower-bound", "not-verified").tolist()
+        warnings = self.warnings
+        if bounded.any():
+            warnings += (f"at {bounded.sum()} of {len(depths)} speeds the search could not resolve what lies deeper",)
+            kinds = ["none" if here else kind for here, kind in zip(bounded, kinds, strict=True)]
+        return StabilityLobes(
+            self.spindle_speeds, depths, frequencies, tuple(kinds), self.method, warnings, tuple(status)
+        )
 
     def unstable_multipliers(self, depths: Real) -> Index:
         """Number of unstable multipliers at every speed and depth, shape (n_speeds, n_depths).

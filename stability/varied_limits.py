@@ -103,6 +103,15 @@ def _halved(system: DelaySystem, speed: float, bracket: tuple[float, float], bef
     return _Limit(depth, frequency, _kind(value), last - before, float(error))
 
 
+def critical_motion(system: DelaySystem, speed: float, depth: float) -> tuple[float, str]:
+    """Frequency (Hz) of the strongest line, and kind, of the motion whose multiplier is the largest at a cut."""
+    cut = varied_cut(system, speed, depth)
+    values, vectors = np.linalg.eig(cut.monodromy)
+    critical = int(np.argmax(np.abs(values)))
+    value = complex(values[critical])
+    return _strongest_line(system, cut, value, vectors[:, critical]), _kind(value)
+
+
 def _kind(value: complex) -> str:
     if abs(value.imag) > 1e-6:
         return "hopf"

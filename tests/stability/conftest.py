@@ -1,13 +1,18 @@
-"""Fixtures of the stability tests: literature benchmarks that several files use."""
+"""Modules of the stability tests that several files use: literature benchmarks, independent multipliers."""
 
 import importlib.util
 import sys
 from pathlib import Path
 
-_PATH = Path(__file__).with_name("benchmarks_of_literature.py")
-_SPEC = importlib.util.spec_from_file_location("benchmarks_of_literature", _PATH)
-assert _SPEC is not None
-assert _SPEC.loader is not None
-_MODULE = importlib.util.module_from_spec(_SPEC)
-sys.modules["benchmarks_of_literature"] = _MODULE
-_SPEC.loader.exec_module(_MODULE)
+
+def _load(name: str) -> None:
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+
+
+for _name in ("benchmarks_of_literature", "independent_floquet"):
+    _load(_name)
