@@ -18,7 +18,7 @@ from .rigid_links import rigid_matrices, rigid_model, tip_jacobian
 from .robot_files import read_table
 from .spatial_file import SpatialCase, read_spatial_robot
 from .spatial_modes import TIP, TIP_ROTATIONS, damping_warnings, model_of_modes, modes_at
-from .spatial_robot import structure_at
+from .spatial_robot import rigid_arms, structure_at
 
 Real = NDArray[np.float64]
 
@@ -111,11 +111,12 @@ def in_posture(case: PlanarCase | SpatialCase, driven: Real, axes: Real | None =
         return _planar(case, driven)
     robot = case.robot
     q = close_loops(robot.mechanism, driven)
-    compliance = tip_compliance(structure_at(robot, q))
+    structure = structure_at(robot, q)
+    compliance = tip_compliance(structure)
     if axes is not None:
         turn = np.kron(np.eye(2), np.asarray(axes))
         compliance = turn.T @ compliance @ turn
-    warnings = posture_warnings(robot.mechanism, q)
+    warnings = (*posture_warnings(robot.mechanism, q), *rigid_arms(robot, structure))
     labels = (*TIP, *TIP_ROTATIONS)
     if not robot.bodies:
         return PostureResult(np.zeros(0), None, compliance, labels, warnings)

@@ -13,7 +13,7 @@ from .generalised_coordinates import coordinate_basis
 from .receptance_coupling import couple_along
 from .spatial_modes import TIP
 from .spatial_robot import SpatialRobot, structure_at
-from .structure import Structure, mass_matrix, rigid_rows, six_by_six, stiffness_matrix
+from .structure import Structure, mass_matrix, rigid_rows, stiffness_matrix
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -70,8 +70,8 @@ def coupled_frf_at(robot: SpatialRobot, q: Real, frequencies: Real, loss_factor:
     for spring in structure.springs:
         elastic = np.isfinite(spring.stiffness)
         turned = np.zeros((len(clamp), int(elastic.sum())))
-        for node, sign in zip(spring.nodes, (-1.0, 1.0), strict=True):
-            turned[6 * node : 6 * node + 6] = sign * six_by_six(spring.axes)[:, elastic]
+        for node, sign, motion in zip(spring.nodes, (-1.0, 1.0), spring.motions(structure.positions), strict=True):
+            turned[6 * node : 6 * node + 6] = sign * motion[elastic].T
         columns.append(turned)
         compliance.append(1 / (spring.stiffness[elastic] * (1 + 1j * loss_factor)))
     rigid = columns[0].shape[1] + columns[1].shape[1]

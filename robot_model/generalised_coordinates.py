@@ -47,12 +47,15 @@ def _next_node(structure: Structure, motion: _Motion, width: int) -> tuple[int, 
         first, second = spring.nodes
         for known, new in ((first, second), (second, first)):
             if known in motion and new not in motion and np.isinf(spring.stiffness).any():
-                elastic = _elastic_directions(spring)
-                added = elastic.shape[1]
-                return new, [*motion[known], (slice(width, width + added), elastic)], added
+                elastic = _elastic_directions(spring, structure.positions[new])
+                shift = rigid_motion(structure.positions[new] - structure.positions[known])
+                carried = [(columns, shift @ block) for columns, block in motion[known]]
+                return new, [*carried, (slice(width, width + elastic.shape[1]), elastic)], elastic.shape[1]
     free = next(node for node in range(len(structure.positions)) if node not in motion)
     return free, [(slice(width, width + 6), np.eye(6))], 6
 
 
-def _elastic_directions(spring: Spring) -> Real:
-    return six_by_six(spring.axes)[:, np.isfinite(spring.stiffness)]
+def _elastic_directions(spring: Spring, position: Real) -> Real:
+    """Motion of a node at ``position`` over the joint's elastic directions, shape (6, n_elastic)."""
+    directions = six_by_six(spring.axes)[:, np.isfinite(spring.stiffness)]
+    return np.asarray(rigid_motion(position - spring.place) @ directions)

@@ -108,6 +108,9 @@ class Mechanism:
         for name in (self.tool, *(name for pair in self.closures for name in pair)):
             if name not in seen:
                 raise InputError(f"there is no frame {name!r}; the frames are {', '.join(sorted(seen))}")
+        passive = [frame.name for frame in self.frames if frame.motion != "fixed" and not frame.active]
+        if passive and not self.closures:
+            raise InputError(f"frame {passive[0]} is passive, but no closed loop moves it; make it active, or fixed")
 
     @cached_property
     def moving(self) -> tuple[int, ...]:
@@ -118,6 +121,20 @@ class Mechanism:
     def active(self) -> NDArray[np.bool_]:
         """Which entries of q are driven, shape (n_moving,)."""
         return np.array([self.frames[index].active for index in self.moving])
+
+    @cached_property
+    def body_of(self) -> dict[str, str]:
+        """Body of each frame, by the name of one frame on it: fixed frames and closed cuts join what they hold.
+
+        ``"0"`` is the base.
+        """
+        body = {"0": "0"}
+        for frame in self.frames:
+            body[frame.name] = body[frame.antecedent] if frame.motion == "fixed" else frame.name
+        for first, second in self.closures:
+            kept, merged = body[second], body[first]
+            body = {name: kept if owner == merged else owner for name, owner in body.items()}
+        return body
 
     @cached_property
     def _parents(self) -> tuple[int, ...]:

@@ -10,6 +10,7 @@ from foundation import InputError
 
 from .gravity import gravity_stiffness
 from .mechanism import Mechanism
+from .robot_check import check_robot
 from .section import Section
 from .structure import Beam, Body, Spring, Structure, cross_matrix
 
@@ -77,7 +78,7 @@ class SpatialRobot:
     Raises
     ------
     InputError
-        A node that is placed nowhere, or gravity on a robot with closed loops.
+        Parts that do not fit together: see :func:`robot_model.robot_check.check_robot`.
     """
 
     mechanism: Mechanism
@@ -91,13 +92,7 @@ class SpatialRobot:
     gravity: float = 0.0
 
     def __post_init__(self) -> None:
-        placed = {node for joint in self.joints for node in joint.nodes} | set(self.points)
-        wanted = {node for link in self.links for node in link.nodes} | {body.node for body in self.bodies} | {self.tip}
-        missing = sorted((wanted | set(range(max(wanted | placed) + 1))) - placed)
-        if missing:
-            raise InputError(f"robot: nodes {missing} are at no joint and no point; give their place")
-        if self.gravity and self.mechanism.closures:
-            raise InputError("gravity is given for open chains only; this robot has closed loops: leave it at 0")
+        check_robot(self)
 
     @property
     def n_nodes(self) -> int:
@@ -121,13 +116,11 @@ def structure_at(robot: SpatialRobot, q: Real) -> Structure:
     mechanism = robot.mechanism
     placed = mechanism.transforms(q)
     frames = {frame.name: placed[i] for i, frame in enumerate(mechanism.frames)} | {"0": np.eye(4)}
-    places = np.zeros((robot.n_nodes, 3))
-    springs = []
-    for joint in robot.joints:
-        places[list(joint.nodes)] = frames[joint.frame][:3, 3]
-        springs.append(Spring(joint.nodes, frames[joint.frame][:3, :3], joint.stiffness))
-    for node, (name, place) in robot.points.items():
-        places[node] = frames[name][:3, :3] @ place + frames[name][:3, 3]
+    places = _node_places(robot, frames)
+    springs = tuple(
+        Spring(joint.nodes, frames[joint.frame][:3, :3], joint.stiffness, frames[joint.frame][:3, 3])
+        for joint in robot.joints
+    )
     beams: list[Beam] = []
     extra: list[Real] = []
     for link in robot.links:
@@ -136,10 +129,39 @@ def structure_at(robot: SpatialRobot, q: Real) -> Structure:
     positions = np.vstack([places, *extra]) if extra else places
     rigid = tuple(link.nodes for link in robot.links if link.section is None)
     bodies = tuple(_body(body, frames[body.frame][:3, :3]) for body in robot.bodies)
-    structure = Structure(positions, tuple(springs), tuple(beams), rigid, bodies, robot.tip)
+    structure = Structure(positions, springs, tuple(beams), rigid, bodies, robot.tip)
     if not robot.gravity:
         return structure
     return replace(structure, weight=gravity_stiffness(robot, q, structure))
+
+
+def _node_places(robot: SpatialRobot, frames: dict[str, Real]) -> Real:
+    """Place of each node, m, (n_nodes, 3): its point, else the first joint that names it; base frame."""
+    places = np.zeros((robot.n_nodes, 3))
+    for joint in reversed(robot.joints):
+        places[list(joint.nodes)] = frames[joint.frame][:3, 3]
+    for node, (name, place) in robot.points.items():
+        places[node] = frames[name][:3, :3] @ place + frames[name][:3, 3]
+    return places
+
+
+def rigid_arms(robot: SpatialRobot, structure: Structure) -> tuple[str, ...]:
+    """Where joints that share a node stand apart: what lies between them is taken as rigid, one sentence a pair."""
+    found = []
+    for node in range(robot.n_nodes):
+        here = [
+            (joint.frame, spring.place)
+            for joint, spring in zip(robot.joints, structure.springs, strict=True)
+            if node in joint.nodes
+        ]
+        for (first, place), (second, other) in pairwise(here):
+            apart = float(np.linalg.norm(place - other))
+            if apart > 1e-6:
+                found.append(
+                    f"joints {first} and {second} share node {node} and stand {apart:.3g} m apart: the body between them "
+                    "is taken as rigid; give each its own node and a [[links]] tube between them if it is not"
+                )
+    return tuple(found)
 
 
 def _divide(link: Link, frames: dict[str, Real], places: Real, beams: list[Beam], extra: list[Real]) -> None:

@@ -1,7 +1,7 @@
 """Joint stiffnesses from measured deflections of the tool, with standard errors (Belchior et al. 2013, section 4.2)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from foundation import InputError
 from .constrained_statics import constrained_system
 from .identification import Identification, identify
 from .spatial_robot import SpatialRobot, structure_at
-from .structure import six_by_six
+from .structure import Spring
 
 Real = NDArray[np.float64]
 
@@ -120,13 +120,13 @@ class _Problem:
         free = _free(robot)
         for structure in self.structures:
             springs = tuple(
-                type(spring)(spring.nodes, spring.axes, joint.stiffness)
+                replace(spring, stiffness=joint.stiffness)
                 for spring, joint in zip(structure.springs, robot.joints, strict=True)
             )
-            system = constrained_system(type(structure)(**{**vars(structure), "springs": springs}))
+            system = constrained_system(replace(structure, springs=springs))
             motion = np.vstack([np.zeros((6, 6)), system.tip_responses()]).reshape(-1, 6, 6)
             compliances.append(motion[structure.tip])
-            relative = [six_by_six(s.axes).T @ (motion[s.nodes[1]] - motion[s.nodes[0]]) for s in springs]
+            relative = [_relative(spring, structure.positions, motion) for spring in springs]
             slopes.append([_slope(relative[joint], robot.joints[joint].stiffness, group) for joint, group in free])
         return np.array(compliances)[self.owner], np.array(slopes)[self.owner]
 
@@ -137,6 +137,12 @@ class _Problem:
     def jacobian(self, values: Real) -> Real:
         slopes = np.einsum("kpab,kb->kap", self._at(values)[1][:, :, :3], self.wrenches)
         return np.asarray(slopes.reshape(-1, slopes.shape[-1]) / self.error)
+
+
+def _relative(spring: Spring, positions: Real, motion: Real) -> Real:
+    """The joint's relative displacement for unit loads at the tool, in its axes, shape (6, 6)."""
+    before, after = spring.motions(positions)
+    return np.asarray(after @ motion[spring.nodes[1]] - before @ motion[spring.nodes[0]])
 
 
 def _slope(relative: Real, stiffness: Real, group: str) -> Real:

@@ -14,7 +14,9 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Spring:
-    """A joint's compliance between two nodes at one place (Belchior et al. 2013, Eqs. 6-8).
+    """A joint's compliance between two nodes (Belchior et al. 2013, Eqs. 6-8).
+
+    It acts at its own place; where a node stands elsewhere (one that several joints share), a rigid arm carries it there.
 
     Parameters
     ----------
@@ -24,11 +26,23 @@ class Spring:
         Columns: joint frame in the base frame, z the joint's axis.
     stiffness : (6,)
         ``(K_r, K_r, K_a, K_rr, K_rr, K_ar)``: radial and axial, N/m, then rotational, N m/rad; infinite: rigid.
+    place : (3,), m
+        Where the joint is, base frame.
     """
 
     nodes: tuple[int, int]
     axes: Real
     stiffness: Real
+    place: Real
+
+    def motions(self, positions: Real) -> tuple[Real, Real]:
+        """Motion at the joint, in its axes, over that of its first and of its second node, each (6, 6).
+
+        ``R^T (t + theta x (place - p); theta)``: the joint's relative displacement is the second's minus the first's.
+        """
+        turn = six_by_six(self.axes).T
+        first, second = (turn @ rigid_motion(self.place - positions[node]) for node in self.nodes)
+        return first, second
 
 
 @dataclass(frozen=True)
@@ -84,13 +98,12 @@ def stiffness_matrix(structure: Structure) -> Real:
     whole = np.zeros((size, size)) if structure.weight is None else structure.weight.copy()
     for spring in structure.springs:
         elastic = np.where(np.isfinite(spring.stiffness), spring.stiffness, 0.0)
-        turn = six_by_six(spring.axes)
-        block = (turn * elastic) @ turn.T
+        before, after = spring.motions(structure.positions)
         first, second = (slice(6 * node, 6 * node + 6) for node in spring.nodes)
-        whole[first, first] += block
-        whole[second, second] += block
-        whole[first, second] -= block
-        whole[second, first] -= block
+        whole[first, first] += (before.T * elastic) @ before
+        whole[second, second] += (after.T * elastic) @ after
+        whole[first, second] -= (before.T * elastic) @ after
+        whole[second, first] -= (after.T * elastic) @ before
     for beam, length in _lengths(structure):
         _add(whole, beam.nodes, _turned(beam_stiffness(beam.section, length), beam.axes))
     return whole
@@ -129,10 +142,10 @@ def rigid_rows(structure: Structure) -> Real:
         stiff = np.isinf(spring.stiffness)
         if stiff.any():
             block = np.zeros((int(stiff.sum()), size))
-            directions = six_by_six(spring.axes)[:, stiff].T
+            before, after = spring.motions(structure.positions)
             first, second = spring.nodes
-            block[:, 6 * second : 6 * second + 6] = directions
-            block[:, 6 * first : 6 * first + 6] = -directions
+            block[:, 6 * second : 6 * second + 6] = after[stiff]
+            block[:, 6 * first : 6 * first + 6] = -before[stiff]
             rows.append(block)
     return np.vstack(rows) if rows else np.zeros((0, size))
 
