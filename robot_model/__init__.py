@@ -14,6 +14,7 @@ from .generalised_coordinates import coordinate_basis
 from .gravity import gravity_hessian, with_gravity
 from .identification import Identification, identify
 from .inverse_kinematics import inverse_kinematics
+from .joint_values import driven_values, shown_values, typed_values, unit_doubts
 from .loop_closure import close_loops, posture_warnings, tool_jacobian
 from .mechanism import Frame, Mechanism
 from .modal_damping import modal_damping_matrix, rayleigh_constants
@@ -32,8 +33,8 @@ from .robot_files import assumptions, robot_names
 from .section import Material, Section, hollow_circle
 from .spatial_file import SpatialCase, read_spatial_robot
 from .spatial_modes import StructureModes, damping_warnings, frf_at, modal_model_at, model_of_modes, modes_at
-from .spatial_robot import ElasticJoint, Link, LumpedBody, SpatialRobot, structure_at
-from .spherical_wrist import nearest_solution, wrist_solutions
+from .spatial_robot import ElasticJoint, Link, LumpedBody, SpatialRobot, drive_stiffness, structure_at
+from .spherical_wrist import has_spherical_wrist, nearest_solution, wrist_solutions
 from .stiffness_identification import (
     Deflection,
     apply_joint_stiffness,
@@ -105,6 +106,8 @@ __all__ = [
     "deformation_uncertainty",
     "deviation_map",
     "drilling_wrench",
+    "drive_stiffness",
+    "driven_values",
     "equivalent_causes",
     "exact_frf_at",
     "exact_receptance",
@@ -112,6 +115,7 @@ __all__ = [
     "frequencies_over",
     "frf_at",
     "gravity_hessian",
+    "has_spherical_wrist",
     "hollow_circle",
     "identify",
     "identify_from_frequencies",
@@ -146,6 +150,7 @@ __all__ = [
     "rigid_matrices",
     "rigid_model",
     "robot_names",
+    "shown_values",
     "spatial_dynamic_stiffness",
     "stiffness_matrix",
     "stiffness_names",
@@ -157,6 +162,8 @@ __all__ = [
     "tool_down",
     "tool_jacobian",
     "turned_place",
+    "typed_values",
+    "unit_doubts",
     "with_damping_factor",
     "with_gravity",
     "with_joint_factor",

@@ -81,7 +81,7 @@ def read_robot(robot: str | os.PathLike[str]) -> PlanarCase | SpatialCase:
 
 
 def named_posture(case: PlanarCase | SpatialCase, name: str | None) -> Real:
-    """Joint values of a posture in the robot's file; None: the first.
+    """Driven joint values (rad, m) of a posture in the robot's file; None: the first.
 
     Raises
     ------
@@ -90,13 +90,15 @@ def named_posture(case: PlanarCase | SpatialCase, name: str | None) -> Real:
     """
     if name is None and case.poses:
         return next(iter(case.poses.values()))
+    if name is None:
+        raise InputError("the robot's file names no posture; give the joint values, or add a [[poses]] table")
     if name not in case.poses:
         raise InputError(f"no posture {name!r}; the robot's file has {', '.join(case.poses) or 'none'}")
     return case.poses[name]
 
 
 def in_posture(case: PlanarCase | SpatialCase, driven: Real, axes: Real | None = None) -> PostureResult:
-    """Frequencies, modal model and compliance at driven joint values (rad).
+    """Frequencies, modal model and compliance at driven joint values (rad; prismatic joints: m).
 
     Parameters
     ----------

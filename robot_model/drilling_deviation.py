@@ -11,7 +11,7 @@ from foundation import InputError
 from .constrained_statics import tip_compliance
 from .loop_closure import tool_jacobian
 from .posture_map import CutPlace, target_of
-from .spatial_robot import SpatialRobot, structure_at
+from .spatial_robot import SpatialRobot, drive_stiffness, structure_at
 from .spherical_wrist import wrist_solutions
 
 Real = NDArray[np.float64]
@@ -23,7 +23,7 @@ def drilling_wrench(load: DrillingLoad, tool_axis: Real) -> Real:
 
 
 def joint_deformation(robot: SpatialRobot, q: Real, wrench: Real, position_gain: Real | None = None) -> Real:
-    """Small angles of the driven joints, rad: ``phi = tau / k`` and the controller's ``tau / K_pos`` (6,).
+    """Small motions of the driven joints, rad (m): ``phi = tau / k`` and the controller's ``tau / K_pos``, (n_active,).
 
     ``tau = J^T W`` are the torques with which the process turns the joints; the simulated angles are
     ``psi + Delta psi_Kpos + phi`` (Ferreras-Higuero et al., Eq. 41).
@@ -31,9 +31,9 @@ def joint_deformation(robot: SpatialRobot, q: Real, wrench: Real, position_gain:
     Parameters
     ----------
     robot
-        An open chain; the turning stiffness of its joints is taken.
-    q, wrench : (6,)
-    position_gain : (6,), N m/rad, or None
+        An open chain; the stiffness of its joints about (prismatic ones: along) their axes is taken.
+    q : (n_moving,), wrench : (6,)
+    position_gain : (n_active,), N m/rad or N/m, or None
         Of the controller; None: it holds the motor's angle whatever the torque.
 
     Raises
@@ -43,8 +43,9 @@ def joint_deformation(robot: SpatialRobot, q: Real, wrench: Real, position_gain:
     """
     if robot.mechanism.closures:
         raise InputError("this robot has closed loops; its deflection is tip_compliance @ wrench")
-    stiffness = np.array([joint.stiffness[5] for joint in robot.joints])
-    compliance = 1 / stiffness + (0 if position_gain is None else 1 / np.asarray(position_gain, dtype=float))
+    compliance = 1 / drive_stiffness(robot) + (
+        0 if position_gain is None else 1 / np.asarray(position_gain, dtype=float)
+    )
     return np.asarray(compliance * (tool_jacobian(robot.mechanism, q).T @ wrench))
 
 

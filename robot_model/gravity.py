@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
+from .mechanism import drive_direction
 from .structure import Structure
 
 if TYPE_CHECKING:
@@ -41,9 +42,10 @@ def gravity_hessian(robot: SpatialRobot, q: Real, structure: Structure) -> Real:
     """Second derivative of ``V = sum m g z`` over the joint values, N m/rad, shape (n_moving, n_moving).
 
     A mass at p on a body that joints i and j carry, i nearer to the base, has ``d^2 p / dq_i dq_j = z_i x (z_j x
-    (p - o_j))`` with z the joints' axes and o their origins (Siciliano et al., Robotics, section 3.6): the spatial form
-    of the term ``sum m_i y_i g`` of Chen et al. 2026, Eq. 18. Beams count with half their mass at each end; links are
-    taken as rigid in this term, so that joints alone turn the weight.
+    (p - o_j))`` with z the joints' axes and o their origins (Siciliano et al., Robotics, section 3.6). Where j is
+    prismatic the inner term is z_j; where i is, there is none. This is the spatial form of the term ``sum m_i y_i g``
+    of Chen et al. 2026, Eq. 18. Beams count with half their mass at each end; links are taken as rigid in this term,
+    so that joints alone turn the weight.
     """
     mechanism = robot.mechanism
     placed = mechanism.transforms(q)
@@ -55,22 +57,30 @@ def gravity_hessian(robot: SpatialRobot, q: Real, structure: Structure) -> Real:
         ]
         for position, first in enumerate(carried):
             for second in carried[position:]:
+                if mechanism.frames[mechanism.moving[first]].motion == "prismatic":
+                    continue
                 near, far = (placed[mechanism.moving[column]] for column in (first, second))
-                bend = np.cross(near[:3, 2], np.cross(far[:3, 2], place - far[:3, 3]))
+                slides = mechanism.frames[mechanism.moving[second]].motion == "prismatic"
+                moved = far[:3, 2] if slides else np.cross(far[:3, 2], place - far[:3, 3])
+                bend = np.cross(near[:3, 2], moved)
                 hessian[first, second] += mass * robot.gravity * float(UP @ bend)
                 hessian[second, first] = hessian[first, second]
     return hessian
 
 
 def gravity_stiffness(robot: SpatialRobot, q: Real, structure: Structure) -> Real:
-    """The same over all nodes, (6 H, 6 H): ``S^T G S`` with S the relative rotation of each joint about its axis."""
+    """The same over all nodes, (6 H, 6 H): ``S^T G S`` with S each joint's relative motion on its axis."""
     hessian = gravity_hessian(robot, q, structure)
     rows = np.zeros((len(hessian), 6 * len(structure.positions)))
-    names = [robot.mechanism.frames[index].name for index in robot.mechanism.moving]
-    for joint, spring in zip(robot.joints, structure.springs, strict=True):
-        row = rows[names.index(joint.frame)]
-        for node, sign in zip(spring.nodes, (-1.0, 1.0), strict=True):
-            row[6 * node + 3 : 6 * node + 6] += sign * spring.axes[:, 2]
+    moving = [robot.mechanism.frames[index] for index in robot.mechanism.moving]
+    first = {joint.frame: spring for joint, spring in zip(robot.joints[::-1], structure.springs[::-1], strict=True)}
+    for row, frame in zip(rows, moving, strict=True):
+        spring = first.get(frame.name)
+        if spring is None:
+            continue
+        motions = spring.motions(structure.positions)
+        for node, sign, motion in zip(spring.nodes, (-1.0, 1.0), motions, strict=True):
+            row[6 * node : 6 * node + 6] += sign * motion[drive_direction(frame)]
     return np.asarray(rows.T @ hessian @ rows)
 
 

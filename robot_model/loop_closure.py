@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from .mechanism import Mechanism, rotation_vector
+from .mechanism import Frame, Mechanism, rotation_vector
 
 Real = NDArray[np.float64]
 
@@ -88,8 +88,16 @@ def posture_warnings(mechanism: Mechanism, q: Real, least: float = 0.02) -> tupl
     for index, value in zip(mechanism.moving, q, strict=True):
         frame = mechanism.frames[index]
         if not frame.lower <= value <= frame.upper:
-            warnings.append(f"joint {frame.name} = {value:.4g} is outside {frame.lower:.4g} to {frame.upper:.4g}")
+            warnings.append(_outside(frame, float(value)))
     smallest = np.linalg.svd(tool_jacobian(mechanism, q), compute_uv=False)[-1]
     if smallest < least:
         warnings.append(f"the posture is near a singularity: smallest singular value {smallest:.2g}")
     return tuple(warnings)
+
+
+def _outside(frame: Frame, value: float) -> str:
+    text = f"joint {frame.name} = {value:.4g} is outside {frame.lower:.4g} to {frame.upper:.4g}"
+    if frame.motion == "prismatic":
+        return f"{text} m"
+    degrees = 180 / np.pi
+    return f"{text} rad ({degrees * value:.1f} outside {degrees * frame.lower:.1f} to {degrees * frame.upper:.1f} deg)"

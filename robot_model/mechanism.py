@@ -74,6 +74,11 @@ class Frame:
         )
 
 
+def drive_direction(frame: Frame) -> int:
+    """Place of a joint's own motion in ``(K_r, K_r, K_a, K_rr, K_rr, K_ar)``: 5 about z, 2 along z if prismatic."""
+    return 2 if frame.motion == "prismatic" else 5
+
+
 @dataclass(frozen=True)
 class Mechanism:
     """A tree of frames, with pairs of frames that closed loops hold together.

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from .mechanism import Frame, Mechanism
 from .planar_robot import PlanarRobot
 from .robot_files import Table, read_as
 from .section import Section
@@ -64,6 +65,13 @@ class PlanarCase:
     poses: dict[str, NDArray[np.float64]]
     measured: dict[str, float]
     predicted: dict[str, float]
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The chain's joints 1, 2, ... as revolute frames, for the names and units of joint values."""
+        names = [str(number + 1) for number in range(len(self.robot.lengths))]
+        frames = tuple(Frame(name, before) for name, before in zip(names, ["0", *names[:-1]], strict=True))
+        return Mechanism(frames, names[-1])
 
 
 def read_planar_robot(robot: str | os.PathLike[str]) -> PlanarCase:

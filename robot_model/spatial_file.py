@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from foundation import InputError
 
+from .joint_values import LARGEST_TRAVEL, driven_values
 from .mechanism import Frame, Mechanism
 from .modal_damping import rayleigh_constants
 from .robot_files import Table, read_as
@@ -37,6 +38,7 @@ class _Frame(Table):
     theta_deg: float = 0.0
     r_m: float = 0.0
     limits_deg: tuple[float, float] | None = None
+    limits_m: tuple[float, float] | None = None
 
 
 class _Joint(Table):
@@ -92,8 +94,11 @@ class _Closure(Table):
 
 
 class _Pose(Table):
+    """``driven`` in degrees, of prismatic joints in metres; ``driven_deg`` is its older name and is read alike."""
+
     name: str
-    driven_deg: list[float]
+    driven: list[float] | None = None
+    driven_deg: list[float] | None = None
 
 
 class _File(BaseModel):
@@ -112,7 +117,7 @@ class _File(BaseModel):
 
 @dataclass(frozen=True)
 class SpatialCase:
-    """A robot in space and named postures: driven joint values, rad."""
+    """A robot in space and named postures: driven joint values, rad and (prismatic joints) m."""
 
     name: str
     robot: SpatialRobot
@@ -150,8 +155,22 @@ def _case(content: _File) -> SpatialCase:
         damping_ratio=None if content.damping is None else content.damping.ratio,
         gravity=content.robot.gravity_m_per_s2,
     )
-    poses = {pose.name: np.radians(pose.driven_deg) for pose in content.poses}
-    return SpatialCase(content.robot.name, spatial, poses)
+    return SpatialCase(content.robot.name, spatial, _poses(content, spatial.mechanism))
+
+
+def _poses(content: _File, mechanism: Mechanism) -> dict[str, NDArray[np.float64]]:
+    poses: dict[str, NDArray[np.float64]] = {}
+    for pose in content.poses:
+        if pose.name in poses:
+            raise InputError(f"two postures are named {pose.name!r}; name each once")
+        typed = pose.driven_deg if pose.driven is None else pose.driven
+        if typed is None or (pose.driven is not None and pose.driven_deg is not None):
+            raise InputError(f"posture {pose.name!r}: give driven = [...] once: degrees, prismatic joints in metres")
+        try:
+            poses[pose.name] = driven_values(mechanism, typed)
+        except InputError as error:
+            raise InputError(f"posture {pose.name!r}: {error}") from error
+    return poses
 
 
 def _rayleigh(damping: _Damping | None) -> tuple[float, float]:
@@ -163,7 +182,7 @@ def _rayleigh(damping: _Damping | None) -> tuple[float, float]:
 
 
 def _frame(row: _Frame) -> Frame:
-    lower, upper = (-inf, inf) if row.limits_deg is None else (radians(limit) for limit in row.limits_deg)
+    lower, upper = _limits(row)
     return Frame(
         row.name,
         row.antecedent,
@@ -178,6 +197,24 @@ def _frame(row: _Frame) -> Frame:
         lower,
         upper,
     )
+
+
+def _limits(row: _Frame) -> tuple[float, float]:
+    """Limits in rad or m, by the frame's motion."""
+    if row.motion == "prismatic":
+        given, wrong, right = row.limits_m, row.limits_deg, "limits_m"
+    else:
+        given, wrong, right = row.limits_deg, row.limits_m, "limits_deg"
+    if wrong is not None or (given is not None and row.motion == "fixed"):
+        remedy = "leave its limits out" if row.motion == "fixed" else f"give {right}"
+        raise InputError(f"frame {row.name}: limits {list(wrong or given or ())} of a {row.motion} frame; {remedy}")
+    if given is None:
+        return (-inf, inf)
+    if row.motion == "revolute":
+        return radians(given[0]), radians(given[1])
+    if max(map(abs, given)) > LARGEST_TRAVEL:
+        raise InputError(f"frame {row.name}: limits_m = {list(given)}: give metres, at most {LARGEST_TRAVEL:g}")
+    return given
 
 
 def _stiffness(row: _Joint) -> NDArray[np.float64]:

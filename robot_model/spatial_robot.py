@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from .gravity import gravity_stiffness
-from .mechanism import Mechanism
+from .mechanism import Mechanism, drive_direction
 from .robot_check import check_robot
 from .section import Section
 from .structure import Beam, Body, Spring, Structure, cross_matrix
@@ -135,6 +135,20 @@ def structure_at(robot: SpatialRobot, q: Real) -> Structure:
     return replace(structure, weight=gravity_stiffness(robot, q, structure))
 
 
+def drive_stiffness(robot: SpatialRobot) -> Real:
+    """Stiffness of each driven joint along its own motion, (n_active,): N m/rad about z, N/m along z if prismatic.
+
+    In the order of the driven frames, whatever the order of ``robot.joints``; infinite where a frame has no joint.
+    """
+    found = []
+    for index in robot.mechanism.moving:
+        frame = robot.mechanism.frames[index]
+        if frame.active:
+            own = [joint.stiffness[drive_direction(frame)] for joint in robot.joints if joint.frame == frame.name]
+            found.append(float(sum(own)) if own else np.inf)
+    return np.array(found)
+
+
 def _node_places(robot: SpatialRobot, frames: dict[str, Real]) -> Real:
     """Place of each node, m, (n_nodes, 3): its point, else the first joint that names it; base frame."""
     places = np.zeros((robot.n_nodes, 3))
@@ -158,8 +172,8 @@ def rigid_arms(robot: SpatialRobot, structure: Structure) -> tuple[str, ...]:
             apart = float(np.linalg.norm(place - other))
             if apart > 1e-6:
                 found.append(
-                    f"joints {first} and {second} share node {node} and stand {apart:.3g} m apart: the body between them "
-                    "is taken as rigid; give each its own node and a [[links]] tube between them if it is not"
+                    f"joints {first} and {second} share node {node} and stand {apart:.3g} m apart: the body between "
+                    "them is taken as rigid; give each its own node and a [[links]] tube between them if it is not"
                 )
     return tuple(found)
 

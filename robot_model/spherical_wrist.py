@@ -62,14 +62,24 @@ def nearest_solution(mechanism: Mechanism, target: Real, near: Real) -> Real | N
 
 
 def _six_frames(mechanism: Mechanism) -> tuple[tuple[Frame, ...], Real]:
-    moving = [mechanism.frames[i] for i in mechanism.moving]
+    if not has_spherical_wrist(mechanism):
+        raise InputError(
+            "this robot has no spherical wrist on a shoulder and elbow (six revolute joints), which maps over places "
+            "need; ask for single postures with --joints or --at, in Python with inverse_kinematics"
+        )
     tool = np.eye(4)
     for frame in mechanism.frames[6:]:
         tool = tool @ frame.transform(0.0)
+    return mechanism.frames[:6], tool
+
+
+def has_spherical_wrist(mechanism: Mechanism) -> bool:
+    """Whether :func:`wrist_solutions` knows this kind of robot."""
+    moving = [mechanism.frames[i] for i in mechanism.moving]
     before = ("0", *(frame.name for frame in mechanism.frames[:-1]))
     chain = all(frame.antecedent == name for frame, name in zip(mechanism.frames, before, strict=True))
     quarters = [moving[i].alpha if len(moving) == 6 else np.nan for i in (1, 3, 4, 5)]
-    pattern = (
+    return bool(
         chain
         and len(moving) == 6
         and tuple(moving) == mechanism.frames[:6]
@@ -79,9 +89,6 @@ def _six_frames(mechanism: Mechanism) -> tuple[tuple[Frame, ...], Real]:
         and moving[4].d == moving[5].d == moving[4].r == 0
         and all(frame.b == 0 for frame in moving[1:])
     )
-    if not pattern:
-        raise InputError("this robot has no spherical wrist on a shoulder and elbow; use inverse_kinematics")
-    return tuple(moving), tool
 
 
 def _first(frames: tuple[Frame, ...], centre: Real) -> list[float]:

@@ -29,7 +29,7 @@ class Deflection:
 
 
 def stiffness_names(robot: SpatialRobot) -> tuple[str, ...]:
-    """``joint 1 radial`` ... of all finite stiffnesses but the turning of passive joints, which is near zero.
+    """``joint 1 radial`` ... of all finite stiffnesses but the own motion of passive joints, which is near free.
 
     Examples
     --------
@@ -152,10 +152,14 @@ def _slope(relative: Real, stiffness: Real, group: str) -> Real:
 
 def _free(robot: SpatialRobot) -> list[tuple[int, str]]:
     """Joint index and group of every stiffness that can be identified."""
-    passive = {frame.name for frame in robot.mechanism.frames if not frame.active}
+    free = {
+        frame.name: "axial" if frame.motion == "prismatic" else "turning"
+        for frame in robot.mechanism.frames
+        if not frame.active
+    }
     return [
         (index, group)
         for index, joint in enumerate(robot.joints)
         for group, places in GROUPS.items()
-        if np.isfinite(joint.stiffness[places[0]]) and not (group == "turning" and joint.frame in passive)
+        if np.isfinite(joint.stiffness[places[0]]) and free.get(joint.frame) != group
     ]

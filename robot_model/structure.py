@@ -16,7 +16,7 @@ Real = NDArray[np.float64]
 class Spring:
     """A joint's compliance between two nodes (Belchior et al. 2013, Eqs. 6-8).
 
-    It acts at its own place; where a node stands elsewhere (one that several joints share), a rigid arm carries it there.
+    It acts at its own place; where a node stands elsewhere (several joints may share it), a rigid arm carries it there.
 
     Parameters
     ----------

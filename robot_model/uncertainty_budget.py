@@ -9,7 +9,7 @@ from foundation import InputError
 
 from .drilling_deviation import joint_deviation
 from .loop_closure import tool_jacobian
-from .spatial_robot import SpatialRobot
+from .spatial_robot import SpatialRobot, drive_stiffness
 
 Real = NDArray[np.float64]
 
@@ -88,8 +88,7 @@ def deformation_uncertainty(robot: SpatialRobot, q: Real, wrench: Real, known: L
     ``delta = -J diag(1 / k) J^T W``; each stiffness and the size of the wrench are independent.
     """
     jacobian = tool_jacobian(robot.mechanism, q)
-    stiffness = np.array([joint.stiffness[5] for joint in robot.joints])
-    parts = -jacobian[:3] * (jacobian.T @ wrench) / stiffness
+    parts = -jacobian[:3] * (jacobian.T @ wrench) / drive_stiffness(robot)
     deviation = parts.sum(axis=1)
     direction = deviation / max(float(np.linalg.norm(deviation)), 1e-300)
     along = direction @ parts

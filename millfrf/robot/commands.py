@@ -17,7 +17,10 @@ robot_app.command()(diagnose)
 
 Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file (.toml), or a name that `robot list` shows.")]
 Pose = Annotated[str | None, typer.Option("--pose", help="Posture named in the robot's file; default: its first.")]
-Joints = Annotated[str | None, typer.Option("--joints", metavar="DEG,DEG,...", help="Driven joints, degrees.")]
+Joints = Annotated[
+    str | None,
+    typer.Option("--joints", metavar="V,V,...", help="Driven joints: degrees; metres of prismatic ones."),
+]
 At = Annotated[
     tuple[float, float, float] | None, typer.Option("--at", metavar="X Y Z", help="Tip of a vertical tool, m.")
 ]

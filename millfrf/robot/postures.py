@@ -3,20 +3,25 @@
 from dataclasses import dataclass
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 from foundation import InputError
 from robot_model import (
     CutPlace,
+    Mechanism,
     PlanarCase,
     SpatialCase,
     SpatialRobot,
     close_loops,
+    driven_values,
+    has_spherical_wrist,
     inverse_kinematics,
     named_posture,
     nearest_solution,
     tool_down,
     turned_place,
+    unit_doubts,
 )
 
 Real = NDArray[np.float64]
@@ -31,7 +36,7 @@ class Asked:
     pose
         Name in the robot's file, or None.
     joints
-        Driven joint values, degrees, comma-separated, or None.
+        Driven joint values, degrees (prismatic joints: metres), comma-separated, or None.
     at
         Place of a vertical tool, m, or None.
     feed
@@ -51,7 +56,7 @@ class Asked:
 
 
 def posture_of(case: PlanarCase | SpatialCase, asked: Asked) -> tuple[Real, Real | None]:
-    """Driven joint values, rad, and the axes of the cut (None: the base frame).
+    """Driven joint values, rad (prismatic joints: m), and the axes of the cut (None: the base frame).
 
     Raises
     ------
@@ -65,11 +70,28 @@ def posture_of(case: PlanarCase | SpatialCase, asked: Asked) -> tuple[Real, Real
         place = cut_place(asked)
         return solve_place(spatial(case).robot, place, named_posture(case, None)), place.axes
     if asked.joints is not None:
-        try:
-            return np.radians([float(value) for value in asked.joints.split(",")]), None
-        except ValueError as error:
-            raise InputError(f"--joints {asked.joints!r} is not a list of degrees such as 0,-20,110,0,90,0") from error
+        return _typed(case, asked.joints), None
     return named_posture(case, asked.pose), None
+
+
+def mechanism_of(case: PlanarCase | SpatialCase) -> Mechanism:
+    """Names, motions and units of a robot's joints, of either kind."""
+    return case.mechanism if isinstance(case, PlanarCase) else case.robot.mechanism
+
+
+def _typed(case: PlanarCase | SpatialCase, text: str) -> Real:
+    """Joint values from ``0,-20,110,...``; a doubt about their unit is printed."""
+    try:
+        typed = [float(value) for value in text.split(",")]
+    except ValueError as error:
+        raise InputError(
+            f"--joints {text!r} is not a list of degrees (prismatic joints: metres) such as 0,-20,110,0,90,0"
+        ) from error
+    mechanism = mechanism_of(case)
+    values = driven_values(mechanism, typed)
+    for doubt in unit_doubts(mechanism, typed):
+        typer.echo(f"warning: {doubt}", err=True)
+    return values
 
 
 def cut_place(asked: Asked) -> CutPlace:
@@ -80,7 +102,7 @@ def cut_place(asked: Asked) -> CutPlace:
 
 
 def solve_place(robot: SpatialRobot, place: CutPlace, start: Real) -> Real:
-    """Driven joint values at a place: the branch nearest to ``start`` where there is a closed form, else by steps.
+    """Driven joint values at a place: the branch nearest to ``start`` where there is a closed form, else in steps.
 
     Raises
     ------
@@ -89,7 +111,7 @@ def solve_place(robot: SpatialRobot, place: CutPlace, start: Real) -> Real:
     """
     target = np.eye(4)
     target[:3, :3], target[:3, 3] = place.attitude, place.position
-    if robot.mechanism.closures:
+    if robot.mechanism.closures or not has_spherical_wrist(robot.mechanism):
         q = inverse_kinematics(robot.mechanism, target, start)
         return np.asarray(q[robot.mechanism.active])
     found = nearest_solution(robot.mechanism, target, close_loops(robot.mechanism, start))

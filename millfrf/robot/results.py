@@ -18,6 +18,7 @@ from robot_model import (
     named_posture,
     read_robot,
     read_tool_path,
+    shown_values,
     tool_down,
     write_compensated_path,
 )
@@ -26,7 +27,7 @@ from ..commands.options import check_band, check_output
 from ..progress import bar
 from ..tables import Table, show
 from .posture_maps import depth_over_places
-from .postures import Asked, posture_of, spatial
+from .postures import Asked, mechanism_of, posture_of, spatial
 
 RPM = np.pi / 30
 
@@ -42,7 +43,13 @@ def show_modes(robot: str, asked: Asked, count: int, picture: Path | None) -> No
     kept = {f"{f:.6f}": f"{100 * z:.2f}" for f, z in zip(model.natural_frequencies, model.damping_ratios, strict=True)}
     shown = [(f, kept.get(f"{f:.6f}", "overdamped")) for f in result.frequencies[:count]]
     rows = tuple((str(i + 1), f"{f:.3f}", ratio) for i, (f, ratio) in enumerate(shown))
-    show(Table(f"Modes in the posture {_degrees(driven)}", ("mode", "frequency (Hz)", "damping ratio (%)"), rows))
+    show(
+        Table(
+            f"Modes in the posture {shown_values(mechanism_of(case), driven)}",
+            ("mode", "frequency (Hz)", "damping ratio (%)"),
+            rows,
+        )
+    )
     warn(result)
     if picture is not None:
         from .picture import draw_modes
@@ -85,7 +92,13 @@ def show_stiffness(robot: str, asked: Asked, force: float) -> None:
     result = in_posture(case, driven, axes)
     names = [label.split(":")[1] for label in result.labels]
     rows = tuple((name, *(f"{v:.3e}" for v in row)) for name, row in zip(names, result.compliance, strict=True))
-    show(Table(f"Compliance at the tool (m/N, rad/N m), posture {_degrees(driven)}", ("", *names), rows))
+    show(
+        Table(
+            f"Compliance at the tool (m/N, rad/N m), posture {shown_values(mechanism_of(case), driven)}",
+            ("", *names),
+            rows,
+        )
+    )
     moving = [i for i, name in enumerate(names) if "R" not in name]
     values, directions = np.linalg.eigh(result.compliance[np.ix_(moving, moving)])
     for value, direction in zip(values[::-1], directions.T[::-1], strict=True):
@@ -138,10 +151,6 @@ def write_compensation(robot: str, path: Path, asked: Asked, out: Path) -> None:
         f"wrote {out}: predicted deviation mean {1e3 * before.mean():.3f} mm, largest {1e3 * before.max():.3f} mm; "
         f"after correction {1e6 * after.max():.2g} um by the same model"
     )
-
-
-def _degrees(driven: object) -> str:
-    return ", ".join(f"{angle:.1f}" for angle in np.degrees(np.asarray(driven))) + " deg"
 
 
 def warn(result: PostureResult) -> None:

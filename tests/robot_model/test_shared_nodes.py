@@ -34,7 +34,7 @@ def turning(value: float) -> np.ndarray:
 
 
 def arm(nodes: tuple[tuple[int, int], ...] = ((0, 1), (1, 2), (2, 3)), tip: int = 4) -> SpatialRobot:
-    """Joint 1 about z at the base, joint 2 about y at (0.2, 0, 0.5), joint 3 about z at (0.9, 0, 0.5), tip (1.2, 0, 0.5).
+    """Joint 1 about z at the base, joint 2 about y at (0.2, 0, 0.5), joint 3 about z at (0.9, 0, 0.5), tip 0.3 m on.
 
     The nodes of neighbouring joints are one: node 1 is the body between joints 1 and 2, half a metre long.
     """
@@ -47,9 +47,7 @@ def arm(nodes: tuple[tuple[int, int], ...] = ((0, 1), (1, 2), (2, 3)), tip: int 
         ),
         "tool",
     )
-    joints = tuple(
-        ElasticJoint(name, pair, turning(k)) for name, pair, k in zip("123", nodes, TURNING, strict=True)
-    )
+    joints = tuple(ElasticJoint(name, pair, turning(k)) for name, pair, k in zip("123", nodes, TURNING, strict=True))
     bodies = tuple(
         LumpedBody(pair[1], name, 10.0, np.array([0.1, 0.0, 0.05]), np.eye(3))
         for name, pair in zip("123", nodes, strict=True)
