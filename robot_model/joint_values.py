@@ -50,13 +50,13 @@ def driven_values(mechanism: Mechanism, typed: Sequence[float]) -> Real:
     if len(typed) != len(frames):
         units = ", ".join(f"{frame.name} ({joint_unit(frame)})" for frame in frames)
         raise InputError(f"{len(typed)} joint values for {len(frames)} driven joints; give one each: {units}")
-    return np.array([_taken(frame, float(value)) for frame, value in zip(frames, typed, strict=True)])
+    return np.array([_taken(frame, float(value)) for frame, value in zip(frames, typed, strict=True)], dtype=float)
 
 
 def typed_values(mechanism: Mechanism, driven: Real) -> Real:
     """The way back: degrees and metres from driven joint values (rad, m), shape (n_active,)."""
-    scale = [1.0 if frame.motion == "prismatic" else 180 / np.pi for frame in _driven(mechanism)]
-    return np.asarray(driven, dtype=float) * np.array(scale)
+    scale = np.array([1.0 if frame.motion == "prismatic" else 180 / np.pi for frame in _driven(mechanism)])
+    return np.asarray(np.asarray(driven, dtype=float) * scale)
 
 
 def shown_values(mechanism: Mechanism, driven: Real) -> str:
