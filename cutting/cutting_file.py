@@ -36,6 +36,9 @@ class _Cutting(BaseModel):
     helix_angle_deg: float = 0.0
     pitch_angles_deg: tuple[float, ...] = ()
     process_damping_n_per_m: float = 0.0
+    ktc_std_pa: float = 0.0
+    krc_std: float = 0.0
+    kac_std: float = 0.0
 
 
 def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
@@ -91,6 +94,9 @@ def _process(cutting: _Cutting, path: object) -> MillingProcess:
             helix_angle=math.radians(cutting.helix_angle_deg),
             pitch_angles=tuple(math.radians(angle) for angle in cutting.pitch_angles_deg),
             process_damping=cutting.process_damping_n_per_m,
+            ktc_std=cutting.ktc_std_pa,
+            krc_std=cutting.krc_std,
+            kac_std=cutting.kac_std,
         )
     except InputError as error:
         raise type(error)(f"{path}: {error}") from error

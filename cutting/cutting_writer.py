@@ -50,6 +50,9 @@ def _entries(process: MillingProcess) -> dict[str, str]:
         "kae_n_per_m": process.kae,
         "runout_m": process.runout,
         "process_damping_n_per_m": process.process_damping,
+        "ktc_std_pa": process.ktc_std,
+        "krc_std": process.krc_std,
+        "kac_std": process.kac_std,
     }
     entries = always | {key: repr(float(value)) for key, value in where_any.items() if value}
     if process.helix_angle:

@@ -42,6 +42,8 @@ class MillingProcess:
     process_damping
         Coefficient C, N/m: the flank takes ``C v_n / V`` per metre of edge, v_n the speed into the surface, V the
         cutting speed (Tyler & Schmitz, Precision Engineering 37, 2013, Eq. 1).
+    ktc_std, krc_std, kac_std
+        Standard errors of ``ktc`` (Pa), ``krc`` and ``kac``, taken as independent of each other. Zero: not known.
 
     Raises
     ------
@@ -65,6 +67,9 @@ class MillingProcess:
     helix_angle: float = 0.0
     pitch_angles: tuple[float, ...] = ()
     process_damping: float = 0.0
+    ktc_std: float = 0.0
+    krc_std: float = 0.0
+    kac_std: float = 0.0
 
     def __post_init__(self) -> None:
         if not (isinstance(self.teeth, int) and self.teeth >= 1):
@@ -77,6 +82,9 @@ class MillingProcess:
             "kae": self.kae,
             "runout": self.runout,
             "process_damping": self.process_damping,
+            "ktc_std": self.ktc_std,
+            "krc_std": self.krc_std,
+            "kac_std": self.kac_std,
         }
         for name, value in positive.items():
             if not (math.isfinite(value) and value > 0):
@@ -95,7 +103,15 @@ class MillingProcess:
             )
         if not 0 <= self.helix_angle < math.pi / 2:
             raise InputError(f"helix angle {math.degrees(self.helix_angle):g} deg is outside 0 <= beta < 90 deg")
+        self._check_errors()
         self._check_pitch()
+
+    def _check_errors(self) -> None:
+        if self.ktc_std >= self.ktc:
+            raise InputError(
+                f"ktc_std = {self.ktc_std:g} Pa is as large as ktc = {self.ktc:g} Pa; give the standard error in Pa, "
+                "or measure the coefficient again"
+            )
 
     def _check_pitch(self) -> None:
         if not self.pitch_angles:
@@ -120,6 +136,11 @@ class MillingProcess:
     def equal_pitch(self) -> bool:
         """Whether all teeth follow each other at the same angle."""
         return max(self.pitches) - min(self.pitches) < 1e-9
+
+    @property
+    def coefficient_errors(self) -> tuple[float, float, float]:
+        """Standard errors of ``ktc`` (Pa), ``krc`` and ``kac``; all zero where the file gives none."""
+        return (self.ktc_std, self.krc_std, self.kac_std)
 
     @property
     def is_plain(self) -> bool:

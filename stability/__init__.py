@@ -5,21 +5,25 @@ from .certified import certified_lobes
 from .chatter import ChatterVerdict, classify_cut
 from .collocation import collocation, collocation_limits, lowest_limits
 from .delay_system import DelaySystem, delay_system
+from .limit_band import LimitBand, limit_band
+from .limit_samples import drawn, sampled_limits
 from .lobes_file import read_lobes, write_lobes
 from .mode_coupling import ModeCouplingLimit, mode_coupling_limit
 from .multi_frequency import multi_frequency, multi_frequency_limits
 from .multipliers import Multipliers, multipliers
 from .nyquist import is_stable, nyquist_limits, unstable_poles
+from .recommended_cut import RecommendedCut, certified_cut, lowered, recommended_cut
 from .semi_discretisation import semi_discretisation, semi_discretised_multipliers
 from .stability_limits import StabilityLimits
 from .stability_lobes import StabilityLobes
 from .tool_receptance import ToolReceptance, tool_receptance
-from .uncertainty import RecommendedCut, depth_errors, probability_of_stability, recommended_cut
+from .uncertainty import depth_errors, probability_of_stability
 from .zero_order import zero_order
 
 __all__ = [
     "ChatterVerdict",
     "DelaySystem",
+    "LimitBand",
     "ModeCouplingLimit",
     "Multipliers",
     "RecommendedCut",
@@ -28,13 +32,17 @@ __all__ = [
     "StabilityLimits",
     "StabilityLobes",
     "ToolReceptance",
+    "certified_cut",
     "certified_lobes",
     "classify_cut",
     "collocation",
     "collocation_limits",
     "delay_system",
     "depth_errors",
+    "drawn",
     "is_stable",
+    "limit_band",
+    "lowered",
     "lowest_limits",
     "mode_coupling_limit",
     "multi_frequency",
@@ -44,6 +52,7 @@ __all__ = [
     "probability_of_stability",
     "read_lobes",
     "recommended_cut",
+    "sampled_limits",
     "semi_discretisation",
     "semi_discretised_multipliers",
     "stability_grid",

@@ -1,95 +1,68 @@
-"""From the covariance of a measurement to a band around the stability limit, a probability and a recommended cut."""
+"""From the errors of a measurement to a standard error of each stability limit, and to a probability."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtr
 
-from cutting import MillingProcess, average_directional_matrix, refuse_varied
-from estimation import Frf
+from cutting import MillingProcess
+from estimation import Frf, to_receptance
 from foundation import InputError
 from modal_fit import ModalModel
-from modal_fit.uncertainty import pack_parameters, unpack_parameters
 
+from .limit_sensitivity import LimitSensitivity, limit_sensitivities
 from .stability_lobes import StabilityLobes
-from .tool_receptance import tool_receptance
+from .tool_receptance import tool_directions
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
-
-@dataclass(frozen=True)
-class RecommendedCut:
-    """The cut that removes most at a stated confidence.
-
-    Parameters
-    ----------
-    spindle_speed
-        rad/s.
-    depth
-        Axial, m.
-    confidence
-        Probability that it is stable wherever the speed drifts.
-    removal
-        Depth times speed, the part of the removal rate that was chosen, m rad/s.
-    """
-
-    spindle_speed: float
-    depth: float
-    confidence: float
-    removal: float
+AVERAGED = ("zero-order", "nyquist")
+"""Methods with coefficients averaged over the tooth, whose limits are not those of the cut."""
 
 
 def depth_errors(structure: Frf | ModalModel, process: MillingProcess, lobes: StabilityLobes) -> Real:
-    """Standard error of each zero-order depth limit, from the covariance of the FRF or of the modal model.
+    """Standard error of each certified depth limit from those of structure and cutting coefficients, to first order.
 
-    At the limit ``g(w, a) = a K_tc (1 - exp(-i w tau)) lambda(w) - 1 = 0``; a change dH of the receptance changes the
-    eigenvalue by ``dlambda = y^H alpha dH x / y^H x`` (x, y its right and left vectors), and with it depth and chatter
-    frequency, which both follow from the two real equations g = 0. To first order; where two lobes meet the true
-    spread is not symmetric.
+    ``var(a) = g^T C g + sum_k (da/dk)^2 std_k^2`` with g the limit's derivatives by the modal parameters (or by the
+    FRF's lines) and k the coefficients K_tc, k_rc, k_ac; see :func:`limit_sensitivities`. Hopf, period doubling and
+    fold alike. Where two lobes meet the true spread is not symmetric: :func:`limit_band` notices and takes samples.
 
     Parameters
     ----------
     structure
-        What the lobes were computed from, with its covariance.
+        What the lobes were computed from.
     process
-        Cutter and engagement.
+        Cutter and engagement, with the coefficients' standard errors where they are known.
     lobes
-        Hopf limits of :func:`zero_order`.
+        Of :func:`certified_lobes`.
 
     Returns
     -------
-    (n_speeds,), m; NaN where there is no limit
+    (n_speeds,), m; NaN where there is no limit, or no first order of it
 
     Raises
     ------
     InputError
-        No covariance, or lobes of another solver.
+        Neither a covariance nor errors of the coefficients, lobes with averaged coefficients, or a cut with a helix,
+        unequal pitch or process damping.
     """
-    if structure.covariance is None:
+    if structure.covariance is None and not any(process.coefficient_errors):
         raise InputError("the structure has no covariance; fit or estimate it from more averages")
-    if lobes.method != "zero-order":
-        raise InputError(f"lobes of {lobes.method} have no first-order error; compute zero-order ones")
+    if lobes.method in AVERAGED:
+        raise InputError(
+            f"the limits of {lobes.method} are those of averaged coefficients, not of the cut; "
+            "give those of certified_lobes (the default of millfrf lobes)"
+        )
+    if isinstance(structure, Frf):
+        structure = to_receptance(structure)
     errors = np.full(len(lobes.depth_limits), np.nan)
-    found = np.flatnonzero(np.isfinite(lobes.depth_limits))
-    if not len(found):
-        return errors
-    frequencies, depths = lobes.chatter_frequencies[found], lobes.depth_limits[found]
-    refuse_varied(process, "the band of a limit", "draw it for equal pitch without process damping", takes=("helix",))
-    delays = 2 * math.pi / (process.teeth * lobes.spindle_speeds[found])
-    weights, slope, level = _sensitivity(structure, process, frequencies, depths, delays)
-    # d a / d Re g and d a / d Im g, with the frequency free to follow
-    jacobian = np.stack([np.stack([level.real, slope.real], -1), np.stack([level.imag, slope.imag], -1)], -2)
-    row = np.linalg.inv(jacobian)[:, 0]
-    if isinstance(structure, ModalModel):
-        change = _model_changes(structure, frequencies, weights)
-        moved = row[:, :1] * change.real + row[:, 1:] * change.imag
-        variance = np.einsum("ki,ij,kj->k", moved, structure.covariance, moved, optimize=True)
-    else:
-        variance = _frf_variance(structure, frequencies, weights) * 0.5 * np.sum(row**2, axis=1)
-    errors[found] = np.sqrt(np.maximum(variance, 0.0))
+    stated = np.array(process.coefficient_errors)
+    for k, found in enumerate(limit_sensitivities(structure, process, lobes)):
+        if found is not None:
+            variance = float(np.sum((found.coefficients * stated) ** 2)) + _structure_variance(structure, found)
+            errors[k] = math.sqrt(max(variance, 0.0))
     return errors
 
 
@@ -99,66 +72,51 @@ def probability_of_stability(
     """Probability that a cut is stable at every speed within ``drift`` (share) of the chosen one.
 
     ``P = min Phi((limit - depth) / error)`` over the lobes' speeds in that range; the limits' errors come from one
-    measurement and move together, so that the worst speed decides.
+    measurement and move together, so that the worst speed decides. A speed without a limit counts with the largest
+    limit there is and with the largest relative error.
 
     Raises
     ------
     InputError
-        A depth that is not positive, or a speed outside the lobes.
+        A depth that is not positive, a speed outside the lobes, or a limit or an error in the range that is not known.
     """
     if not depth > 0:
         raise InputError(f"depth {depth:g} m must be positive")
-    near = _within(lobes.spindle_speeds, spindle_speed, drift)
-    limits = np.array([np.interp(s, lobes.spindle_speeds, _capped(lobes.depth_limits)) for s in near])
-    spread = np.array([np.interp(s, lobes.spindle_speeds, np.nan_to_num(errors)) for s in near])
-    return float(np.min(ndtr((limits - depth) / np.maximum(spread, 1e-12))))
+    near = speeds_within(lobes.spindle_speeds, spindle_speed, drift)
+    known, spread = usable_limits(lobes, errors, math.inf)
+    limits, errors_near = (np.interp(near, lobes.spindle_speeds, column) for column in (known, spread))
+    if not (np.isfinite(limits).all() and np.isfinite(errors_near).all()):
+        worst = near[~(np.isfinite(limits) & np.isfinite(errors_near))][0] * 30 / math.pi
+        raise InputError(f"the limit near {worst:.0f} rpm is not resolved, or its error is not; no probability there")
+    return float(np.min(ndtr((limits - depth) / np.maximum(errors_near, 1e-12))))
 
 
-def recommended_cut(
-    lobes: StabilityLobes, errors: Real, *, confidence: float = 0.95, drift: float = 0.02, max_depth: float = math.inf
-) -> RecommendedCut:
-    """The cut with the largest depth times speed that is stable with ``confidence`` whatever the speed drifts.
+def usable_limits(lobes: StabilityLobes, errors: Real, max_depth: float) -> tuple[Real, Real]:
+    """Limits and standard errors that can be computed with, each (n_speeds,), m; NaN where nothing is known.
 
-    At a given feed per tooth and radial engagement the removal rate is proportional to depth times speed.
+    A speed without a limit has ``max_depth``, or where that is infinite the largest limit there is, with the largest
+    relative error of the other speeds.
+    """
+    finite = np.isfinite(lobes.depth_limits)
+    relative = errors[finite] / lobes.depth_limits[finite]
+    relative = relative[np.isfinite(relative)]
+    free = np.isposinf(lobes.depth_limits)
+    top = max_depth if math.isfinite(max_depth) else float(lobes.depth_limits[finite].max()) if finite.any() else 0.0
+    limits = np.where(free, top, lobes.depth_limits)
+    largest = float(relative.max()) if len(relative) else 0.0
+    spread = np.where(free, largest * top, errors)
+    unknown = np.array([status == "unresolved" for status in lobes.status], dtype=bool) | ~np.isfinite(spread)
+    return np.where(unknown, np.nan, np.minimum(limits, max_depth)), np.where(unknown, np.nan, spread)
 
-    Parameters
-    ----------
-    lobes, errors
-        Limits and their standard errors.
-    confidence
-        Between 0.5 and 1.
-    drift
-        Largest relative deviation of the spindle's speed.
-    max_depth
-        That the cutter allows, m.
+
+def speeds_within(speeds: Real, speed: float, drift: float) -> Real:
+    """Those of ``speeds`` within a relative ``drift`` of one, with the ends of that range.
 
     Raises
     ------
     InputError
-        A confidence or drift that cannot be, or no cut with that confidence.
+        A speed outside them.
     """
-    if not 0.5 <= confidence < 1 or not 0 <= drift < 0.5:
-        raise InputError(f"confidence {confidence:g} must lie in 0.5 ... 1 and drift {drift:g} in 0 ... 0.5")
-    lower = _capped(lobes.depth_limits) - ndtri(confidence) * np.nan_to_num(errors)
-    allowed = np.empty(len(lower))
-    for k, speed in enumerate(lobes.spindle_speeds):
-        near = _within(lobes.spindle_speeds, float(speed), drift)
-        allowed[k] = np.interp(near, lobes.spindle_speeds, lower).min()
-    allowed = np.minimum(allowed, max_depth)
-    removal = allowed * lobes.spindle_speeds
-    best = int(np.argmax(removal))
-    if allowed[best] <= 0:
-        raise InputError(f"no cut is stable with confidence {confidence:g}; measure longer or lower the confidence")
-    return RecommendedCut(float(lobes.spindle_speeds[best]), float(allowed[best]), confidence, float(removal[best]))
-
-
-def _capped(limits: Real) -> Real:
-    """Where there is no limit below the largest depth asked for, the largest limit there is."""
-    finite = limits[np.isfinite(limits)]
-    return np.where(np.isfinite(limits), limits, finite.max() if len(finite) else 0.0)
-
-
-def _within(speeds: Real, speed: float, drift: float) -> Real:
     low, high = speed * (1 - drift), speed * (1 + drift)
     if not speeds.min() <= speed <= speeds.max():
         raise InputError(
@@ -169,58 +127,53 @@ def _within(speeds: Real, speed: float, drift: float) -> Real:
     return np.unique(np.concatenate([inside, np.clip([low, speed, high], speeds.min(), speeds.max())]))
 
 
-def _sensitivity(
-    structure: Frf | ModalModel, process: MillingProcess, frequencies: Real, depths: Real, delays: Real
-) -> tuple[Complex, Complex, Complex]:
-    """dg per dH (n, 3, 3), dg per Hz, dg per metre of depth."""
-    source = tool_receptance(structure)
-    alpha = average_directional_matrix(process)
-    receptance = source.evaluate(frequencies)
-    turn = 1 - np.exp(-2j * np.pi * frequencies * delays)
-    factor = depths * process.ktc * turn
-    values, right = np.linalg.eig(alpha @ receptance)
-    chosen = np.argmin(np.abs(values * factor[:, None] - 1), axis=1)
-    lines = np.arange(len(frequencies))
-    x, eigenvalue = right[lines, :, chosen], values[lines, chosen]
-    left = np.linalg.pinv(right)[lines, chosen]  # rows of the inverse: y^H, with y^H x = 1
-    weights = factor[:, None, None] * np.einsum("kp,kq->kpq", left @ alpha, x)
-    step = 1e-4 * frequencies
-    beside = [source.evaluate(np.clip(frequencies + sign * step, *source.span)) for sign in (1, -1)]
-    through_h = np.einsum("kpq,kpq->k", weights, (beside[0] - beside[1]) / (2 * step)[:, None, None])
-    through_turn = depths * process.ktc * eigenvalue * 2j * np.pi * delays * (1 - turn)
-    return weights, through_h + through_turn, process.ktc * turn * eigenvalue
+def _structure_variance(structure: Frf | ModalModel, found: LimitSensitivity) -> float:
+    if structure.covariance is None:
+        return 0.0
+    if isinstance(structure, ModalModel):
+        gradient = _by_parameters(structure, found)
+        return float(gradient @ structure.covariance @ gradient)
+    return _frf_variance(structure, found)
 
 
-def _model_changes(model: ModalModel, frequencies: Real, weights: Complex) -> Complex:
-    """dg by each real parameter of the model, by central differences, (n_frequencies, n_parameters)."""
-    packed = pack_parameters(model)
-    size = np.maximum(np.abs(packed), 1e-3 * np.abs(packed).max())
-    changes = np.empty((len(frequencies), len(packed)), dtype=complex)
-    for number in range(len(packed)):
-        step = np.zeros(len(packed))
-        step[number] = 1e-6 * size[number]
-        ends = [
-            tool_receptance(unpack_parameters(model, packed + sign * step)).evaluate(frequencies) for sign in (1, -1)
-        ]
-        changes[:, number] = np.einsum("kpq,kpq->k", weights, ends[0] - ends[1]) / (2 * step[number])
-    return changes
+def _by_parameters(model: ModalModel, found: LimitSensitivity) -> Real:
+    """da by each real parameter of the model, in the order of ``ModalModel.covariance``."""
+    place = tool_directions(model)
+    right, left = place.place_rows(model.right), place.place_columns(model.left)
+    s = 2j * np.pi * found.lines[:, None]
+    poles, ends = np.empty((2, len(right)), complex), np.empty((2, 2, *right.shape), complex)
+    halves = ((model.poles, right, left), (model.poles.conj(), right.conj(), left.conj()))
+    for turn, (pole, out, into) in enumerate(halves):
+        pull = 1 / (s - pole)
+        ends[0, turn] = np.einsum("qr,qij,rj->ri", pull, found.weights, into, optimize=True)
+        ends[1, turn] = np.einsum("qr,qij,ri->rj", pull, found.weights, out, optimize=True)
+        poles[turn] = np.einsum("qr,qij,ri,rj->r", pull**2, found.weights, out, into, optimize=True)
+    by_right, by_left = np.zeros((2, *model.right.shape), complex), np.zeros((2, *model.left.shape), complex)
+    by_right[:, :, place.rows] = ends[0][:, :, place.row_axes] * place.row_signs
+    by_left[:, :, place.columns] = ends[1][:, :, place.column_axes] * place.column_signs
+    pieces = []
+    for direct, conjugate in (poles, by_right, by_left):
+        pieces += [np.real(direct + conjugate).ravel(), np.real(1j * (direct - conjugate)).ravel()]
+    return np.concatenate(pieces)
 
 
-def _frf_variance(frf: Frf, frequencies: Real, weights: Complex) -> Real:
-    """E|dg|^2 from the covariance of the measured lines nearest to each frequency."""
+def _frf_variance(frf: Frf, found: LimitSensitivity) -> float:
+    """``E (Re sum w dH)^2``, dH circular and independent from line to line, taken at the measured lines nearest."""
     assert frf.covariance is not None
-    valid = np.flatnonzero(frf.valid)
-    nearest = valid[np.argmin(np.abs(frf.frequencies[valid][None, :] - frequencies[:, None]), axis=1)]
-    placed = weights[:, : len(frf.responses), : len(frf.excitations)]
-    return np.asarray(
-        np.real(
-            np.einsum(
-                "kpq,kpu,kqv,kuv->k",
-                placed,
-                frf.covariance.response[nearest],
-                frf.covariance.excitation[nearest],
-                placed.conj(),
-                optimize=True,
-            )
-        )
-    )
+    place = tool_directions(frf)
+    valid = np.flatnonzero(frf.valid & (frf.frequencies > 0))
+    size = np.abs(found.lines)
+    inside = size <= frf.frequencies[valid[-1]]
+    nearest = valid[np.argmin(np.abs(frf.frequencies[valid][None, :] - size[inside][:, None]), axis=1)]
+    folded = np.where((found.lines < 0)[:, None, None], found.weights.conj(), found.weights)
+    below = size < frf.frequencies[valid[0]]  # there the first line's real part stands in
+    folded = np.where(below[:, None, None], folded.real, folded)[inside]
+    total = 0.0
+    for line in np.unique(nearest):
+        tool = folded[nearest == line].sum(axis=0)
+        weights = np.zeros((len(frf.responses), len(frf.excitations)), dtype=complex)
+        chosen = tool[place.row_axes][:, place.column_axes] * np.outer(place.row_signs, place.column_signs)
+        weights[np.ix_(place.rows, place.columns)] = chosen
+        response, excitation = frf.covariance.response[line], frf.covariance.excitation[line]
+        total += 0.5 * float(np.real(np.sum((weights.T @ response @ weights.conj()) * excitation)))
+    return total

@@ -9,12 +9,13 @@ import pytest
 from cutting import MillingProcess
 from estimation import FrfCovariance
 from foundation import InputError
-from modal_fit import fit_polyreference
-from replay_data import default_structure, table_one_model, tip_model
+from modal_fit import ModalModel
+from replay_data import table_one_model
 from stability import (
     StabilityLobes,
-    collocation,
+    certified_lobes,
     depth_errors,
+    drawn,
     probability_of_stability,
     recommended_cut,
     zero_order,
@@ -24,24 +25,24 @@ HALF_DOWN = MillingProcess(2, 0.0127, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 0.1
 SPEEDS = np.array([650, 800, 950, 1100, 1300, 1600, 2000, 2300]) * pi / 30
 
 
+def with_errors(model: ModalModel, poles: float, vectors: float) -> ModalModel:
+    """The model with independent errors: of poles as a share of their decay, of vectors as a share of the largest."""
+    sizes = [np.tile(poles * -model.poles.real, 2)]
+    sizes += [np.full(2 * part.size, vectors * np.abs(part).max()) for part in (model.right, model.left)]
+    return replace(model, covariance=np.diag(np.concatenate(sizes) ** 2))
+
+
 def run_of_bands(seeds: range) -> np.ndarray:
-    """Normalised errors (limit - truth) / standard error, (n_seeds, n_speeds), of fits of noisy FRFs."""
-    truth = tip_model(default_structure())
-    axis = np.arange(8.0, 35.0, 0.0625)
-    clean = truth.frf(axis)
-    level = 0.01 * np.sqrt(np.mean(np.abs(clean.values) ** 2, axis=(0, 2)))
-    covariance = FrfCovariance(
-        np.broadcast_to(np.diag(level**2).astype(complex), (len(axis), 3, 3)),
-        np.broadcast_to(np.eye(3, dtype=complex), (len(axis), 3, 3)),
-    )
-    exact = zero_order(truth, HALF_DOWN, SPEEDS, 20e-3).depth_limits
+    """Normalised errors (limit - truth) / standard error, (n_seeds, n_speeds), of estimates that are off at random."""
+    truth = with_errors(table_one_model(), 0.03, 0.01)
+    cut = replace(HALF_DOWN, ktc_std=0.02 * HALF_DOWN.ktc, krc_std=0.02, kac_std=0.02)
+    exact = certified_lobes(truth, HALF_DOWN, SPEEDS, 20e-3).depth_limits
     found = []
     for seed in seeds:
-        noise = np.random.default_rng(seed).standard_normal((2, *clean.values.shape)) * level[:, None] / np.sqrt(2)
-        noisy = replace(clean, values=clean.values + noise[0] + 1j * noise[1], covariance=covariance)
-        model = fit_polyreference(noisy, (10.0, 30.0)).model
-        lobes = zero_order(model, HALF_DOWN, SPEEDS, 20e-3)
-        found.append((lobes.depth_limits - exact) / depth_errors(model, HALF_DOWN, lobes))
+        [(model, process)] = drawn(truth, cut, 1, seed)
+        model, process = replace(model, covariance=truth.covariance), replace(process, ktc_std=cut.ktc_std)
+        lobes = certified_lobes(model, process, SPEEDS, 20e-3)
+        found.append((lobes.depth_limits - exact) / depth_errors(model, process, lobes))
     return np.array(found)
 
 
@@ -65,9 +66,9 @@ def test_error_of_a_model_follows_its_parameters() -> None:
     shift = 1e-4 * abs(model.poles[0])
     covariance[len(model.poles), len(model.poles)] = shift**2  # imaginary part of pole 1
     known = replace(model, covariance=covariance)
-    lobes = zero_order(known, HALF_DOWN, SPEEDS, 20e-3)
+    lobes = certified_lobes(known, HALF_DOWN, SPEEDS, 20e-3)
     moved = replace(model, poles=model.poles + np.array([1j * shift, 0]))
-    change = zero_order(moved, HALF_DOWN, SPEEDS, 20e-3).depth_limits - lobes.depth_limits
+    change = certified_lobes(moved, HALF_DOWN, SPEEDS, 20e-3).depth_limits - lobes.depth_limits
     np.testing.assert_allclose(depth_errors(known, HALF_DOWN, lobes), np.abs(change), rtol=0.02, atol=1e-9)
 
 
@@ -81,12 +82,15 @@ def test_measured_frf_gives_errors_of_the_same_kind() -> None:
         np.broadcast_to(level**2 * np.eye(3, dtype=complex), (len(axis), 3, 3)),
         np.broadcast_to(np.eye(3, dtype=complex), (len(axis), 3, 3)),
     )
-    # one smooth error over all lines, so that interpolation and the choice of line do not matter
+    # errors that are smooth over a line's neighbours, and independent from one line of the motion to the next
     limits, stated = [], []
     for seed in range(40):
-        draw = np.random.default_rng(seed).standard_normal((2, 3, 3)) * level / np.sqrt(2)
-        noisy = replace(clean, values=clean.values + draw[0] + 1j * draw[1], covariance=covariance)
-        lobes = zero_order(noisy, HALF_DOWN, SPEEDS[1:6], 20e-3)
+        generator = np.random.default_rng(seed)
+        draw = generator.standard_normal((2, 3, 3, 16)) * level / np.sqrt(32)
+        waves = np.exp(2j * pi * np.outer(axis, generator.uniform(-0.3, 0.3, 16)))
+        error = np.einsum("pqm,km->kpq", draw[0] + 1j * draw[1], waves)
+        noisy = replace(clean, values=clean.values + error, covariance=covariance)
+        lobes = certified_lobes(noisy, HALF_DOWN, SPEEDS[1:6:2], 20e-3)
         limits.append(lobes.depth_limits)
         stated.append(depth_errors(noisy, HALF_DOWN, lobes))
     ratio = np.std(limits, axis=0) / np.mean(stated, axis=0)
@@ -97,7 +101,7 @@ def flat_lobes() -> StabilityLobes:
     """Limit 2 mm, with a pocket of 4 mm between 1400 and 1600 rpm."""
     rpm = np.arange(1000.0, 2001.0, 10)
     depth = np.where((rpm > 1400) & (rpm < 1600), 4e-3, 2e-3)
-    return StabilityLobes(rpm * pi / 30, depth, np.full(len(rpm), 18.0), ("hopf",) * len(rpm), "zero-order")
+    return StabilityLobes(rpm * pi / 30, depth, np.full(len(rpm), 18.0), ("hopf",) * len(rpm), "collocation")
 
 
 def test_probability_and_recommendation() -> None:
@@ -126,7 +130,5 @@ def test_requests_that_cannot_be_met_are_refused() -> None:
         depth_errors(table_one_model(), HALF_DOWN, lobes)
     model = table_one_model()
     size = 2 * (model.poles.size + model.right.size + model.left.size)
-    with pytest.raises(InputError, match="collocation"):
-        depth_errors(
-            replace(model, covariance=np.eye(size)), HALF_DOWN, collocation(model, HALF_DOWN, SPEEDS[:1], 5e-3)
-        )
+    with pytest.raises(InputError, match="averaged coefficients"):
+        depth_errors(replace(model, covariance=np.eye(size)), HALF_DOWN, zero_order(model, HALF_DOWN, SPEEDS[:1], 5e-3))

@@ -1,0 +1,96 @@
+"""The interval that holds the true limit at each speed: first order where it holds, samples where it does not."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from cutting import MillingProcess
+from estimation import Frf
+from modal_fit import ModalModel
+
+from .limit_samples import sampled_limits
+from .stability_lobes import StabilityLobes
+from .uncertainty import depth_errors
+
+Real = NDArray[np.float64]
+
+SAMPLES = 39
+"""The smallest and the largest of 39 draws hold the next one with a probability of 38 / 40 = 95 %."""
+
+CONFIDENCE = 0.95
+
+OUTSIDE = 5
+"""Of 39 samples, 2 are expected outside the first-order interval; more than 5 come by chance once in a hundred."""
+
+SPREAD = (0.65, 1.5)
+"""Ratio of the samples' spread to the first-order error that 39 samples show by chance, three standard errors wide."""
+
+
+@dataclass(frozen=True)
+class LimitBand:
+    """95 % interval of the depth limit at each speed.
+
+    Parameters
+    ----------
+    spindle_speeds : (n_speeds,), rad/s
+    low, high : (n_speeds,), m
+        ``high`` is infinite where the limit may lie above the largest depth looked at; both are NaN where nothing is
+        known.
+    basis
+        One a speed: ``first-order``, ``samples``, or ``none``.
+    """
+
+    spindle_speeds: Real
+    low: Real
+    high: Real
+    basis: tuple[str, ...]
+
+
+def limit_band(
+    structure: Frf | ModalModel, process: MillingProcess, lobes: StabilityLobes, max_depth: float, seed: int = 0
+) -> LimitBand:
+    """95 % interval of each limit of ``certified_lobes``, from errors of the structure and the coefficients.
+
+    Of a modal model 39 draws are solved besides the first order; a speed at which they contradict it (where two lobes
+    meet, beside a notch, where no limit was found) has their smallest and largest limit instead. Of an FRF there are no
+    draws: the first order alone.
+
+    Parameters
+    ----------
+    structure, process, lobes
+        As :func:`depth_errors`.
+    max_depth
+        Largest depth that draws are solved to, m.
+    seed
+        Of the draws.
+
+    Raises
+    ------
+    InputError
+        As :func:`depth_errors`; a helix, unequal pitch or process damping is refused.
+    """
+    errors = depth_errors(structure, process, lobes)
+    half = ndtri(0.5 + CONFIDENCE / 2) * errors
+    low, high = np.maximum(lobes.depth_limits - half, 0.0), lobes.depth_limits + half
+    known = np.isfinite(low) & np.array([status != "unresolved" for status in lobes.status], dtype=bool)
+    basis = np.where(known, "first-order", "none").astype(object)
+    low, high = np.where(known, low, np.nan), np.where(known, high, np.nan)
+    if isinstance(structure, ModalModel):
+        samples = sampled_limits(structure, process, lobes.spindle_speeds, max_depth, SAMPLES, seed)
+        solved = ~np.isnan(samples).any(axis=0)
+        chosen = solved & ~(known & _agree(samples, lobes.depth_limits, errors, half))
+        low[chosen], high[chosen] = samples.min(axis=0)[chosen], samples.max(axis=0)[chosen]
+        basis[chosen] = "samples"
+    return LimitBand(lobes.spindle_speeds, low, high, tuple(str(one) for one in basis))
+
+
+def _agree(samples: Real, limits: Real, errors: Real, half: Real) -> NDArray[np.bool_]:
+    """Whether the draws spread as the first order says, (n_speeds,)."""
+    finite = np.isfinite(samples).all(axis=0)
+    away = np.where(finite, samples, 0.0) - limits
+    outside = np.sum(~(np.abs(away) <= half), axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = np.sqrt(np.mean(away**2, axis=0)) / errors
+    return np.asarray(finite & (outside <= OUTSIDE) & (ratio > SPREAD[0]) & (ratio < SPREAD[1]))

@@ -1,0 +1,217 @@
+"""The cut that removes most at a stated confidence, from certified limits and their errors."""
+
+import heapq
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
+
+from cutting import MillingProcess
+from estimation import Frf
+from foundation import InputError
+from modal_fit import ModalModel
+
+from .certified import certified_lobes
+from .limit_samples import sampled_limits
+from .stability_lobes import StabilityLobes
+from .uncertainty import depth_errors, speeds_within, usable_limits
+
+Real = NDArray[np.float64]
+
+FINE = 25
+"""Speeds inside the drift at which the limits are computed anew."""
+
+SAMPLED_SPEEDS = 7
+"""Of these, the ones with the lowest limits and both ends, at which draws are solved."""
+
+LOOKED_AT = (60, 8)
+"""Most speeds whose drift is computed, and most that are sampled."""
+
+
+@dataclass(frozen=True)
+class RecommendedCut:
+    """The cut that removes most at a stated confidence.
+
+    Parameters
+    ----------
+    spindle_speed
+        rad/s.
+    depth
+        Axial, m.
+    confidence
+        Probability that it is stable wherever the speed drifts.
+    removal
+        Depth times speed, the part of the removal rate that was chosen, m rad/s.
+    drift
+        Largest relative deviation of the speed that it allows for.
+    draws
+        Structures and coefficients drawn from their errors at which it was tried; 0: first order alone.
+    """
+
+    spindle_speed: float
+    depth: float
+    confidence: float
+    removal: float
+    drift: float = 0.0
+    draws: int = 0
+
+
+def recommended_cut(
+    lobes: StabilityLobes, errors: Real, *, confidence: float = 0.95, drift: float = 0.02, max_depth: float = math.inf
+) -> RecommendedCut:
+    """The cut with the largest depth times speed that is stable with ``confidence`` whatever the speed drifts.
+
+    At a given feed per tooth and radial engagement the removal rate is proportional to depth times speed. This stands
+    on the limits given and on straight lines between them; :func:`certified_cut` computes what lies between. Where a
+    limit or its error is not known nothing is recommended; where there is no limit, no more than ``max_depth``.
+
+    Parameters
+    ----------
+    lobes, errors
+        Limits and their standard errors.
+    confidence
+        Between 0.5 and 1.
+    drift
+        Largest relative deviation of the spindle's speed.
+    max_depth
+        That the cutter allows, m.
+
+    Raises
+    ------
+    InputError
+        A confidence or drift that cannot be, or no cut with that confidence.
+    """
+    allowed = _allowed(lobes, errors, confidence, drift, max_depth)
+    removal = allowed * lobes.spindle_speeds
+    best = int(np.argmax(removal))
+    if allowed[best] <= 0:
+        raise InputError(f"no cut is stable with confidence {confidence:g}; measure longer or lower the confidence")
+    speed, depth = float(lobes.spindle_speeds[best]), float(allowed[best])
+    return RecommendedCut(speed, depth, confidence, float(removal[best]), drift)
+
+
+def certified_cut(
+    structure: Frf | ModalModel,
+    process: MillingProcess,
+    lobes: StabilityLobes,
+    errors: Real,
+    *,
+    confidence: float = 0.95,
+    drift: float = 0.02,
+    max_depth: float,
+    seed: int = 0,
+) -> RecommendedCut:
+    """As :func:`recommended_cut`, with the limits inside the drift computed anew and tried with draws.
+
+    Speeds are taken in the order of what they promise. The limits of one are computed at 25 speeds inside its drift, so
+    that no notch between two speeds of ``lobes`` is passed over, and lessened by their errors. Then 99 or more
+    structures and coefficients are drawn from their errors, and the depth is lowered to the one at which
+    ``confidence`` of them are stable at every speed tried inside the drift (of an FRF there are no draws). What is left
+    is compared with the next speed's promise.
+
+    Parameters
+    ----------
+    structure, process
+        What the lobes are of, with its errors.
+    lobes, errors
+        Of :func:`certified_lobes` and :func:`depth_errors`.
+    confidence, drift, max_depth
+        As :func:`recommended_cut`; the depth is finite, and draws are solved up to it.
+    seed
+        Of the draws.
+
+    Raises
+    ------
+    InputError
+        As :func:`recommended_cut`.
+    """
+    allowed = _allowed(lobes, errors, confidence, drift, max_depth)
+    promise = [(-float(a * s), 0, float(s), float(a)) for a, s in zip(allowed, lobes.spindle_speeds, strict=True)]
+    heapq.heapify(promise)
+    computed, sampled, last = 0, 0, 2 if isinstance(structure, ModalModel) else 1
+    proven: list[tuple[float, float, float]] = []
+    while promise and computed < LOOKED_AT[0] and sampled < LOOKED_AT[1]:
+        removal, stage, speed, depth = heapq.heappop(promise)
+        if depth <= 0 or (proven and removal >= min(proven)[0]):
+            break
+        if stage == 0:
+            depth = min(depth, _inside_drift(structure, process, speed, confidence, drift, max_depth))
+            computed += 1
+        else:
+            depth = _of_draws(structure, process, speed, depth, confidence, drift, seed)
+            sampled += 1
+        if stage + 1 == last:
+            proven.append((-depth * speed, speed, depth))
+        else:
+            heapq.heappush(promise, (-depth * speed, stage + 1, speed, depth))
+    if not proven or min(proven)[2] <= 0:
+        raise InputError(f"no cut is stable with confidence {confidence:g}; measure longer or lower the confidence")
+    removal, speed, depth = min(proven)
+    return RecommendedCut(speed, depth, confidence, -removal, drift, draws_for(confidence) if last == 2 else 0)
+
+
+def lowered(cut: RecommendedCut, share: float) -> RecommendedCut:
+    """The same cut at a share of its depth."""
+    return replace(cut, depth=share * cut.depth, removal=share * cut.removal)
+
+
+def draws_for(confidence: float) -> int:
+    """How many draws tell a quantile: the k-th lowest of n holds with a probability of ``1 - k / (n + 1)``."""
+    return max(99, math.ceil(1 / (1 - confidence)) - 1)
+
+
+def _allowed(lobes: StabilityLobes, errors: Real, confidence: float, drift: float, max_depth: float) -> Real:
+    """Depth at each of the lobes' speeds that holds over the drift, on straight lines between limits; 0: none."""
+    if not 0.5 <= confidence < 1 or not 0 <= drift < 0.5:
+        raise InputError(f"confidence {confidence:g} must lie in 0.5 ... 1 and drift {drift:g} in 0 ... 0.5")
+    lower = _lower(lobes, errors, confidence, max_depth)
+    speeds = lobes.spindle_speeds
+    ranges = [speeds_within(speeds, float(s), drift) for s in speeds]
+    return np.asarray([float(np.interp(near, speeds, lower).min()) for near in ranges])
+
+
+def _lower(lobes: StabilityLobes, errors: Real, confidence: float, max_depth: float) -> Real:
+    """Depth that holds at each speed with the confidence; 0 where nothing is known."""
+    limits, spread = usable_limits(lobes, errors, max_depth)
+    return np.maximum(np.nan_to_num(limits - ndtri(confidence) * spread, nan=0.0), 0.0)
+
+
+def _around(speed: float, drift: float) -> Real:
+    return np.asarray(speed * (1 + (np.linspace(-drift, drift, FINE) if drift else np.zeros(1))))
+
+
+def _inside_drift(
+    structure: Frf | ModalModel,
+    process: MillingProcess,
+    speed: float,
+    confidence: float,
+    drift: float,
+    max_depth: float,
+) -> float:
+    """The depth that the computed limits inside the drift allow."""
+    fine = certified_lobes(structure, process, _around(speed, drift), max_depth)
+    return float(_lower(fine, depth_errors(structure, process, fine), confidence, max_depth).min())
+
+
+def _of_draws(
+    structure: Frf | ModalModel,
+    process: MillingProcess,
+    speed: float,
+    depth: float,
+    confidence: float,
+    drift: float,
+    seed: int,
+) -> float:
+    """The depth, no more than ``depth``, at which ``confidence`` of the draws are stable inside the drift."""
+    assert isinstance(structure, ModalModel)
+    fine = _around(speed, drift)
+    limits = certified_lobes(structure, process, fine, 2 * depth).depth_limits
+    order = np.argsort(np.nan_to_num(limits, nan=0.0))
+    chosen = np.unique([*order[: SAMPLED_SPEEDS - 2], 0, len(fine) - 1])
+    count = draws_for(confidence)
+    samples = sampled_limits(structure, process, fine[chosen], depth, count, seed)
+    lowest = np.minimum(np.nan_to_num(samples, nan=0.0, posinf=depth), depth).min(axis=1)
+    rank = max(1, math.floor((1 - confidence) * (count + 1) + 1e-9))
+    return float(np.sort(lowest)[rank - 1])
