@@ -175,7 +175,7 @@ def _allowed(lobes: StabilityLobes, errors: Real, confidence: float, drift: floa
 def _lower(lobes: StabilityLobes, errors: Real, confidence: float, max_depth: float) -> Real:
     """Depth that holds at each speed with the confidence; 0 where nothing is known."""
     limits, spread = usable_limits(lobes, errors, max_depth)
-    return np.maximum(np.nan_to_num(limits - ndtri(confidence) * spread, nan=0.0), 0.0)
+    return np.asarray(np.maximum(np.nan_to_num(limits - ndtri(confidence) * spread, nan=0.0), 0.0))
 
 
 def _around(speed: float, drift: float) -> Real:
