@@ -2,7 +2,7 @@
 
 from .boundary import StabilityBoundary, StabilityGrid, stability_grid, trace_boundary
 from .certified import certified_lobes
-from .chatter import ChatterVerdict, classify_cut
+from .chatter import ChatterVerdict, Evidence, ForeignTone, classify_cut, gather_evidence
 from .collocation import collocation, collocation_limits, lowest_limits
 from .delay_system import DelaySystem, delay_system
 from .limit_band import LimitBand, limit_band
@@ -23,6 +23,8 @@ from .zero_order import zero_order
 __all__ = [
     "ChatterVerdict",
     "DelaySystem",
+    "Evidence",
+    "ForeignTone",
     "LimitBand",
     "ModeCouplingLimit",
     "Multipliers",
@@ -40,6 +42,7 @@ __all__ = [
     "delay_system",
     "depth_errors",
     "drawn",
+    "gather_evidence",
     "is_stable",
     "limit_band",
     "lowered",

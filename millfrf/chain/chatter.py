@@ -1,4 +1,4 @@
-"""From recordings of cuts to a table of verdicts."""
+"""From recordings of cuts to verdicts, and tables of them."""
 
 import math
 import os
@@ -12,13 +12,15 @@ import numpy as np
 from acquisition import Recording
 from estimation import choose_channels
 from foundation import InputError
-from stability import classify_cut
+from stability import ChatterVerdict, classify_cut
 
 from ..progress import Watch, silent
 from ..tables import Table
 
 SPEED_EVENTS = "spindle_speed_rpm"
 """Event series, and key of any table of the set-up, that states the spindle's speed."""
+_SPEED_OFF = 0.002  # relative error of the stated speed from which it is told
+_CERTAIN = 0.01  # p-value below which its order of magnitude is enough
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,8 @@ class CutOptions:
         Channel names; empty: chosen by quantity.
     stream
         Sample clock; None: the only one.
+    natural_frequencies
+        Of the structure's modes, Hz; with them the line nearest to a mode is the chatter frequency. Empty: not known.
     """
 
     teeth: int
@@ -44,17 +48,54 @@ class CutOptions:
     runout: bool = True
     responses: tuple[str, ...] = ()
     stream: str | None = None
+    natural_frequencies: tuple[float, ...] = ()
 
 
-def classify_recordings(paths: Sequence[str | os.PathLike[str]], options: CutOptions, watch: Watch = silent) -> Table:
-    """One row a recording: verdict, size of what does not repeat, its growth, its frequency.
+DERIVATIVES = {"acceleration": 2, "velocity": 1}
+"""How often a quantity is the time derivative of displacement; 0 for all others."""
+
+
+@dataclass(frozen=True)
+class JudgedCut:
+    """A recording and what it says.
+
+    Parameters
+    ----------
+    name
+        File name.
+    stated_rpm
+        Spindle speed that the recording or the user states.
+    verdict
+        See :class:`stability.ChatterVerdict`.
+    """
+
+    name: str
+    stated_rpm: float
+    verdict: ChatterVerdict
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why nothing could be concluded, and what else is doubtful; one sentence each."""
+        doubts = self.verdict.warnings
+        if self.verdict.kind == "inconclusive":
+            doubts = (f"inconclusive: {self.verdict.reason}", *doubts)
+        found = self.verdict.spindle_speed * 30 / math.pi
+        if abs(found / self.stated_rpm - 1) > _SPEED_OFF:
+            doubts = (*doubts, f"the spindle turned at {found:.1f} rpm, stated are {self.stated_rpm:.1f} rpm")
+        return tuple(f"{self.name}: {doubt}" for doubt in doubts)
+
+
+def judge_recordings(
+    paths: Sequence[str | os.PathLike[str]], options: CutOptions, watch: Watch = silent
+) -> tuple[JudgedCut, ...]:
+    """The verdict on each recording.
 
     Raises
     ------
     InputError
         A file that cannot be used, no speed, or too short a cut.
     """
-    rows = []
+    cuts = []
     for path in paths:
         with Recording(path) as recording:
             stream = recording.stream(options.stream)
@@ -63,14 +104,46 @@ def classify_recordings(paths: Sequence[str | os.PathLike[str]], options: CutOpt
             with watch(f"judging {Path(path).name}"):
                 samples = stream.read(channels=[channel.name for channel in responses])
                 found = classify_cut(
-                    samples, stream.sample_rate, rpm * math.pi / 30, options.teeth, runout=options.runout
+                    samples,
+                    stream.sample_rate,
+                    rpm * math.pi / 30,
+                    options.teeth,
+                    runout=options.runout,
+                    derivatives=[DERIVATIVES.get(channel.quantity, 0) for channel in responses],
+                    natural_frequencies=options.natural_frequencies,
                 )
-        line = "" if math.isnan(found.frequency) else f"{found.frequency:.2f}"
+        cuts.append(JudgedCut(Path(path).name, rpm, found))
+    return tuple(cuts)
+
+
+def verdict_table(cuts: Sequence[JudgedCut]) -> Table:
+    """One row a recording: verdict, its p-value, size of what does not repeat, growth, frequency, spindle."""
+    rows = []
+    for cut in cuts:
+        found = cut.verdict
         rows.append(
-            (Path(path).name, f"{rpm:.1f}", found.kind, f"{100 * found.deviation:.1f} %", f"{found.growth:.2f}", line)
+            (
+                cut.name,
+                f"{found.spindle_speed * 30 / math.pi:.1f}",
+                found.kind,
+                f"{found.p_value:.0e}" if found.p_value < _CERTAIN else f"{found.p_value:.2g}",
+                f"{100 * found.deviation:.1f} %",
+                "" if math.isnan(found.growth) else f"{found.growth:.2f}",
+                "" if math.isnan(found.frequency) else f"{found.frequency:.2f}",
+            )
         )
-    columns = ("cut", "speed (rpm)", "verdict", "does not repeat", "last / first quarter", "line (Hz, folded)")
-    return Table("Cuts; lines are folded into half the tooth passing", columns, tuple(rows))
+    columns = ("cut", "speed (rpm)", "verdict", "p of noise", "does not repeat", "last / first eighth", "line (Hz)")
+    return Table("Cuts", columns, tuple(rows))
+
+
+def tone_table(cuts: Sequence[JudgedCut]) -> Table:
+    """Tones that are neither the spindle's nor chatter, one row each."""
+    rows = [
+        (cut.name, f"{tone.frequency:.2f}", f"{100 * tone.share:.1f} %", tone.name)
+        for cut in cuts
+        for tone in cut.verdict.foreign
+    ]
+    return Table("Foreign tones", ("cut", "frequency (Hz)", "of the motion", "what it is"), tuple(rows))
 
 
 def _speed(recording: Recording, options: CutOptions) -> float:

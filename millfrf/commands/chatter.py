@@ -17,19 +17,33 @@ def chatter(
     response: Annotated[
         list[str] | None, typer.Option("--response", help="Channel to judge by; default: all that respond.")
     ] = None,
+    model: Annotated[
+        Path | None, typer.Option("--model", metavar="MODEL.json", help="Structure whose modes tell the frequency.")
+    ] = None,
     stream: Stream = None,
 ) -> None:
-    """Classify cuts as stable, Hopf chatter or period doubling from their vibration.
+    """Classify cuts as stable, Hopf chatter, period doubling or inconclusive from their vibration.
 
-    Where the cutting file gives a runout, teeth are taken to cut unequal chips; two teeth then hide period doubling.
-    The spindle speed (within 1 %) is taken from events `spindle_speed_rpm` or from the set-up where --speed is missing.
+    The spindle is followed in the recording (its speed within 1 % comes from --speed, from events `spindle_speed_rpm`
+    or from the set-up), its orders are taken away, and lines that stand out of the noise are named: chatter, or a
+    foreign tone. Where the cutting file gives a runout, teeth are taken to cut unequal chips: with an even number of
+    teeth, period doubling is then only told while it grows.
     """
     from cutting import read_cutting_process
+    from modal_fit import read_modal_model
 
-    from ..chain.chatter import CutOptions, classify_recordings
+    from ..chain.chatter import CutOptions, judge_recordings, tone_table, verdict_table
     from ..progress import bar
     from ..tables import show
 
     process = read_cutting_process(cutting)
-    options = CutOptions(process.teeth, speed, process.runout > 0, names(response), stream)
-    show(classify_recordings(recordings, options, bar))
+    natural = () if model is None else tuple(float(f) for f in read_modal_model(model).natural_frequencies)
+    options = CutOptions(process.teeth, speed, process.runout > 0, names(response), stream, natural)
+    cuts = judge_recordings(recordings, options, bar)
+    show(verdict_table(cuts))
+    if any(cut.verdict.foreign for cut in cuts):
+        show(tone_table(cuts))
+    for cut in cuts:
+        typer.echo(f"{cut.name}: {cut.verdict.kind}: {cut.verdict.reason}")
+        for doubt in cut.doubts:
+            typer.echo(f"warning: {doubt}", err=True)

@@ -1,4 +1,4 @@
-"""Modules of the stability tests that several files use: literature benchmarks, independent multipliers."""
+"""Modules of the stability tests that several files use: benchmarks, independent multipliers, simulated cuts."""
 
 import importlib.util
 import sys
@@ -14,5 +14,5 @@ def _load(name: str) -> None:
     spec.loader.exec_module(module)
 
 
-for _name in ("benchmarks_of_literature", "independent_floquet"):
+for _name in ("benchmarks_of_literature", "independent_floquet", "milling_simulator", "random_cuts"):
     _load(_name)

@@ -1,0 +1,96 @@
+"""What is found in the recording of a cut, before anything is concluded from it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .families import Family, families_of
+from .lines import Spectrum, lines_of, spectrum_of
+from .orders import Revolutions, to_revolutions
+from .spindle import SpindleTrack, track_spindle
+
+Real = NDArray[np.float64]
+
+LEVEL = 1e-4
+"""Family-wise p-value below which a line stands out."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Spindle, spectrum and lines of a recording.
+
+    Parameters
+    ----------
+    track
+        Angle of the spindle.
+    revolutions
+        The whole recording, channels of like size.
+    late
+        Its second half, which is judged.
+    spectrum
+        Of what does not repeat in the second half.
+    families
+        Lines that stand out, gathered by the tooth passing, strongest first.
+    order_p_value
+        Probability that noise alone looks as much like orders of the spindle as the recording.
+    sample_rate
+        Hz.
+    """
+
+    track: SpindleTrack
+    revolutions: Revolutions
+    late: Revolutions
+    spectrum: Spectrum
+    families: tuple[Family, ...]
+    order_p_value: float
+    sample_rate: float
+
+    @property
+    def deviation(self) -> float:
+        """Size of what does not repeat over the size of the motion, in the channel where it is smallest."""
+        return float(np.min(self.late.residual.std(axis=0) / self.late.size))
+
+    @property
+    def least_share(self) -> float:
+        """Smallest share of the motion that a line must have to stand out where the floor is highest."""
+        floor = np.where(self.spectrum.searched[:, None], self.spectrum.floor, 0.0)
+        needed = math.log(self.spectrum.searched.sum() * floor.shape[1] / LEVEL)
+        return float(np.min(np.sqrt(needed * floor.max(axis=0)) / self.late.size))
+
+
+def gather_evidence(samples: Real, sample_rate: float, spindle_speed: float, teeth: int) -> Evidence:
+    """Follow the spindle, take its orders away, and find the lines that are left.
+
+    Parameters
+    ----------
+    samples : (n_samples, n_channels)
+        Channels that hold no motion are left out.
+    sample_rate
+        Hz.
+    spindle_speed
+        rad/s, within 1 %.
+    teeth
+        Number of teeth.
+    """
+    data = samples - samples.mean(axis=0)
+    data = data / np.maximum(data.std(axis=0), 1e-300)
+    track = track_spindle(data, sample_rate, spindle_speed / (2 * math.pi))
+    revolutions = to_revolutions(data, sample_rate, track, teeth)
+    late = revolutions.part(revolutions.count // 2, revolutions.count)
+    spectrum = spectrum_of(late)
+    lines = lines_of(spectrum, track.mean_frequency, LEVEL)
+    families = families_of(lines, teeth, spectrum.resolution, late.size)
+    return Evidence(track, revolutions, late, spectrum, families, _order_p_value(late, spectrum), sample_rate)
+
+
+def _order_p_value(late: Revolutions, spectrum: Spectrum) -> float:
+    """Family-wise p-value of the strongest order of the mean revolution over the floor beside it."""
+    amplitudes = np.fft.rfft(late.mean_turn, axis=0)[1:] / late.mean_turn.shape[0]
+    power = 2 * np.abs(amplitudes) ** 2
+    count = min(len(power), int(spectrum.orders[spectrum.searched][-1]))
+    floor = spectrum.floor[np.arange(1, count + 1) * late.count]
+    ratio = float((power[:count] / floor).max())
+    trials = count * power.shape[1] * 100  # frequencies of the spindle that were tried
+    return min(1.0, float(trials * math.exp(-min(ratio, 700.0))))

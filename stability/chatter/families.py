@@ -1,0 +1,95 @@
+"""Lines that belong together: chatter is modulated by the teeth and has a line at every tooth passing beside it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .lines import Line
+
+Real = NDArray[np.float64]
+
+TOLERANCE = 1.2
+"""Lines of resolution by which lines of one family may differ."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """Lines at ``+-f + k f_tooth``: one periodic disturbance and what the teeth make of it.
+
+    Parameters
+    ----------
+    lines
+        Strongest first.
+    share
+        Root mean square over the motion's, in the channel where it is largest.
+    place
+        Distance from the nearest multiple of the tooth passing, in orders of the spindle, 0 to half the teeth.
+    """
+
+    lines: tuple[Line, ...]
+    share: float
+    place: float
+
+    @property
+    def p_value(self) -> float:
+        """Of its most significant line."""
+        return min(line.p_value for line in self.lines)
+
+
+def folded(order: float, teeth: int) -> float:
+    """Distance (orders) from the nearest multiple of the number of teeth."""
+    return abs((order + teeth / 2) % teeth - teeth / 2)
+
+
+def families_of(lines: tuple[Line, ...], teeth: int, resolution: float, size: Real) -> tuple[Family, ...]:
+    """Lines gathered by their place between two multiples of the tooth passing, families with most power first.
+
+    Parameters
+    ----------
+    lines
+        Strongest first.
+    teeth
+        Number of teeth.
+    resolution
+        Orders between two lines of the spectrum.
+    size : (n_channels,)
+        Root mean square of the motion.
+    """
+    left = list(lines)
+    found = []
+    while left:
+        place = folded(left[0].order, teeth)
+        own = [line for line in left if abs(folded(line.order, teeth) - place) < TOLERANCE * resolution]
+        left = [line for line in left if line not in own]
+        power = np.sum([line.amplitude**2 for line in own], axis=0)
+        found.append(Family(tuple(own), float(np.max(np.sqrt(power) / size)), place))
+    return tuple(sorted(found, key=lambda family: -family.share))
+
+
+def largest_motion(lines: tuple[Line, ...], derivative: tuple[int, ...], natural: tuple[float, ...]) -> Line:
+    """The line of a family at which the tool moves most, or, with natural frequencies, the one nearest to a mode.
+
+    Chatter vibrates close to a mode of the structure (Altintas, Manufacturing Automation, 2nd ed., section 3.3); its
+    other lines are what the teeth make of it. Lines weaker than a tenth of the largest motion are not taken.
+
+    Parameters
+    ----------
+    lines
+        Of one family.
+    derivative : (n_channels,)
+        2 for acceleration, 1 for velocity, 0 for displacement.
+    natural
+        Natural frequencies of the structure, Hz; empty: not known.
+    """
+
+    def motion(line: Line) -> float:
+        sizes = [a / line.frequency**power for a, power in zip(line.amplitude, derivative, strict=True)]
+        return math.sqrt(sum(size**2 for size in sizes))
+
+    largest = max(motion(line) for line in lines)
+    if not natural:
+        return max(lines, key=motion)
+    strong = [line for line in lines if motion(line) > 0.1 * largest]
+    return min(strong, key=lambda line: min(abs(math.log(line.frequency / mode)) for mode in natural))

@@ -1,0 +1,120 @@
+"""Random cuts on a known side of the boundary, disturbed as a laboratory's recordings are."""
+
+from dataclasses import dataclass, replace
+from math import pi
+
+import numpy as np
+from milling_simulator import SimulatedCut, simulate
+
+from stability import multipliers
+
+FAR_FROM_ONE = 0.02
+"""Stable cuts have a largest multiplier of at most 1 less this, unstable ones of at least 1 plus this."""
+
+
+@dataclass(frozen=True)
+class DisturbedCut:
+    """What is judged, and the truth: samples (n, 2), rate (Hz), stated speed (rad/s), largest multiplier, the cut."""
+
+    samples: np.ndarray
+    rate: float
+    stated_speed: float
+    multiplier: complex
+    cut: SimulatedCut
+    noise: float
+    tone: float
+
+
+def largest_multiplier(cut: SimulatedCut, depth: float) -> complex:
+    """Of the equal-toothed cut at this depth (m)."""
+    return complex(multipliers(cut.model, cut.process, cut.rpm * pi / 30, depth).values[0])
+
+
+def random_structure(rng: np.random.Generator) -> SimulatedCut:
+    """One to three modes of any direction, one to four teeth, any side and width of cut, 0.4 to 2.5 modes a tooth."""
+    modes = int(rng.integers(1, 4))
+    base = float(np.exp(rng.uniform(np.log(15), np.log(900))))
+    angles = rng.uniform(0, pi, modes)
+    teeth = int(rng.integers(1, 5))
+    width = float(rng.choice([rng.uniform(0.15, 1.0), 1.0, 2.0])) * pi / 2
+    start = 0.0 if rng.random() < 0.5 else pi - width
+    rpm = base / rng.uniform(0.4, 2.5) * 60 / teeth
+    return SimulatedCut(
+        base * np.concatenate([[1.0], rng.uniform(1.1, 2.5, modes - 1)]),
+        rng.uniform(0.01, 0.05, modes),
+        1e6 * np.exp(rng.uniform(0, 2, modes)),
+        np.column_stack([np.cos(angles), np.sin(angles)]),
+        teeth,
+        start,
+        start + width,
+        rpm,
+        krc=float(rng.uniform(0.1, 0.5)),
+    )
+
+
+def depth_with(cut: SimulatedCut, size: float) -> float:
+    """Least depth (m) at which the largest multiplier has this modulus; NaN where none has below 1 m."""
+    depths = np.geomspace(1e-6, 1.0, 121)
+    sizes = np.array([abs(largest_multiplier(cut, float(depth))) for depth in depths])
+    above = np.flatnonzero(sizes >= size)
+    if not len(above) or above[0] == 0:
+        return float("nan")
+    low, high = depths[above[0] - 1], depths[above[0]]
+    for _ in range(30):
+        middle = np.sqrt(low * high)
+        low, high = (low, middle) if abs(largest_multiplier(cut, float(middle))) >= size else (middle, high)
+    return float(np.sqrt(low * high))
+
+
+def random_cut(rng: np.random.Generator, *, stable: bool) -> DisturbedCut:
+    """A simulated cut of 400 to 900 tooth periods with noise, runout, tones, speed error and drift.
+
+    A stable cut whose undisturbed twin does not repeat from turn to turn is drawn again: runout then makes teeth leave
+    the cut, and the multiplier of equal teeth is not its own.
+    """
+    while True:
+        cut = random_structure(rng)
+        size = rng.uniform(0.75, 1 - FAR_FROM_ONE) if stable else 1 + FAR_FROM_ONE * np.exp(rng.uniform(0, 3.2))
+        depth = depth_with(cut, size)
+        runout = cut.feed * float(rng.choice([0.0, rng.uniform(0.02, 0.3)]))
+        cut = replace(cut, depth=depth, runout=runout, uneven=float(rng.choice([0.0, 0.01, 0.03])))
+        cut = replace(cut, drift=float(rng.uniform(-3e-3, 3e-3)), seed=int(rng.integers(1 << 30)))
+        if not np.isfinite(depth):
+            continue
+        rate = float(cut.frequencies.max()) * rng.uniform(8, 25)
+        periods = int(rng.integers(400, 900))
+        if stable and simulate(replace(cut, uneven=0.0), periods, rate).difference > 0.01:
+            continue
+        motion = simulate(cut, periods, rate, skip=int(rng.integers(0, 100)))
+        return disturbed(cut, motion.acceleration, rate, largest_multiplier(cut, depth), rng)
+
+
+def disturbed(
+    cut: SimulatedCut, clean: np.ndarray, rate: float, multiplier: complex, rng: np.random.Generator
+) -> DisturbedCut:
+    """Add noise of 0 to 20 % (white or coloured), in half of the cuts one or two foreign tones, and a speed error."""
+    size = clean.std(axis=0)
+    noise = float(rng.choice([0.0, rng.uniform(0, 0.2), 0.2]))
+    white = rng.standard_normal(clean.shape)
+    if rng.random() < 0.5:
+        white = _coloured(white)
+    samples = clean + noise * size * white
+    time = np.arange(len(clean)) / rate
+    tone = 0.0
+    if rng.random() < 0.5:
+        for _ in range(int(rng.integers(1, 3))):
+            tone = float(rng.uniform(0.02, 0.15))
+            mains = 50.0 * float(rng.integers(1, 4))
+            frequency = mains if rng.random() < 0.5 and mains < 0.4 * rate else float(rng.uniform(0.01, 0.3)) * rate
+            wave = np.cos(2 * pi * frequency * time[:, None] + rng.uniform(0, 2 * pi, 2))
+            samples = samples + tone * size * np.sqrt(2) * wave * rng.uniform(0.3, 1.0, 2)
+    stated = cut.rpm * pi / 30 * (1 + rng.uniform(-0.01, 0.01))
+    return DisturbedCut(samples, rate, float(stated), multiplier, cut, noise, tone)
+
+
+def _coloured(white: np.ndarray) -> np.ndarray:
+    """First-order noise of unit size."""
+    from scipy.signal import lfilter
+
+    filtered = lfilter([1.0], [1.0, -0.9], white, axis=0)
+    return np.asarray(filtered / filtered.std(axis=0))

@@ -1,0 +1,56 @@
+"""What must not be taken for chatter, and what must, on cuts of a simulator that shares no code with the project."""
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+import pytest
+from milling_simulator import SimulatedCut, simulate
+
+from stability import classify_cut
+
+CUT = SimulatedCut(
+    np.array([18.0, 27.0]),
+    np.array([0.03, 0.04]),
+    np.array([6e5, 9e5]),
+    np.array([[1.0, 0.0], [0.0, 1.0]]),
+    teeth=2,
+    start=pi / 2,
+    leave=pi,
+    rpm=800.0,
+    depth=1.0e-3,
+    ktc=119e6,
+    krc=0.17,
+    feed=0.15e-3,
+)
+RATE = 640.0
+STATED = CUT.rpm * pi / 30
+
+
+def stable(periods: int = 400) -> np.ndarray:
+    """A steady stable cut, the entry left out."""
+    return simulate(CUT, periods + 100, RATE, skip=100).acceleration
+
+
+def test_noise_of_ten_per_cent_is_no_chatter() -> None:
+    samples = stable()
+    noise = 0.1 * samples.std(axis=0) * np.random.default_rng(1).standard_normal(samples.shape)
+    found = classify_cut(samples + noise, RATE, STATED, 2)
+    assert found.kind == "stable"
+    assert found.p_value > 1e-4
+
+
+def test_a_tone_of_the_mains_is_named() -> None:
+    samples = stable()
+    time = np.arange(len(samples)) / RATE
+    tone = 0.1 * np.sqrt(2) * samples.std(axis=0) * np.cos(2 * pi * 50 * time)[:, None]
+    found = classify_cut(samples + tone, RATE, STATED, 2)
+    assert found.kind == "stable"
+    assert [tone.name for tone in found.foreign] == ["mains (1 x 50 Hz)"]
+    assert found.foreign[0].share == pytest.approx(0.1, rel=0.1)
+
+
+def test_pure_noise_is_not_judged() -> None:
+    found = classify_cut(np.random.default_rng(2).standard_normal((20000, 2)), RATE, STATED, 2)
+    assert found.kind == "inconclusive"
+    assert "no order of the spindle" in found.reason
