@@ -83,13 +83,13 @@ def _doubt(family: Family, course: Course) -> str:
 def _of_alternation(evidence: Evidence, runout: bool, verdict: ChatterVerdict) -> ChatterVerdict:
     """Period doubling of an even number of teeth, whose lines are orders of the spindle."""
     size = alternation(evidence.late)
-    if not size > ALTERNATING:
+    if not size > ALTERNATING or evidence.alternation_p_value > _SILENT:
         return verdict
     course = alternation_course(evidence.revolutions)
     teeth = evidence.revolutions.teeth
     frequency = 0.5 * teeth * evidence.track.mean_frequency
     told = f"the motion that alternates from tooth to tooth is {size:.2g} times that which does not"
-    verdict = replace(verdict, growth=course.growth, p_value=evidence.order_p_value)
+    verdict = replace(verdict, growth=course.growth, p_value=evidence.alternation_p_value)
     if course.grows:
         return replace(verdict, kind=DOUBLING, frequency=frequency, reason=f"{told}, and grows")
     if not runout:

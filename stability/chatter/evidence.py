@@ -15,6 +15,7 @@ Real = NDArray[np.float64]
 
 LEVEL = 1e-4
 """Family-wise p-value below which a line stands out."""
+_TRIALS = 100  # frequencies of the spindle that were tried
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,12 @@ class Evidence:
     families: tuple[Family, ...]
     order_p_value: float
     sample_rate: float
+
+    @property
+    def alternation_p_value(self) -> float:
+        """The same of the orders at odd multiples of half the tooth passing; 1 with an odd number of teeth."""
+        teeth = self.late.teeth
+        return 1.0 if teeth % 2 else _order_p_value(self.late, self.spectrum, teeth // 2, teeth)
 
     @property
     def deviation(self) -> float:
@@ -85,12 +92,10 @@ def gather_evidence(samples: Real, sample_rate: float, spindle_speed: float, tee
     return Evidence(track, revolutions, late, spectrum, families, _order_p_value(late, spectrum), sample_rate)
 
 
-def _order_p_value(late: Revolutions, spectrum: Spectrum) -> float:
-    """Family-wise p-value of the strongest order of the mean revolution over the floor beside it."""
-    amplitudes = np.fft.rfft(late.mean_turn, axis=0)[1:] / late.mean_turn.shape[0]
-    power = 2 * np.abs(amplitudes) ** 2
-    count = min(len(power), int(spectrum.orders[spectrum.searched][-1]))
-    floor = spectrum.floor[np.arange(1, count + 1) * late.count]
-    ratio = float((power[:count] / floor).max())
-    trials = count * power.shape[1] * 100  # frequencies of the spindle that were tried
-    return min(1.0, float(trials * math.exp(-min(ratio, 700.0))))
+def _order_p_value(late: Revolutions, spectrum: Spectrum, first: int = 1, step: int = 1) -> float:
+    """Family-wise p-value of the strongest of the orders ``first, first + step, ...`` over the floor beside it."""
+    amplitudes = np.fft.rfft(late.mean_turn, axis=0) / late.mean_turn.shape[0]
+    orders = np.arange(first, int(spectrum.orders[spectrum.searched][-1]) + 1, step)
+    power = 2 * np.abs(amplitudes[orders]) ** 2
+    ratio = float((power / spectrum.floor[orders * late.count]).max())
+    return min(1.0, power.size * _TRIALS * math.exp(-min(ratio, 700.0)))
