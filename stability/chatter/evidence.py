@@ -98,4 +98,4 @@ def _order_p_value(late: Revolutions, spectrum: Spectrum, first: int = 1, step: 
     orders = np.arange(first, int(spectrum.orders[spectrum.searched][-1]) + 1, step)
     power = 2 * np.abs(amplitudes[orders]) ** 2
     ratio = float((power / spectrum.floor[orders * late.count]).max())
-    return min(1.0, power.size * _TRIALS * math.exp(-min(ratio, 700.0)))
+    return min(1.0, float(power.size * _TRIALS * math.exp(-min(ratio, 700.0))))

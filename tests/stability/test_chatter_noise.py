@@ -1,6 +1,5 @@
 """What must not be taken for chatter, and what must, on cuts of a simulator that shares no code with the project."""
 
-from dataclasses import replace
 from math import pi
 
 import numpy as np
