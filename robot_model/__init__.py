@@ -4,7 +4,8 @@ from .any_robot import PostureResult, in_posture, named_posture, read_robot
 from .beam_element import beam_mass, beam_stiffness
 from .causes import Cause, PostureFrequencies, equivalent_causes, explain_frequencies
 from .cell_structure import cell_structure_at
-from .changes import Change, changed_robot, possible_changes
+from .change import Change, Companion, Numbered
+from .changes import changed_robot, possible_changes
 from .constrained_statics import constrained_system, tip_compliance, tip_stiffness
 from .drilling_deviation import DeviationMap, deviation_map, drilling_wrench, joint_deformation, joint_deviation
 from .exact_beam import planar_dynamic_stiffness, spatial_dynamic_stiffness
@@ -43,6 +44,7 @@ from .stiffness_identification import (
     stiffness_names,
 )
 from .structure import Beam, Body, Spring, Structure, mass_matrix, stiffness_matrix
+from .tool_spring import housing_node, tool_spring, with_tool_spring
 from .uncertainty_budget import (
     LoadUncertainty,
     UncertaintyBudget,
@@ -52,13 +54,21 @@ from .uncertainty_budget import (
     monte_carlo_deformation,
     tolerance_grade,
 )
-from .variations import with_damping_factor, with_joint_factor, with_link_factor, with_payload, with_rigid_links
+from .variations import (
+    with_damping_factor,
+    with_joint_factor,
+    with_lighter_end,
+    with_link_factor,
+    with_payload,
+    with_rigid_links,
+)
 
 __all__ = [
     "Beam",
     "Body",
     "Cause",
     "Change",
+    "Companion",
     "CompensatedPath",
     "CutPlace",
     "Deflection",
@@ -73,6 +83,7 @@ __all__ = [
     "Mechanism",
     "NaturalChain",
     "NaturalRobot",
+    "Numbered",
     "PlanarCase",
     "PlanarRobot",
     "PostureFrequencies",
@@ -117,6 +128,7 @@ __all__ = [
     "gravity_hessian",
     "has_spherical_wrist",
     "hollow_circle",
+    "housing_node",
     "identify",
     "identify_from_frequencies",
     "identify_from_frfs",
@@ -161,15 +173,18 @@ __all__ = [
     "tolerance_grade",
     "tool_down",
     "tool_jacobian",
+    "tool_spring",
     "turned_place",
     "typed_values",
     "unit_doubts",
     "with_damping_factor",
     "with_gravity",
     "with_joint_factor",
+    "with_lighter_end",
     "with_link_factor",
     "with_payload",
     "with_rigid_links",
+    "with_tool_spring",
     "wrist_solutions",
     "write_compensated_path",
 ]

@@ -10,7 +10,8 @@ from scipy.optimize import least_squares
 
 from foundation import InputError
 
-from .changes import Change, possible_changes
+from .change import Change
+from .changes import possible_changes
 from .spatial_modes import modes_at
 from .spatial_robot import SpatialRobot
 
@@ -62,7 +63,8 @@ def explain_frequencies(
 
     Each cause has one parameter, so the causes are compared by chi^2 alone; those within ``AS_GOOD`` of the best cannot
     be told apart from these postures (:func:`equivalent_causes`). One posture rarely tells joints apart; several do,
-    because each loads the joints in another way.
+    because each loads the joints in another way. A payload hangs at the tip here; a tool's compliance and damping leave
+    the frequencies as they are and are not asked.
 
     Parameters
     ----------
@@ -91,8 +93,8 @@ def explain_frequencies(
 
     nominal = deviations(robot, np.zeros(len(robot.mechanism.moving)))
     causes = [Cause("as modelled", 1.0, 0.0, float(nominal @ nominal), n_data)]
-    for change in possible_changes(robot):
-        if change.kind == "damping" or change.name == _BLIND:
+    for change in possible_changes(robot, payload_at=np.zeros(3)):
+        if change.kind in ("damping", "tool") or change.name == _BLIND:
             continue
         causes.append(Cause(change.name, *_fit(partial(_of_change, deviations, robot, change), change), n_data))
     return tuple(sorted(causes, key=lambda cause: cause.chi_square))
@@ -111,11 +113,11 @@ def _fit(residuals: Callable[[Real], Real], change: Change) -> tuple[float, floa
     """Number, its standard error and chi^2, from the best of the change's starts."""
     bounds = [change.to_fit(bound) for bound in change.bounds]
     start = min((change.to_fit(value) for value in change.values[::2]), key=lambda x: _size(residuals, x))
-    scale = 0.1 if change.logarithmic else 0.01
+    scale = 0.1 if change.logarithmic or change.scale else 0.01
     found = least_squares(residuals, [start], bounds=bounds, x_scale=scale, max_nfev=15, xtol=1e-6)
     slope = float(np.sqrt(found.jac[:, 0] @ found.jac[:, 0]))
     number, chi_square = change.from_fit(float(found.x[0])), float(found.fun @ found.fun)
-    error = np.inf if slope == 0 else (number if change.logarithmic else 1.0) / slope
+    error = np.inf if slope == 0 else change.slope(number) / slope
     return number, float(error), chi_square
 
 

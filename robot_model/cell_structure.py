@@ -8,6 +8,7 @@ from modal_fit import ModalModel
 
 from .spatial_modes import TIP, modal_damping, modes_at
 from .spatial_robot import SpatialRobot
+from .tool_spring import housing_node
 
 Real = NDArray[np.float64]
 
@@ -19,9 +20,10 @@ def cell_structure_at(
 ) -> ModalModel:
     """Modal model with motion at the tip and at a sensor on the spindle, forces at the tip.
 
-    The sensor sits on the tool's rigid end: it moves by ``t + theta x r`` with the tip's translation and rotation in
-    every mode (Mohammadi & Ahmadi, Fig. 12 a). Modes are real, so that ``sum 2 Re(right left^T) = 0``: a step of force
-    gives no step of velocity. Higher and overdamped modes are dropped, without a residual: the cell integrates modes.
+    The sensor sits on the spindle: it moves by ``t + theta x r`` with the translation and rotation, in every mode, of
+    the tip, or of the node before the tool's spring where the robot has one (Mohammadi & Ahmadi, Fig. 12 a). Modes are
+    real, so that ``sum 2 Re(right left^T) = 0``: a step of force gives no step of velocity. Higher and overdamped modes
+    are dropped, without a residual: the cell integrates modes.
 
     Parameters
     ----------
@@ -41,12 +43,13 @@ def cell_structure_at(
     modes = modes_at(robot, q)
     turn = np.eye(3) if axes is None else np.asarray(axes, dtype=float)
     tip = modes.shapes[:, modes.structure.tip]
-    moved, turned = tip[:, :3] @ turn, tip[:, 3:] @ turn
+    housing = modes.shapes[:, housing_node(robot)]
+    moved, held, turned = tip[:, :3] @ turn, housing[:, :3] @ turn, housing[:, 3:] @ turn
     natural, twice = np.sqrt(modes.squares), modal_damping(robot, modes.squares)
     kept = (natural < 2 * np.pi * highest_frequency) & (twice < 2 * natural) & (twice > 0)
     if not kept.any():
         raise InputError("no damped mode is left for the simulated cell; give the robot damping, or more modes")
     damped = np.sqrt(modes.squares[kept] - twice[kept] ** 2 / 4)
-    right = np.hstack([moved, moved + np.cross(turned, np.asarray(sensor, dtype=float))])[kept].astype(complex)
+    right = np.hstack([moved, held + np.cross(turned, np.asarray(sensor, dtype=float))])[kept].astype(complex)
     left = moved[kept] / (2j * damped[:, None])
     return ModalModel(-twice[kept] / 2 + 1j * damped, right, left, (*TIP, *HOUSING), TIP)

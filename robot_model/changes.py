@@ -1,69 +1,32 @@
 """What may be wrong with a robot's model: every single change with one number that is weighed against data."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .change import Change, Changed, Companion, Numbered
 from .gravity import with_gravity
 from .spatial_robot import SpatialRobot
-from .variations import with_damping_factor, with_joint_factor, with_link_factor, with_payload, with_rigid_links
+from .tool_spring import tool_spring, with_tool_spring
+from .variations import (
+    end_bodies,
+    with_damping_factor,
+    with_joint_factor,
+    with_lighter_end,
+    with_link_factor,
+    with_payload,
+    with_rigid_links,
+)
 
 Real = NDArray[np.float64]
-
-Changed = tuple[SpatialRobot, Real]
-"""A robot, and by how much its joints stand elsewhere than was said, rad, (n_moving,)."""
-
-
-@dataclass(frozen=True)
-class Change:
-    """One thing that may be wrong, with one number.
-
-    Parameters
-    ----------
-    name
-        ``joint 3 stiffness``, ``links``, ``payload``, ``posture of joint 3``, ``gravity``, ``damping``.
-    kind
-        ``stiffness``, ``links``, ``payload``, ``posture``, ``gravity`` or ``damping``.
-    unit
-        Of the number; "" for a factor.
-    logarithmic
-        The number is positive and is fitted by its logarithm.
-    values
-        Numbers from which a search starts, from small to large change.
-    bounds
-        Within which the number is sought.
-    neutral
-        Number at which next to nothing is changed.
-    apply
-        From a robot and the number to the changed robot and the offset of its joints.
-    """
-
-    name: str
-    kind: str
-    unit: str
-    logarithmic: bool
-    values: tuple[float, ...]
-    bounds: tuple[float, float]
-    neutral: float
-    apply: Callable[[SpatialRobot, float], Changed]
-
-    def to_fit(self, number: float) -> float:
-        """Coordinate in which it is fitted: ln, or the number itself."""
-        return float(np.log(number)) if self.logarithmic else number
-
-    def from_fit(self, coordinate: float) -> float:
-        """Back to the number, kept within its bounds."""
-        number = float(np.exp(min(coordinate, 700.0))) if self.logarithmic else coordinate
-        return float(np.clip(number, *self.bounds))
-
 
 _FACTORS = (0.05, 20.0)
 _FACTOR_STARTS = tuple(float(value) for value in np.geomspace(0.2, 5.0, 16))
 _LINK_STARTS = (*(float(value) for value in np.geomspace(0.05, 5.0, 12)), 100.0)
 _PAYLOADS = tuple(float(value) for value in np.geomspace(0.5, 100.0, 14))
+_COMPLIANCES = tuple(float(value) for value in np.geomspace(1e-8, 2e-6, 12))
 _OFFSETS = tuple(float(value) for value in np.radians([-8.0, -4.0, -2.0, -1.0, 1.0, 2.0, 4.0, 8.0]))
 
 
@@ -72,9 +35,11 @@ def possible_changes(
 ) -> tuple[Change, ...]:
     """Every change that this robot's model can undergo.
 
-    A payload hangs at ``payload_at`` (3,) from the tool tip in the tool frame, m; None: at the tip. Gravity is weighed
-    where the model has none and the chain is open; damping is one factor for all modes. ``rigid_links``: the model is
-    used with its links made rigid, so that their flexibility may have been left out.
+    A payload hangs at ``payload_at`` (3,) from the tool tip in the tool frame, m; None: its place is not known and
+    fitted with its mass. A negative one is mass that the model's spindle has and the robot's has not. A tool may give
+    way where the model's is rigid. Gravity is weighed where the model has none and the chain is open; damping is one
+    factor for all modes. ``rigid_links``: the model is used with its links made rigid, so that their flexibility may
+    have been left out.
     """
     nothing = np.zeros(len(robot.mechanism.moving))
     changes = [
@@ -94,8 +59,9 @@ def possible_changes(
     if any(link.section is not None for link in robot.links):
         name = "link flexibility left out" if rigid_links else "links"
         changes.append(Change(name, "links", "", True, _LINK_STARTS, (1e-2, 1e3), 1.0, partial(_with_links, nothing)))
-    loaded = partial(_with_load, payload_at, nothing)
-    changes.append(Change("payload", "payload", "kg", True, _PAYLOADS, (1e-3, 500.0), 0.05, loaded))
+    changes.append(_payload(robot, payload_at))
+    if tool_spring(robot) is None:
+        changes.append(_tool(nothing))
     for column, index in enumerate(robot.mechanism.moving):
         if robot.mechanism.frames[index].active and robot.mechanism.frames[index].motion == "revolute":
             name = f"posture of joint {robot.mechanism.frames[index].name}"
@@ -110,18 +76,48 @@ def possible_changes(
     return tuple(changes)
 
 
-def changed_robot(
-    robot: SpatialRobot, changes: Sequence[tuple[Change, float]], *, rigid_links: bool = False
-) -> Changed:
-    """The robot with all changes at their numbers.
+def _payload(robot: SpatialRobot, payload_at: Real | None) -> Change:
+    """Mass at the tool end, of both signs, with its place where that is not known."""
+    nothing = np.zeros(len(robot.mechanism.moving))
+    lightest = -0.9 * max((robot.bodies[i].mass for i in end_bodies(robot)), default=0.0)
+    values = _PAYLOADS + tuple(share * lightest for share in (0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 0.9) if lightest)
+    loaded = partial(_with_load, payload_at, nothing)
+    places = () if payload_at is not None else _places(robot)
+    return Change("payload", "payload", "kg", False, values, (lightest, 500.0), 0.0, loaded, 1.0, places)
+
+
+def _places(robot: SpatialRobot) -> tuple[Companion, ...]:
+    """Where a mass may hang: somewhere between the last axis and the tip, beside the tool by a quarter of that."""
+    mechanism = robot.mechanism
+    placed = mechanism.transforms(np.zeros(len(mechanism.moving)))
+    tool, last = placed[mechanism.index(mechanism.tool)], placed[mechanism.moving[-1]]
+    back = tool[:3, :3].T @ (last[:3, 3] - tool[:3, 3])
+    reach = max(float(np.sqrt(back @ back)), 0.1)
+    return tuple(
+        Companion(f"place {axis} from the tip", "m", (middle - 1.0, middle + 1.0), middle, spread)
+        for axis, middle, spread in zip("xyz", (back / 2).tolist(), (reach / 4, reach / 4, reach / 2), strict=True)
+    )
+
+
+def _tool(nothing: Real) -> Change:
+    axial = Companion("axial", "m/N", (0.0, 1e-4), 0.0, 2e-7, 1e-8)
+    given = partial(_with_tool, nothing)
+    return Change("tool compliance", "tool", "m/N", True, _COMPLIANCES, (1e-10, 1e-4), 1e-9, given, 0.0, (axial,))
+
+
+def changed_robot(robot: SpatialRobot, changes: Sequence[Numbered], *, rigid_links: bool = False) -> Changed:
+    """The robot with all changes at their numbers, each with the numbers of its companions that follow it.
 
     ``rigid_links``: the links are rigid unless one of the changes gives them their flexibility back.
     """
     offset = np.zeros(len(robot.mechanism.moving))
-    for change, number in changes:
-        robot, aside = change.apply(robot, number)
+    for position, (change, number) in enumerate(changes):
+        if isinstance(change, Companion):
+            continue
+        own = [beside for one, beside in changes[position + 1 :] if one in change.companions]
+        robot, aside = change.apply(robot, number, *own)
         offset = offset + aside
-    if rigid_links and all(change.kind != "links" for change, _ in changes):
+    if rigid_links and all(isinstance(change, Companion) or change.kind != "links" for change, _ in changes):
         robot = with_rigid_links(robot)
     return robot, offset
 
@@ -134,8 +130,19 @@ def _with_links(offset: Real, robot: SpatialRobot, factor: float) -> Changed:
     return with_link_factor(robot, factor), offset
 
 
-def _with_load(centre: Real | None, offset: Real, robot: SpatialRobot, mass: float) -> Changed:
-    return with_payload(robot, mass, centre), offset
+def _with_load(known: Real | None, offset: Real, robot: SpatialRobot, mass: float, *place: float) -> Changed:
+    if mass == 0:
+        return robot, offset
+    if known is None and not place:
+        place = tuple(one.neutral for one in _places(robot))
+    where = np.array(place) if known is None else known
+    if mass > 0:
+        return with_payload(robot, mass, where), offset
+    return with_lighter_end(robot, -mass, None if known is not None else where), offset
+
+
+def _with_tool(offset: Real, robot: SpatialRobot, lateral: float, axial: float = 0.0) -> Changed:
+    return with_tool_spring(robot, lateral, axial), offset
 
 
 def _with_offset(direction: Real, robot: SpatialRobot, angle: float) -> Changed:

@@ -9,6 +9,7 @@ from foundation import InputError
 
 from .section import Section
 from .spatial_robot import LumpedBody, SpatialRobot, structure_at
+from .tool_spring import housing_node
 
 Real = NDArray[np.float64]
 
@@ -28,12 +29,68 @@ def with_joint_factor(robot: SpatialRobot, frame: str, factor: float) -> Spatial
 
 
 def with_payload(robot: SpatialRobot, mass: float, centre: Real | None = None) -> SpatialRobot:
-    """A further point mass (kg) on the tool's node, ``centre`` (3,) from the tip in the tool frame, m."""
+    """A further point mass (kg) on the spindle, ``centre`` (3,) from the tip in the tool frame, m.
+
+    It sits on the tool's node, or before the tool's spring where the robot has one.
+    """
     if not mass > 0:
         raise InputError(f"payload {mass!r} kg must be positive")
     place = np.zeros(3) if centre is None else np.asarray(centre, dtype=float)
-    body = LumpedBody(robot.tip, robot.mechanism.tool, mass, place, np.zeros((3, 3)))
+    body = LumpedBody(housing_node(robot), robot.mechanism.tool, mass, place, np.zeros((3, 3)))
     return replace(robot, bodies=(*robot.bodies, body))
+
+
+def end_bodies(robot: SpatialRobot) -> tuple[int, ...]:
+    """Indices of the bodies that the last joint carries: spindle, holder, tool."""
+    mechanism = robot.mechanism
+    last = mechanism.frames[mechanism.moving[-1]].name
+    carried = {last}
+    for frame in mechanism.frames:
+        if frame.antecedent in carried and frame.motion == "fixed":
+            carried.add(frame.name)
+    return tuple(i for i, body in enumerate(robot.bodies) if body.frame in carried)
+
+
+def with_lighter_end(robot: SpatialRobot, mass: float, place: Real | None = None) -> SpatialRobot:
+    """The heaviest body that the last joint carries without ``mass`` (kg): a spindle lighter than modelled.
+
+    Its centre moves to ``(M c - m p) / (M - m)``, its inertia about the centre is taken as ``(M - m) / M`` of what it
+    was, so that the body stays a possible one.
+
+    Parameters
+    ----------
+    robot
+    mass
+        Taken away, kg.
+    place : (3,), m
+        Where from the tool tip in the tool frame it was; None: at the body's centre, which stays.
+
+    Raises
+    ------
+    InputError
+        The last joint carries no body that is so heavy.
+    """
+    ends = end_bodies(robot)
+    index = max(ends, key=lambda i: robot.bodies[i].mass, default=None)
+    if index is None or not 0 < mass < robot.bodies[index].mass:
+        heaviest = 0.0 if index is None else robot.bodies[index].mass
+        raise InputError(f"{mass!r} kg less than {heaviest:g} kg, the heaviest body after the last joint, is no body")
+    body = robot.bodies[index]
+    left = body.mass - mass
+    centre = body.centre
+    if place is not None:
+        centre = (body.mass * body.centre - mass * _from_node(robot, body, place)) / left
+    lighter = replace(body, mass=left, centre=centre, inertia=body.inertia * left / body.mass)
+    return replace(robot, bodies=(*robot.bodies[:index], lighter, *robot.bodies[index + 1 :]))
+
+
+def _from_node(robot: SpatialRobot, body: LumpedBody, place: Real) -> Real:
+    """A place told from the tip in the tool frame, from a body's node in the body's frame."""
+    mechanism, reference = robot.mechanism, np.zeros(len(robot.mechanism.moving))
+    placed = mechanism.transforms(reference)
+    tool, own = placed[mechanism.index(mechanism.tool)], placed[mechanism.index(body.frame)]
+    node = structure_at(robot, reference).positions[body.node]
+    return np.asarray(own[:3, :3].T @ (tool[:3, :3] @ place + tool[:3, 3] - node))
 
 
 def with_link_factor(robot: SpatialRobot, factor: float) -> SpatialRobot:

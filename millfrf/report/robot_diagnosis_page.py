@@ -9,13 +9,14 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from foundation import writing_whole_file
-from mismatch.robot_causes import RobotCause, RobotDiagnosis
+from mismatch.robot_causes import NOISE_LIKE, RobotCause, RobotDiagnosis
 
 from ..figures.embed import as_data_uri
 from ..figures.robot_diagnosis_figure import robot_evidence_figure, robot_spectra_figure
 from ..figures.style import house_style
 from ..provenance import versions
-from ..tables import Table, with_error
+from ..robot.diagnosis_words import UNITS, told_number, what_is_asked
+from ..tables import Table
 from .section import Picture, Section
 
 
@@ -59,9 +60,11 @@ def _warnings(found: RobotDiagnosis) -> list[str]:
     ]
     if len(found.setting.recordings) == 1:
         warnings.append("One posture loads the joints in one way: causes are told apart better from several.")
-    if found.excess_after > 2:
+    warnings.append(what_is_asked())
+    if found.excess_after > NOISE_LIKE:
         warnings.append(
-            f"What is left is {found.excess_after:.1f} times what a right model leaves: some of the physics is missing."
+            f"What is left is {found.excess_after:.2g} times what a right model's modes are off (passes up to "
+            f"{NOISE_LIKE:g}): some of the physics is missing."
         )
     return warnings
 
@@ -73,30 +76,47 @@ def _spectra(found: RobotDiagnosis) -> Section:
         "Root of response power over force power, all channels of a recording together, as receptance. The modes of "
         "the robot are drawn without the small deviations that a right model is allowed."
     )
-    rows = tuple(
-        (one.name, f"{100 * one.before:.3g}", f"{100 * one.after:.3g}", f"{100 * one.free:.3g}")
-        for one in found.held_out
-    )
-    columns = ("recording", "as modelled", "with the change", "modes fitted freely")
-    table = Table("Error of recordings that were left out of the fit (% of the response)", columns, rows)
+    columns: tuple[str, ...] = ("recording", "as modelled", "modes fitted freely")
+    rows: list[tuple[str, ...]] = [
+        (one.name, f"{100 * one.before:.3g}", f"{100 * one.free:.3g}") for one in found.held_out
+    ]
+    if found.causes:
+        columns = (*columns[:2], "with the change", columns[2])
+        pairs = zip(rows, found.held_out, strict=True)
+        rows = [(*row[:2], f"{100 * one.after:.3g}", row[2]) for row, one in pairs]
+    table = Table("Error of recordings that were left out of the fit (% of the response)", columns, tuple(rows))
     return Section("On the recordings", (), (table,), (Picture(picture, caption, "Spectra before and after"),))
 
 
 def _candidates(found: RobotDiagnosis) -> Section:
     with house_style():
         picture = as_data_uri(robot_evidence_figure(found))
-    rows = tuple((one.name, *_number(one), f"{one.evidence:.1f}") for one in found.candidates)
-    table = Table("Every change with its number", ("change", "number", "unit", "evidence"), rows)
+    rows = tuple((one.name, *_number(one), f"{one.evidence:.1f}", one.stage or "-") for one in found.candidates)
+    columns = ("change", "number", "unit", "evidence", "recordings left out")
+    table = Table("Every change alone with its number, error of the fit alone", columns, rows)
     caption = "Gain in score of each single change (twice a log Bayes factor); blue: accepted, or as good."
-    return Section("What was weighed", (), (table,), (Picture(picture, caption, "Evidence of the candidates"),))
+    tables = (_errors(found), table) if found.causes else (table,)
+    return Section("What was weighed", (), tables, (Picture(picture, caption, "Evidence of the candidates"),))
+
+
+def _errors(found: RobotDiagnosis) -> Table:
+    """Where the errors of the numbers told come from."""
+    rows = []
+    for one in found.causes:
+        number, unit = told_number(one)
+        factor = UNITS.get(one.unit, ("", 1.0))[1]
+        parts = (f"{factor * part:.2g}" for part in (one.fitted_error, one.spread, one.form))
+        rows.append((one.name, number, unit or "times", *parts))
+    columns = ("change", "number", "unit", "fit", "between recordings", "another change free")
+    return Table("What was found, and the parts of its error", columns, tuple(rows))
 
 
 def _number(cause: RobotCause) -> tuple[str, str]:
-    if not cause.standard_error < 3 * abs(cause.number) + 0.5:
+    size = {"m/N": 0.0}.get(cause.unit, 0.5)
+    if not cause.standard_error < 3 * abs(cause.number) + size:
         return "not told by the data", ""
-    if cause.kind == "posture":
-        return with_error(float(np.degrees(cause.number)), float(np.degrees(cause.standard_error)), sign=True), "deg"
-    return with_error(cause.number, cause.standard_error), cause.unit or "times"
+    number, unit = told_number(cause)
+    return number, unit or "times"
 
 
 def _postures(found: RobotDiagnosis) -> Section:

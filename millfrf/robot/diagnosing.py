@@ -11,8 +11,6 @@ from foundation import InputError
 from mismatch import LabError
 from mismatch.robot_causes import (
     PosedRecording,
-    RobotCause,
-    RobotDiagnosis,
     diagnose_robot,
     read_posed,
     write_robot_diagnosis,
@@ -24,6 +22,7 @@ from ..commands.options import check_band
 from ..progress import bar
 from ..report.robot_diagnosis_page import write_robot_report
 from ..result_folder import refuse_file
+from .diagnosis_words import summary
 from .postures import Asked, posture_of, spatial
 
 Real = NDArray[np.float64]
@@ -116,39 +115,3 @@ def _band(case: SpatialCase, postures: Sequence[Real]) -> tuple[float, float]:
 
 def _place(given: tuple[float, float, float] | None) -> Real | None:
     return None if given is None else np.array(given)
-
-
-def summary(found: RobotDiagnosis) -> list[str]:
-    """A few lines for the terminal and the head of the report."""
-    lines = [f"verdict: {found.verdict}", _sentence(found)]
-    lines += [describe(cause) for cause in found.causes]
-    if found.equivalents:
-        lines.append(f"cannot be told from: {', '.join(found.equivalents)}; record in another posture")
-    for one in found.held_out:
-        lines.append(
-            f"error on {one.name}, held out: {100 * one.before:.3g} % as modelled, {100 * one.after:.3g} % changed, "
-            f"{100 * one.free:.3g} % with modes fitted freely"
-        )
-    return lines
-
-
-def describe(cause: RobotCause) -> str:
-    """One cause with its number, in a user's units."""
-    number, error, unit = cause.number, cause.standard_error, cause.unit
-    if cause.kind == "posture":
-        number, error, unit = np.degrees(number), np.degrees(error), "deg"
-    text = f"{number:+.3g}" if cause.kind == "posture" else f"{number:.3g}"
-    what = f"times {text}" if not unit else text
-    return f"{cause.name}: {what} ± {error:.2g}{f' {unit}' if unit else ''}; evidence {cause.evidence:.0f}"
-
-
-def _sentence(found: RobotDiagnosis) -> str:
-    if found.verdict == "none":
-        return "the robot's model agrees with the recordings as well as such a model can: nothing to change"
-    if found.verdict == "unexplained":
-        return "the robot's model is wrong in a way that none of the changes explains"
-    if found.verdict == "class":
-        return "one of several changes explains the recordings; they cannot say which"
-    return (
-        "one change explains the recordings and stands alone" if len(found.causes) == 1 else "two changes together do"
-    )

@@ -1,7 +1,7 @@
 """What is wrong with a robot's model, from recordings in one or more postures."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +11,16 @@ from robot_model import Change, SpatialRobot, modes_at, possible_changes
 
 from ..shape_of_model import LabError
 from .posed_recording import PosedRecording
+from .robot_choice import LEAST_EVIDENCE, Choice, chosen, pruned
+from .robot_errors import number_errors
 from .robot_fit import RobotFit
-from .robot_held_out import held_out
+from .robot_held_out import Tested, chance, folds_of, lowers, raised, tested
 from .robot_results import RobotCause, RobotDiagnosis
 from .robot_search import FreeFit, best_starts, fit_from, free_fit, what_is_left
 from .robot_setting import Changes, Setting
+from .robot_telling import fit_errors, held_out_table, told_causes
 
 Real = NDArray[np.float64]
-
-LEAST_EVIDENCE = 20.0
-"""Gain in score below which no change is accepted, as everywhere in :mod:`mismatch`."""
-
-AS_GOOD = 6.0
-"""Score by which another change may be worse and still not be told from the best: a likelihood ratio of 20."""
 
 NOISE_LIKE = 2.0
 """Excess (see :class:`RobotDiagnosis`) up to which a model passes as right: 1 is expected where its belief is met."""
@@ -33,6 +30,9 @@ REACH = 3.0
 
 EXPLAINED = 0.9
 """Share of what the nominal robot left that the changes must take away, unless what is left is noise-like."""
+
+PARTLY = 0.5
+"""Share that changes must take away, there and of the squared error on recordings held out, to be told at all."""
 
 ROBOT_ERROR = LabError(frequency=0.01, damping=0.15, shape=0.05)
 """What the modes of a right robot model are still off: one per cent, 15 per cent, a twentieth of a shape's size."""
@@ -50,10 +50,10 @@ def diagnose_robot(
 ) -> RobotDiagnosis:
     """Which change of the robot explains the recordings: a joint's stiffness, links, payload, posture, damping.
 
-    Every change has one number. Each is fitted together with the deviations of all modes (frequency, damping, shape)
-    that a right model still has, ``error``, independent in each posture; the score is
-    ``2 sum r^H V^-1 r + |u|^2 + n ln N``, so that a change must gain more than deviations cost. A further change is
-    sought where the first leaves more than noise.
+    Every change is fitted together with the deviations of all modes (frequency, damping, shape) that a right model
+    still has, ``error``, independent in each posture; the score is ``2 sum r^H V^-1 r + |u|^2 + n ln N``, so that a
+    change must gain more than deviations cost. It must also lower the error on recordings left out of the fit, by more
+    than chance. A further change is sought where the first leaves more than noise.
 
     Parameters
     ----------
@@ -79,29 +79,83 @@ def diagnose_robot(
     """
     setting = _setting(robot, recordings, rigid_links, sensor, error)
     changes = possible_changes(robot, payload_at=payload_at, rigid_links=rigid_links)
-    free = free_fit(setting, _nearest(setting, changes))
+    near = _nearest(setting, changes)
+    free = free_fit(setting, near)
     nominal = fit_from(setting, (), free)
-    accepted: list[RobotCause] = []
-    candidates: tuple[RobotCause, ...] = ()
-    equivalents: tuple[str, ...] = ()
-    current = nominal
-    while len(accepted) < most_causes:
-        if accepted and _excess(current, free) < NOISE_LIKE:
+    folds = folds_of(setting, free, near)
+    before = current = tested(folds, ())
+    fitted = nominal
+    rounds: list[Choice] = []
+    while len(rounds) < most_causes and not (rounds and _excess(fitted, free) < NOISE_LIKE):
+        choice = chosen(setting, fitted, changes, free, folds, current)
+        rounds.append(choice)
+        if choice.best is None:
             break
-        ranked = _ranked(setting, current, changes, free)
-        if not accepted:
-            candidates = tuple(cause for cause, _ in ranked)
-        best, fitted = ranked[0]
-        if best.evidence < LEAST_EVIDENCE:
-            break
-        accepted = [*_updated(accepted, fitted), best]
-        equivalents = tuple(one.name for one, _ in ranked[1:] if one.evidence > best.evidence - AS_GOOD)
-        current = fitted
-    before, after = _excess(nominal, free), _excess(current, free)
-    verdict = _verdict(bool(accepted), bool(equivalents), before, after)
-    held = held_out(setting, current.changes)
+        fitted, current = choice.best[0].fitted, choice.best[1]
+    if len(names_of(fitted)) > 1:
+        fitted = pruned(setting, fitted, free)
+        current = tested(folds, fitted.changes)
+    found = _Found(setting, nominal, fitted, free, before, current, tuple(rounds), tuple(one.name for one in folds))
+    verdict = _verdict(found)
+    if verdict in ("none", "unexplained"):
+        found = replace(found, fitted=nominal, after=before)
+    return _result(found, verdict, changes)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Where a search ends: fits, errors on recordings held out, rounds."""
+
+    setting: Setting
+    nominal: RobotFit
+    fitted: RobotFit
+    free: FreeFit
+    before: Tested
+    after: Tested
+    rounds: tuple[Choice, ...]
+    names: tuple[str, ...]
+
+    @property
+    def equivalents(self) -> tuple[str, ...]:
+        """Of the change that was accepted last."""
+        named = [
+            one for one in self.rounds if one.best is not None and one.best[0].change.name in names_of(self.fitted)
+        ]
+        return named[-1].equivalents if named else ()
+
+
+def names_of(fitted: RobotFit) -> list[str]:
+    """Names of the changes of a fit, without their companions."""
+    return [change.name for change, _ in fitted.changes if isinstance(change, Change)]
+
+
+def _result(found: _Found, verdict: str, changes: Sequence[Change]) -> RobotDiagnosis:
+    setting, fitted = found.setting, found.fitted
+    causes: tuple[RobotCause, ...] = ()
+    if fitted.changes:
+        errors = number_errors(setting, fitted, found.after, changes, found.free)
+        evidence = {one.change.name: one.evidence for choice in found.rounds for one in choice.ranked}
+        causes = told_causes(fitted, errors, evidence)
+    first = found.rounds[0]
+    plain = {one.change.name: fit_errors(one.fitted) for one in first.ranked}
+    candidates = tuple(
+        replace(told_causes(one.fitted, plain[one.change.name], {one.change.name: one.evidence})[-1],
+                stage=first.stages.get(one.change.name, ""))
+        for one in first.ranked
+    )  # fmt: skip
     return RobotDiagnosis(
-        verdict, tuple(accepted), equivalents, candidates, before, after, held, setting, nominal, current, free
+        verdict,
+        causes,
+        found.equivalents if causes else (),
+        candidates,
+        _excess(found.nominal, found.free),
+        _excess(fitted, found.free),
+        held_out_table(found.names, found.before, found.after),
+        chance(found.before.blocks, found.after.blocks),
+        setting,
+        found.nominal,
+        fitted,
+        found.free,
     )
 
 
@@ -139,39 +193,20 @@ def _nearest(setting: Setting, changes: Sequence[Change]) -> Changes:
     return best.changes if best.left < what_is_left(setting, ()) - LEAST_EVIDENCE else ()
 
 
-def _ranked(
-    setting: Setting, current: RobotFit, changes: Sequence[Change], free: FreeFit
-) -> list[tuple[RobotCause, RobotFit]]:
-    """Every further change fitted, best first."""
-    price = float(np.log(2 * sum(one.lines.measured.size for one in setting.recordings)))
-    ranked = []
-    for change in changes:
-        if any(change.name == other.name for other, _ in current.changes):
-            continue
-        starts = [(*current.changes, (change, change.neutral))]
-        starts += [one.changes for one in best_starts(setting, current.changes, change) if np.isfinite(one.left)]
-        fitted = min((fit_from(setting, start, free) for start in starts), key=lambda one: one.cost)
-        evidence = max(current.cost - fitted.cost, 0.0) - price
-        number, spread = fitted.changes[-1][1], float(fitted.standard_errors[-1])
-        cause = RobotCause(change.name, change.kind, change.unit, number, spread, evidence)
-        ranked.append((cause, fitted))
-    return sorted(ranked, key=lambda pair: -pair[0].evidence)
-
-
-def _updated(causes: list[RobotCause], fitted: RobotFit) -> list[RobotCause]:
-    """Causes accepted before with the numbers that they have beside a further one."""
-    pairs = zip(causes, fitted.changes, fitted.standard_errors, strict=False)
-    return [replace(cause, number=number, standard_error=float(error)) for cause, (_, number), error in pairs]
-
-
 def _excess(fitted: RobotFit, free: FreeFit) -> float:
     """What a fit costs beyond free modes, for each deviation that the recordings tell."""
     return (fitted.cost - free.fitted.misfit) / max(fitted.told, 1.0)
 
 
-def _verdict(accepted: bool, equivalents: bool, before: float, after: float) -> str:
-    if after > max(NOISE_LIKE, (1 - EXPLAINED) * before):
-        return "unexplained"
-    if not accepted:
-        return "none"
-    return "class" if equivalents else "explained"
+def _verdict(found: _Found) -> str:
+    """See :class:`RobotDiagnosis`: what is left decides, and whether changes hold on recordings held out."""
+    before, after = (_excess(one, found.free) for one in (found.nominal, found.fitted))
+    little = after <= max(NOISE_LIKE, (1 - EXPLAINED) * before)
+    if not found.fitted.changes:
+        return "none" if little else "unexplained"
+    if not lowers(found.before, found.after):
+        return "none" if before <= NOISE_LIKE else "unexplained"
+    if little and not raised(found.before, found.after):
+        return "class" if found.equivalents else "explained"
+    less = after <= max(NOISE_LIKE, (1 - PARTLY) * before)
+    return "partly explained" if less and found.after.beyond <= (1 - PARTLY) * found.before.beyond else "unexplained"

@@ -24,6 +24,7 @@ def robot_diagnosis_content(diagnosis: RobotDiagnosis) -> dict[str, Any]:
         "equivalents": list(diagnosis.equivalents),
         "candidates": [_plain(cause) for cause in diagnosis.candidates],
         "excess": {"before": diagnosis.excess_before, "after": diagnosis.excess_after},
+        "p_value": diagnosis.p_value,
         "held_out": [asdict(one) for one in diagnosis.held_out],
         "rigid_links": diagnosis.setting.rigid_links,
         "model_error": {"frequency": error.frequency, "damping": error.damping, "shape": error.shape},

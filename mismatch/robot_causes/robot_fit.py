@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robot_model import Companion
+
 from .robot_receptance import RobotModes, predicted_lines, quick_lines
 from .robot_setting import Changes, Setting
 
@@ -30,6 +32,8 @@ class RobotFit:
         ``2 sum r^H V^-1 r`` over lines and recordings, V known.
     deviation
         ``sum |u|^2``.
+    doubt
+        ``sum ((number - centre) / spread)^2`` over companions of the changes, of which something is believed.
     standard_errors : (n_changes,)
         Of the numbers, in their units.
     modes
@@ -42,14 +46,26 @@ class RobotFit:
     deviations: tuple[Real, ...]
     misfit: float
     deviation: float
+    doubt: float
     standard_errors: Real
     modes: tuple[RobotModes, ...]
     told: float
 
     @property
     def cost(self) -> float:
-        """Misfit and deviation: what the changes are judged by."""
-        return self.misfit + self.deviation
+        """Misfit, deviation and doubt: what the changes are judged by."""
+        return self.misfit + self.deviation + self.doubt
+
+    @property
+    def price(self) -> float:
+        """``2 ln(spread / standard error)`` over companions: what their freedom costs (Laplace's approximation)."""
+        return float(
+            sum(
+                max(2 * np.log(one.spread / max(float(error), 1e-300)), 0.0)
+                for (one, _), error in zip(self.changes, self.standard_errors, strict=True)
+                if isinstance(one, Companion)
+            )
+        )
 
 
 def fit_robot(
@@ -99,14 +115,13 @@ def fit_robot(
         matrix, gradient = _normal(setting, state, beside, rest, whiteners, belief)
         if gained < 0.05:
             break
-    deviation = float(sum(u @ u for u in state.deviations))
+    deviation, doubt = float(sum(u @ u for u in state.deviations)), _doubt(state.changes)
     variance = np.maximum(np.diag(np.linalg.inv(matrix)), 0.0)
     spread, told = np.sqrt(variance[: len(changes)]), float(np.sum(1 - belief * variance[len(changes) :]))
-    units = np.array([number if change.logarithmic else 1.0 for change, number in state.changes])
+    units = np.array([change.slope(number) for change, number in state.changes])
     seen = tuple(one.moved(u, setting.error) for one, u in zip(state.modes, state.deviations, strict=True))
-    return RobotFit(
-        state.changes, tuple(state.deviations), cost - belief * deviation, deviation, spread * units, seen, told
-    )
+    misfit = cost - belief * deviation - doubt
+    return RobotFit(state.changes, tuple(state.deviations), misfit, deviation, doubt, spread * units, seen, told)
 
 
 def start_cost(setting: Setting, changes: Changes, whiteners: Sequence[Complex], deviations: Sequence[Real]) -> float:
@@ -167,6 +182,13 @@ class _State:
         return state
 
 
+def _doubt(changes: Changes) -> float:
+    """``sum ((number - centre) / spread)^2`` over companions."""
+    return float(
+        sum(((number - one.centre) / one.spread) ** 2 for one, number in changes if isinstance(one, Companion))
+    )
+
+
 def _cost(setting: Setting, state: _State, whiteners: Sequence[Complex], belief: float) -> tuple[float, list[Complex]]:
     """Misfit and belief; whitened residuals (n_lines, n_responses) of each recording."""
     rest = []
@@ -174,7 +196,7 @@ def _cost(setting: Setting, state: _State, whiteners: Sequence[Complex], belief:
         predicted = predicted_lines(modes.moved(u, setting.error), recording.lines)
         rest.append(np.einsum("kij,kj->ki", white, recording.lines.measured - predicted))
     misfit = 2 * sum(float(np.sum(np.abs(one) ** 2)) for one in rest)
-    cost = misfit + belief * float(sum(u @ u for u in state.deviations))
+    cost = misfit + belief * float(sum(u @ u for u in state.deviations)) + _doubt(state.changes)
     return (cost if np.isfinite(cost) else np.inf), rest
 
 
@@ -191,6 +213,11 @@ def _normal(
     size = count + sum(len(u) for u in state.deviations)
     matrix, gradient = np.diag(np.full(size, belief)), np.zeros(size)
     matrix[:count, :count] = 1e-6 * np.eye(count)
+    for place, (one, value) in enumerate(state.changes):
+        if isinstance(one, Companion):
+            slope = one.slope(value) / one.spread
+            matrix[place, place] += slope**2
+            gradient[place] -= slope * (value - one.centre) / one.spread
     at = count
     for number, (recording, white) in enumerate(zip(setting.recordings, whiteners, strict=True)):
         lines, u = recording.lines, state.deviations[number]
@@ -204,11 +231,11 @@ def _normal(
             followed = slopes @ state.modes[number].deviations(aside, setting.error)
             held = aside.moved(aside.deviations(modes, setting.error), setting.error)
             columns.append(((followed + quick_lines(held, lines) - here) / STEP)[:, :, None])
-        slope = (white @ np.concatenate([*columns, slopes], axis=2)).reshape(rest[number].size, -1)
+        turned = (white @ np.concatenate([*columns, slopes], axis=2)).reshape(rest[number].size, -1)
         small = rest[number].ravel()
         places = np.concatenate([np.arange(count), np.arange(at, at + len(u))])
-        matrix[np.ix_(places, places)] += 2 * (slope.real.T @ slope.real + slope.imag.T @ slope.imag)
-        gradient[places] += 2 * (slope.real.T @ small.real + slope.imag.T @ small.imag)
+        matrix[np.ix_(places, places)] += 2 * (turned.real.T @ turned.real + turned.imag.T @ turned.imag)
+        gradient[places] += 2 * (turned.real.T @ small.real + turned.imag.T @ small.imag)
         gradient[at : at + len(u)] -= belief * u
         at += len(u)
     return matrix, gradient

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from robot_model import SpatialRobot, modes_at
+from robot_model import SpatialRobot, housing_node, modes_at
 from robot_model.spatial_modes import modal_damping
 
 from ..shape_of_model import LabError
@@ -143,7 +143,8 @@ def robot_modes(robot: SpatialRobot, recording: PosedRecording, offset: Real, se
     offset : (n_moving,), rad
         By how much the joints stand elsewhere than stated.
     sensor : (3,), m
-        Housing sensor from the tip, in the recording's axes: it moves by ``t + theta x r``.
+        Housing sensor from the tip, in the recording's axes: it moves by ``t + theta x r`` with the node before the
+        tool's spring.
     count
         Modes that may be off.
     """
@@ -152,7 +153,9 @@ def robot_modes(robot: SpatialRobot, recording: PosedRecording, offset: Real, se
     shapes = tip[:, :3] @ recording.axes
     places: tuple[str, ...] = TIP
     if any(label in HOUSING for label in recording.responses):
-        shapes = np.hstack([shapes, shapes + np.cross(tip[:, 3:] @ recording.axes, sensor)])
+        moved = modes.shapes[:, housing_node(robot)]
+        held = moved[:, :3] @ recording.axes + np.cross(moved[:, 3:] @ recording.axes, sensor)
+        shapes = np.hstack([shapes, held])
         places = (*TIP, *HOUSING)
     natural = np.sqrt(modes.squares)
     return RobotModes(

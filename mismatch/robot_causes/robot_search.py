@@ -1,6 +1,7 @@
 """Where a fit of each cause begins: the number that leaves least, and the modes and noise that the data show freely."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,11 @@ class Start:
     left: float
 
 
+def numbered(change: Change, number: float) -> Changes:
+    """A change at a number, its companions where nothing is known of them."""
+    return ((change, number), *((one, one.neutral) for one in change.companions))
+
+
 def best_starts(setting: Setting, before: Changes, change: Change, most: int = 1) -> list[Start]:
     """The numbers of one further change from which a fit is worth while, best first.
 
@@ -48,7 +54,7 @@ def best_starts(setting: Setting, before: Changes, change: Change, most: int = 1
     """
     starts = []
     for number in change.values:
-        changes = (*before, (change, number))
+        changes = (*before, *numbered(change, number))
         starts.append(Start(changes, what_is_left(setting, changes)))
     return sorted(starts, key=lambda start: start.left)[:most]
 
@@ -82,6 +88,12 @@ class FreeFit:
 
     fitted: RobotFit
     whiteners: tuple[Complex, ...]
+
+    def only(self, chosen: Sequence[int]) -> "FreeFit":
+        """Of some of the recordings: freely fitted modes of one know nothing of the others."""
+        modes = tuple(self.fitted.modes[i] for i in chosen)
+        u = tuple(self.fitted.deviations[i] for i in chosen)
+        return FreeFit(replace(self.fitted, modes=modes, deviations=u), tuple(self.whiteners[i] for i in chosen))
 
 
 def free_fit(setting: Setting, start: Changes) -> FreeFit:

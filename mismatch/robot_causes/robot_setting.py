@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_model import Change, SpatialRobot, changed_robot
+from robot_model import Numbered, SpatialRobot, changed_robot
 
 from ..shape_of_model import LabError
 from .posed_recording import PosedRecording
@@ -14,7 +14,8 @@ from .robot_receptance import RobotModes, robot_modes
 
 Real = NDArray[np.float64]
 
-Changes = tuple[tuple[Change, float], ...]
+Changes = tuple[Numbered, ...]
+"""Changes with their numbers; the companions of a change follow it."""
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ import importlib.util
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -14,13 +15,20 @@ from mismatch.fitting import Fit
 from mismatch.noise_model import KNOTS, NoiseModel
 from modal_fit import ModalModel
 
-_PATH = Path(__file__).with_name("concealed_recordings.py")
-_SPEC = importlib.util.spec_from_file_location("concealed_recordings", _PATH)
-assert _SPEC is not None
-assert _SPEC.loader is not None
-_MODULE = importlib.util.module_from_spec(_SPEC)
-sys.modules["concealed_recordings"] = _MODULE
-_SPEC.loader.exec_module(_MODULE)
+
+def _loaded(name: str) -> ModuleType:
+    """A file beside this one: test folders are no packages."""
+    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+_MODULE = _loaded("concealed_recordings")
+_loaded("independent_robot")
 
 
 @pytest.fixture(scope="session")
