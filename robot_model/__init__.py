@@ -7,12 +7,20 @@ from .cell_structure import cell_structure_at
 from .change import Change, Companion, Numbered
 from .changes import changed_robot, possible_changes
 from .constrained_statics import constrained_system, tip_compliance, tip_stiffness
-from .drilling_deviation import DeviationMap, deviation_map, drilling_wrench, joint_deformation, joint_deviation
+from .drilling_deviation import (
+    DeviationMap,
+    deviation_map,
+    drilling_wrench,
+    joint_deformation,
+    joint_deviation,
+    sag_parts,
+)
 from .exact_beam import planar_dynamic_stiffness, spatial_dynamic_stiffness
 from .exact_chain import coupled_receptance, exact_receptance
 from .exact_structure import coupled_frf_at, exact_frf_at
+from .flexible_chain import FlexibleChain, flexible_chain
 from .generalised_coordinates import coordinate_basis
-from .gravity import gravity_hessian, with_gravity
+from .gravity import gravity_hessian, gravity_torques, with_gravity
 from .identification import Identification, identify
 from .inverse_kinematics import inverse_kinematics
 from .joint_values import driven_values, shown_values, typed_values, unit_doubts
@@ -49,9 +57,12 @@ from .uncertainty_budget import (
     LoadUncertainty,
     UncertaintyBudget,
     deformation_uncertainty,
+    lateral_uncertainty,
     machining_uncertainty,
     measured_machining_uncertainty,
     monte_carlo_deformation,
+    position_tolerance,
+    position_verdict,
     tolerance_grade,
 )
 from .variations import (
@@ -62,6 +73,7 @@ from .variations import (
     with_payload,
     with_rigid_links,
 )
+from .weight import Payload, StaticResponse, counted_weight, payload_wrench, sag_at, static_response
 
 __all__ = [
     "Beam",
@@ -74,6 +86,7 @@ __all__ = [
     "Deflection",
     "DeviationMap",
     "ElasticJoint",
+    "FlexibleChain",
     "Frame",
     "Identification",
     "Link",
@@ -84,6 +97,7 @@ __all__ = [
     "NaturalChain",
     "NaturalRobot",
     "Numbered",
+    "Payload",
     "PlanarCase",
     "PlanarRobot",
     "PostureFrequencies",
@@ -93,6 +107,7 @@ __all__ = [
     "SpatialCase",
     "SpatialRobot",
     "Spring",
+    "StaticResponse",
     "Structure",
     "StructureModes",
     "ToolPath",
@@ -109,6 +124,7 @@ __all__ = [
     "compensate_path",
     "constrained_system",
     "coordinate_basis",
+    "counted_weight",
     "couple_along",
     "couple_receptances",
     "coupled_frf_at",
@@ -123,9 +139,11 @@ __all__ = [
     "exact_frf_at",
     "exact_receptance",
     "explain_frequencies",
+    "flexible_chain",
     "frequencies_over",
     "frf_at",
     "gravity_hessian",
+    "gravity_torques",
     "has_spherical_wrist",
     "hollow_circle",
     "housing_node",
@@ -137,6 +155,7 @@ __all__ = [
     "inverse_kinematics",
     "joint_deformation",
     "joint_deviation",
+    "lateral_uncertainty",
     "machining_uncertainty",
     "mass_matrix",
     "measured_machining_uncertainty",
@@ -149,7 +168,10 @@ __all__ = [
     "named_posture",
     "natural_robot",
     "nearest_solution",
+    "payload_wrench",
     "planar_dynamic_stiffness",
+    "position_tolerance",
+    "position_verdict",
     "possible_changes",
     "posture_map",
     "posture_warnings",
@@ -162,8 +184,11 @@ __all__ = [
     "rigid_matrices",
     "rigid_model",
     "robot_names",
+    "sag_at",
+    "sag_parts",
     "shown_values",
     "spatial_dynamic_stiffness",
+    "static_response",
     "stiffness_matrix",
     "stiffness_names",
     "structure_at",

@@ -10,15 +10,16 @@ from scipy.linalg import eigh
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .constrained_statics import tip_compliance
+from .flexible_chain import flexible_chain
 from .loop_closure import close_loops, posture_warnings
 from .planar_file import PlanarCase, read_planar_robot
 from .planar_robot import TIP_IN_PLANE
-from .rigid_links import rigid_matrices, rigid_model, tip_jacobian
+from .rigid_links import planar_compliance, planar_sag, rigid_matrices, rigid_model
 from .robot_files import read_table
 from .spatial_file import SpatialCase, read_spatial_robot
 from .spatial_modes import TIP, TIP_ROTATIONS, damping_warnings, model_of_modes, modes_at
 from .spatial_robot import rigid_arms, structure_at
+from .weight import NO_MASSES, static_response
 
 Real = NDArray[np.float64]
 
@@ -38,7 +39,9 @@ class PostureResult:
     labels
         ``node:direction``.
     warnings
-        Limits, singularities, damping: one sentence each.
+        Limits, singularities, damping, what the file does not tell: one sentence each.
+    own_weight : (n_dof,), m and rad, or None
+        Deflection at the tool under the weight of links and bodies, over ``labels``; None: masses are unknown.
     """
 
     frequencies: Real
@@ -46,6 +49,7 @@ class PostureResult:
     compliance: Real
     labels: tuple[str, ...]
     warnings: tuple[str, ...]
+    own_weight: Real | None = None
 
     @property
     def stiffness(self) -> Real:
@@ -97,7 +101,9 @@ def named_posture(case: PlanarCase | SpatialCase, name: str | None) -> Real:
     return case.poses[name]
 
 
-def in_posture(case: PlanarCase | SpatialCase, driven: Real, axes: Real | None = None) -> PostureResult:
+def in_posture(
+    case: PlanarCase | SpatialCase, driven: Real, axes: Real | None = None, *, links: bool = False
+) -> PostureResult:
     """Frequencies, modal model and compliance at driven joint values (rad; prismatic joints: m).
 
     Parameters
@@ -108,28 +114,54 @@ def in_posture(case: PlanarCase | SpatialCase, driven: Real, axes: Real | None =
         As many as the robot has driven joints.
     axes : (3, 3) or None
         Frame of the tool's degrees of freedom, as columns in the base frame (robots in space only).
+    links
+        Planar robots: take the file's link sections in, not the joints alone (robots in space always do).
     """
     if isinstance(case, PlanarCase):
-        return _planar(case, driven)
+        return _planar(case, driven, links)
     robot = case.robot
     q = close_loops(robot.mechanism, driven)
     structure = structure_at(robot, q)
-    compliance = tip_compliance(structure)
-    if axes is not None:
-        turn = np.kron(np.eye(2), np.asarray(axes))
-        compliance = turn.T @ compliance @ turn
+    static = static_response(robot, structure)
+    turn = np.eye(6) if axes is None else np.kron(np.eye(2), np.asarray(axes))
+    compliance = turn.T @ static.compliance @ turn
     warnings = (*posture_warnings(robot.mechanism, q), *rigid_arms(robot, structure))
     labels = (*TIP, *TIP_ROTATIONS)
-    if not robot.bodies:
-        return PostureResult(np.zeros(0), None, compliance, labels, warnings)
+    if static.own_weight is None:
+        return PostureResult(np.zeros(0), None, compliance, labels, (*warnings, NO_MASSES))
     modes = modes_at(robot, q)
     model = model_of_modes(modes, robot, axes=axes)
-    return PostureResult(modes.frequencies, model, compliance, labels, (*warnings, *damping_warnings(robot, modes)))
+    warnings = (*warnings, *damping_warnings(robot, modes))
+    return PostureResult(modes.frequencies, model, compliance, labels, warnings, turn.T @ static.own_weight)
 
 
-def _planar(case: PlanarCase, driven: Real) -> PostureResult:
-    mass, stiffness = rigid_matrices(case.robot, driven)
-    tip = tip_jacobian(case.robot, driven)
-    frequencies = np.sqrt(eigh(stiffness, mass, eigvals_only=True)) / (2 * np.pi)
-    compliance = tip @ np.linalg.solve(stiffness, tip.T)
-    return PostureResult(frequencies, rigid_model(case.robot, driven), compliance, TIP_IN_PLANE, ())
+def _planar(case: PlanarCase, driven: Real, links: bool) -> PostureResult:
+    robot = case.robot
+    rigid = rigid_model(robot, driven)
+    if robot.sections is None:
+        return PostureResult(
+            _undamped(*rigid_matrices(robot, driven)),
+            rigid,
+            planar_compliance(robot, driven),
+            TIP_IN_PLANE,
+            (),
+            planar_sag(robot, driven),
+        )
+    flexible = flexible_chain(robot, driven)
+    if links:
+        compliance = flexible.compliance()
+        return PostureResult(flexible.frequencies(), flexible.model(), compliance, TIP_IN_PLANE, (), flexible.sag())
+    frequencies = _undamped(*rigid_matrices(robot, driven))
+    compliance = planar_compliance(robot, driven)
+    lower, softer = flexible.frequencies()[0], flexible.compliance()
+    share = 100 * (np.linalg.norm(softer[:2, :2], 2) / np.linalg.norm(compliance[:2, :2], 2) - 1)
+    left_out = (
+        f"the links are taken as rigid: the file's {len(robot.sections)} link sections are left out; with them the "
+        f"first mode is at {lower:.2f} Hz instead of {frequencies[0]:.2f} Hz and the tip {share:.2g} % softer "
+        "(--links takes them in)"
+    )
+    return PostureResult(frequencies, rigid, compliance, TIP_IN_PLANE, (left_out,), planar_sag(robot, driven))
+
+
+def _undamped(mass: Real, stiffness: Real) -> Real:
+    return np.asarray(np.sqrt(eigh(stiffness, mass, eigvals_only=True)) / (2 * np.pi))

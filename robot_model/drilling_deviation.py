@@ -9,12 +9,16 @@ from cutting import DrillingLoad
 from foundation import InputError
 
 from .constrained_statics import tip_compliance
+from .gravity import gravity_torques
 from .loop_closure import tool_jacobian
 from .posture_map import CutPlace, target_of
 from .spatial_robot import SpatialRobot, drive_stiffness, structure_at
 from .spherical_wrist import wrist_solutions
+from .weight import Payload, acceleration, payload_wrench, sag_at, static_response, tool_attitude
 
 Real = NDArray[np.float64]
+
+NO_PAYLOAD = Payload()
 
 
 def drilling_wrench(load: DrillingLoad, tool_axis: Real) -> Real:
@@ -69,6 +73,8 @@ class DeviationMap:
     deviations : (n, 3), m
         Nominal minus real place; NaN exactly where not reached.
     q : (n, 6), rad
+    weight : (n, 3), m
+        Nominal minus real place under own weight and payload alone; NaN where not reached or where masses are unknown.
     reached : (n,), bool
     switches : (n,), bool
         True where the branch of the inverse kinematics is another than at the place before: a jump of the deviation
@@ -77,6 +83,7 @@ class DeviationMap:
 
     positions: Real
     deviations: Real
+    weight: Real
     q: Real
     reached: NDArray[np.bool_]
     switches: NDArray[np.bool_]
@@ -89,6 +96,7 @@ def deviation_map(
     *,
     position_gain: Real | None = None,
     links: bool = False,
+    payload: Payload = NO_PAYLOAD,
 ) -> DeviationMap:
     """Deviation at each place, on the branch nearest to the posture at the place before.
 
@@ -102,6 +110,8 @@ def deviation_map(
         As :func:`joint_deformation`.
     links
         Add the compliance of links and of the joints' other directions: the whole elastic structure, linear.
+    payload
+        What the robot carries besides the bodies of its file.
 
     Raises
     ------
@@ -111,7 +121,7 @@ def deviation_map(
     if links and position_gain is not None:
         raise InputError("deviation map: give either links or a position gain")
     n = len(places)
-    deviations, postures = np.full((n, 3), np.nan), np.full((n, 6), np.nan)
+    deviations, sags, postures = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full((n, 6), np.nan)
     reached, switches = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     last: Real | None = None
     for i, place in enumerate(places):
@@ -125,6 +135,26 @@ def deviation_map(
             deviations[i] = -(tip_compliance(structure_at(robot, q)) @ wrench)[:3]
         else:
             deviations[i] = joint_deviation(robot, q, wrench, position_gain)
+        if robot.bodies:
+            sags[i] = -_sag(robot, q, payload, links)
         postures[i], reached[i], last = q, True, q
     positions = np.array([place.position for place in places]).reshape(n, 3)
-    return DeviationMap(positions, deviations, postures, reached, switches)
+    return DeviationMap(positions, deviations, sags, postures, reached, switches)
+
+
+def sag_parts(robot: SpatialRobot, q: Real, payload: Payload = NO_PAYLOAD) -> Real:
+    """Displacement of the tool by each driven joint under own weight and payload, m, (3, n_active).
+
+    ``J_j tau_j / k_j`` with the torques of :func:`robot_model.gravity_torques`.
+    """
+    jacobian = tool_jacobian(robot.mechanism, q)
+    carried = jacobian.T @ payload_wrench(robot, tool_attitude(robot.mechanism, q), payload)
+    torques = gravity_torques(robot, q, structure_at(robot, q), acceleration(robot)) + carried
+    return np.asarray(jacobian[:3] * (torques / drive_stiffness(robot)))
+
+
+def _sag(robot: SpatialRobot, q: Real, payload: Payload, links: bool) -> Real:
+    """Displacement of the tool under own weight and payload, (3,), m: of joints alone, or of the whole structure."""
+    if links:
+        return sag_at(robot, q, static_response(robot, structure_at(robot, q)), payload)[:3]
+    return np.asarray(sag_parts(robot, q, payload).sum(axis=1))

@@ -21,9 +21,6 @@ Real = NDArray[np.float64]
 STANDARD_GRAVITY = 9.80665
 """m/s^2."""
 
-UP = np.array([0.0, 0.0, 1.0])
-"""Axis of the base frame against which weight acts."""
-
 
 def with_gravity(robot: SpatialRobot, gravity: float = STANDARD_GRAVITY) -> SpatialRobot:
     """The robot with the stiffness of its own weight, ``gravity`` m/s^2 along the base's -z.
@@ -63,9 +60,29 @@ def gravity_hessian(robot: SpatialRobot, q: Real, structure: Structure) -> Real:
                 slides = mechanism.frames[mechanism.moving[second]].motion == "prismatic"
                 moved = far[:3, 2] if slides else np.cross(far[:3, 2], place - far[:3, 3])
                 bend = np.cross(near[:3, 2], moved)
-                hessian[first, second] += mass * robot.gravity * float(UP @ bend)
+                hessian[first, second] += mass * robot.gravity * float(np.asarray(robot.up) @ bend)
                 hessian[second, first] = hessian[first, second]
     return hessian
+
+
+def gravity_torques(robot: SpatialRobot, q: Real, structure: Structure, acceleration: float) -> Real:
+    """``-dV/dq`` of ``V = sum m g h``: how the weight turns (N m) or pushes (N) each moving joint, shape (n_moving,).
+
+    A mass at p on a body that joint i carries gives ``-m g u . (z_i x (p - o_i))``, or ``-m g u . z_i`` of a prismatic
+    joint, with u upwards (Siciliano et al., Robotics, section 7.3.1).
+    """
+    mechanism = robot.mechanism
+    placed, up = mechanism.transforms(q), np.asarray(robot.up)
+    torques = np.zeros(len(mechanism.moving))
+    for frame, mass, place in _masses(robot, structure):
+        for column, index in enumerate(mechanism.moving):
+            if frame >= 0 and _carries(robot, index, frame):
+                axis, origin = placed[index, :3, 2], placed[index, :3, 3]
+                slides = mechanism.frames[index].motion == "prismatic"
+                torques[column] -= (
+                    mass * acceleration * float(up @ (axis if slides else np.cross(axis, place - origin)))
+                )
+    return torques
 
 
 def gravity_stiffness(robot: SpatialRobot, q: Real, structure: Structure) -> Real:

@@ -8,11 +8,17 @@ from scipy.spatial.transform import Rotation
 
 from foundation import InputError
 
-from .constrained_statics import tip_compliance
 from .inverse_kinematics import inverse_kinematics
+from .loop_closure import posture_warnings
 from .spatial_robot import SpatialRobot, structure_at
+from .weight import NO_MASSES, Payload, counted_weight, sag_at, static_response
 
 Real = NDArray[np.float64]
+
+NO_PAYLOAD = Payload()
+
+_SHOWN = 5
+"""Warnings that are told one by one."""
 
 _SETTLED = 1e-9
 """Change of the corrected place at which the correction has settled, m and rad."""
@@ -46,36 +52,59 @@ class CompensatedPath:
         Send this to the controller.
     deviations : (n, 6), m and rad
         Of the tool on the uncorrected path.
+    weight : (n, 6), m and rad
+        Whole deflection under own weight (where it is known) and payload on the uncorrected path; ``deviations`` holds
+        the part of it that was asked for.
     left : (n, 6), m and rad
         Predicted deviation from the nominal path after correction.
-    q : (n, n_moving), rad
+    q : (n, n_moving), rad or m
         Joint values on the corrected path.
+    warnings
+        Limits and singularities on the way, and what the robot's file does not tell: one sentence each.
     """
 
     path: ToolPath
     deviations: Real
+    weight: Real
     left: Real
     q: Real
+    warnings: tuple[str, ...] = ()
 
 
-def compensate_path(robot: SpatialRobot, path: ToolPath, start: Real, *, rounds: int = 4) -> CompensatedPath:
+def compensate_path(
+    robot: SpatialRobot,
+    path: ToolPath,
+    start: Real,
+    *,
+    rounds: int = 4,
+    payload: Payload = NO_PAYLOAD,
+    weight: str = "all",
+) -> CompensatedPath:
     """Corrected path ``x_c = x - delta(x_c)``, found by repetition (Belchior et al. 2013, section 5, one round).
 
-    Forces are taken as given: those of a stiff machine, as the part should take them when it is formed rightly.
+    ``delta = C (F + F_payload) + sag``: the forces of the path, the weight of the payload and the robot's own weight
+    (:func:`robot_model.static_response`). Forces are taken as given: those of a stiff machine, as the part should take
+    them when it is formed rightly.
 
     Parameters
     ----------
     robot, path
-    start : (n_active,), rad
+    start : (n_active,), rad or m
         Driven joint values near the first place.
     rounds
         At most; compliance changes slowly, so two or three settle.
+    payload
+        What the robot carries besides the bodies of its file.
+    weight
+        ``all``, ``change`` or ``none``: see :func:`robot_model.counted_weight`; with ``change`` the correction of the
+        first place is that of its force alone.
 
     Raises
     ------
     InputError
-        Columns of unequal length, or a place that is not reached.
+        Columns of unequal length, a place that is not reached, or another word for the weight.
     """
+    counted_weight(np.zeros((0, 6)), weight)
     n = len(path.positions)
     if path.positions.shape != (n, 3) or path.attitudes.shape != (n, 3) or path.wrenches.shape != (n, 6):
         raise InputError(
@@ -85,12 +114,21 @@ def compensate_path(robot: SpatialRobot, path: ToolPath, start: Real, *, rounds:
     active = robot.mechanism.active
     nominal = np.hstack([path.positions, path.attitudes])
     corrected, first, left, postures = nominal.copy(), np.zeros((n, 6)), np.zeros((n, 6)), []
+    sags = np.zeros((n, 6))
+    doubts: dict[str, int] = {} if robot.bodies or weight == "none" else {NO_MASSES: 0}
     for i in range(n):
         driven = start
         for turn in range(rounds):
             q = inverse_kinematics(robot.mechanism, _matrix(corrected[i]), driven)
             driven = q[active]
-            deflection = tip_compliance(structure_at(robot, q)) @ path.wrenches[i]
+            static = static_response(robot, structure_at(robot, q))
+            sag = sag_at(robot, q, static, payload)
+            if turn == 0:
+                sags[i] = sag
+                for doubt in posture_warnings(robot.mechanism, q):
+                    doubts.setdefault(f"row {i + 2} of the path: {doubt}", i)
+            reference = sags[0] if weight == "change" else np.zeros(6)
+            deflection = static.compliance @ path.wrenches[i] + (0 if weight == "none" else sag - reference)
             if turn == 0:
                 first[i] = deflection
             left[i] = _sum(corrected[i], deflection) - nominal[i]
@@ -100,7 +138,13 @@ def compensate_path(robot: SpatialRobot, path: ToolPath, start: Real, *, rounds:
         start = driven
         postures.append(q)
     moved = ToolPath(corrected[:, :3], corrected[:, 3:], path.wrenches)
-    return CompensatedPath(moved, first, left, np.array(postures).reshape(n, len(active)))
+    return CompensatedPath(moved, first, sags, left, np.array(postures).reshape(n, len(active)), _few(doubts))
+
+
+def _few(doubts: dict[str, int]) -> tuple[str, ...]:
+    """The first sentences, and how many more there are."""
+    lines = tuple(doubts)
+    return lines if len(lines) <= _SHOWN else (*lines[:_SHOWN], f"and {len(lines) - _SHOWN} more warnings like these")
 
 
 def _matrix(place: Real) -> Real:

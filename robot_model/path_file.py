@@ -23,7 +23,7 @@ def read_tool_path(path: str | os.PathLike[str]) -> ToolPath:
     InputError
         No such file.
     FileFormatError
-        A column missing, or an entry that is not a finite number.
+        A column missing, an entry that is not a finite number, places that look like mm or rotations like degrees.
     """
     if not Path(path).is_file():
         raise InputError(f"no file {path}; check the name")
@@ -38,14 +38,27 @@ def read_tool_path(path: str | os.PathLike[str]) -> ToolPath:
         raise FileFormatError(f"{path}: {error}; a path holds numbers only") from error
     if not np.isfinite(table).all():
         raise FileFormatError(f"{path}: row {int(np.argmin(np.isfinite(table).all(axis=1))) + 2} is not finite")
+    large = np.abs(table).max(axis=0)
+    if (large[:3] > 20).any():
+        raise FileFormatError(
+            f"{path}: places up to {large[:3].max():g} m; give x_m, y_m and z_m in metres, at most 20"
+        )
+    if (large[3:6] > 6.5).any():
+        raise FileFormatError(
+            f"{path}: rotations up to {large[3:6].max():g}; give rx_rad, ry_rad and rz_rad as a rotation vector in rad"
+        )
     return ToolPath(table[:, :3], table[:, 3:6], table[:, 6:])
 
 
 def write_compensated_path(path: str | os.PathLike[str], result: CompensatedPath) -> None:
-    """Write the corrected path, the forces, and the deviation (m) that was predicted without correction."""
+    """Write the corrected path, the forces, and the deviations (m) that were predicted without correction.
+
+    ``deviation_*`` is what was corrected, ``weight_*`` the whole deflection under own weight and payload.
+    """
     moved = result.path
-    table = np.hstack([moved.positions, moved.attitudes, moved.wrenches, result.deviations[:, :3]])
-    names = (*COLUMNS, *MOMENTS, "deviation_x_m", "deviation_y_m", "deviation_z_m")
+    parts = (moved.positions, moved.attitudes, moved.wrenches, result.deviations[:, :3], result.weight[:, :3])
+    table = np.hstack(parts)
+    names = (*COLUMNS, *MOMENTS, *(f"{what}_{axis}_m" for what in ("deviation", "weight") for axis in "xyz"))
     with writing_whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(names)

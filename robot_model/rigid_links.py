@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
+from .gravity import STANDARD_GRAVITY
 from .modal_damping import modal_damping_matrix
 from .modal_reduction import modal_model
 from .planar_robot import TIP_IN_PLANE, PlanarRobot
@@ -52,6 +53,23 @@ def tip_jacobian(robot: PlanarRobot, angles: Real) -> Real:
     along = robot.lengths[:, None] * np.column_stack([np.cos(directions), np.sin(directions)])
     arm = np.cumsum(along[::-1], axis=0)[::-1]
     return np.vstack([-arm[:, 1], arm[:, 0], np.ones(len(arm))])
+
+
+def planar_compliance(robot: PlanarRobot, angles: Real) -> Real:
+    """``J K^-1 J^T`` over reach, height and rotation of the tip, shape (3, 3)."""
+    tip = tip_jacobian(robot, angles)
+    return np.asarray((tip / np.asarray(robot.stiffness, dtype=float)) @ tip.T)
+
+
+def planar_sag(robot: PlanarRobot, angles: Real) -> Real:
+    """Deflection of the tip under the links' own weight, ``J K^-1 tau`` with ``tau = -dV/dtheta``, shape (3,)."""
+    directions = robot.directions(angles)
+    along = robot.lengths * np.cos(directions)
+    middles = np.cumsum(along) - along / 2
+    starts = np.cumsum(along) - along
+    levers = np.array([np.sum(robot.masses[i:] * (middles[i:] - starts[i])) for i in range(len(along))])
+    torques = -STANDARD_GRAVITY * levers
+    return np.asarray(tip_jacobian(robot, angles) @ (torques / np.asarray(robot.stiffness, dtype=float)))
 
 
 def rigid_model(robot: PlanarRobot, angles: Real, gravity: float = 0.0) -> ModalModel:

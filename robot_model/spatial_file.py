@@ -2,7 +2,7 @@
 
 import os
 from dataclasses import dataclass
-from math import inf, radians
+from math import hypot, inf, radians
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,9 @@ class _Head(Table):
     kind: str
     tip_node: int
     tool_frame: str
-    gravity_m_per_s2: float = Field(0.0, ge=0)
+    gravity_m_per_s2: float = Field(0.0, ge=0, le=30)
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    repeatability_m: float | None = Field(None, gt=0, le=0.01)
 
 
 class _Frame(Table):
@@ -117,11 +119,22 @@ class _File(BaseModel):
 
 @dataclass(frozen=True)
 class SpatialCase:
-    """A robot in space and named postures: driven joint values, rad and (prismatic joints) m."""
+    """A robot in space as its file describes it.
+
+    Parameters
+    ----------
+    name
+    robot
+    poses
+        Driven joint values by name, rad and (prismatic joints) m.
+    repeatability
+        Pose repeatability after ISO 9283 (RP: radius of the sphere), m; None: the file does not tell it.
+    """
 
     name: str
     robot: SpatialRobot
     poses: dict[str, NDArray[np.float64]]
+    repeatability: float | None = None
 
 
 def read_spatial_robot(robot: str | os.PathLike[str]) -> SpatialCase:
@@ -154,8 +167,17 @@ def _case(content: _File) -> SpatialCase:
         rayleigh=_rayleigh(content.damping),
         damping_ratio=None if content.damping is None else content.damping.ratio,
         gravity=content.robot.gravity_m_per_s2,
+        up=_upwards(content.robot.up),
     )
-    return SpatialCase(content.robot.name, spatial, _poses(content, spatial.mechanism))
+    poses = _poses(content, spatial.mechanism)
+    return SpatialCase(content.robot.name, spatial, poses, content.robot.repeatability_m)
+
+
+def _upwards(given: tuple[float, float, float]) -> tuple[float, float, float]:
+    length = hypot(*given)
+    if not length > 0:
+        raise InputError(f"up = {list(given)} has no direction; give the base frame's axis against weight: [0, 0, 1]")
+    return given[0] / length, given[1] / length, given[2] / length
 
 
 def _poses(content: _File, mechanism: Mechanism) -> dict[str, NDArray[np.float64]]:

@@ -73,7 +73,9 @@ class SpatialRobot:
     damping_ratio
         One for all modes, instead of Rayleigh's constants; or None.
     gravity
-        m/s^2 along the base's -z: the stiffness of weight is added to that of the joints; 0: left out.
+        m/s^2 against ``up``: the stiffness of weight is added to that of the joints; 0: left out.
+    up
+        Unit vector against which weight acts, in the base frame: ``(0, 0, -1)`` for a robot that hangs from a ceiling.
 
     Raises
     ------
@@ -90,6 +92,7 @@ class SpatialRobot:
     rayleigh: tuple[float, float] = (0.0, 0.0)
     damping_ratio: float | None = None
     gravity: float = 0.0
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
 
     def __post_init__(self) -> None:
         check_robot(self)

@@ -13,9 +13,6 @@ from .spatial_robot import SpatialRobot, drive_stiffness
 
 Real = NDArray[np.float64]
 
-ROBOT_REPEATABILITY = 40e-6
-"""U_robpos of the paper's robot without loads, after ISO 9283, m."""
-
 
 @dataclass(frozen=True)
 class UncertaintyBudget:
@@ -24,30 +21,44 @@ class UncertaintyBudget:
     Parameters
     ----------
     robot_position
-        U_robpos: robot without load.
+        U_robpos: robot without load, its pose repeatability after ISO 9283 (the paper's: 40 um); None: unknown.
     robot_deformation
         U_robdef: from what is not known of forces and stiffness.
     machining
-        U_mach: axis of the tool, runout and the tool's own deformation together.
+        U_mach: axis of the tool, runout and the tool's own deformation together; None: unknown.
     """
 
-    robot_position: float
+    robot_position: float | None
     robot_deformation: float
-    machining: float
+    machining: float | None
+
+    @property
+    def unknown(self) -> tuple[str, ...]:
+        """Parts that are left out because nobody told them; with any, the sums are lower bounds."""
+        parts = {"robot without load": self.robot_position, "machining": self.machining}
+        return tuple(name for name, value in parts.items() if value is None)
 
     @property
     def robot(self) -> float:
-        """``U_robot^2 = U_robpos^2 + U_robdef^2`` (Eq. 4), m."""
-        return float(np.hypot(self.robot_position, self.robot_deformation))
+        """``U_robot^2 = U_robpos^2 + U_robdef^2`` (Eq. 4), m, of what is known."""
+        return float(np.hypot(self.robot_position or 0.0, self.robot_deformation))
 
     @property
     def work(self) -> float:
-        """``U_work^2 = U_robot^2 + U_mach^2`` (Eq. 3), m."""
-        return float(np.hypot(self.robot, self.machining))
+        """``U_work^2 = U_robot^2 + U_mach^2`` (Eq. 3), m, of what is known."""
+        return float(np.hypot(self.robot, self.machining or 0.0))
 
     @property
     def process_share(self) -> float:
-        """Part of U_work^2 that the process makes: machining and deformation under its forces."""
+        """Part of U_work^2 that the process makes: machining and deformation under its forces.
+
+        Raises
+        ------
+        InputError
+            A part is unknown: its share cannot be told.
+        """
+        if self.robot_position is None or self.machining is None:
+            raise InputError(f"the process's share cannot be told: {', '.join(self.unknown)} unknown; give a figure")
         return (self.machining**2 + self.robot_deformation**2) / self.work**2
 
 
@@ -76,10 +87,15 @@ def measured_machining_uncertainty(diameter: float) -> float:
 
 @dataclass(frozen=True)
 class LoadUncertainty:
-    """Relative standard uncertainties of the wrench and of each joint's stiffness."""
+    """Relative standard uncertainties of the wrench and of each joint's stiffness; these two are assumed."""
 
     wrench: float = 0.05
     stiffness: float = 0.10
+
+    def __post_init__(self) -> None:
+        for name, value in (("forces", self.wrench), ("joint stiffness", self.stiffness)):
+            if not 0 <= value <= 1:
+                raise InputError(f"{name} known to {100 * value:g} %: give 0 to 100")
 
 
 def deformation_uncertainty(robot: SpatialRobot, q: Real, wrench: Real, known: LoadUncertainty) -> float:
@@ -94,6 +110,86 @@ def deformation_uncertainty(robot: SpatialRobot, q: Real, wrench: Real, known: L
     along = direction @ parts
     variance = float(np.sum(along**2) * known.stiffness**2 + along.sum() ** 2 * known.wrench**2)
     return 2 * float(np.sqrt(variance))
+
+
+def lateral_uncertainty(
+    robot: SpatialRobot, q: Real, wrench: Real, known: LoadUncertainty, axis: Real, resting: Real | None = None
+) -> float:
+    """Expanded uncertainty of the deviation across the drill's axis, in the worst direction, first order, m.
+
+    ``U = 2 sqrt(lambda_max)`` of the covariance ``P (s_k^2 sum_j d_j d_j^T + s_w^2 d d^T) P`` with d_j the part of
+    joint j, d their sum under the process alone, and P across the axis.
+
+    Parameters
+    ----------
+    robot, q, wrench, known
+        As :func:`deformation_uncertainty`.
+    axis : (3,)
+        Unit vector of the hole.
+    resting : (3, n_active), m, or None
+        Deflection by each joint under weight (:func:`robot_model.sag_parts`) where weight counts: it has the error of
+        the stiffness, not of the forces.
+    """
+    jacobian = tool_jacobian(robot.mechanism, q)
+    process = jacobian[:3] * (jacobian.T @ wrench) / drive_stiffness(robot)
+    parts = process if resting is None else process + resting
+    deviation = process.sum(axis=1)
+    covariance = known.stiffness**2 * parts @ parts.T + known.wrench**2 * np.outer(deviation, deviation)
+    across = np.eye(3) - np.outer(axis, axis)
+    return 2 * float(np.sqrt(np.linalg.eigvalsh(across @ covariance @ across)[-1]))
+
+
+def position_tolerance(systematic: float, expanded: float) -> float:
+    """Position tolerance that a hole needs, m: diameter of the cylindrical zone of its axis, ``t = 2 (|d| + U)``.
+
+    The axis may lie anywhere within t / 2 of its true place (ISO 1101, position; ISO 5458), so a radial deviation
+    counts twice. A systematic deviation d adds to U as it is: it has one direction and is no scatter (JCGM 100,
+    F.2.4.5). ISO 286 grades (:func:`tolerance_grade`) are of sizes, the hole's diameter, and do not grade a position.
+
+    Parameters
+    ----------
+    systematic
+        Radial distance of the predicted axis from its true place, m.
+    expanded
+        Expanded uncertainty of that distance, m.
+
+    Raises
+    ------
+    InputError
+        A negative or infinite number.
+
+    Examples
+    --------
+    >>> round(1e3 * position_tolerance(0.1e-3, 0.05e-3), 6)
+    0.3
+    """
+    if not (np.isfinite(systematic) and np.isfinite(expanded) and expanded >= 0):
+        raise InputError(f"deviation {systematic!r} m with U = {expanded!r} m: give finite numbers, U 0 or more")
+    return 2 * (abs(systematic) + expanded)
+
+
+def position_verdict(needed: float, allowed: float, unknown: tuple[str, ...] = ()) -> str:
+    """``holds``, ``does not hold``, or ``cannot tell`` where parts of the budget are unknown.
+
+    Parameters
+    ----------
+    needed
+        :func:`position_tolerance` of what is known, m.
+    allowed
+        Of the drawing, m.
+    unknown
+        Parts that are left out: they can only make it worse.
+
+    Examples
+    --------
+    >>> position_verdict(0.3, 0.2, ("robot without load",)), position_verdict(0.1, 0.2, ("robot without load",))
+    ('does not hold', 'cannot tell')
+    """
+    if not allowed > 0:
+        raise InputError(f"position tolerance {allowed!r} m must be positive")
+    if needed > allowed:
+        return "does not hold"
+    return "cannot tell" if unknown else "holds"
 
 
 def monte_carlo_deformation(
@@ -115,8 +211,9 @@ def monte_carlo_deformation(
 
 
 def tolerance_grade(width: float, diameter: float) -> int:
-    """Finest IT grade, 6 to 16, whose tolerance at this diameter is at least ``width`` (m); 17 where none is.
+    """Finest IT grade, 6 to 16, whose tolerance of a diameter is at least ``width`` (m); 17 where none is.
 
+    Of a size alone: the position of a hole is graded by :func:`position_tolerance`.
     ``i = 0.45 D^(1/3) + 0.001 D`` um with D in mm, the geometric mean of its step; IT6 = 10 i and so on (ISO 286-1).
 
     Raises

@@ -29,6 +29,20 @@ Turn = Annotated[float, typer.Option("--turn", metavar="DEG", help="Turn of the 
 Redundancy = Annotated[
     str, typer.Option("--redundancy", help="tool: about the tool's axis; table: tool and work about the feed.")
 ]
+Links = Annotated[
+    bool, typer.Option("--links", help="Planar robots: the file's link sections too (others always take links in).")
+]
+PayloadMass = Annotated[float, typer.Option("--payload", metavar="KG", help="Carried besides the file's bodies.")]
+PayloadAt = Annotated[
+    tuple[float, float, float] | None,
+    typer.Option("--payload-at", metavar="X Y Z", help="Its centre of mass from the tip, tool frame, m."),
+]
+Weight = Annotated[
+    str,
+    typer.Option(
+        "--weight", help="Deflection under weight: all; change: from the first place on (touched off there); none."
+    ),
+]
 Speed = Annotated[float | None, typer.Option("--speed", metavar="RPM", help="Spindle speed of a posture map.")]
 
 
@@ -58,6 +72,7 @@ def modes(
     feed: Feed = 0.0,
     turn: Turn = 0.0,
     redundancy: Redundancy = "tool",
+    links: Links = False,
     count: Annotated[int, typer.Option("--count", help="Modes to show.")] = 10,
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE", help=".png or .pdf, or .html: a page to turn and play.")
@@ -67,7 +82,7 @@ def modes(
     from .postures import Asked
     from .results import show_modes
 
-    show_modes(robot, Asked(pose, joints, at, feed, turn, redundancy), count, picture)
+    show_modes(robot, Asked(pose, joints, at, feed, turn, redundancy), count, picture, links)
 
 
 @robot_app.command()
@@ -80,6 +95,7 @@ def frf(
     feed: Feed = 0.0,
     turn: Turn = 0.0,
     redundancy: Redundancy = "tool",
+    links: Links = False,
     band: Annotated[tuple[float, float], typer.Option("--band", metavar="LO HI", help="Hz.")] = (1.0, 100.0),
     lines: Annotated[int, typer.Option("--lines", help="Frequency lines.")] = 1000,
     sensor: Annotated[
@@ -91,7 +107,7 @@ def frf(
     from .postures import Asked
     from .results import write_receptance
 
-    write_receptance(robot, Asked(pose, joints, at, feed, turn, redundancy), out, band, lines, sensor)
+    write_receptance(robot, Asked(pose, joints, at, feed, turn, redundancy), out, band, lines, sensor, links)
 
 
 @robot_app.command()
@@ -103,13 +119,18 @@ def stiffness(
     feed: Feed = 0.0,
     turn: Turn = 0.0,
     redundancy: Redundancy = "tool",
+    links: Links = False,
     force: Annotated[float, typer.Option("--force", metavar="N", help="Force to deflect it with.")] = 650.0,
+    payload: PayloadMass = 0.0,
+    payload_at: PayloadAt = None,
 ) -> None:
-    """Static compliance at the tool tip, its softest and stiffest directions, and the deflection under a force."""
+    """Compliance at the tool tip, softest and stiffest directions, deflection under a force, weight and payload."""
+    from .asked_loads import loads_of
     from .postures import Asked
     from .results import show_stiffness
 
-    show_stiffness(robot, Asked(pose, joints, at, feed, turn, redundancy), force)
+    asked = Asked(pose, joints, at, feed, turn, redundancy)
+    show_stiffness(robot, asked, force, loads_of(payload, payload_at), links)
 
 
 @robot_app.command()
@@ -125,13 +146,37 @@ def deviation(
     y: Annotated[tuple[float, float, int], typer.Option("--y", metavar="LO HI N", help="m.")] = (-0.6, 0.6, 13),
     z: Annotated[float, typer.Option("--z", metavar="M", help="Height of the holes, m.")] = 0.8,
     links: Annotated[bool, typer.Option("--links", help="Flexible links and bearings too, not joints alone.")] = False,
+    payload: PayloadMass = 0.0,
+    payload_at: PayloadAt = None,
+    weight: Weight = "all",
+    repeatability: Annotated[
+        float | None,
+        typer.Option("--repeatability", metavar="MM", help="Pose repeatability, ISO 9283; default: the file's."),
+    ] = None,
+    position_tolerance: Annotated[
+        float | None,
+        typer.Option("--position-tolerance", metavar="MM", help="Of the drawing (ISO 1101): does it hold?"),
+    ] = None,
+    force_error: Annotated[
+        float, typer.Option("--force-error", metavar="PERCENT", help="Standard error of the forces; 5 is assumed.")
+    ] = 5.0,
+    stiffness_error: Annotated[
+        float, typer.Option("--stiffness-error", metavar="PERCENT", help="Of joint stiffnesses; 10 is assumed.")
+    ] = 10.0,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE.csv", help="Deviation of every hole.")] = None,
     picture: Annotated[Path | None, typer.Option("--picture", metavar="FILE.png", help="Map of the deviation.")] = None,
 ) -> None:
-    """Deviation of drilled holes over a work area (vertical drill, aluminium), and its uncertainty budget."""
-    from .drilled_holes import DrillingArea, show_deviation
+    """Deviation of drilled holes over a work area (vertical drill, aluminium), and the position tolerance they need."""
+    from robot_model import LoadUncertainty
 
-    show_deviation(robot, DrillingArea(1e-3 * drill, 1e-3 * feed_rev, x, y, z, links), out, picture)
+    from .asked_loads import loads_of
+    from .drilled_holes import Accuracy, DrillingArea, show_deviation
+
+    area = DrillingArea(1e-3 * drill, 1e-3 * feed_rev, x, y, z, links)
+    known = LoadUncertainty(1e-2 * force_error, 1e-2 * stiffness_error)
+    in_metres = [None if value is None else 1e-3 * value for value in (repeatability, position_tolerance)]
+    accuracy = Accuracy(in_metres[0], in_metres[1], known)
+    show_deviation(robot, area, out, picture, accuracy, loads_of(payload, payload_at, weight))
 
 
 @robot_app.command()
@@ -199,9 +244,13 @@ def compensate(
     out: Annotated[Path, typer.Option("--out", metavar="FILE.csv", help="Corrected path.")],
     joints: Joints = None,
     pose: Pose = None,
+    payload: PayloadMass = 0.0,
+    payload_at: PayloadAt = None,
+    weight: Weight = "all",
 ) -> None:
-    """Move a tool path against the deflection that its forces will cause."""
+    """Move a tool path against the deflection that its forces, the robot's weight and a payload will cause."""
+    from .asked_loads import loads_of
     from .postures import Asked
     from .results import write_compensation
 
-    write_compensation(robot, path, Asked(pose, joints), out)
+    write_compensation(robot, path, Asked(pose, joints), out, loads_of(payload, payload_at, weight))

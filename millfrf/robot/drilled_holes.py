@@ -1,32 +1,44 @@
-"""`millfrf robot deviation`: deviation of drilled holes over a work area, and its uncertainty budget."""
+"""`millfrf robot deviation`: deviation of drilled holes over a work area, and the position tolerance they need."""
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 import typer
+from numpy.typing import NDArray
 
-from cutting import Drill, drilling_load, fitted_to_catalogue
+from cutting import Drill, DrillingLoad, drilling_load, fitted_to_catalogue
 from foundation import InputError, writing_whole_file
 from robot_model import (
     DeviationMap,
     LoadUncertainty,
+    SpatialCase,
     UncertaintyBudget,
+    counted_weight,
     deformation_uncertainty,
     deviation_map,
     drilling_wrench,
+    lateral_uncertainty,
     measured_machining_uncertainty,
     monte_carlo_deformation,
+    position_tolerance,
+    position_verdict,
     read_robot,
-    tolerance_grade,
+    sag_parts,
     tool_down,
 )
-from robot_model.uncertainty_budget import ROBOT_REPEATABILITY
+from robot_model.weight import NO_MASSES
 
 from ..commands.options import check_output
 from ..tables import Table, show
+from .asked_loads import Loads, check_axis, check_places, check_positive
 from .postures import spatial
+
+Real = NDArray[np.float64]
+
+DOWN = np.array([0.0, 0.0, -1.0])
+"""Axis of the drill."""
 
 
 @dataclass(frozen=True)
@@ -41,68 +53,191 @@ class DrillingArea:
     links: bool
 
 
-def show_deviation(robot: str, area: DrillingArea, out: Path | None, picture: Path | None) -> None:
-    """Largest and mean deviation over the area, budget at the worst hole, CSV and map where asked."""
+@dataclass(frozen=True)
+class Accuracy:
+    """What is known of the robot's accuracy, and what the drawing allows.
+
+    Parameters
+    ----------
+    repeatability
+        Pose repeatability after ISO 9283, m; None: that of the robot's file, if it has one.
+    allowed
+        Position tolerance of the drawing (diameter of the zone), m; None: not asked.
+    known
+        Errors of forces and joint stiffness.
+    """
+
+    repeatability: float | None = None
+    allowed: float | None = None
+    known: LoadUncertainty = field(default_factory=LoadUncertainty)
+
+
+@dataclass(frozen=True)
+class _Holes:
+    """Deviations of one area and what the position tolerance is made of."""
+
+    case: SpatialCase
+    area: DrillingArea
+    accuracy: Accuracy
+    loads: Loads
+    found: DeviationMap
+    load: DrillingLoad
+
+    @property
+    def wrench(self) -> Real:
+        return drilling_wrench(self.load, DOWN)
+
+    def weight(self) -> Real:
+        """Part of the weight's deviation that counts, m, (n, 3); zeros where masses are unknown."""
+        if not self.case.robot.bodies or self.loads.weight == "none":
+            return np.zeros_like(self.found.weight)
+        sags = np.hstack([self.found.weight, np.where(np.isnan(self.found.weight), np.nan, 0.0)])
+        return counted_weight(sags, self.loads.weight)[:, :3]
+
+    def budget(self, hole: int) -> UncertaintyBudget:
+        """Of the position of one hole across the drill."""
+        repeatability = self.accuracy.repeatability or self.case.repeatability
+        known = self.accuracy.known
+        across = lateral_uncertainty(self.case.robot, self.found.q[hole], self.wrench, known, DOWN, self._resting(hole))
+        try:
+            machining: float | None = measured_machining_uncertainty(self.area.diameter)
+        except InputError:
+            machining = None
+        return UncertaintyBudget(repeatability, across, machining)
+
+    def _resting(self, hole: int) -> Real | None:
+        robot, payload = self.case.robot, self.loads.payload
+        if not robot.bodies or self.loads.weight == "none":
+            return None
+        own = sag_parts(robot, self.found.q[hole], payload)
+        if self.loads.weight == "all":
+            return own
+        return np.asarray(own - sag_parts(robot, self.found.q[int(np.argmax(self.found.reached))], payload))
+
+
+def show_deviation(
+    robot: str, area: DrillingArea, out: Path | None, picture: Path | None, accuracy: Accuracy, loads: Loads
+) -> None:
+    """Deviation under thrust and weight, the position tolerance that holes need; CSV and map where asked."""
     for path, suffixes in ((out, (".csv",)), (picture, (".png", ".pdf"))):
         if path is not None:
             check_output(path, suffixes)
+    _check(area, accuracy)
     case = spatial(read_robot(robot))
     drill = Drill(area.diameter)
     load = drilling_load(drill, area.feed, *fitted_to_catalogue(drill))
     places = [tool_down([x, y, area.z]) for x in np.linspace(*area.x) for y in np.linspace(*area.y)]
-    found = deviation_map(case.robot, places, load, links=area.links)
+    found = deviation_map(case.robot, places, load, links=area.links, payload=loads.payload)
     if not found.reached.any():
         raise InputError("no hole of the area is reached; move --x, --y or --z")
-    sizes = np.linalg.norm(found.deviations, axis=1)
-    worst = int(np.nanargmax(sizes))
+    holes = _Holes(case, area, accuracy, loads, found, load)
+    weight = holes.weight()
     typer.echo(f"thrust {load.thrust:.0f} N, torque {load.torque:.2f} N m")
     typer.echo(f"{found.reached.sum()} of {len(places)} holes reached; the branch changes at {found.switches.sum()}")
-    typer.echo(f"deviation: mean {1e3 * np.nanmean(sizes):.3f} mm, largest {1e3 * sizes[worst]:.3f} mm")
-    _show_budget(robot, area, found, worst)
+    _show_sizes("deviation under thrust", found.deviations)
+    if case.robot.bodies:
+        _show_sizes("deflection under weight", found.weight)
+    elif loads.weight != "none":
+        typer.echo(f"warning: {NO_MASSES}", err=True)
+    needed = np.full(len(places), np.nan)
+    radial = np.linalg.norm((found.deviations + weight)[:, :2], axis=1)
+    for hole in np.flatnonzero(found.reached):
+        needed[hole] = position_tolerance(float(radial[hole]), holes.budget(int(hole)).work)
+    _show_position(holes, weight, needed)
     if out is not None:
-        _write_deviations(out, found)
+        _write_deviations(out, found, needed)
         typer.echo(f"wrote {out}")
     if picture is not None:
         from .picture import draw_deviation
 
-        draw_deviation(picture, found, (area.x[2], area.y[2]))
+        draw_deviation(picture, found, (area.x[2], area.y[2]), needed)
         typer.echo(f"wrote {picture}")
 
 
-def _show_budget(robot: str, area: DrillingArea, found: DeviationMap, worst: int) -> None:
-    case = spatial(read_robot(robot))
-    drill = Drill(area.diameter)
-    wrench = drilling_wrench(drilling_load(drill, area.feed, *fitted_to_catalogue(drill)), np.array([0.0, 0.0, -1.0]))
-    try:
-        machining = measured_machining_uncertainty(area.diameter)
-    except InputError as error:
-        typer.echo(f"no uncertainty budget: {error}")
-        return
-    deformation = deformation_uncertainty(case.robot, found.q[worst], wrench, LoadUncertainty())
-    _, trial = monte_carlo_deformation(case.robot, found.q[worst], wrench, LoadUncertainty(), trials=400)
-    budget = UncertaintyBudget(ROBOT_REPEATABILITY, deformation, machining)
-    parts = (
-        ("robot without load", budget.robot_position),
-        ("deformation under load", budget.robot_deformation),
-        ("the same, 400 Monte Carlo trials", trial),
-        ("machining", budget.machining),
-        ("hole position", budget.work),
+def _check(area: DrillingArea, accuracy: Accuracy) -> None:
+    check_positive("drill", 1e3 * area.diameter, "millimetres", 100)
+    check_positive("feed-per-rev", 1e3 * area.feed, "millimetres", 5)
+    check_axis("x", area.x)
+    check_axis("y", area.y)
+    check_places(z=area.z)
+    if accuracy.repeatability is not None:
+        check_positive("repeatability", 1e3 * accuracy.repeatability, "millimetres (ISO 9283)", 5)
+    if accuracy.allowed is not None:
+        check_positive("position-tolerance", 1e3 * accuracy.allowed, "millimetres", 50)
+
+
+def _show_sizes(what: str, deviations: Real) -> None:
+    sizes = 1e3 * np.linalg.norm(deviations, axis=1)
+    typer.echo(f"{what}: mean {np.nanmean(sizes):.3f} mm, largest {np.nanmax(sizes):.3f} mm")
+
+
+def _show_position(holes: _Holes, weight: Real, needed: Real) -> None:
+    """Budget and position tolerance at the hole that needs the largest, and the verdict on the drawing's."""
+    worst = int(np.nanargmax(needed))
+    budget = holes.budget(worst)
+    _show_budget(holes, worst, budget)
+    thrust, resting = holes.found.deviations[worst], weight[worst]
+    both = thrust + resting
+    typer.echo(
+        f"systematic there: {1e3 * np.linalg.norm(both[:2]):.3f} mm across the drill (thrust "
+        f"{1e3 * np.linalg.norm(thrust[:2]):.3f}, weight {1e3 * np.linalg.norm(resting[:2]):.3f}), "
+        f"{1e3 * abs(both[2]):.3f} mm along it (depth)"
     )
-    rows = tuple((name, f"{1e6 * value:.1f}", _grade(2 * value, area.diameter)) for name, value in parts)
-    title = "Expanded uncertainty at the worst hole (forces 5 %, joint stiffness 10 %: assumed)"
-    show(Table(title, ("part", "U, k = 2 (um)", "2 U fits in"), rows))
+    least = "at least " if budget.unknown else ""
+    typer.echo(
+        f"position tolerance needed (ISO 1101, diameter of the zone = 2 (systematic + U)): {least}"
+        f"{1e3 * needed[worst]:.3f} mm there, {least}{1e3 * np.nanmin(needed):.3f} mm at the best hole; "
+        "an IT grade of ISO 286 is of a size, not of a position"
+    )
+    if "robot without load" in budget.unknown:
+        typer.echo(
+            "warning: the robot's file gives no repeatability_m (ISO 9283) and --repeatability MM is not given: "
+            "unknown and left out, so tolerances are lower bounds",
+            err=True,
+        )
+    if "machining" in budget.unknown:
+        typer.echo(
+            f"warning: the uncertainty of machining is known for drills of 8 to 12 mm, not "
+            f"{1e3 * holes.area.diameter:g} mm: left out, so tolerances are lower bounds",
+            err=True,
+        )
+    if holes.accuracy.allowed is not None:
+        allowed = holes.accuracy.allowed
+        verdicts = [position_verdict(float(value), allowed, budget.unknown) for value in needed[~np.isnan(needed)]]
+        counts = ", ".join(f"{word} at {verdicts.count(word)}" for word in ("holds", "does not hold", "cannot tell"))
+        typer.echo(f"position tolerance of {1e3 * allowed:g} mm, {len(verdicts)} holes: {counts}")
 
 
-def _grade(width: float, diameter: float) -> str:
-    grade = tolerance_grade(width, diameter)
-    return f"IT{grade}" if grade <= 16 else "none"
+def _show_budget(holes: _Holes, worst: int, budget: UncertaintyBudget) -> None:
+    robot, q, known = holes.case.robot, holes.found.q[worst], holes.accuracy.known
+    length = deformation_uncertainty(robot, q, holes.wrench, known)
+    _, trial = monte_carlo_deformation(robot, q, holes.wrench, known, trials=400)
+    assumed = " (assumed)" if known == LoadUncertainty() else ""
+    errors = f"forces {100 * known.wrench:g} %, stiffness {100 * known.stiffness:g} %{assumed}"
+    where = "--repeatability" if holes.accuracy.repeatability else "the robot's file"
+    parts = (
+        ("robot without load (ISO 9283)", budget.robot_position, where),
+        ("deformation across the drill", budget.robot_deformation, errors),
+        ("machining", budget.machining, "Ferreras-Higuero et al., their spindle"),
+        ("hole position together", budget.work, "of what is known" if budget.unknown else "quadratic sum"),
+        ("length of the deviation under thrust", length, "first order, beside it"),
+        ("the same, 400 Monte Carlo trials", trial, "without linearisation"),
+    )
+    rows = tuple(
+        (name, "unknown" if value is None else f"{1e6 * value:.1f}", "left out" if value is None else source)
+        for name, value, source in parts
+    )
+    x, y, _ = holes.found.positions[worst]
+    title = f"Expanded uncertainty at the worst hole, x = {x:.2f} m, y = {y:.2f} m"
+    show(Table(title, ("part", "U, k = 2 (um)", "from"), rows))
 
 
-def _write_deviations(out: Path, found: DeviationMap) -> None:
+def _write_deviations(out: Path, found: DeviationMap, needed: Real) -> None:
     with writing_whole_file(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
-        names = ("x_m", "y_m", "z_m", "deviation_x_m", "deviation_y_m", "deviation_z_m")
-        writer.writerow((*names, *(f"q{i + 1}_deg" for i in range(6))))
-        for position, moved, q in zip(found.positions, found.deviations, found.q, strict=True):
-            cells = (*position, *moved, *np.degrees(q))
+        names = [f"{what}{axis}_m" for what in ("", "deviation_", "weight_") for axis in "xyz"]
+        writer.writerow((*names, "position_tolerance_m", *(f"q{i + 1}_deg" for i in range(6))))
+        rows = zip(found.positions, found.deviations, found.weight, needed, found.q, strict=True)
+        for position, moved, sag, tolerance, q in rows:
+            cells = (*position, *moved, *sag, tolerance, *np.degrees(q))
             writer.writerow(["" if np.isnan(cell) else f"{cell:.9g}" for cell in cells])

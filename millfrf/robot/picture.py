@@ -81,15 +81,16 @@ def _from_above(axes: Axes, modes: StructureModes, moved: Real) -> None:
     axes.set_xlabel("x (m)")
 
 
-def draw_deviation(path: Path, found: DeviationMap, shape: tuple[int, int]) -> None:
-    """Length of the deviation over y (across) and x (reach), mm; white where not reached."""
-    _save(deviation_figure(found, shape), path)
+def draw_deviation(path: Path, found: DeviationMap, shape: tuple[int, int], needed: Real) -> None:
+    """Deviation under thrust and the position tolerance that holes need, mm; white where not reached."""
+    _save(deviation_figure(found, shape, needed), path)
 
 
-def deviation_figure(found: DeviationMap, shape: tuple[int, int]) -> Figure:
-    """The same as a figure; ``shape``: how many places along x and y."""
+def deviation_figure(found: DeviationMap, shape: tuple[int, int], needed: Real) -> Figure:
+    """The same as a figure; ``shape``: how many places along x and y; ``needed`` (n,): position tolerance, m."""
     sizes = 1e3 * np.linalg.norm(found.deviations, axis=1)
-    return map_figure(found.positions, shape, [(sizes, "deviation (mm)")])
+    fields = [(sizes, "deviation under thrust (mm)"), (1e3 * needed, "position tolerance (mm)")]
+    return map_figure(found.positions, shape, fields)
 
 
 def draw_workspace(path: Path, places: Sequence[CutPlace], shape: tuple[int, int], lowest: Real, limits: Real) -> None:

@@ -24,6 +24,8 @@ from robot_model import (
     unit_doubts,
 )
 
+from .asked_loads import check_degrees, check_places
+
 Real = NDArray[np.float64]
 
 
@@ -98,6 +100,9 @@ def cut_place(asked: Asked) -> CutPlace:
     """The place of a vertical tool, after the redundancy turned."""
     if asked.at is None:
         raise InputError("give the place of the tool tip: --at X Y Z, in metres")
+    for value in asked.at:
+        check_places(at=value)
+    check_degrees(feed=asked.feed, turn=asked.turn)
     return turned_place(tool_down(asked.at, np.radians(asked.feed)), np.radians(asked.turn), asked.redundancy)
 
 

@@ -1,21 +1,24 @@
 """What the robot commands do: read, compute, print a table, write a file."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import typer
+from numpy.typing import NDArray
 
 from cutting import read_cutting_process
 from estimation import write_frf
-from foundation import InputError
+from foundation import InputError, writing_whole_file
 from modal_fit import write_modal_model
 from robot_model import (
+    PlanarCase,
     PostureResult,
+    SpatialCase,
     cell_structure_at,
     close_loops,
     compensate_path,
     in_posture,
-    named_posture,
     read_robot,
     read_tool_path,
     shown_values,
@@ -25,31 +28,33 @@ from robot_model import (
 
 from ..commands.options import check_band, check_output
 from ..progress import bar
+from ..provenance import add_to_json, versions
 from ..tables import Table, show
+from .asked_loads import Loads, check_axis, check_degrees, check_near, check_places, check_positive
+from .carried import carried_wrench, largest_together
 from .posture_maps import depth_over_places
 from .postures import Asked, mechanism_of, posture_of, spatial
+
+Real = NDArray[np.float64]
 
 RPM = np.pi / 30
 
 
-def show_modes(robot: str, asked: Asked, count: int, picture: Path | None) -> None:
+def show_modes(robot: str, asked: Asked, count: int, picture: Path | None, links: bool = False) -> None:
     """Table of modes; a picture or a page where asked."""
     if picture is not None:
         check_output(picture, (".png", ".pdf", ".html"))
+    if count < 1:
+        raise InputError(f"--count {count}: give 1 or more modes")
     case = read_robot(robot)
     driven, axes = posture_of(case, asked)
-    result = in_posture(case, driven, axes)
+    result = in_posture(case, driven, axes, links=links)
     model = result.known_model()
     kept = {f"{f:.6f}": f"{100 * z:.2f}" for f, z in zip(model.natural_frequencies, model.damping_ratios, strict=True)}
     shown = [(f, kept.get(f"{f:.6f}", "overdamped")) for f in result.frequencies[:count]]
     rows = tuple((str(i + 1), f"{f:.3f}", ratio) for i, (f, ratio) in enumerate(shown))
-    show(
-        Table(
-            f"Modes in the posture {shown_values(mechanism_of(case), driven)}",
-            ("mode", "frequency (Hz)", "damping ratio (%)"),
-            rows,
-        )
-    )
+    title = f"Modes in the posture {shown_values(mechanism_of(case), driven)}"
+    show(Table(title, ("mode", "frequency (Hz)", "damping ratio (%)"), rows))
     warn(result)
     if picture is not None:
         from .picture import draw_modes
@@ -65,47 +70,81 @@ def write_receptance(
     band: tuple[float, float],
     lines: int,
     sensor: tuple[float, float, float] | None = None,
+    links: bool = False,
 ) -> None:
     """FRF or modal model at the tool tip; with a sensor, a modal model with the housing's motion."""
     check_output(out, (".json",) if sensor is not None else (".h5", ".json"))
     check_band(band)
-    if lines < 2:
-        raise InputError(f"{lines} frequency lines: give 2 or more")
+    check_positive("band", band[1], "Hz", 1e6)
+    if not 2 <= lines <= 1_000_000:
+        raise InputError(f"{lines} frequency lines: give 2 to 1000000")
     case = read_robot(robot)
     driven, axes = posture_of(case, asked)
-    result = in_posture(case, driven, axes)
+    result = in_posture(case, driven, axes, links=links)
     model = result.known_model()
     if sensor is not None:
+        check_near("sensor", sensor)
         model = cell_structure_at(spatial(case).robot, driven, np.array(sensor), axes=axes)
+    provenance = {
+        "command": "robot frf",
+        "robot": robot,
+        "posture": shown_values(mechanism_of(case), driven),
+        "warnings": list(result.warnings),
+        "versions": versions(),
+    }
     if out.suffix == ".json":
-        write_modal_model(out, model)
+        with writing_whole_file(out) as temporary:
+            write_modal_model(temporary, model)
+            add_to_json(temporary, provenance)
     else:
-        write_frf(out, model.frf(np.linspace(*band, lines)))
+        write_frf(out, model.frf(np.linspace(*band, lines)), provenance=json.dumps(provenance))
     warn(result)
     typer.echo(f"wrote {out}: {len(model.poles)} modes from {model.natural_frequencies.min():.2f} Hz")
 
 
-def show_stiffness(robot: str, asked: Asked, force: float) -> None:
-    """Compliance table, principal directions, deflection."""
+def show_stiffness(robot: str, asked: Asked, force: float, loads: Loads, links: bool = False) -> None:
+    """Compliance table, principal directions, deflection under the force, under weight, and under both."""
+    check_positive("force", force, "newtons", 1e6)
     case = read_robot(robot)
     driven, axes = posture_of(case, asked)
-    result = in_posture(case, driven, axes)
+    result = in_posture(case, driven, axes, links=links)
     names = [label.split(":")[1] for label in result.labels]
     rows = tuple((name, *(f"{v:.3e}" for v in row)) for name, row in zip(names, result.compliance, strict=True))
-    show(
-        Table(
-            f"Compliance at the tool (m/N, rad/N m), posture {shown_values(mechanism_of(case), driven)}",
-            ("", *names),
-            rows,
-        )
-    )
+    title = f"Compliance at the tool (m/N, rad/N m), posture {shown_values(mechanism_of(case), driven)}"
+    show(Table(title, ("", *names), rows))
     moving = [i for i, name in enumerate(names) if "R" not in name]
-    values, directions = np.linalg.eigh(result.compliance[np.ix_(moving, moving)])
+    compliance = result.compliance[np.ix_(moving, moving)]
+    values, directions = np.linalg.eigh(compliance)
     for value, direction in zip(values[::-1], directions.T[::-1], strict=True):
         parts = ", ".join(f"{names[i][1:]} {d:+.2f}" for i, d in zip(moving, direction, strict=True))
         typer.echo(f"{1e-6 / value:8.3f} N/um along ({parts})")
     typer.echo(f"largest deflection under {force:g} N: {1e3 * force * values[-1]:.3f} mm")
+    sag = _show_sag(case, driven, axes, result, loads, [names[i] for i in moving])
+    if sag.any():
+        largest = largest_together(sag[moving], force * compliance)
+        typer.echo(f"largest deflection under weight and {force:g} N together: {1e3 * largest:.3f} mm")
     warn(result)
+
+
+def _show_sag(
+    case: PlanarCase | SpatialCase,
+    driven: Real,
+    axes: Real | None,
+    result: PostureResult,
+    loads: Loads,
+    names: list[str],
+) -> Real:
+    """Print the deflection under own weight and payload; return their sum over the tool's degrees of freedom."""
+    parts = []
+    if result.own_weight is not None:
+        parts.append(("the robot's own weight (links and bodies of its file)", result.own_weight))
+    if loads.payload.mass:
+        carried = result.compliance @ carried_wrench(case, driven, axes, loads.payload)
+        parts.append((f"a payload of {loads.payload.mass:g} kg", carried))
+    for what, moved in parts:
+        cells = ", ".join(f"{name[1:]} {1e3 * value:+.3f}" for name, value in zip(names, moved, strict=False))
+        typer.echo(f"deflection under {what}: {1e3 * np.linalg.norm(moved[: len(names)]):.3f} mm ({cells})")
+    return np.sum([moved for _, moved in parts], axis=0) if parts else np.zeros(len(result.labels))
 
 
 def write_workspace_map(
@@ -123,6 +162,13 @@ def write_workspace_map(
     if (cutting is None) != (speed is None):
         raise InputError("a map of depth limits needs both --cutting CUT.toml and --speed RPM")
     x, y, z, feed = area
+    check_axis("x", x)
+    check_axis("y", y)
+    check_places(z=z)
+    check_degrees(feed=feed)
+    check_positive("max-depth", max_depth, "metres", 1.0)
+    if speed is not None:
+        check_positive("speed", speed, "rpm", 1e6)
     case = spatial(read_robot(robot))
     places = [tool_down([u, v, z], np.radians(feed)) for u in np.linspace(*x) for v in np.linspace(*y)]
     process = None if cutting is None else read_cutting_process(cutting)
@@ -137,20 +183,34 @@ def write_workspace_map(
     typer.echo(f"wrote {picture}: {np.isfinite(lowest).sum()} of {len(places)} places reached")
 
 
-def write_compensation(robot: str, path: Path, asked: Asked, out: Path) -> None:
+def write_compensation(robot: str, path: Path, asked: Asked, out: Path, loads: Loads) -> None:
     """Corrected path, and what it is worth."""
     check_output(out, (".csv",))
     case = spatial(read_robot(robot))
-    start = posture_of(case, asked)[0] if asked.joints or asked.pose else named_posture(case, None)
+    start = posture_of(case, asked)[0]
     close_loops(case.robot.mechanism, start)
     with bar("compensating"):
-        result = compensate_path(case.robot, read_tool_path(path), start)
+        result = compensate_path(case.robot, read_tool_path(path), start, payload=loads.payload, weight=loads.weight)
     write_compensated_path(out, result)
-    before, after = (np.linalg.norm(moved[:, :3], axis=1) for moved in (result.deviations, result.left))
-    typer.echo(
-        f"wrote {out}: predicted deviation mean {1e3 * before.mean():.3f} mm, largest {1e3 * before.max():.3f} mm; "
-        f"after correction {1e6 * after.max():.2g} um by the same model"
+    before, after, sag = (
+        1e3 * np.linalg.norm(moved[:, :3], axis=1) for moved in (result.deviations, result.left, result.weight)
     )
+    change = 1e3 * np.linalg.norm((result.weight - result.weight[0])[:, :3], axis=1)
+    typer.echo(
+        f"wrote {out}: predicted deviation mean {before.mean():.3f} mm, largest {before.max():.3f} mm; "
+        f"after correction {1e3 * after.max():.2g} um by the same model"
+    )
+    counted = {
+        "all": "all of it is corrected (--weight all)",
+        "change": "only its change from the first place is corrected (--weight change)",
+        "none": "none of it is corrected (--weight none)",
+    }
+    typer.echo(
+        f"weight of the robot and of a payload of {loads.payload.mass:g} kg: largest deflection {sag.max():.3f} mm, "
+        f"changes by up to {change.max():.3f} mm from the first place; {counted[loads.weight]}"
+    )
+    for warning in result.warnings:
+        typer.echo(f"warning: {warning}", err=True)
 
 
 def warn(result: PostureResult) -> None:

@@ -19,9 +19,12 @@ from robot_model import (
     drilling_wrench,
     joint_deformation,
     joint_deviation,
+    lateral_uncertainty,
     machining_uncertainty,
     measured_machining_uncertainty,
     monte_carlo_deformation,
+    position_tolerance,
+    position_verdict,
     read_planar_robot,
     read_spatial_robot,
     rigid_matrices,
@@ -73,6 +76,51 @@ def test_budget_of_the_paper() -> None:
     assert machining_uncertainty(2e-6, 3e-6, 6e-6) == pytest.approx(7e-6)
     with pytest.raises(InputError, match="8 to 12 mm"):
         measured_machining_uncertainty(5e-3)
+
+
+def test_what_nobody_told_is_left_out_and_said() -> None:
+    unknown = UncertaintyBudget(None, 30e-6, 40e-6)
+    assert unknown.unknown == ("robot without load",)
+    assert unknown.work == pytest.approx(50e-6)
+    with pytest.raises(InputError, match="cannot be told"):
+        _ = unknown.process_share
+    assert UncertaintyBudget(40e-6, 0.0, None).unknown == ("machining",)
+    for name in ("kuka_kr90_r3100", "staubli_rx170", "fanuc_s420if"):
+        assert read_spatial_robot(name).repeatability is None  # no source gives it: 40 um is another robot's
+
+
+def test_a_position_is_graded_by_the_zone_of_its_axis() -> None:
+    """An axis 0.1 mm off, known to 0.05 mm, lies in a zone of 0.3 mm; trials of such axes stay in it."""
+    needed = position_tolerance(0.1e-3, 0.05e-3)
+    assert needed == pytest.approx(0.3e-3)
+    rng = np.random.default_rng(3)
+    axes = np.array([0.1e-3, 0.0]) + 0.025e-3 * rng.standard_normal((4000, 2))
+    inside = np.linalg.norm(axes, axis=1) <= needed / 2
+    assert 0.95 < inside.mean() < 0.99
+    assert np.mean(np.linalg.norm(axes, axis=1) <= 0.05e-3) < 0.05  # without the systematic part hardly one is inside
+    assert position_verdict(0.3e-3, 0.4e-3) == "holds"
+    assert position_verdict(0.5e-3, 0.4e-3, ("machining",)) == "does not hold"
+    assert position_verdict(0.3e-3, 0.4e-3, ("machining",)) == "cannot tell"
+    with pytest.raises(InputError, match="positive"):
+        position_verdict(0.3e-3, 0.0)
+    with pytest.raises(InputError, match="finite"):
+        position_tolerance(np.nan, 1e-6)
+
+
+def test_lateral_uncertainty_is_the_spread_of_trials() -> None:
+    """Twice the largest standard deviation across the drill of trials with each stiffness and the force drawn."""
+    wrench = np.array([150.0, -80.0, 400.0, 0.5, 0.0, 1.0])
+    known = LoadUncertainty(0.05, 0.05)
+    axis = np.array([0.0, 0.0, -1.0])
+    found = lateral_uncertainty(ROBOT, READY, wrench, known, axis)
+    rng = np.random.default_rng(8)
+    nominal = np.array([joint.stiffness for joint in ROBOT.joints])
+    trials = []
+    for _ in range(1500):
+        factors = np.exp(known.stiffness * rng.standard_normal(len(nominal)))
+        pushed = wrench * (1 + known.wrench * rng.standard_normal())
+        trials.append(joint_deviation(ROBOT.with_stiffness(nominal * factors[:, None]), READY, pushed)[:2])
+    assert 2 * np.sqrt(np.linalg.eigvalsh(np.cov(np.array(trials).T))[-1]) == pytest.approx(found, rel=0.06)
 
 
 def test_monte_carlo_agrees_with_the_budget() -> None:

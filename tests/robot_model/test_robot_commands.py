@@ -115,15 +115,32 @@ def test_stiffness_and_list(capsys: pytest.CaptureFixture[str]) -> None:
 def test_deviation_of_drilled_holes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table, picture = tmp_path / "d.csv", tmp_path / "d.png"
     area = ["--x", "0.7", "1.0", "2", "--y", "-0.2", "0.2", "3"]
-    options = ["--drill", "8", *area, "--out", str(table), "--picture", str(picture)]
+    options = ["--drill", "8", *area, "--out", str(table), "--picture", str(picture), "--position-tolerance", "5"]
     assert run(["robot", "deviation", "staubli_rx170", *options]) == DONE
-    printed = capsys.readouterr().out
+    captured = capsys.readouterr()
+    printed = captured.out
     assert "thrust 1" in printed
     assert "Monte Carlo" in printed
-    assert "IT" in printed
+    assert "position tolerance needed (ISO 1101" in printed
+    assert "at least" in printed
+    assert "repeatability" in captured.err
+    assert "cannot tell at 6" in printed
     with table.open() as stream:
-        assert len(list(csv.DictReader(stream))) == 6
+        rows = list(csv.DictReader(stream))
+    assert len(rows) == 6
     assert picture.exists()
+    for row in rows:
+        moved = [float(row[f"deviation_{axis}_m"]) + float(row[f"weight_{axis}_m"]) for axis in "xy"]
+        assert float(row["position_tolerance_m"]) > 2 * np.hypot(*moved)
+    known = [*options, "--repeatability", "0.04"]
+    assert run(["robot", "deviation", "staubli_rx170", *known]) == DONE
+    captured = capsys.readouterr()
+    assert "holds at 6" in captured.out
+    assert "repeatability" not in captured.err
+    assert "40.0" in captured.out
+    with table.open() as stream:
+        better = [float(row["position_tolerance_m"]) for row in csv.DictReader(stream)]
+    assert all(new > float(row["position_tolerance_m"]) for new, row in zip(better, rows, strict=True))
 
 
 def test_lobes_and_posture_map(tmp_path: Path, cut: str) -> None:
