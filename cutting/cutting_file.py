@@ -4,13 +4,17 @@ import math
 import os
 import tomllib
 from pathlib import Path
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, Strict, ValidationError
 
-from foundation import FileFormatError, InputError
+from foundation import FileFormatError, InputError, mistake_in_words
 
 from .immersion import immersion_angles
 from .milling_process import MillingProcess
+
+Number = Annotated[float, Strict()]
+"""No text, and no true or false, is taken for a number."""
 
 
 class _Cutting(BaseModel):
@@ -18,27 +22,27 @@ class _Cutting(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
 
-    teeth: int
-    diameter_m: float
-    edge_angle_deg: float = 90.0
-    ktc_pa: float
-    krc: float
-    kac: float = 0.0
-    start_angle_deg: float | None = None
-    exit_angle_deg: float | None = None
+    teeth: Annotated[int, Strict()]
+    diameter_m: Number
+    edge_angle_deg: Number = 90.0
+    ktc_pa: Number
+    krc: Number
+    kac: Number = 0.0
+    start_angle_deg: Number | None = None
+    exit_angle_deg: Number | None = None
     immersion: str | None = None
-    radial_depth_m: float | None = None
-    feed_per_tooth_m: float = 0.0
-    kte_n_per_m: float = 0.0
-    kre_n_per_m: float = 0.0
-    kae_n_per_m: float = 0.0
-    runout_m: float = 0.0
-    helix_angle_deg: float = 0.0
-    pitch_angles_deg: tuple[float, ...] = ()
-    process_damping_n_per_m: float = 0.0
-    ktc_std_pa: float = 0.0
-    krc_std: float = 0.0
-    kac_std: float = 0.0
+    radial_depth_m: Number | None = None
+    feed_per_tooth_m: Number = 0.0
+    kte_n_per_m: Number = 0.0
+    kre_n_per_m: Number = 0.0
+    kae_n_per_m: Number = 0.0
+    runout_m: Number = 0.0
+    helix_angle_deg: Number = 0.0
+    pitch_angles_deg: tuple[Number, ...] = ()
+    process_damping_n_per_m: Number = 0.0
+    ktc_std_pa: Number = 0.0
+    krc_std: Number = 0.0
+    kac_std: Number = 0.0
 
 
 def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
@@ -66,11 +70,7 @@ def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
     try:
         cutting = _Cutting.model_validate(table)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        meaning = {"extra_forbidden": "is not a known key", "missing": "is missing"}.get(first["type"], first["msg"])
-        known = ", ".join(_Cutting.model_fields)
-        raise FileFormatError(f"{path}: cutting.{key} {meaning}; known keys: {known}") from error
+        raise FileFormatError(f"{path}: [cutting] {mistake_in_words(error, _Cutting)}") from error
     return _process(cutting, path)
 
 

@@ -42,7 +42,10 @@ def immersion_angles(kind: str, radial_depth: float, diameter: float) -> tuple[f
     if kind == "slot":
         return 0.0, math.pi
     if not 0 < radial_depth <= diameter:
-        raise InputError(f"radial depth {radial_depth!r} m must be above 0 and at most the diameter, {diameter:g} m")
+        raise InputError(
+            f"radial depth {radial_depth!r} m must be above 0 and at most the diameter, {diameter:g} m; "
+            "give metres, not mm"
+        )
     width = math.acos(1 - 2 * radial_depth / diameter)
     if kind == "up":
         return 0.0, width

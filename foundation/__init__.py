@@ -6,6 +6,7 @@ Nothing here knows about signals, models or the command line.
 from foundation.atomic_files import writing_whole_file
 from foundation.degrees_of_freedom import DegreeOfFreedom
 from foundation.errors import FileFormatError, InputError, MillfrfError
+from foundation.table_mistakes import mistake_in_words, shown
 from foundation.units import SI_UNITS, si_factor
 from foundation.valid_band import Band, checked_band, shared_band
 
@@ -17,7 +18,9 @@ __all__ = [
     "InputError",
     "MillfrfError",
     "checked_band",
+    "mistake_in_words",
     "shared_band",
+    "shown",
     "si_factor",
     "writing_whole_file",
 ]

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import Recording
-from cutting import read_cutting_process
 from estimation import read_frf
 from modal_fit import read_modal_model
 from stability import read_lobes
 
 from .file_kinds import CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
+from .gate import read_checked_cutting
 from .gate.signals import level_table, look
 from .progress import Watch, silent
 from .tables import Table, mode_table
@@ -144,10 +144,10 @@ def _lobes(path: str | os.PathLike[str]) -> Findings:
 
 
 def _cutting(path: str | os.PathLike[str]) -> Findings:
-    process = read_cutting_process(path)
+    process, doubts = read_checked_cutting(path)
     immersion = (np.degrees(process.start_angle), np.degrees(process.exit_angle))
     summary = (
         f"cutting data of {Path(path).name}: {process.teeth} teeth, {1e3 * process.diameter:g} mm, "
         f"Ktc {process.ktc / 1e6:g} MPa, immersion {immersion[0]:g} to {immersion[1]:g} deg"
     )
-    return Findings(CUTTING, summary)
+    return Findings(CUTTING, summary, concerns=tuple(doubts))

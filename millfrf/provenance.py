@@ -4,7 +4,7 @@ import hashlib
 import json
 import os
 import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -48,9 +48,11 @@ def add_to_json(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> 
 
 
 def read_provenance(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """What an FRF or model file says of its making; empty where it says nothing that can be read."""
+    """What an FRF, a model or a table of lobes says of its making; empty where it says nothing that can be read."""
     try:
-        if Path(path).suffix.lower() == ".json":
+        if Path(path).suffix.lower() == ".csv":
+            stored = _of_lobes(Path(path))
+        elif Path(path).suffix.lower() == ".json":
             stored = json.loads(Path(path).read_text(encoding="utf-8")).get("provenance", {})
         else:
             with h5py.File(path, "r") as file:
@@ -58,3 +60,28 @@ def read_provenance(path: str | os.PathLike[str]) -> dict[str, Any]:
     except (OSError, ValueError, AttributeError):
         return {}
     return stored if isinstance(stored, dict) else {}
+
+
+def of_lobes(inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any]) -> str:
+    """Provenance of a table of lobes as one line of JSON: files with hashes, options, versions."""
+    return json.dumps({"step": "lobes", "sources": sources(inputs), "options": dict(options), "versions": versions()})
+
+
+def _of_lobes(path: Path) -> Any:
+    """From the line that `write_lobes` puts above the headings."""
+    mark = "# provenance: "
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for line in file:
+            if not line.startswith("#"):
+                break
+            if line.startswith(mark):
+                return json.loads(line.removeprefix(mark))
+    return {}
+
+
+def with_warnings(setup: str, warnings: Sequence[str]) -> str:
+    """A recording's set-up (TOML text) with the warnings of the job that made it; as it is where there are none."""
+    if not warnings:
+        return setup
+    listed = ", ".join(json.dumps(" ".join(warning.split())) for warning in warnings)
+    return f"{setup.rstrip()}\n\n[made_by_millfrf]\nwarnings = [{listed}]\n".lstrip()

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from foundation import FileFormatError, InputError
+from foundation import FileFormatError, InputError, mistake_in_words
 
 Schema = TypeVar("Schema", bound=BaseModel)
 
@@ -67,9 +67,7 @@ def read_as(schema: type[Schema], robot: str | os.PathLike[str], kind: str) -> S
     try:
         return schema.model_validate(content)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise FileFormatError(f"{robot}: {key}: {first['msg']} ({first['input']!r:.60})") from error
+        raise FileFormatError(f"{robot}: {mistake_in_words(error, schema)}") from error
 
 
 def assumptions(robot: str | os.PathLike[str]) -> tuple[str, ...]:

@@ -12,13 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from foundation import FileFormatError, InputError, writing_whole_file
+from foundation import FileFormatError, InputError, mistake_in_words, writing_whole_file
 
 from ..drivers.can_bus import CanSignal, DbcDecoder
 from ..errors import DriverMissing
 from ..recording import Recording
 from .content import recording_content
-from .mapping import first_complaint
 from .writers import require_writable, write_content
 
 SUFFIXES = (".blf", ".asc")
@@ -146,4 +145,4 @@ def _read_mapping(path: Path) -> LogMapping:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"mapping {path} is not TOML: {error}") from error
     except ValidationError as error:
-        raise InputError(f"mapping {path}: {first_complaint(error)}") from error
+        raise InputError(f"mapping {path}: {mistake_in_words(error, LogMapping)}") from error

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from foundation import SI_UNITS, InputError, si_factor
+from foundation import SI_UNITS, InputError, mistake_in_words, si_factor
 
 from ..channel import Channel
 
@@ -196,19 +196,4 @@ def load_mapping(path: str | os.PathLike[str]) -> Mapping:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"mapping {file} is not TOML: {error}") from error
     except ValidationError as error:
-        raise InputError(f"mapping {file}: {first_complaint(error)}") from error
-
-
-def first_complaint(error: ValidationError) -> str:
-    """The first complaint as one line: key, what is wrong, the value."""
-    first = error.errors(include_url=False)[0]
-    key = ""
-    for part in first["loc"]:
-        key += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if key else str(part)
-    if first["type"] == "extra_forbidden":
-        return f"unknown key {key}; check its spelling"
-    if first["type"] == "missing":
-        return f"key {key} is missing; add it"
-    reason = " ".join(first["msg"].removeprefix("Value error, ").split())
-    value = "" if isinstance(first["input"], (dict, BaseModel)) else f", got {first['input']!r}"
-    return f"{key}: {reason}{value}" if key else f"{reason}"
+        raise InputError(f"mapping {file}: {mistake_in_words(error, Mapping)}") from error

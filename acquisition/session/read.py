@@ -1,36 +1,18 @@
 """Reading a session file: every mistake in one line that a lab user understands."""
 
-import difflib
 import os
 import tomllib
 from pathlib import Path
-from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
-from foundation import FileFormatError, InputError
+from foundation import FileFormatError, InputError, mistake_in_words
 
-from .channel_table import ChannelTable
-from .feed_tables import AmplifierTable, CanTable, CommandTable, ModbusTable, RegisterTable, SignalTable
-from .feed_tables import TachometerTable as _Tachometer
-from .tables import LiveTable, NiDevice, ReplayDevice, Session, SimulatedDevice
+from .tables import Session
 
-_TABLES: tuple[type[BaseModel], ...] = (
-    *(Session, NiDevice, ReplayDevice, SimulatedDevice, ChannelTable, CanTable, SignalTable),
-    *(_Tachometer, ModbusTable, RegisterTable, AmplifierTable, CommandTable, LiveTable),
-)
-_BY_KEY: dict[str, tuple[type[BaseModel], ...]] = {
-    "live": (LiveTable,),
-    "device": (NiDevice, ReplayDevice, SimulatedDevice),
-    "channels": (ChannelTable,),
-    "can": (CanTable,),
-    "signals": (SignalTable,),
-    "tachometer": (_Tachometer,),
-    "modbus": (ModbusTable,),
-    "registers": (RegisterTable,),
-    "amplifier": (AmplifierTable,),
-    "on_open": (CommandTable,),
-    "on_close": (CommandTable,),
+_DRIVERS = {
+    "union_tag_not_found": ".driver is missing; use ni, replay or simulated",
+    "union_tag_invalid": ".driver is not known; use ni, replay or simulated",
 }
 _LARGEST = 1_000_000
 
@@ -80,44 +62,4 @@ def session_from_text(text: str, name: str = "session") -> Session:
     try:
         return Session.model_validate(content)
     except ValidationError as error:
-        mistakes = error.errors(include_url=False)
-        more = f" (and {len(mistakes) - 1} more)" if len(mistakes) > 1 else ""
-        raise InputError(f"{name}: {_in_words(mistakes[0])}{more}") from error
-
-
-def _in_words(mistake: Any) -> str:
-    """One mistake as a sentence."""
-    location = [part for part in mistake["loc"] if part not in ("ni", "replay", "simulated")]
-    where = _where(location)
-    kind, value = mistake["type"], mistake.get("input")
-    if kind == "extra_forbidden":
-        return f"{where} is not a known key{_meant(location)}"
-    if kind == "missing":
-        return f"{where} is missing"
-    if kind == "union_tag_not_found":
-        return f"{where}.driver is missing; use ni, replay or simulated"
-    if kind == "union_tag_invalid":
-        return f"{where}.driver is not known; use ni, replay or simulated"
-    if kind == "value_error":
-        said = str(mistake["ctx"]["error"])
-        return f"{where}: {said}" if location else said
-    shown = repr(value)
-    given = f", not {shown if len(shown) < 60 else shown[:57] + '...'}"
-    return f"{where}: {mistake['msg'][0].lower()}{mistake['msg'][1:]}{given}"
-
-
-def _where(location: list[str | int]) -> str:
-    """``channels[2].unit``, counted from 1 as people do."""
-    text = ""
-    for part in location:
-        text += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if text else str(part)
-    return text or "the file"
-
-
-def _meant(location: list[str | int]) -> str:
-    """The nearest known key, or all of them."""
-    parents = [part for part in location[:-1] if isinstance(part, str)]
-    models = _BY_KEY.get(parents[-1], _TABLES) if parents else (Session,)
-    known = sorted({key for model in models for key in model.model_fields})
-    near = difflib.get_close_matches(str(location[-1]), known, 1)
-    return f"; did you mean {near[0]}?" if near else f"; known keys: {', '.join(known)}"
+        raise InputError(f"{name}: {mistake_in_words(error, Session, _DRIVERS)}") from error

@@ -10,10 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import Recording
+from cutting import MillingProcess
 from estimation import choose_channels
 from foundation import InputError
 from stability import ChatterVerdict, classify_cut
 
+from ..gate import check_one_speed, check_recordings
 from ..progress import Watch, silent
 from ..tables import Table
 
@@ -144,6 +146,27 @@ def tone_table(cuts: Sequence[JudgedCut]) -> Table:
         for tone in cut.verdict.foreign
     ]
     return Table("Foreign tones", ("cut", "frequency (Hz)", "of the motion", "what it is"), tuple(rows))
+
+
+def doubts_of_cuts(
+    paths: Sequence[str | os.PathLike[str]], process: MillingProcess, options: CutOptions, watch: Watch = silent
+) -> list[str]:
+    """Judge recordings before they are classified: their channels, and what they state of speed and teeth.
+
+    Raises
+    ------
+    InputError
+        A channel that is dead or cannot be, a speed sweep, or a speed in another unit than rpm.
+    """
+    doubts = []
+    for path in paths:
+        with Recording(path) as recording:
+            stream = recording.stream(options.stream)
+            _, responses = choose_channels(stream, None, options.responses or None)
+            doubts += check_one_speed(recording.path.name, recording.setup, process, options.speed_rpm)
+        names = [channel.name for channel in responses]
+        doubts += check_recordings([path], stream=options.stream, responses=names, watch=watch)
+    return doubts
 
 
 def _speed(recording: Recording, options: CutOptions) -> float:

@@ -8,10 +8,10 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from cutting import read_cutting_process
 from estimation import SweepDemand, SweepPlan, plan_sweeps
-from foundation import FileFormatError
+from foundation import FileFormatError, mistake_in_words
 
+from ..gate import check_demand, check_duration, read_checked_cutting
 from ..tables import Table
 
 RPM = math.pi / 30
@@ -30,11 +30,15 @@ class _Plan(BaseModel):
     immersion_widths_deg: tuple[float, ...] = (30.0, 45.0, 60.0)
 
 
-def plan_from_file(path: str | os.PathLike[str]) -> SweepPlan:
+def plan_from_file(path: str | os.PathLike[str]) -> tuple[SweepPlan, list[str]]:
     """Read ``[cutting]`` and ``[plan]`` of a TOML file and plan the sweeps.
 
     The accelerometer's noise becomes one of displacement at the band's lower end, where it is largest:
     ``acceleration_noise / (2 pi f_low)^2``.
+
+    Returns
+    -------
+    plan, doubts
 
     Raises
     ------
@@ -43,22 +47,21 @@ def plan_from_file(path: str | os.PathLike[str]) -> SweepPlan:
     FileFormatError
         Not TOML, or a table or key missing or unknown.
     """
-    cutter = read_cutting_process(path)
+    cutter, doubts = read_checked_cutting(path)
     table = tomllib.loads(Path(path).read_text(encoding="utf-8")).get("plan")
     if not isinstance(table, dict):
         raise FileFormatError(f"{path} has no table [plan]; add one with {', '.join(_Plan.model_fields)}")
     try:
         asked = _Plan.model_validate(table)
     except ValidationError as error:
-        first = error.errors()[0]
-        key = ".".join(str(part) for part in first["loc"])
-        raise FileFormatError(
-            f"{path}: [plan] {key}: {first['msg'].lower()}; its keys are {', '.join(_Plan.model_fields)}"
-        ) from error
-    noise = asked.acceleration_noise / (2 * math.pi * max(asked.band_hz[0], 1e-9)) ** 2
+        raise FileFormatError(f"{path}: [plan] {mistake_in_words(error, _Plan)}") from error
+    density = asked.acceleration_noise
+    doubts += check_demand(asked.band_hz, asked.depth_m, density, asked.immersion_widths_deg, cutter)
+    noise = density / (2 * math.pi * max(asked.band_hz[0], 1e-9)) ** 2
     widths = tuple(math.radians(width) for width in asked.immersion_widths_deg)
     demand = SweepDemand(asked.band_hz, asked.depth_m, asked.resolution_hz, noise, asked.frf_error_m_per_n, widths)
-    return plan_sweeps(cutter, demand)
+    found = plan_sweeps(cutter, demand)
+    return found, doubts + check_duration(found, demand)
 
 
 def plan_tables(plan: SweepPlan) -> tuple[Table, Table]:

@@ -8,6 +8,9 @@ from mismatch.prediction import predict
 from mismatch.trial import read_trial
 from modal_fit import read_modal_model
 
+from ..gate import check_recordings, check_scales
+from ..provenance import with_warnings
+
 
 def predict_file(
     model_path: str | os.PathLike[str],
@@ -24,19 +27,26 @@ def predict_file(
         Files that cannot be used together.
     """
     model = read_modal_model(model_path)
+    doubts = check_recordings([recording_path], stream=stream)
     trial = read_trial(recording_path, model, stream=stream)
     result = predict(model, trial)
     with Recording(recording_path) as recording:
         source = recording.stream(stream)
         known: dict[str, Channel] = {channel.name: channel for channel in source.channels}
-        start_time, name = source.start_time, source.name
+        start_time, name, setup = source.start_time, source.name, recording.setup
     names = trial.channels[trial.force.shape[1] :]
     channels = tuple(known[one] for one in names)
     description = StreamDescription(name, trial.rate, start_time, channels)
     title = f"responses predicted for {Path(recording_path).name} by {Path(model_path).name}"
-    with RecordingWriter(out, (description,), title=title) as writer:
+    kept = slice(result.run_in, None)
+    doubts += check_scales(names, trial.response[kept], result.response[kept])
+    setup = with_warnings(setup, doubts)
+    with RecordingWriter(
+        out, (description,), title=title, setup=with_warnings(setup, doubts), overwrite=True
+    ) as writer:
         writer.append(name, result.response)
-    lines = [
+    lines = [f"warning: {doubt}" for doubt in doubts]
+    lines += [
         f"{one}: error {100 * float(error):.3g} % of the measured root mean square"
         for one, error in zip(names, result.error, strict=True)
     ]

@@ -22,7 +22,7 @@ def calibrate(
     from ..progress import bar
     from ..tables import mode_table, show
 
-    check_output(out, (".json",))
+    check_output(out, (".json",), [model, tip, sensor])
     result = calibrate_model(read_modal_model(model), read_frf(tip), read_frf(sensor), bar)
     write_calibration(out, result, [model, tip, sensor])
     for warning in result.warnings:

@@ -29,17 +29,20 @@ def chatter(
     foreign tone. Where the cutting file gives a runout, teeth are taken to cut unequal chips: with an even number of
     teeth, period doubling is then only told while it grows.
     """
-    from cutting import read_cutting_process
     from modal_fit import read_modal_model
 
-    from ..chain.chatter import CutOptions, judge_recordings, tone_table, verdict_table
+    from ..chain.chatter import CutOptions, doubts_of_cuts, judge_recordings, tone_table, verdict_table
+    from ..gate import read_checked_cutting
     from ..progress import bar
     from ..tables import show
 
-    process = read_cutting_process(cutting)
+    process, doubts = read_checked_cutting(cutting)
     natural = () if model is None else tuple(float(f) for f in read_modal_model(model).natural_frequencies)
     options = CutOptions(process.teeth, speed, process.runout > 0, names(response), stream, natural)
+    doubts += doubts_of_cuts(recordings, process, options, bar)
     cuts = judge_recordings(recordings, options, bar)
+    for doubt in doubts:
+        typer.echo(f"warning: {doubt}", err=True)
     show(verdict_table(cuts))
     if any(cut.verdict.foreign for cut in cuts):
         show(tone_table(cuts))

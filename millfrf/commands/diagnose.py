@@ -7,6 +7,8 @@ import typer
 
 from foundation import InputError
 
+from .options import check_shares
+
 
 def diagnose(
     files: Annotated[
@@ -31,14 +33,13 @@ def diagnose(
     stream: Annotated[str | None, typer.Option("--stream", help="Sample clock.")] = None,
 ) -> None:
     """Locate where a model and recordings disagree, name the physics left out, model it, show that the fit improves."""
-    from cutting import read_cutting_process
     from mismatch import LabError, Settings
 
     from ..chain.diagnose import diagnose_files, nominal_from_simulation
+    from ..gate import read_checked_cutting
     from ..progress import bar
 
-    if min(lab_error) <= 0:
-        raise InputError(f"--lab-error {lab_error} must be three positive shares, for example 0.01 0.12 0.03")
+    check_shares("--lab-error", lab_error, (0.01, 0.12, 0.03))
     model, recordings = (files[0], files[1:]) if simulated is None else (simulated, files)
     if not recordings:
         raise InputError("no recording given; name the nominal model and then one or more recordings")
@@ -46,7 +47,9 @@ def diagnose(
         if band is None:
             raise InputError("--simulated needs --band LO HI, the band in which the nominal model is fitted")
         model = nominal_from_simulation(simulated, band, out, stream=stream, watch=bar)
-    process = read_cutting_process(cutting) if cutting is not None else None
+    process, doubts = read_checked_cutting(cutting) if cutting is not None else (None, [])
+    for doubt in doubts:
+        typer.echo(f"warning: {doubt}", err=True)
     settings = Settings(LabError(*lab_error))
     result = diagnose_files(model, recordings, out, settings, stream=stream, process=process, watch=bar)
     for line in result.summary:

@@ -38,7 +38,7 @@ def estimate(
     from ..chain.estimate import EstimateOptions, estimate_recordings, write_estimate
     from ..progress import bar
 
-    check_output(out, (".h5", ".hdf5"))
+    check_output(out, (".h5", ".hdf5"), recordings)
     channels = (names(excitation), names(response))
     options = EstimateOptions(segment, overlap, window, stack, *channels, check_band(band), stream, estimator, exclude)
     result = estimate_recordings(recordings, options, bar)

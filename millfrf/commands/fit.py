@@ -34,7 +34,7 @@ def fit(
     from ..progress import bar
     from ..tables import mode_table, show
 
-    check_output(out, (".json",))
+    check_output(out, (".json",), files)
     check_band(band)
     given = (max_order, modes, names(excitation), names(response), stream)
     result, used = fit_files(files, method, lambda chosen: FitOptions(band, chosen, *given), bar)

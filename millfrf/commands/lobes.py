@@ -1,5 +1,6 @@
 """`millfrf lobes`: depth limit over spindle speed."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -23,23 +24,29 @@ def lobes(
     ] = "zero-order",
 ) -> None:
     """Stability lobes from a modal model or straight from a measured FRF."""
-    from cutting import read_cutting_process
     from estimation import read_frf
-    from modal_fit import read_modal_model
+    from modal_fit import ModalModel, read_modal_model
     from stability import write_lobes
 
     from ..chain.lobes import compute_lobes, mode_coupling_line, speed_axis
     from ..file_kinds import FRF, MODEL, kind_of
+    from ..gate import check_depth, check_speeds, lowest_frequency, read_checked_cutting
     from ..progress import bar
+    from ..provenance import of_lobes
 
     check_output(out, (".csv",))
     kind = kind_of(dynamics)
     if kind not in (FRF, MODEL):
         raise InputError(f"{dynamics} is a file of {kind}; lobes need a modal model or an FRF at the tool tip")
-    process = read_cutting_process(cutting)
+    process, doubts = read_checked_cutting(cutting)
     known = read_frf(dynamics) if kind == FRF else read_modal_model(dynamics)
+    doubts += check_depth(max_depth, process)
+    mode = lowest_frequency(known.natural_frequencies) if isinstance(known, ModalModel) else None
+    doubts += check_speeds(speeds, process, mode)
     result = compute_lobes(known, process, speed_axis(*speeds), max_depth, method, bar)
-    write_lobes(out, result)
+    result = replace(result, warnings=(*doubts, *result.warnings))
+    asked = {"speeds_rpm": speeds, "max_depth_m": max_depth, "method": method}
+    write_lobes(out, result, provenance=of_lobes([dynamics, cutting], asked))
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)
     lowest = result.depth_limits.argmin()

@@ -37,13 +37,37 @@ def check_band(band: tuple[float, float] | None) -> tuple[float, float] | None:
     return band
 
 
-def check_output(path: Path, suffixes: Sequence[str]) -> None:
-    """Refuse a name that cannot be written, before anything is computed.
+def check_shares(option: str, given: tuple[float, ...], example: tuple[float, ...]) -> None:
+    """Refuse errors that are no shares, such as percent.
 
     Raises
     ------
     InputError
-        A folder that is not there, or a suffix that says another format.
+        With the values and an example.
+    """
+    if not all(0 < share < 1 for share in given):
+        typed, right = (" ".join(f"{share:g}" for share in shares) for shares in (given, example))
+        raise InputError(
+            f"{option} {typed}: give {len(given)} positive shares below 1 (0.12 is 12 %), for example {right}"
+        )
+
+
+def check_output(path: Path, suffixes: Sequence[str], inputs: Sequence[Path] = ()) -> None:
+    """Refuse a name that cannot be written, before anything is computed.
+
+    Parameters
+    ----------
+    path
+        As typed.
+    suffixes
+        That the command writes.
+    inputs
+        Files that the command reads, none of which it may overwrite.
+
+    Raises
+    ------
+    InputError
+        A folder that is not there, a suffix that says another format, or one of the inputs.
     """
     if path.suffix.lower() not in suffixes:
         raise InputError(
@@ -53,3 +77,5 @@ def check_output(path: Path, suffixes: Sequence[str]) -> None:
         raise InputError(f"cannot write {path}: folder {path.parent} does not exist; create it first")
     if path.is_dir():
         raise InputError(f"cannot write {path}: it is a folder; give a file name")
+    if any(one.exists() and path.exists() and path.samefile(one) for one in inputs):
+        raise InputError(f"{path} is the input itself; choose another --out")

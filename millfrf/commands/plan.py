@@ -13,5 +13,8 @@ def plan(
     from ..chain.plan import plan_from_file, plan_tables
     from ..tables import show
 
-    for table in plan_tables(plan_from_file(session)):
+    found, doubts = plan_from_file(session)
+    for doubt in doubts:
+        typer.echo(f"warning: {doubt}", err=True)
+    for table in plan_tables(found):
         show(table)

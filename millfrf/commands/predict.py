@@ -17,6 +17,6 @@ def predict(
     """Simulate a recording's forces through a model; print how far measured responses are off."""
     from ..chain.predict import predict_file
 
-    check_output(out, (".h5",))
+    check_output(out, (".h5",), [recording])
     for line in predict_file(model, recording, out, stream=stream):
-        typer.echo(line)
+        typer.echo(line, err=line.startswith("warning: "))

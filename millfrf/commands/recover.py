@@ -19,7 +19,7 @@ def recover(
     from .options import check_output
 
     if out is not None:
-        check_output(out, (".h5", ".hdf5"))
+        check_output(out, (".h5", ".hdf5"), [recording])
     with bar(f"recovering {recording.name}") as update:
         back = recover_file(recording, out, progress=update)
     for name, n_samples in back.samples.items():

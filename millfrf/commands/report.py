@@ -23,6 +23,7 @@ def report(
     from ..progress import bar
     from ..report import ReportOptions, write_report
 
-    check_output(out, (".html", ".htm"))
-    write_report(out, files, ReportOptions(title, check_band(band), reference), bar)
+    check_output(out, (".html", ".htm"), files)
+    for doubt in write_report(out, files, ReportOptions(title, check_band(band), reference), bar):
+        typer.echo(f"warning: {doubt}", err=True)
     typer.echo(f"wrote {out}")

@@ -47,4 +47,4 @@ def diagnose(
 
     asking = Asking(depth, speed, model, coefficient_error, force_error, stream)
     for line in diagnose_cut_files(cutting, recordings, out, asking):
-        typer.echo(line)
+        typer.echo(line, err=line.startswith("warning: "))

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cutting import read_cutting_process
+from acquisition import Recording
+from cutting import MillingProcess
 from foundation import InputError
 from mismatch import AcceptedCause
 from mismatch.cutting_causes import (
@@ -18,6 +19,7 @@ from mismatch.cutting_causes import (
 )
 from modal_fit import read_modal_model
 
+from ..gate import check_depth, check_one_speed, check_recordings, read_checked_cutting
 from ..progress import bar
 from ..report.cut_diagnosis_page import write_cut_report
 from ..result_folder import refuse_file
@@ -51,7 +53,8 @@ def diagnose_cut_files(cutting: Path, paths: Sequence[Path], out: Path, asking: 
     names = [path.stem for path in paths]
     if len(set(names)) < len(names):
         raise InputError(f"recordings need different names to tell their results apart, not {', '.join(names)}")
-    process = read_cutting_process(cutting)
+    process, doubts = read_checked_cutting(cutting)
+    doubts += _checked(paths, process, asking)
     model = None if asking.model is None else read_modal_model(asking.model)
     speed = None if asking.speed is None else asking.speed * math.pi / 30
     recordings = [read_cut_recording(path, process, speed=speed, model=model, stream=asking.stream) for path in paths]
@@ -66,11 +69,23 @@ def diagnose_cut_files(cutting: Path, paths: Sequence[Path], out: Path, asking: 
     out.mkdir(parents=True, exist_ok=True)
     write_cut_diagnosis(out / "diagnosis.json", found)
     write_improved_cut(out / "improved_cut.toml", found)
-    lines = summary(found)
+    lines = [*summary(found), *(f"warning: {doubt}" for doubt in doubts)]
     with bar("writing the report"):
         write_cut_report(out / "report.html", found, cutting.name, lines)
     written = ", ".join(str(out / name) for name in ("diagnosis.json", "improved_cut.toml", "report.html"))
     return [*lines, f"wrote {written}"]
+
+
+def _checked(paths: Sequence[Path], process: MillingProcess, asking: Asking) -> list[str]:
+    """Judge what was typed and the recordings; doubts."""
+    doubts = check_depth(asking.depth, process, "depth")
+    for name, share in (("--coefficient-error", asking.coefficient_error), ("--force-error", asking.force_error)):
+        if not 0 < share < 1:
+            raise InputError(f"{name} {share:g} must be a share above 0 and below 1, for example {share / 100:g}")
+    for path in paths:
+        with Recording(path) as recording:
+            doubts += check_one_speed(recording.path.name, recording.setup, process, asking.speed)
+    return doubts + check_recordings(paths, stream=asking.stream, watch=bar)
 
 
 def summary(found: CutDiagnosis) -> list[str]:

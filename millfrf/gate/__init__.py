@@ -4,7 +4,31 @@ A function ``check_...`` raises :class:`foundation.InputError` (one line: the va
 be done with what is given, and returns doubts: sentences that a command prints as warnings and stores with the result.
 """
 
+from .belonging import Given, check_belonging
+from .cutting_data import check_cutting, read_checked_cutting
 from .inputs import check_inputs, check_records, driven_lines
+from .plans import check_demand, check_duration
 from .recordings import check_recordings
+from .scales import check_scales
+from .spindle import check_depth, check_speed, check_speeds, lowest_frequency
+from .stated_cut import check_one_speed, stated_cut
 
-__all__ = ["check_inputs", "check_recordings", "check_records", "driven_lines"]
+__all__ = [
+    "Given",
+    "check_belonging",
+    "check_cutting",
+    "check_demand",
+    "check_depth",
+    "check_duration",
+    "check_inputs",
+    "check_one_speed",
+    "check_recordings",
+    "check_records",
+    "check_scales",
+    "check_speed",
+    "check_speeds",
+    "driven_lines",
+    "lowest_frequency",
+    "read_checked_cutting",
+    "stated_cut",
+]

@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 from acquisition import Recording
-from cutting import MillingProcess, read_cutting_process
+from cutting import MillingProcess
 from estimation import Frf, read_frf
 from foundation import InputError
 from modal_fit import ModalModel, read_modal_model
 from stability import StabilityLobes, read_lobes
 
 from ..file_kinds import CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
+from ..gate import Given, check_belonging, read_checked_cutting
 from ..provenance import read_provenance, sha256
 
 
@@ -56,6 +57,8 @@ class Collected:
         In the order given.
     recordings, frfs, models, lobes, cutting
         By kind, with the file each came from.
+    doubts
+        Files that do not belong together; one sentence each.
     """
 
     files: tuple[SourceFile, ...]
@@ -64,6 +67,7 @@ class Collected:
     models: tuple[tuple[SourceFile, ModalModel], ...] = ()
     lobes: tuple[tuple[SourceFile, StabilityLobes], ...] = ()
     cutting: tuple[tuple[SourceFile, MillingProcess], ...] = field(default=())
+    doubts: tuple[str, ...] = ()
 
     def model_of(self, file: SourceFile, frf: Frf) -> tuple[SourceFile, ModalModel] | None:
         """The model fitted to an FRF, or else one of the same degrees of freedom."""
@@ -111,10 +115,14 @@ def collect(paths: Sequence[str | os.PathLike[str]]) -> Collected:
         tuple((file, read_frf(file.path)) for file in chosen(FRF)),
         tuple((file, read_modal_model(file.path)) for file in chosen(MODEL)),
         tuple((file, read_lobes(file.path)) for file in chosen(LOBES)),
-        tuple((file, read_cutting_process(file.path)) for file in chosen(CUTTING)),
+        tuple((file, read_checked_cutting(file.path)[0]) for file in chosen(CUTTING)),
+        tuple(check_belonging([Given(file.path.name, file.kind, file.sha256, file.provenance) for file in files])),
     )
 
 
 def _source(path: Path) -> SourceFile:
     kind = kind_of(path)
-    return SourceFile(path, kind, sha256(path), read_provenance(path) if kind in (FRF, MODEL) else {})
+    stored = read_provenance(path) if kind in (FRF, MODEL, LOBES) else {}
+    if kind == CUTTING:
+        stored = {"warnings": read_checked_cutting(path)[1]}
+    return SourceFile(path, kind, sha256(path), stored)

@@ -46,17 +46,24 @@ def write_report(
     paths: Sequence[str | os.PathLike[str]],
     options: ReportOptions | None = None,
     watch: Watch = silent,
-) -> None:
+) -> list[str]:
     """Write one HTML page, figures inside, that needs no other file and no network.
+
+    Returns
+    -------
+    list of str
+        Doubts about files that do not belong together; they stand on the page too.
 
     Raises
     ------
     InputError
         A file that cannot be used; nothing is written.
     """
-    text = report_text(collect(paths), options or ReportOptions(), watch)
+    collected = collect(paths)
+    text = report_text(collected, options or ReportOptions(), watch)
     with writing_whole_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
+    return list(collected.doubts)
 
 
 def report_text(collected: Collected, options: ReportOptions, watch: Watch = silent) -> str:
@@ -111,4 +118,4 @@ def _warnings(collected: Collected, concerns: Sequence[str]) -> list[str]:
         f"{file.path.name}: {warning}" for file in collected.files for warning in file.provenance.get("warnings", [])
     ]
     found += [f"{file.path.name}: {warning}" for file, lobes in collected.lobes for warning in lobes.warnings]
-    return list(dict.fromkeys([*found, *concerns]))
+    return list(dict.fromkeys([*collected.doubts, *found, *concerns]))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from foundation import InputError
+from ..commands.options import check_shares
 
 
 def diagnose(
@@ -44,8 +44,7 @@ def diagnose(
 
     from .diagnosing import Asking, diagnose_robot_files
 
-    if min(model_error) <= 0:
-        raise InputError(f"--model-error {model_error} must be three positive shares, for example 0.01 0.15 0.05")
+    check_shares("--model-error", model_error, (0.01, 0.15, 0.05))
     asking = Asking(tuple(pose or ()), feed, band, sensor, payload_at, rigid_links, LabError(*model_error), stream)
     for line in diagnose_robot_files(robot, recordings, out, asking):
         typer.echo(line)

@@ -1,13 +1,13 @@
 """What the robot commands do: read, compute, print a table, write a file."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import typer
 from numpy.typing import NDArray
 
-from cutting import read_cutting_process
 from estimation import write_frf
 from foundation import InputError, writing_whole_file
 from modal_fit import write_modal_model
@@ -27,6 +27,7 @@ from robot_model import (
 )
 
 from ..commands.options import check_band, check_output
+from ..gate import check_depth, check_speed, read_checked_cutting
 from ..progress import bar
 from ..provenance import add_to_json, versions
 from ..tables import Table, show
@@ -171,7 +172,8 @@ def write_workspace_map(
         check_positive("speed", speed, "rpm", 1e6)
     case = spatial(read_robot(robot))
     places = [tool_down([u, v, z], np.radians(feed)) for u in np.linspace(*x) for v in np.linspace(*y)]
-    process = None if cutting is None else read_cutting_process(cutting)
+    process, doubts = (None, []) if cutting is None else read_checked_cutting(cutting)
+    say_doubts([*doubts, *check_depth(max_depth, process), *([] if speed is None else check_speed(speed, process))])
     with bar("map"):
         limits, lowest = depth_over_places(case.robot, places, process, (speed or 1.0) * RPM, max_depth, workers=2)
     if np.isnan(lowest).all():
@@ -185,7 +187,7 @@ def write_workspace_map(
 
 def write_compensation(robot: str, path: Path, asked: Asked, out: Path, loads: Loads) -> None:
     """Corrected path, and what it is worth."""
-    check_output(out, (".csv",))
+    check_output(out, (".csv",), [path])
     case = spatial(read_robot(robot))
     start = posture_of(case, asked)[0]
     close_loops(case.robot.mechanism, start)
@@ -211,6 +213,12 @@ def write_compensation(robot: str, path: Path, asked: Asked, out: Path, loads: L
     )
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)
+
+
+def say_doubts(doubts: Sequence[str]) -> None:
+    """Print doubts as warnings."""
+    for doubt in doubts:
+        typer.echo(f"warning: {doubt}", err=True)
 
 
 def warn(result: PostureResult) -> None:

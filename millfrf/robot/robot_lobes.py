@@ -1,11 +1,11 @@
 """Lobes of a robot's posture, and depth limits over its redundancy, from the command line."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import typer
 
-from cutting import read_cutting_process
 from foundation import InputError
 from modal_fit import ModalModel, Residuals
 from robot_model import in_posture, read_robot
@@ -15,10 +15,11 @@ from ..chain.lobes import compute_lobes, speed_axis
 from ..commands.options import check_output
 from ..figures.embed import save_figure
 from ..figures.lobes_figure import lobes_figure
+from ..gate import check_depth, check_speed, check_speeds, lowest_frequency, read_checked_cutting
 from ..progress import bar
 from .posture_maps import depth_over_redundancy, write_posture_map
 from .postures import Asked, cut_place, posture_of, spatial
-from .results import RPM, warn
+from .results import RPM, say_doubts
 
 TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 
@@ -58,10 +59,14 @@ def write_lobes_in_posture(
     case = read_robot(robot)
     driven, axes = posture_of(case, asked)
     result = in_posture(case, driven, axes)
-    process = read_cutting_process(cutting)
+    process, doubts = read_checked_cutting(cutting)
+    doubts += check_depth(max_depth, process)
+    doubts += check_speeds(speeds, process, lowest_frequency(result.known_model().natural_frequencies))
     found = compute_lobes(at_the_tip(result.known_model()), process, speed_axis(*speeds), max_depth, method, bar)
+    found = replace(found, warnings=(*doubts, *result.warnings, *found.warnings))
     write_lobes(out, found)
-    warn(result)
+    for warning in found.warnings:
+        typer.echo(f"warning: {warning}", err=True)
     lowest = found.depth_limits.argmin()
     typer.echo(
         f"wrote {out}: lowest limit {1e3 * found.depth_limits[lowest]:.3g} mm "
@@ -94,7 +99,8 @@ def write_map_over_redundancy(
     if angles[2] < 1 or not max_depth > 0:
         raise InputError(f"{angles[2]} angles up to a depth of {max_depth!r} m: both must be positive")
     case = spatial(read_robot(robot))
-    process = read_cutting_process(cutting)
+    process, doubts = read_checked_cutting(cutting)
+    say_doubts([*doubts, *check_depth(max_depth, process), *check_speed(speed, process)])
     axis = np.radians(np.linspace(*angles))
     with bar("posture map"):
         found = depth_over_redundancy(

@@ -44,6 +44,12 @@ def plan(folder: Path, *lines: str) -> None:
     toml(folder, "plan.toml", *lines)
 
 
+def renamed(folder: Path, file: str, old: str, new: str) -> None:
+    """Write a key otherwise."""
+    path = folder / file
+    path.write_text(path.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8")
+
+
 def timed(folder: Path, file: str) -> None:
     """Columns after one of times, which the mapping names."""
     path = folder / file

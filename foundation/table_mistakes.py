@@ -1,0 +1,166 @@
+"""What pydantic says of a wrong table, as one sentence of ours: the key, what it must be, what it is."""
+
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any, get_args
+
+MUST_BE: dict[str, str] = {
+    "float_type": "must be a number",
+    "float_parsing": "must be a number",
+    "finite_number": "must be finite",
+    "int_type": "must be a whole number",
+    "int_parsing": "must be a whole number",
+    "int_parsing_size": "must be a whole number of fewer digits",
+    "int_from_float": "must be a whole number",
+    "bool_type": "must be true or false",
+    "bool_parsing": "must be true or false",
+    "string_type": "must be text in quotation marks",
+    "string_too_short": "must not be empty",
+    "string_pattern_mismatch": "must begin with a letter and hold letters, digits and _ only",
+    "tuple_type": "must be a list in brackets",
+    "list_type": "must be a list in brackets",
+    "dict_type": "must be a table",
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+    "too_short": "must have more entries",
+}
+"""By pydantic's name of the mistake; those with a bound are in :data:`BOUNDS`."""
+
+BOUNDS: dict[str, tuple[str, str]] = {
+    "greater_than": ("must be above {}", "gt"),
+    "greater_than_equal": ("must be {} or more", "ge"),
+    "less_than": ("must be below {}", "lt"),
+    "less_than_equal": ("must be {} or less", "le"),
+    "too_long": ("must have {} entries", "max_length"),
+    "string_too_long": ("must have at most {} letters", "max_length"),
+    "literal_error": ("must be {}", "expected"),
+    "enum": ("must be {}", "expected"),
+}
+_TYPES = ("constrained-int", "constrained-str", "int", "str", "float", "bool")
+"""Parts of a location that are pydantic's names of types and no keys."""
+
+_LONGEST = 60
+
+
+def mistake_in_words(error: Any, schema: Any = None, known: Mapping[str, str] | None = None) -> str:
+    """The first mistake of a table as one sentence, and how many more there are.
+
+    Parameters
+    ----------
+    error
+        pydantic's ``ValidationError``.
+    schema
+        The model class that refused the table; its keys are proposed where a key is not known.
+    known
+        Sentences for keys of its own, by pydantic's name of the mistake.
+
+    Returns
+    -------
+    str
+        Such as ``channels[2].range_v must be above 0, not -3``.
+    """
+    mistakes = error.errors(include_url=False)
+    first = _deepest(mistakes)
+    more = f" (and {len(mistakes) - 1} more)" if len(mistakes) > 1 else ""
+    return f"{_sentence(first, schema, known or {})}{more}"
+
+
+def _deepest(mistakes: list[Any]) -> Any:
+    """Of several readings of one value, that which got farthest."""
+    first = mistakes[0]
+    same = [one for one in mistakes if one["loc"][:1] == first["loc"][:1] and one["input"] == first["input"]]
+    return max(same, key=lambda one: one["type"] in BOUNDS) if len(same) > 1 else first
+
+
+def _sentence(mistake: Any, schema: Any, known: Mapping[str, str]) -> str:
+    kind, value = mistake["type"], mistake.get("input")
+    location = _of_the_file([part for part in mistake["loc"] if part not in _TYPES], schema)
+    where = place(location)
+    if kind in known:
+        return f"{where}{known[kind]}"
+    if kind == "extra_forbidden":
+        return f"{where} is not a known key{_meant(location, schema)}"
+    if kind == "missing":
+        short = bool(location) and isinstance(location[-1], int)
+        return f"{place(location[:-1])} must have more entries" if short else f"{where} is missing; add it"
+    if kind in ("value_error", "assertion_error"):
+        said = str(mistake["ctx"]["error"])
+        return f"{where}: {said}" if location else said
+    if kind in BOUNDS:
+        words, bound = BOUNDS[kind]
+        number = mistake["ctx"][bound]
+        return f"{where} {words.format(f'{number:g}' if isinstance(number, float) else number)}, not {shown(value)}"
+    return f"{where} {MUST_BE.get(kind, 'has a value that cannot be used')}, not {shown(value)}"
+
+
+def place(location: Iterable[str | int]) -> str:
+    """``channels[2].unit``, counted from 1 as people do.
+
+    Examples
+    --------
+    >>> place(["channels", 1, "unit"])
+    'channels[2].unit'
+    """
+    text = ""
+    for part in location:
+        text += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return text or "the file"
+
+
+def shown(value: object) -> str:
+    """A value as a user wrote it, cut off where it is long.
+
+    Examples
+    --------
+    >>> shown(True), shown("119 MPa"), shown({"a": 1})
+    ('true', "'119 MPa'", 'a table')
+    """
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, list | tuple):
+        text = "[" + ", ".join(shown(one) for one in value[:8]) + (", ..." if len(value) > 8 else "") + "]"
+    else:
+        text = repr(value)
+    return " ".join(text.split()) if len(text) < _LONGEST else f"{' '.join(text.split())[: _LONGEST - 3]}..."
+
+
+def _models(annotation: Any) -> list[Any]:
+    """Tables inside a type: of a list, a choice, an option."""
+    if hasattr(annotation, "model_fields"):
+        return [annotation]
+    return [model for inner in get_args(annotation) for model in _models(inner)]
+
+
+def _of_the_file(location: list[str | int], schema: Any) -> list[str | int]:
+    """The location without names of choices that pydantic puts between keys."""
+    if schema is None:
+        return location
+    models: list[Any] = [schema]
+    kept: list[str | int] = []
+    for number, part in enumerate(location):
+        inside = [model for model in models if part in model.model_fields]
+        if isinstance(part, int) or inside or number == len(location) - 1:
+            kept.append(part)
+        if inside:
+            models = [one for model in inside for one in _models(model.model_fields[part].annotation)]
+    return kept
+
+
+def _meant(location: list[str | int], schema: Any) -> str:
+    """The nearest known key, or all of them."""
+    if schema is None:
+        return "; check its spelling"
+    models = [schema]
+    for part in location[:-1]:
+        if isinstance(part, str):
+            models = [
+                one
+                for model in models
+                if part in model.model_fields
+                for one in _models(model.model_fields[part].annotation)
+            ]
+    keys = sorted({key for model in models for key in model.model_fields})
+    near = difflib.get_close_matches(str(location[-1]), keys, 1)
+    return f"; did you mean {near[0]}?" if near else f"; known keys: {', '.join(keys)}"
