@@ -70,7 +70,7 @@ def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
     try:
         cutting = _Cutting.model_validate(table)
     except ValidationError as error:
-        raise FileFormatError(f"{path}: [cutting] {mistake_in_words(error, _Cutting)}") from error
+        raise FileFormatError(f"{path}: cutting.{mistake_in_words(error, _Cutting)}") from error
     return _process(cutting, path)
 
 

@@ -82,10 +82,14 @@ def _checked(paths: Sequence[Path], process: MillingProcess, asking: Asking) -> 
     for name, share in (("--coefficient-error", asking.coefficient_error), ("--force-error", asking.force_error)):
         if not 0 < share < 1:
             raise InputError(f"{name} {share:g} must be a share above 0 and below 1, for example {share / 100:g}")
+    judged = []
     for path in paths:
         with Recording(path) as recording:
             doubts += check_one_speed(recording.path.name, recording.setup, process, asking.speed)
-    return doubts + check_recordings(paths, stream=asking.stream, watch=bar)
+            kinds = {channel.quantity for channel in recording.stream(asking.stream).channels}
+        if "force" in kinds and kinds & {"acceleration", "velocity", "displacement"}:
+            judged.append(path)  # what the others lack is said where it is needed
+    return doubts + (check_recordings(judged, stream=asking.stream, watch=bar) if judged else [])
 
 
 def summary(found: CutDiagnosis) -> list[str]:
