@@ -33,7 +33,10 @@ def choose_channels(
             found = tuple(channel for channel in stream.channels if channel.quantity in quantities)
         if not found:
             listed = ", ".join(f"{channel.name} ({channel.quantity})" for channel in stream.channels)
-            raise InputError(f"{stream.path.name}: no channel {role}; it has {listed}. Name the channels to use")
+            raise InputError(
+                f"{stream.path.name}: no channel {role} ({' or '.join(quantities[:3])} is needed); it has {listed}. "
+                "Name the channels to use"
+            )
         chosen.append(found)
     return chosen[0], chosen[1]
 

@@ -2,7 +2,9 @@
 
 import os
 import sys
+import traceback
 from collections.abc import Sequence
+from pathlib import Path
 
 import typer
 
@@ -11,6 +13,7 @@ from foundation import InputError, MillfrfError
 from .commands import COMMANDS
 from .cut.commands import cut_app
 from .robot.commands import robot_app
+from .usage_words import usage_in_words
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 INTERRUPTED = 130
@@ -41,13 +44,13 @@ def run(arguments: Sequence[str]) -> int:
     except (KeyboardInterrupt, typer.Abort):
         return _fail(STOPPED, FAILED)
     except Exception as error:
-        return _explain(error)
+        return _explain(error, arguments)
     if result == INTERRUPTED:
         return _fail(STOPPED, FAILED)
     return result if isinstance(result, int) else DONE
 
 
-def _explain(error: Exception) -> int:
+def _explain(error: Exception, arguments: Sequence[str]) -> int:
     """One line and the exit code for whatever ended a command."""
     if isinstance(error, InputError):
         return _fail(str(error), BAD_INPUT)
@@ -55,12 +58,24 @@ def _explain(error: Exception) -> int:
         return _fail(str(error), FAILED)
     usage = getattr(error, "format_message", None)  # a wrong option, whichever click typer brings along
     if callable(usage):
-        return _fail(f"{usage()} Try 'millfrf --help'.", BAD_INPUT)
+        return _fail(usage_in_words(str(usage()), arguments), BAD_INPUT)
     if os.environ.get("MILLFRF_TRACEBACK"):
         raise error
     if isinstance(error, OSError):
         return _fail(f"{error.filename or 'a file'}: {error.strerror or error}", FAILED)
-    return _fail(f"unexpected {type(error).__name__}: {error}; MILLFRF_TRACEBACK=1 shows where", FAILED)
+    return _fail(_unforeseen(error), FAILED)
+
+
+def _unforeseen(error: Exception) -> str:
+    """A fault of the program: where it stopped, without the words of the libraries underneath."""
+    if isinstance(error, MemoryError):
+        return "not enough memory; ask for fewer lines, speeds or samples"
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "site-packages" not in frame.filename]
+    place = f"{Path(frames[-1].filename).name}, line {frames[-1].lineno}" if frames else "an unknown place"
+    return (
+        f"the program met something that it does not foresee ({place}); look at the inputs with 'millfrf inspect', and "
+        "report it with the files if nothing looks wrong; MILLFRF_TRACEBACK=1 shows more"
+    )
 
 
 def _fail(message: str, code: int) -> int:

@@ -26,6 +26,10 @@ def kind_of(path: str | os.PathLike[str]) -> str:
         It is none of these; the message says what it looked like.
     """
     file = Path(path)
+    if file.is_dir():
+        raise InputError(f"{file} is a folder; give a file in it")
+    if file.is_file() and not file.stat().st_size:
+        raise FileFormatError(f"{file} is empty (0 bytes); copy or record it again")
     if not file.is_file():
         raise InputError(f"no file {file}; check the name")
     kind = _hdf5_kind(file) if h5py.is_hdf5(file) else _text_kind(file)

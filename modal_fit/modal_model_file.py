@@ -81,7 +81,7 @@ def read_modal_model(path: str | os.PathLike[str]) -> ModalModel:
     except KeyError as error:
         raise FileFormatError(f"{path} lacks the field {error.args[0]}; fit anew") from error
     except (TypeError, ValueError, IndexError, AttributeError) as error:
-        raise FileFormatError(f"{path}: a field has the wrong form ({error}); fit anew") from error
+        raise FileFormatError(f"{path}: {_wrong_field(content)}; fit anew") from error
     except InputError as error:
         raise FileFormatError(f"{path}: {error}") from error
 
@@ -114,6 +114,18 @@ def _model(content: dict[str, Any]) -> ModalModel:
         delay=float(content.get("delay_s", 0.0)),
         band=_band(content),
     )
+
+
+def _wrong_field(content: dict[str, Any]) -> str:
+    """Which field holds no pairs of numbers in the shape that the others ask for."""
+    for name in ("poles_rad_per_s", "right", "left"):
+        try:
+            pairs = np.asarray(content.get(name), dtype=float)
+        except (TypeError, ValueError):
+            return f"field {name} holds something that is no number"
+        if pairs.ndim < 1 or pairs.shape[-1:] != (2,):
+            return f"field {name} must hold pairs [re, im]"
+    return "a field has not the shape that responses, excitations and poles_rad_per_s ask for"
 
 
 def _band(content: dict[str, Any]) -> tuple[float, float] | None:

@@ -32,10 +32,7 @@ def read_tool_path(path: str | os.PathLike[str]) -> ToolPath:
     missing = [name for name in COLUMNS if not rows or name not in rows[0]]
     if missing:
         raise FileFormatError(f"{path} lacks the columns {', '.join(missing)}; a path has {', '.join(COLUMNS)}")
-    try:
-        table = np.array([[float(row.get(name) or 0.0) for name in (*COLUMNS, *MOMENTS)] for row in rows])
-    except ValueError as error:
-        raise FileFormatError(f"{path}: {error}; a path holds numbers only") from error
+    table = np.array([_numbers(row, number, path) for number, row in enumerate(rows, 2)])
     if not np.isfinite(table).all():
         raise FileFormatError(f"{path}: row {int(np.argmin(np.isfinite(table).all(axis=1))) + 2} is not finite")
     large = np.abs(table).max(axis=0)
@@ -48,6 +45,19 @@ def read_tool_path(path: str | os.PathLike[str]) -> ToolPath:
             f"{path}: rotations up to {large[3:6].max():g}; give rx_rad, ry_rad and rz_rad as a rotation vector in rad"
         )
     return ToolPath(table[:, :3], table[:, 3:6], table[:, 6:])
+
+
+def _numbers(row: dict[str, str], line: int, path: object) -> list[float]:
+    """One row; an empty entry is zero."""
+    values = []
+    for name in (*COLUMNS, *MOMENTS):
+        try:
+            values.append(float(row.get(name) or 0.0))
+        except ValueError as error:
+            raise FileFormatError(
+                f"{path}: {name} = {row[name]!r} in line {line} is no number; a path holds numbers only"
+            ) from error
+    return values
 
 
 def write_compensated_path(path: str | os.PathLike[str], result: CompensatedPath) -> None:

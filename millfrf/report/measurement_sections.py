@@ -72,7 +72,7 @@ def channel_section(collected: Collected, watch: Watch) -> tuple[Section, list[s
     for number, file in enumerate(collected.recordings):
         with Recording(file.path) as recording:
             if recording.complete is not True:
-                concerns.append(f"{file.path.name}: not closed in order; its end may be missing")
+                concerns.append(f"{file.path.name}: the recording was not closed in order: its end may be missing")
             for stream in recording.streams.values():
                 if not stream.n_samples:
                     continue

@@ -1,0 +1,40 @@
+"""What the option parser says of a wrong command line, in our words and with what was typed."""
+
+import re
+from collections.abc import Sequence
+
+_INVALID = re.compile(r"Invalid value for '(?P<option>--[\w-]+)[^:]*: (?P<said>.*)", re.DOTALL)
+
+
+def usage_in_words(said: str, arguments: Sequence[str]) -> str:
+    """One line for a command line that was not understood.
+
+    Parameters
+    ----------
+    said
+        By the parser.
+    arguments
+        As typed.
+
+    Examples
+    --------
+    >>> usage_in_words("Invalid value for '--modes': Input should be a valid integer", ["fit", "--modes", "2.5"])
+    "--modes 2.5 is not understood: give a whole number. Try 'millfrf --help'."
+    """
+    found = _INVALID.match(said)
+    if found is None or not re.search(r"Input should|is not a valid", found["said"]):
+        return f"{said} Try 'millfrf --help'."
+    option = found["option"]
+    typed = " ".join([option, *_values(option, arguments)])
+    number = "integer" in found["said"]
+    wanted = "a whole number" if number and len(typed.split()) == 2 else "a whole number for N" if number else "numbers"
+    return f"{typed} is not understood: give {wanted}. Try 'millfrf --help'."
+
+
+def _values(option: str, arguments: Sequence[str]) -> list[str]:
+    """What was typed after an option, up to the next one."""
+    if option not in arguments:
+        return []
+    rest = list(arguments[arguments.index(option) + 1 :])
+    end = next((i for i, word in enumerate(rest) if word.startswith("--")), len(rest))
+    return rest[:end]
