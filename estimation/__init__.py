@@ -10,6 +10,7 @@ from .h1 import h1, h1_side_by_side
 from .hammer import Tap, exponential_window, find_taps, force_window, without_added_damping
 from .independence import RANK_TOLERANCE, InputIndependence, bands_text, input_independence
 from .integration import displacement_from_acceleration
+from .known_band import known_band
 from .local_polynomial import local_polynomial
 from .order_tracking import excitation_map, spectrogram, track_order
 from .quantities import correct_high_pass, to_receptance
@@ -52,6 +53,7 @@ __all__ = [
     "input_coherence",
     "input_independence",
     "instrumental_variable",
+    "known_band",
     "local_polynomial",
     "multiple_coherence",
     "partial_coherence",

@@ -18,13 +18,14 @@ from estimation import (
     h2,
     hv,
     input_independence,
+    known_band,
     settings_for,
     sum_tests,
     write_frf,
 )
 from foundation import InputError
 
-from ..gate import check_inputs, check_recordings
+from ..gate import check_inputs, check_recordings, driven_lines
 from ..progress import Watch, silent
 from ..provenance import sources, versions
 
@@ -142,6 +143,7 @@ def estimate_recordings(
     warnings = [*doubts, *check_inputs(total)]
     frf = ESTIMATORS[options.estimator](total) if options.stack == "sum" else h1_side_by_side(tests)
     frf = correct_high_pass(frf, [channel.high_pass_hz for channel in total.responses])
+    frf = replace(frf, band=known_band(frf, driven_lines(total)))
     if total.n_excluded:
         warnings.append(
             f"{total.n_excluded} of {total.n_excluded + total.n_segments} segments hold overload, clipping or dropped "

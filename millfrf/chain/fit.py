@@ -20,7 +20,7 @@ from modal_fit import (
     write_modal_model,
 )
 
-from ..gate import check_recordings, check_records
+from ..gate import check_frf_for_fit, check_recordings, check_records, fit_doubts
 from ..progress import Watch, silent
 from ..provenance import add_to_json, sources, versions
 
@@ -66,20 +66,23 @@ class FitOptions:
         return MAX_ORDER[self.method] if self.max_order is None else self.max_order
 
 
-def fit_model(frf: Frf, options: FitOptions, watch: Watch = silent) -> ModalFit:
-    """Fit a modal model to an FRF.
+def fit_model(frf: Frf, options: FitOptions, watch: Watch = silent, name: str = "the FRF") -> ModalFit:
+    """Fit a modal model to an FRF; ``name`` is that of its file, for messages.
 
     Raises
     ------
     InputError
-        A method that needs recordings, or a band without enough lines.
+        A method that needs recordings, a band without enough lines, or an FRF that :mod:`millfrf.gate` refuses.
     MillfrfError
         No stable pole was found.
     """
     if options.method != POLYREFERENCE:
         raise InputError(f"method {options.method!r} does not fit an FRF; use {POLYREFERENCE}, or give recordings")
+    doubts = check_frf_for_fit(frf, options.band, name)
     with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
-        return fit_polyreference(frf, options.band, max_order=options.order, n_modes=options.n_modes)
+        fit = fit_polyreference(frf, options.band, max_order=options.order, n_modes=options.n_modes)
+    poor = fit_doubts(fit.reduced_chi_square, fit.relative_error, fit.warnings)
+    return replace(fit, warnings=(*doubts, *fit.warnings, *poor))
 
 
 def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions, watch: Watch = silent) -> SubspaceFit:
@@ -101,7 +104,7 @@ def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions,
     doubts += check_records(records, options.band)
     with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
         fit = fit_subspace(records, options.band, max_order=options.order, n_modes=options.n_modes)
-    return replace(fit, warnings=(*doubts, *fit.warnings))
+    return replace(fit, warnings=(*doubts, *fit.warnings, *fit_doubts(fit.reduced_chi_square, None)))
 
 
 def _band_record(path: str | os.PathLike[str], options: FitOptions, watch: Watch) -> BandRecord:

@@ -2,12 +2,15 @@
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 
 from estimation import read_frf
 from foundation import InputError
 from modal_fit import ModalFit, SubspaceFit
 
 from ..file_kinds import FRF, RECORDING, kind_of
+from ..gate import stored_doubts
 from ..progress import Watch, silent
 from .fit import MAX_ORDER, POLYREFERENCE, SUBSPACE, FitOptions, fit_model, fit_recordings
 
@@ -42,7 +45,8 @@ def fit_files(
         return fit_recordings(files, options, watch), options
     if kinds == {FRF} and len(files) == 1:
         options = options_of(method or POLYREFERENCE)
-        return fit_model(read_frf(files[0]), options, watch), options
+        fit = fit_model(read_frf(files[0]), options, watch, Path(files[0]).name)
+        return replace(fit, warnings=(*stored_doubts(files[0]), *fit.warnings)), options
     raise InputError(
         f"cannot fit {len(files)} file{'s' if len(files) != 1 else ''} of {' and '.join(sorted(kinds))}; "
         "give one FRF, or recordings"

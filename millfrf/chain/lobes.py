@@ -1,6 +1,7 @@
 """From a model or an FRF at the tool tip to stability lobes."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,7 @@ from stability import (
     zero_order,
 )
 
+from ..gate import check_band_of_lobes, check_frf, check_model
 from ..progress import Watch, silent
 
 Speeds = NDArray[np.float64]
@@ -61,13 +63,14 @@ def compute_lobes(
     max_depth: float,
     method: str = "zero-order",
     watch: Watch = silent,
+    name: str = "the structure",
 ) -> StabilityLobes:
-    """Depth limit at each spindle speed (rad/s), up to ``max_depth`` (m).
+    """Depth limit at each spindle speed (rad/s), up to ``max_depth`` (m); ``name`` is that of the file, for messages.
 
     Raises
     ------
     InputError
-        An unknown method, or dynamics that are not a receptance at the tool tip.
+        An unknown method, or dynamics that are not a receptance at the tool tip or that :mod:`millfrf.gate` refuses.
     """
     if method not in LOBE_METHODS:
         raise InputError(f"unknown method {method!r}; use one of {', '.join(LOBE_METHODS)}")
@@ -76,12 +79,21 @@ def compute_lobes(
     known = to_receptance(dynamics) if isinstance(dynamics, Frf) else dynamics
     if known.quantity != "receptance":
         raise InputError(f"lobes need a receptance in m/N at the tool tip; this is a {known.quantity} in {known.unit}")
+    doubts = check_frf(dynamics, name) if isinstance(dynamics, Frf) else check_model(dynamics, name)
     with watch(f"lobes, {method}"):
-        if method in OF_ANY:
-            return OF_ANY[method](known, process, spindle_speeds, max_depth)
-        if isinstance(known, Frf):
-            raise InputError(f"method {method} needs a modal model, not an FRF; fit one, or use multi-frequency")
-        return OF_MODELS[method](known, process, spindle_speeds, max_depth)
+        found = _solved(known, process, spindle_speeds, max_depth, method)
+    doubts += check_band_of_lobes(known, found, process)
+    return replace(found, warnings=(*found.warnings, *doubts))
+
+
+def _solved(
+    known: Frf | ModalModel, process: MillingProcess, spindle_speeds: Speeds, max_depth: float, method: str
+) -> StabilityLobes:
+    if method in OF_ANY:
+        return OF_ANY[method](known, process, spindle_speeds, max_depth)
+    if isinstance(known, Frf):
+        raise InputError(f"method {method} needs a modal model, not an FRF; fit one, or use multi-frequency")
+    return OF_MODELS[method](known, process, spindle_speeds, max_depth)
 
 
 def mode_coupling_line(model: ModalModel, process: MillingProcess, max_depth: float) -> str:

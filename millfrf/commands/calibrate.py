@@ -23,7 +23,7 @@ def calibrate(
     from ..tables import mode_table, show
 
     check_output(out, (".json",), [model, tip, sensor])
-    result = calibrate_model(read_modal_model(model), read_frf(tip), read_frf(sensor), bar)
+    result = calibrate_model(read_modal_model(model), read_frf(tip), read_frf(sensor), bar, (tip.name, sensor.name))
     write_calibration(out, result, [model, tip, sensor])
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)

@@ -30,7 +30,7 @@ def lobes(
 
     from ..chain.lobes import compute_lobes, mode_coupling_line, speed_axis
     from ..file_kinds import FRF, MODEL, kind_of
-    from ..gate import check_depth, check_speeds, lowest_frequency, read_checked_cutting
+    from ..gate import check_depth, check_speeds, lowest_frequency, read_checked_cutting, stored_doubts
     from ..progress import bar
     from ..provenance import of_lobes
 
@@ -43,8 +43,8 @@ def lobes(
     doubts += check_depth(max_depth, process)
     mode = lowest_frequency(known.natural_frequencies) if isinstance(known, ModalModel) else None
     doubts += check_speeds(speeds, process, mode)
-    result = compute_lobes(known, process, speed_axis(*speeds), max_depth, method, bar)
-    result = replace(result, warnings=(*doubts, *result.warnings))
+    result = compute_lobes(known, process, speed_axis(*speeds), max_depth, method, bar, dynamics.name)
+    result = replace(result, warnings=(*stored_doubts(dynamics), *doubts, *result.warnings))
     asked = {"speeds_rpm": speeds, "max_depth_m": max_depth, "method": method}
     write_lobes(out, result, provenance=of_lobes([dynamics, cutting], asked))
     for warning in result.warnings:

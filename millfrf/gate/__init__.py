@@ -5,8 +5,12 @@ be done with what is given, and returns doubts: sentences that a command prints 
 """
 
 from .belonging import Given, check_belonging
+from .calibrations import check_tip_and_sensor
 from .cutting_data import check_cutting, read_checked_cutting
+from .frfs import check_frf, check_frf_for_fit
 from .inputs import check_inputs, check_records, driven_lines
+from .lobes_band import check_band_of_lobes
+from .models import check_model, fit_doubts, stored_doubts
 from .plans import check_demand, check_duration
 from .recordings import check_recordings
 from .scales import check_scales
@@ -15,20 +19,27 @@ from .stated_cut import check_one_speed, stated_cut
 
 __all__ = [
     "Given",
+    "check_band_of_lobes",
     "check_belonging",
     "check_cutting",
     "check_demand",
     "check_depth",
     "check_duration",
+    "check_frf",
+    "check_frf_for_fit",
     "check_inputs",
+    "check_model",
     "check_one_speed",
     "check_recordings",
     "check_records",
     "check_scales",
     "check_speed",
     "check_speeds",
+    "check_tip_and_sensor",
     "driven_lines",
+    "fit_doubts",
     "lowest_frequency",
     "read_checked_cutting",
     "stated_cut",
+    "stored_doubts",
 ]

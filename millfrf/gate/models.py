@@ -1,0 +1,105 @@
+"""Modal models that a job uses: stable, passive at drive points, fitted well enough, and used in their band."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import InputError
+from modal_fit import ModalModel
+
+from ..provenance import read_provenance
+from .frfs import check_frf
+
+CHI_SQUARE = 2.0
+"""Misfit over noise of a fit above which its error bars are too small; below the inverse the noise is overstated."""
+
+MISFIT = 0.3
+"""Root mean square misfit over an FRF entry's own, above which the entry is hardly known."""
+
+NOISE = "what the noise explains"
+
+N_LINES = 400
+
+
+def check_model(model: ModalModel, name: str = "the model") -> list[str]:
+    """Judge a modal model before lobes, a calibration, a prediction or a diagnosis stand on it.
+
+    Parameters
+    ----------
+    model
+        Fitted, imported or written by hand.
+    name
+        Of its file, for the message.
+
+    Returns
+    -------
+    list of str
+        Doubts: drive points that give back part of the power in the model's band.
+
+    Raises
+    ------
+    InputError
+        No mode, an unstable pole, vectors that are all zero, or a drive point that moves against its own force.
+    """
+    if not len(model.poles):
+        raise InputError(f"{name} has no mode; fit it in a band that holds one")
+    zeta = model.damping_ratios
+    if zeta.min() <= 0:
+        worst = int(zeta.argmin())
+        raise InputError(
+            f"{name}: mode {worst + 1} at {model.natural_frequencies[worst]:.4g} Hz has a damping ratio of "
+            f"{100 * zeta[worst]:.3g} %: it is unstable by itself; fit again, or turn the sign of the pole's real part"
+        )
+    return check_frf(replace(model.frf(_lines(model)), band=None), name)
+
+
+def stored_doubts(path: str | os.PathLike[str]) -> list[str]:
+    """What an FRF's or a model's file says of its making that lets one doubt it, each with the file's name.
+
+    The warnings in its provenance, and a fit that was poor: they go wherever the result goes.
+    """
+    made = read_provenance(path)
+    stored = made.get("warnings", [])
+    texts = [str(text) for text in stored] if isinstance(stored, list) else []
+    if made.get("step") == "fit":
+        error = made.get("relative_error")
+        texts += fit_doubts(made.get("reduced_chi_square"), None if error is None else np.asarray(error), texts)
+    return [f"{Path(path).name}: {text}" for text in dict.fromkeys(texts)]
+
+
+def fit_doubts(chi_square: float | None, error: NDArray[np.float64] | None, said: Sequence[str] = ()) -> list[str]:
+    """What the quality of a fit lets one doubt, one sentence each.
+
+    Parameters
+    ----------
+    chi_square
+        Misfit over noise, reduced; None or NaN: not known.
+    error : (n_responses, n_excitations) or None
+        Root mean square misfit over root mean square FRF.
+    said
+        Warnings that the fit gave itself; what they say is not said twice.
+    """
+    doubts = []
+    if chi_square is not None and chi_square > CHI_SQUARE and not any(NOISE in text for text in said):
+        doubts.append(f"the misfit is {chi_square:.1f} times {NOISE}: its error bars are too small")
+    if chi_square is not None and chi_square < 1 / CHI_SQUARE:
+        doubts.append(
+            f"the misfit is {chi_square:.2g} times {NOISE}: the noise is stated too large, or the model has more modes "
+            "than the data show"
+        )
+    if error is not None and error.max() > MISFIT and not any("% only" in text for text in said):
+        doubts.append(f"an entry of the FRF is fitted to {100 * error.max():.0f} % only")
+    return doubts
+
+
+def _lines(model: ModalModel) -> NDArray[np.float64]:
+    """Lines (Hz) on which the model is judged: its band, or around its modes; each mode's peak is among them."""
+    natural, width = model.natural_frequencies, 2 * np.abs(model.poles.real) / (2 * np.pi)
+    low, high = model.band or (0.5 * float(natural.min()), 1.5 * float(natural.max()))
+    near = natural[:, None] + width[:, None] * np.linspace(-2, 2, 17)
+    every = np.concatenate([np.linspace(low, high, N_LINES), near.ravel()])
+    return np.unique(every[(every >= max(low, 1e-6)) & (every <= high)])

@@ -1,0 +1,69 @@
+"""Lobes of a model that holds in a narrow band: what lies outside is said, on the terminal and in the file."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foundation import Band
+from millfrf.__main__ import DONE, run
+from millfrf.chain import compute_lobes, speed_axis
+from millfrf.demonstration import CUTTER, cutting_text
+from modal_fit import ModalModel, write_modal_model
+from replay_data import default_structure, tip_model
+from stability import read_lobes
+
+
+def fitted(band: Band | None) -> ModalModel:
+    """The two modes of the tip near 18 Hz, as a fit from 12 to 24 Hz gives them."""
+    whole = tip_model(default_structure())
+    low = whole.natural_frequencies < 24.0
+    return replace(whole, poles=whole.poles[low], right=whole.right[low], left=whole.left[low], band=band)
+
+
+def warnings(band: Band | None, lowest: float, highest: float, count: int = 5) -> str:
+    lobes = compute_lobes(fitted(band), CUTTER, speed_axis(lowest, highest, count), 0.05, "zero-order")
+    return " ".join(lobes.warnings)
+
+
+def test_a_speed_far_above_the_band_is_said() -> None:
+    said = warnings((12.0, 24.0), 6000, 6000, 1)
+    assert "1 of 1 speeds (6000 rpm)" in said
+    assert "the teeth pass at 200 Hz, beyond the 12 to 24 Hz in which the structure was measured" in said
+
+
+def test_chatter_outside_the_band_is_said() -> None:
+    said = warnings((17.5, 18.5), 800, 2400)
+    assert "the chatter frequency" in said
+    assert "lies outside the 17.5 to 18.5 Hz in which the structure was measured" in said
+
+
+@pytest.mark.parametrize("band", [None, (2.0, 500.0)])
+def test_a_wide_or_unknown_band_is_not_doubted(band: Band | None) -> None:
+    assert warnings(band, 6000, 6000, 1) == ""
+
+
+def test_the_lobes_of_the_demonstration_are_not_doubted() -> None:
+    assert warnings((13.0, 25.0), 300, 2400, 22) == ""
+
+
+def test_an_frf_without_a_band_holds_on_its_valid_lines() -> None:
+    axis = np.arange(1.0, 60.0, 0.25)
+    frf = fitted(None).frf(axis)
+    narrow = replace(frf, valid=(axis > 12) & (axis < 24))
+    lobes = compute_lobes(narrow, CUTTER, speed_axis(6000, 6000, 1), 0.05, "zero-order")
+    assert "beyond the 12.25 to 23.75 Hz" in " ".join(lobes.warnings)
+
+
+def test_the_doubt_reaches_terminal_file_and_reader(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write_modal_model(tmp_path / "m.json", fitted((12.0, 24.0)))
+    (tmp_path / "cut.toml").write_text(cutting_text(CUTTER), encoding="utf-8")
+    out = tmp_path / "lobes.csv"
+    code = run(
+        ["lobes", str(tmp_path / "m.json"), "--cutting", str(tmp_path / "cut.toml"), "--speeds", "5800", "6000", "2"]
+        + ["--max-depth", "0.05", "--method", "zero-order", "--out", str(out)]
+    )
+    assert code == DONE
+    assert "warning: at 2 of 2 speeds (5800 to 6000 rpm) the teeth pass" in capsys.readouterr().err
+    assert any("the teeth pass at" in text for text in read_lobes(out).warnings)
