@@ -12,6 +12,7 @@ from mismatch.spindle_orders import SpindleSpeed, spindle_speed
 from mismatch.trial import measured_part
 from modal_fit import read_modal_model, write_modal_model
 
+from ..gate import check_model_and_recordings
 from ..progress import Watch, silent
 from ..report.diagnosis_page import with_location, write_diagnosis_report
 from ..result_folder import refuse_file
@@ -48,6 +49,7 @@ def diagnose_files(
     refuse_file(folder)
     whole = read_modal_model(model_path)
     model = measured_part(whole, recordings, stream=stream)
+    doubts = check_model_and_recordings(model_path, model, recordings, stream, watch)
     trials = read_trials(recordings, model, stream=stream)
     with watch("diagnosing"):
         diagnosis = diagnose(model, trials, settings)
@@ -61,7 +63,7 @@ def diagnose_files(
         write_diagnosis_report(paths[2], view, Path(model_path).name, process)
     missing = [label for label in whole.responses if label not in model.responses]
     note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []
-    return DiagnosisFiles(diagnosis, paths, (*note, *summary(diagnosis)))
+    return DiagnosisFiles(diagnosis, paths, (*(f"warning: {doubt}" for doubt in doubts), *note, *summary(diagnosis)))
 
 
 def nominal_from_simulation(

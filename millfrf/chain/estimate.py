@@ -25,7 +25,7 @@ from estimation import (
 )
 from foundation import InputError
 
-from ..gate import check_inputs, check_recordings, driven_lines
+from ..gate import check_inputs, check_recordings, check_sample_rates, driven_lines, gain_of
 from ..progress import Watch, silent
 from ..provenance import sources, versions
 
@@ -139,6 +139,8 @@ def estimate_recordings(
         watch=watch,
     )
     tests = spectra_of_tests(paths, options, watch)
+    names = [Path(path).name for path in paths]
+    doubts += check_sample_rates([gain_of(t, name, t.sample_rate) for t, name in zip(tests, names, strict=True)])
     total = sum_tests(tests)
     warnings = [*doubts, *check_inputs(total)]
     frf = ESTIMATORS[options.estimator](total) if options.stack == "sum" else h1_side_by_side(tests)

@@ -101,19 +101,27 @@ def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions,
         paths, stream=options.stream, excitations=options.excitations, responses=options.responses, watch=watch
     )
     records = [_band_record(path, options, watch) for path in paths]
-    doubts += check_records(records, options.band)
+    doubts += check_records(
+        [record for record, _ in records],
+        options.band,
+        [Path(path).name for path in paths],
+        [rate for _, rate in records],
+    )
     with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
-        fit = fit_subspace(records, options.band, max_order=options.order, n_modes=options.n_modes)
+        fit = fit_subspace(
+            [record for record, _ in records], options.band, max_order=options.order, n_modes=options.n_modes
+        )
     return replace(fit, warnings=(*doubts, *fit.warnings, *fit_doubts(fit.reduced_chi_square, None)))
 
 
-def _band_record(path: str | os.PathLike[str], options: FitOptions, watch: Watch) -> BandRecord:
+def _band_record(path: str | os.PathLike[str], options: FitOptions, watch: Watch) -> tuple[BandRecord, float]:
     with Recording(path) as recording:
         stream = recording.stream(options.stream)
         channels = choose_channels(stream, options.excitations or None, options.responses or None)
         with watch(f"reading {Path(path).name}", stream.n_samples) as update:
             highest = KEPT_ABOVE * options.band[1]
-            return band_record(recording, highest, *channels, stream=options.stream, progress=update)
+            made = band_record(recording, highest, *channels, stream=options.stream, progress=update)
+    return made, stream.sample_rate
 
 
 def write_fit(

@@ -8,7 +8,7 @@ from mismatch.prediction import predict
 from mismatch.trial import read_trial
 from modal_fit import read_modal_model
 
-from ..gate import check_recordings, check_scales
+from ..gate import check_model_and_recordings, check_scales
 from ..provenance import with_warnings
 
 
@@ -27,7 +27,7 @@ def predict_file(
         Files that cannot be used together.
     """
     model = read_modal_model(model_path)
-    doubts = check_recordings([recording_path], stream=stream)
+    doubts = check_model_and_recordings(model_path, model, [recording_path], stream)
     trial = read_trial(recording_path, model, stream=stream)
     result = predict(model, trial)
     with Recording(recording_path) as recording:

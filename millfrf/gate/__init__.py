@@ -10,9 +10,11 @@ from .cutting_data import check_cutting, read_checked_cutting
 from .frfs import check_frf, check_frf_for_fit
 from .inputs import check_inputs, check_records, driven_lines
 from .lobes_band import check_band_of_lobes
+from .model_and_recordings import check_model_and_recordings
 from .models import check_model, fit_doubts, stored_doubts
 from .plans import check_demand, check_duration
 from .recordings import check_recordings
+from .sample_rates import check_sample_rates, gain_of
 from .scales import check_scales
 from .spindle import check_depth, check_speed, check_speeds, lowest_frequency
 from .stated_cut import check_one_speed, stated_cut
@@ -29,15 +31,18 @@ __all__ = [
     "check_frf_for_fit",
     "check_inputs",
     "check_model",
+    "check_model_and_recordings",
     "check_one_speed",
     "check_recordings",
     "check_records",
+    "check_sample_rates",
     "check_scales",
     "check_speed",
     "check_speeds",
     "check_tip_and_sensor",
     "driven_lines",
     "fit_doubts",
+    "gain_of",
     "lowest_frequency",
     "read_checked_cutting",
     "stated_cut",

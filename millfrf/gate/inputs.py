@@ -17,6 +17,8 @@ from estimation import (
 )
 from foundation import Band, InputError
 
+from .sample_rates import check_sample_rates, gain_of
+
 DRIVEN = 1e-4
 """A line is driven where the power of one of the inputs is above this share of that input's largest."""
 
@@ -79,20 +81,31 @@ def check_inputs(total: CrossSpectra, band: Band | None = None, least_share: flo
     return list(judged.warnings)
 
 
-def check_records(records: Sequence[BandRecord], band: Band) -> list[str]:
-    """Judge the inputs of records that are fitted together, over the band of the fit (Hz).
+def check_records(records: Sequence[BandRecord], band: Band, names: Sequence[str], rates: Sequence[float]) -> list[str]:
+    """Judge the inputs and the sample rates of records that are fitted together.
 
     Segments last 8 s, or less where the records are short: so long that each input can have its own segment.
+
+    Parameters
+    ----------
+    records
+        Of one set-up.
+    band
+        Of the fit, Hz.
+    names, rates
+        Of the recordings they were made from; rates in Hz, as the files state them.
 
     Raises
     ------
     InputError
-        As :func:`check_inputs`.
+        As :func:`check_inputs` and :func:`millfrf.gate.sample_rates.check_sample_rates`.
     """
     n_inputs = len(records[0].excitations)
     shortest = min(len(record.excitation_samples) / record.sample_rate for record in records)
     seconds = min(LONGEST_SEGMENT, shortest, shortest * len(records) / (2 * n_inputs))
-    return check_inputs(sum_tests([_spectra(record, seconds) for record in records]), band, LEAST_SHARE)
+    tests = [_spectra(record, seconds) for record in records]
+    doubts = check_sample_rates([gain_of(*each) for each in zip(tests, names, rates, strict=True)])
+    return doubts + check_inputs(sum_tests(tests), band, LEAST_SHARE)
 
 
 def _spectra(record: BandRecord, seconds: float) -> CrossSpectra:

@@ -1,10 +1,10 @@
 """Recordings that a job uses: signals that are alive, whole, of this world and each their own."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from acquisition import Channel, Recording, Stream
+from acquisition import Recording, Stream
 from estimation import choose_channels
 from foundation import InputError
 
@@ -60,15 +60,37 @@ def check_recordings(
         A dead channel (an excitation: dead in every file), samples that are not finite or beyond what a sensor gives,
         or a channel that copies another.
     """
+
+    def chosen(source: Stream) -> tuple[list[str], list[str]]:
+        exciting, responding = choose_channels(source, excitations or None, responses or None)
+        return [channel.name for channel in exciting], [channel.name for channel in responding]
+
+    return check_channels(paths, chosen, stream, excluding, watch)
+
+
+def check_channels(
+    paths: Sequence[str | os.PathLike[str]],
+    chosen: Callable[[Stream], tuple[list[str], list[str]]],
+    stream: str | None = None,
+    excluding: bool = False,
+    watch: Watch = silent,
+) -> list[str]:
+    """As :func:`check_recordings`, with the names of exciting and responding channels told by ``chosen``.
+
+    Raises
+    ------
+    InputError
+        As :func:`check_recordings`.
+    """
     doubts, silent_in, alive = [], {}, set()
     for path in paths:
         with Recording(path) as recording:
             source = recording.stream(stream)
-            chosen = choose_channels(source, excitations or None, responses or None)
-            seen = _look(source, [*chosen[0], *chosen[1]], watch)
-            idle = [level.channel.name for level in seen.levels[: len(chosen[0])] if level.n_samples and not level.peak]
+            exciting, responding = chosen(source)
+            seen = _look(source, [*exciting, *responding], watch)
+            idle = [level.channel.name for level in seen.levels[: len(exciting)] if level.n_samples and not level.peak]
             silent_in.update({name: Path(path).name for name in idle})
-            alive |= {channel.name for channel in chosen[0]} - set(idle)
+            alive |= set(exciting) - set(idle)
             found = _check_stream(source, seen, set(idle), excluding)
             if recording.complete is False:
                 how = f" ({recording.ending})" if recording.ending else ""
@@ -80,10 +102,10 @@ def check_recordings(
     return doubts
 
 
-def _look(stream: Stream, channels: Sequence[Channel], watch: Watch) -> Look:
+def _look(stream: Stream, names: Sequence[str], watch: Watch) -> Look:
     if stream.n_samples == 0:
         raise InputError(f"{stream.path.name}: stream {stream.name} holds no sample; record again")
-    return look(stream, [channel.name for channel in channels], watch)
+    return look(stream, names, watch)
 
 
 def _check_stream(stream: Stream, seen: Look, idle: set[str], excluding: bool) -> list[str]:
@@ -105,8 +127,8 @@ def _refuse(level: ChannelLevel, file: str, excluding: bool) -> None:
     name, unit = level.channel.name, level.channel.unit
     if level.n_missing and not excluding:
         raise InputError(
-            f"{file}: channel {name} holds {level.n_missing} samples that are NaN or infinite; cut them out, or leave "
-            "their segments out with --exclude"
+            f"{file}: channel {name} holds {level.n_missing} samples that are NaN or infinite; cut them out, or "
+            "estimate with --exclude"
         )
     most = BELIEVED.get(level.channel.quantity)
     if most is not None and level.peak > most:

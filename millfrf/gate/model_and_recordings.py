@@ -1,0 +1,70 @@
+"""A model beside recordings: what diagnose and predict ask before they compare them."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from acquisition import Stream
+from foundation import DegreeOfFreedom
+from modal_fit import ModalModel
+
+from ..progress import Watch, silent
+from .models import check_model, stored_doubts
+from .recordings import check_channels
+
+EXCITES = ("force", "voltage")
+MOVES = ("displacement", "velocity", "acceleration")
+
+
+def check_model_and_recordings(
+    model_path: str | os.PathLike[str],
+    model: ModalModel,
+    recordings: Sequence[str | os.PathLike[str]],
+    stream: str | None = None,
+    watch: Watch = silent,
+) -> list[str]:
+    """Judge a model, what its file says of its fit, and the channels of recordings at its degrees of freedom.
+
+    Parameters
+    ----------
+    model_path
+        File of the model.
+    model
+        What was read of it.
+    recordings
+        Files it is compared with.
+    stream
+        Sample clock; None: the only one.
+    watch
+        Progress bar.
+
+    Returns
+    -------
+    list of str
+        Doubts on the model, on the fit that it comes from and on each recording.
+
+    Raises
+    ------
+    InputError
+        As :func:`millfrf.gate.check_model` and :func:`millfrf.gate.check_recordings`.
+    """
+    doubts = [*check_model(model, Path(model_path).name), *stored_doubts(model_path)]
+    if not recordings:
+        return doubts
+
+    def chosen(source: Stream) -> tuple[list[str], list[str]]:
+        return _at(source, model.excitations, EXCITES), _at(source, model.responses, MOVES)
+
+    return [*doubts, *check_channels(recordings, chosen, stream, watch=watch)]
+
+
+def _at(stream: Stream, labels: Sequence[str], quantities: tuple[str, ...]) -> list[str]:
+    """Names of the channels at some degrees of freedom; those that are missing are the reader's to refuse."""
+    wanted = {(dof.node, dof.axis) for dof in (DegreeOfFreedom.parse(label) for label in labels if ":" in label)}
+    return [
+        channel.name
+        for channel in stream.channels
+        if channel.quantity in quantities
+        and channel.node
+        and (channel.node, DegreeOfFreedom(channel.node, channel.direction).axis) in wanted
+    ]
