@@ -11,7 +11,15 @@ import pytest
 
 from estimation import read_frf
 from millfrf.chain.diagnose import diagnose_files
-from millfrf.demonstration import FIT_BAND, DemoOptions, DemoResult, comparison_tables, nearest_modes, run_demo
+from millfrf.demonstration import (
+    FIT_BAND,
+    SUBSPACE_BAND,
+    DemoOptions,
+    DemoResult,
+    comparison_tables,
+    nearest_modes,
+    run_demo,
+)
 from modal_fit import read_modal_model
 from replay_data import default_structure, table_one_model, tip_model
 
@@ -60,7 +68,7 @@ def test_its_own_model_explains_its_own_recordings(demo: DemoResult, tmp_path: P
     assert found.diagnosis.verdict == "none"
     assert found.diagnosis.physics == ()
     assert found.diagnosis.band is not None
-    assert found.diagnosis.band.edges == FIT_BAND
+    assert found.diagnosis.band.edges == SUBSPACE_BAND
     assert found.diagnosis.improvement.before < 1.1 * found.diagnosis.improvement.noise_floor
     assert any("13 to 25 Hz" in line for line in found.summary)
     assert "13 to 25 Hz" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
