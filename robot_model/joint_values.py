@@ -53,6 +53,25 @@ def driven_values(mechanism: Mechanism, typed: Sequence[float]) -> Real:
     return np.array([_taken(frame, float(value)) for frame, value in zip(frames, typed, strict=True)], dtype=float)
 
 
+def named_values(mechanism: Mechanism, typed: Sequence[tuple[str, Sequence[float]]]) -> dict[str, Real]:
+    """Postures of a file by name, in rad and m.
+
+    Raises
+    ------
+    InputError
+        A name twice, or values that no joint has; the line names the posture.
+    """
+    found: dict[str, Real] = {}
+    for name, values in typed:
+        if name in found:
+            raise InputError(f"two postures are named {name!r}; name each once")
+        try:
+            found[name] = driven_values(mechanism, values)
+        except InputError as error:
+            raise InputError(f"posture {name!r}: {error}") from error
+    return found
+
+
 def typed_values(mechanism: Mechanism, driven: Real) -> Real:
     """The way back: degrees and metres from driven joint values (rad, m), shape (n_active,)."""
     scale = np.array([1.0 if frame.motion == "prismatic" else 180 / np.pi for frame in _driven(mechanism)])

@@ -44,6 +44,8 @@ def read_tool_path(path: str | os.PathLike[str]) -> ToolPath:
         raise FileFormatError(
             f"{path}: rotations up to {large[3:6].max():g}; give rx_rad, ry_rad and rz_rad as a rotation vector in rad"
         )
+    if (large[6:] > 1e6).any():
+        raise FileFormatError(f"{path}: forces up to {large[6:].max():g}; give newtons and newton metres, at most 1e6")
     return ToolPath(table[:, :3], table[:, 3:6], table[:, 6:])
 
 

@@ -1,12 +1,15 @@
 """Planar robots from their files."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
+from foundation import InputError
+
+from .joint_values import named_values
 from .mechanism import Frame, Mechanism
 from .planar_robot import PlanarRobot
 from .robot_files import Table, read_as
@@ -80,7 +83,7 @@ def read_planar_robot(robot: str | os.PathLike[str]) -> PlanarCase:
     Raises
     ------
     InputError
-        No such robot.
+        No such robot, or a posture with values that no joint has.
     FileFormatError
         Not a planar robot, or a key unknown, missing or of the wrong type.
     """
@@ -105,10 +108,15 @@ def read_planar_robot(robot: str | os.PathLike[str]) -> PlanarCase:
         np.array([link.damping_ratio for link in links]),
         sections,
     )
-    poses = {pose.name: np.radians(pose.angles_deg) for pose in content.poses}
     measured = {pose.name: pose.measured_first_mode_hz for pose in content.poses}
     predicted = {pose.name: pose.predicted_first_mode_hz for pose in content.poses}
-    return PlanarCase(chain, poses, _given(measured), _given(predicted))
+    case = PlanarCase(chain, {}, _given(measured), _given(predicted))
+    try:
+        return replace(
+            case, poses=named_values(case.mechanism, [(pose.name, pose.angles_deg) for pose in content.poses])
+        )
+    except InputError as error:
+        raise InputError(f"{robot}: {error}") from error
 
 
 def _given(values: dict[str, float | None]) -> dict[str, float]:

@@ -10,6 +10,8 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 
 from foundation import FileFormatError, InputError, mistake_in_words
 
+from .file_ranges import check_ranges
+
 Schema = TypeVar("Schema", bound=BaseModel)
 
 
@@ -58,14 +60,18 @@ def read_as(schema: type[Schema], robot: str | os.PathLike[str], kind: str) -> S
     Raises
     ------
     FileFormatError
-        Another kind of robot, or a key unknown, missing or of the wrong type.
+        Another kind of robot, a key unknown, missing or of the wrong type, or a number that its unit cannot mean.
     """
     content = read_table(robot)
     found = content.get("robot", {}).get("kind") if isinstance(content.get("robot"), dict) else None
     if found != kind:
-        raise FileFormatError(f"{robot} describes a robot of kind {found!r}; {kind!r} is needed here")
+        raise FileFormatError(f"{robot} describes a robot of kind {found!r}; {kind!r} is needed here ([robot] kind)")
     try:
-        return schema.model_validate(content)
+        checked = schema.model_validate(content)
+        check_ranges(content)
+        return checked
+    except FileFormatError as error:
+        raise FileFormatError(f"{robot}: {error}") from error
     except ValidationError as error:
         raise FileFormatError(f"{robot}: {mistake_in_words(error, schema)}") from error
 

@@ -10,9 +10,10 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from foundation import InputError
 
-from .joint_values import LARGEST_TRAVEL, driven_values
+from .joint_values import LARGEST_TRAVEL, named_values
 from .mechanism import Frame, Mechanism
 from .modal_damping import rayleigh_constants
+from .robot_check import check_tip
 from .robot_files import Table, read_as
 from .section import Material, Section, hollow_circle
 from .spatial_robot import ElasticJoint, Link, LumpedBody, SpatialRobot
@@ -155,6 +156,10 @@ def read_spatial_robot(robot: str | os.PathLike[str]) -> SpatialCase:
 
 
 def _case(content: _File) -> SpatialCase:
+    nodes = [row.node for row in content.points]
+    for node in nodes:
+        if nodes.count(node) > 1:
+            raise InputError(f"[[points]] place node {node} twice; place it once")
     frames = tuple(_frame(row) for row in content.frames)
     closures = tuple(closure.frames for closure in content.closures)
     spatial = SpatialRobot(
@@ -169,6 +174,7 @@ def _case(content: _File) -> SpatialCase:
         gravity=content.robot.gravity_m_per_s2,
         up=_upwards(content.robot.up),
     )
+    check_tip(spatial)
     poses = _poses(content, spatial.mechanism)
     return SpatialCase(content.robot.name, spatial, poses, content.robot.repeatability_m)
 
@@ -181,25 +187,26 @@ def _upwards(given: tuple[float, float, float]) -> tuple[float, float, float]:
 
 
 def _poses(content: _File, mechanism: Mechanism) -> dict[str, NDArray[np.float64]]:
-    poses: dict[str, NDArray[np.float64]] = {}
+    typed = []
     for pose in content.poses:
-        if pose.name in poses:
-            raise InputError(f"two postures are named {pose.name!r}; name each once")
-        typed = pose.driven_deg if pose.driven is None else pose.driven
-        if typed is None or (pose.driven is not None and pose.driven_deg is not None):
+        given = [values for values in (pose.driven, pose.driven_deg) if values is not None]
+        if len(given) != 1:
             raise InputError(f"posture {pose.name!r}: give driven = [...] once: degrees, prismatic joints in metres")
-        try:
-            poses[pose.name] = driven_values(mechanism, typed)
-        except InputError as error:
-            raise InputError(f"posture {pose.name!r}: {error}") from error
-    return poses
+        typed.append((pose.name, given[0]))
+    return named_values(mechanism, typed)
 
 
 def _rayleigh(damping: _Damping | None) -> tuple[float, float]:
-    if damping is None or damping.ratio is not None:
+    if damping is None:
+        return (0.0, 0.0)
+    if damping.ratio is not None:
+        if damping.ratios is not None or damping.frequencies_hz is not None:
+            raise InputError("damping: give one ratio, or frequencies_hz and ratios (two each), not both")
         return (0.0, 0.0)
     if damping.frequencies_hz is None or damping.ratios is None:
         raise InputError("damping: give frequencies_hz and ratios (two each), or one ratio")
+    if not all(0 <= ratio < 1 for ratio in damping.ratios):
+        raise InputError(f"damping: ratios = {list(damping.ratios)} must be 0 or more and below 1; 4 % is 0.04")
     return rayleigh_constants(damping.frequencies_hz, damping.ratios)
 
 
@@ -249,6 +256,12 @@ def _stiffness(row: _Joint) -> NDArray[np.float64]:
 
 
 def _link(row: _Link) -> Link:
+    if row.frame is None and any(row.angles_deg):
+        raise InputError(f"link {list(row.nodes)}: angles_deg turn a frame; give its name too, frame = ...")
+    if row.tube is None and row.elements > 1:
+        raise InputError(
+            f"link {list(row.nodes)}: elements = {row.elements} of a rigid link; give it a tube, or leave it"
+        )
     section = None if row.tube is None else _section(row.tube)
     delta, eta, kappa = (radians(angle) for angle in row.angles_deg)
     return Link(row.nodes, section, row.elements, row.frame, (delta, eta, kappa))
@@ -262,4 +275,12 @@ def _section(tube: _Tube) -> Section:
 
 
 def _body(row: _Body) -> LumpedBody:
+    inertia = sorted(row.inertia_kg_m2)
+    if inertia[0] < 0:
+        raise InputError(f"body at node {row.node}: inertia_kg_m2 = {list(row.inertia_kg_m2)} must be 0 or more")
+    if inertia[2] > (1 + 1e-6) * (inertia[0] + inertia[1]) and inertia[0] > 0:
+        raise InputError(
+            f"body at node {row.node}: inertia_kg_m2 = {list(row.inertia_kg_m2)}: no body has one moment of inertia that "
+            "is larger than the other two together; check units and axes"
+        )
     return LumpedBody(row.node, row.frame, row.mass_kg, np.array(row.centre_m), np.diag(row.inertia_kg_m2))
