@@ -280,7 +280,7 @@ def _body(row: _Body) -> LumpedBody:
         raise InputError(f"body at node {row.node}: inertia_kg_m2 = {list(row.inertia_kg_m2)} must be 0 or more")
     if inertia[2] > (1 + 1e-6) * (inertia[0] + inertia[1]) and inertia[0] > 0:
         raise InputError(
-            f"body at node {row.node}: inertia_kg_m2 = {list(row.inertia_kg_m2)}: no body has one moment of inertia that "
-            "is larger than the other two together; check units and axes"
+            f"body at node {row.node}: inertia_kg_m2 = {list(row.inertia_kg_m2)}: no body has one moment of inertia "
+            "that is larger than the other two together; check units and axes"
         )
     return LumpedBody(row.node, row.frame, row.mass_kg, np.array(row.centre_m), np.diag(row.inertia_kg_m2))

@@ -140,7 +140,7 @@ def show_deviation(
     elif loads.weight != "none":
         typer.echo(f"warning: {NO_MASSES}", err=True)
     needed = np.full(len(places), np.nan)
-    radial = np.linalg.norm((found.deviations + weight)[:, :2], axis=1)
+    radial = np.maximum(*_radial(found.deviations, weight))
     for hole in np.flatnonzero(found.reached):
         needed[hole] = position_tolerance(float(radial[hole]), holes.budget(int(hole)).work)
     _show_position(holes, weight, needed)
@@ -150,8 +150,17 @@ def show_deviation(
     if picture is not None:
         from .picture import draw_deviation
 
-        draw_deviation(picture, found, (area.x[2], area.y[2]), needed)
+        unknown = holes.budget(int(np.nanargmax(needed))).unknown
+        draw_deviation(picture, found, (area.x[2], area.y[2]), needed, "at least " if unknown else "")
         typer.echo(f"wrote {picture}")
+
+
+def _radial(thrust: Real, weight: Real) -> tuple[Real, Real]:
+    """Distance across the drill at entry (weight alone) and under full thrust, m, each (n,).
+
+    The axis of the hole must lie in its zone along the whole depth, so weight and thrust may not cancel each other.
+    """
+    return np.linalg.norm(weight[:, :2], axis=1), np.linalg.norm((weight + thrust)[:, :2], axis=1)
 
 
 def _check(area: DrillingArea, accuracy: Accuracy) -> None:
@@ -177,11 +186,11 @@ def _show_position(holes: _Holes, weight: Real, needed: Real) -> None:
     budget = holes.budget(worst)
     _show_budget(holes, worst, budget)
     thrust, resting = holes.found.deviations[worst], weight[worst]
-    both = thrust + resting
+    entry, full = (float(one[0]) for one in _radial(thrust[None], resting[None]))
     typer.echo(
-        f"systematic there: {1e3 * np.linalg.norm(both[:2]):.3f} mm across the drill (thrust "
-        f"{1e3 * np.linalg.norm(thrust[:2]):.3f}, weight {1e3 * np.linalg.norm(resting[:2]):.3f}), "
-        f"{1e3 * abs(both[2]):.3f} mm along it (depth)"
+        f"systematic there: {1e3 * max(entry, full):.3f} mm across the drill, the larger of entry (weight alone, "
+        f"{1e3 * entry:.3f}) and full thrust ({1e3 * full:.3f}); along it (depth) "
+        f"{1e3 * abs(resting[2]):.3f} mm at entry, {1e3 * abs(thrust[2] + resting[2]):.3f} mm under full thrust"
     )
     least = "at least " if budget.unknown else ""
     typer.echo(

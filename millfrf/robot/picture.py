@@ -81,15 +81,29 @@ def _from_above(axes: Axes, modes: StructureModes, moved: Real) -> None:
     axes.set_xlabel("x (m)")
 
 
-def draw_deviation(path: Path, found: DeviationMap, shape: tuple[int, int], needed: Real) -> None:
+def draw_deviation(path: Path, found: DeviationMap, shape: tuple[int, int], needed: Real, least: str = "") -> None:
     """Deviation under thrust and the position tolerance that holes need, mm; white where not reached."""
-    _save(deviation_figure(found, shape, needed), path)
+    _save(deviation_figure(found, shape, needed, least), path)
 
 
-def deviation_figure(found: DeviationMap, shape: tuple[int, int], needed: Real) -> Figure:
-    """The same as a figure; ``shape``: how many places along x and y; ``needed`` (n,): position tolerance, m."""
+def deviation_figure(found: DeviationMap, shape: tuple[int, int], needed: Real, least: str = "") -> Figure:
+    """The same as a figure.
+
+    Parameters
+    ----------
+    found
+    shape
+        How many places along x and y.
+    needed : (n,), m
+        Position tolerance of each hole.
+    least
+        ``at least `` where parts of the budget are unknown, for the label.
+    """
     sizes = 1e3 * np.linalg.norm(found.deviations, axis=1)
-    fields = [(sizes, "deviation under thrust (mm)"), (1e3 * needed, "position tolerance (mm)")]
+    fields = [
+        (sizes, "deviation under thrust (mm)"),
+        (1e3 * needed, f"position tolerance, {least}(mm)" if least else "position tolerance (mm)"),
+    ]
     return map_figure(found.positions, shape, fields)
 
 

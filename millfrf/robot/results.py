@@ -207,8 +207,9 @@ def write_compensation(robot: str, path: Path, asked: Asked, out: Path, loads: L
         "change": "only its change from the first place is corrected (--weight change)",
         "none": "none of it is corrected (--weight none)",
     }
+    own = "the robot and" if case.robot.bodies else "the robot unknown (its file gives no bodies); of"
     typer.echo(
-        f"weight of the robot and of a payload of {loads.payload.mass:g} kg: largest deflection {sag.max():.3f} mm, "
+        f"weight of {own} a payload of {loads.payload.mass:g} kg: largest deflection {sag.max():.3f} mm, "
         f"changes by up to {change.max():.3f} mm from the first place; {counted[loads.weight]}"
     )
     for warning in result.warnings:

@@ -131,7 +131,9 @@ def test_deviation_of_drilled_holes(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert picture.exists()
     for row in rows:
         moved = [float(row[f"deviation_{axis}_m"]) + float(row[f"weight_{axis}_m"]) for axis in "xy"]
-        assert float(row["position_tolerance_m"]) > 2 * np.hypot(*moved)
+        entry = [float(row[f"weight_{axis}_m"]) for axis in "xy"]
+        # the axis must lie in its zone at entry, under weight alone, and under full thrust: they may not cancel
+        assert float(row["position_tolerance_m"]) > 2 * max(np.hypot(*moved), np.hypot(*entry))
     known = [*options, "--repeatability", "0.04"]
     assert run(["robot", "deviation", "staubli_rx170", *known]) == DONE
     captured = capsys.readouterr()

@@ -184,6 +184,18 @@ def test_drilled_holes_sink_with_the_robot() -> None:
         assert np.isnan(found.weight[1]).all()
 
 
+def test_limits_on_a_path_are_said() -> None:
+    """Inverse kinematics in steps does not keep to limits, so the rows that pass one are named."""
+    path = path_of([(1.5, 0.0, 0.7)], (0.0, 0.0, 0.0))
+    narrow = tuple(
+        replace(frame, lower=-0.1, upper=0.1) if frame.name == "3" else frame for frame in KUKA.robot.mechanism.frames
+    )
+    robot = replace(KUKA.robot, mechanism=replace(KUKA.robot.mechanism, frames=narrow))
+    found = compensate_path(robot, path, KUKA.poses["ready"])
+    assert any("row 2 of the path: joint 3" in line and "outside" in line for line in found.warnings)
+    assert not compensate_path(KUKA.robot, path, KUKA.poses["ready"]).warnings
+
+
 def test_counted_weight() -> None:
     sags = np.array([[np.nan] * 6, [1.0] * 6, [3.0] * 6])
     assert counted_weight(sags, "change")[1:, 0].tolist() == [0.0, 2.0]
@@ -208,6 +220,9 @@ def test_commands_tell_the_weight(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert (
         run(["robot", "compensate", "kuka_kr90_r3100", str(path), "--out", str(out), "--weight", "half"]) == BAD_INPUT
     )
+    path.write_text(path.read_text().replace("1.5,0,0.7", "1.4,0,0.7"))
+    assert run(["robot", "compensate", "fanuc_s420if", str(path), "--out", str(out), "--weight", "none"]) == DONE
+    assert "the robot unknown" in capsys.readouterr().out
     fanuc = ["robot", "stiffness", "fanuc_s420if"]
     assert run(fanuc) == DONE
     assert "own weight cannot be told" in capsys.readouterr().err
