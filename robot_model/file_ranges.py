@@ -47,13 +47,13 @@ def check_ranges(content: Any) -> None:
 
 
 def _numbers(part: Any, place: str, key: str = "") -> Iterator[tuple[str, str, float]]:
-    """Every number with its place (``links.0.tube.outer_m``) and the key that it stands under."""
+    """Every number with its place (``links[1].tube.outer_m``) and the key that it stands under."""
     if isinstance(part, dict):
         for name, entry in part.items():
             if name not in _OWN_CHECK:
                 yield from _numbers(entry, f"{place}.{name}".lstrip("."), name)
     elif isinstance(part, list):
         for index, entry in enumerate(part):
-            yield from _numbers(entry, f"{place}.{index}", key)
+            yield from _numbers(entry, f"{place}[{index + 1}]", key)
     elif isinstance(part, (int, float)) and not isinstance(part, bool):
         yield place, key, float(part)
