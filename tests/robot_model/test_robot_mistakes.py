@@ -148,6 +148,13 @@ def test_mistakes_in_paths(
     assert not out.exists()
 
 
+def test_a_path_is_not_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "p.csv"
+    path.write_text("x_m,y_m,z_m,rx_rad,ry_rad,rz_rad,fx_n,fy_n,fz_n\n1.5,0,0.7,3.14159,0,0,100,0,200\n")
+    assert run(["robot", "compensate", KUKA, str(path), "--out", str(path)]) == BAD_INPUT
+    assert "is the input itself" in capsys.readouterr().err
+
+
 def test_the_robots_that_come_along_are_without_fault() -> None:
     for path in FOLDER.glob("*.toml"):
         assert read_robot(path) is not None
