@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from .crossings import Crossings
 from .delay_system import DelaySystem
-from .period_operator import PeriodOperator
+from .period_operator import PeriodOperator, period_operator
 
 Real = NDArray[np.float64]
 
@@ -44,3 +44,23 @@ def strongest_lines(system: DelaySystem, operator: PeriodOperator, found: Crossi
         motion += (force @ left.conj() / (1j * line - pole.conj()))[:, :, None] * right.conj()
     strongest = np.argmax(np.linalg.norm(motion, axis=2), axis=1)
     return np.asarray(np.abs(line[np.arange(len(line)), strongest]) / (2 * np.pi))
+
+
+def strongest_line(system: DelaySystem, speed: float, depth: float, multiplier: complex) -> float:
+    """Frequency (Hz) of the strongest line of one motion whose multiplier lies on the circle, or near it.
+
+    Parameters
+    ----------
+    system
+        Structure and process.
+    speed
+        Of the spindle, rad/s.
+    depth
+        m.
+    multiplier
+        Of the motion.
+    """
+    operator = period_operator(system, np.array([2 * np.pi / (system.process.teeth * speed)]))
+    theta = np.array([abs(float(np.angle(multiplier)))])
+    here = Crossings(np.zeros(1, dtype=np.int64), np.array([depth]), theta, np.ones(1, dtype=bool))
+    return float(strongest_lines(system, operator, here)[0])

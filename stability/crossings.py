@@ -207,3 +207,29 @@ def moved_depths(spectrum: Spectrum, found: Crossings) -> Real:
     )
     change = there - before
     return np.asarray(found.depth**2 * (np.abs(change.real) + np.abs(change.imag * steep)))
+
+
+def followed(spectrum: Spectrum, found: Crossings, *, steps: int = 3) -> Crossings:
+    """Crossings moved to where they lie for another loop gain that differs little, by Newton's steps along the circle.
+
+    Parameters
+    ----------
+    spectrum
+        Of the other loop gain.
+    found
+        Crossings of the first.
+    steps
+        Of Newton's method.
+    """
+    if not len(found.depth):
+        return found
+    theta, value = found.theta.copy(), (1 / found.depth).astype(np.complex128)
+    fixed = (theta == np.pi) | (theta == 0)
+    for _ in range(1 if fixed.all() else steps):
+        value = nearest(spectrum(found.speed, theta), value)
+        slope = (value - nearest(spectrum(found.speed, theta - SLOPE_STEP), value)) / SLOPE_STEP
+        step = np.where(fixed | (slope.imag == 0), 0.0, value.imag / np.where(slope.imag == 0, 1.0, slope.imag))
+        step = np.clip(step, -0.05, 0.05)
+        theta, value = theta - step, value - slope * step
+    depth = np.where(value.real > 0, 1 / np.where(value.real > 0, value.real, 1.0), np.inf)
+    return Crossings(found.speed, depth, np.clip(theta, 0.0, np.pi), found.outward)

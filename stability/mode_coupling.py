@@ -1,4 +1,4 @@
-"""Mode coupling: chatter without regeneration, the danger of robots whose lowest modes are soft and close."""
+"""Mode coupling: growth in a cut without regeneration, of robots whose lowest modes are soft and close."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,10 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ModeCouplingLimit:
-    """Lowest depth at which the cut destabilises the structure without any wave left on the surface.
+    """Lowest depth at which a cut destabilises the structure if no tooth meets waves that another one left.
+
+    It is no bound of regenerative cuts, in which the force follows the difference of the motion from that of a tooth
+    period ago: their limits can lie below it (waves feed chatter) or above it (fast teeth see no difference).
 
     Parameters
     ----------
@@ -41,7 +44,9 @@ def mode_coupling_limit(
     The robot's modes lie far below tooth passing, so that the force is its average over the tooth; the force's
     direction differs from the motion's, the matrix is not symmetric, and two close modes are drawn together until
     they form one that grows (Pan, Zhang, Zhu & Wang 2006, Chatter analysis of robotic machining process; Cen &
-    Melkote 2017, who add damping, as the poles do here). Spindle speed plays no part.
+    Melkote 2017, who add damping, as the poles do here). Spindle speed plays no part, because the delayed term is left
+    out: each tooth is taken to cut a surface without waves, as in a first cut, or with a feed so large that no tooth
+    meets what another one left. Where teeth follow each other the limits of :func:`certified_lobes` hold.
 
     Parameters
     ----------

@@ -8,8 +8,8 @@ from estimation import Frf
 from modal_fit import ModalModel
 
 from .stability_lobes import StabilityLobes
-from .tool_receptance import ToolReceptance, tool_receptance
-from .zero_order import checked_speeds
+from .tool_receptance import ToolReceptance, reaching, tool_receptance
+from .zero_order import averaged, checked_speeds
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -85,7 +85,7 @@ def nyquist_limits(
         As :func:`zero_order`.
     """
     speeds = checked_speeds(spindle_speeds, max_depth)
-    source = tool_receptance(structure)
+    source = reaching(tool_receptance(structure), process.ktc * average_directional_matrix(process), max_depth)
     limits = np.full(len(speeds), np.inf)
     chatter = np.full(len(speeds), np.nan)
     scan = np.linspace(max_depth / n_depths, max_depth, n_depths)
@@ -104,7 +104,7 @@ def nyquist_limits(
         limits[k] = high
         chatter[k] = _crossing_frequency(source, process, float(speed), high)
     bifurcations = tuple("hopf" if np.isfinite(limit) else "none" for limit in limits)
-    return StabilityLobes(speeds, limits, chatter, bifurcations, "nyquist", source.warnings)
+    return StabilityLobes(speeds, limits, chatter, bifurcations, "nyquist", (*source.warnings, averaged(process)))
 
 
 def _averaged_loop(process: MillingProcess, speed: float, receptance: Complex, frequencies: Real) -> Complex:

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from .chatter_frequency import strongest_lines
-from .crossings import Crossings
+from .chatter_frequency import strongest_line
 from .delay_system import DelaySystem
 from .growing_cuts import unstable_cuts
 from .multipliers import kind_of, monodromies
@@ -21,6 +20,9 @@ Real = NDArray[np.float64]
 
 DENSE = 1.05
 """Ratio of two depths of the denser ladder."""
+
+CLIMB = 1.15
+"""The same where the ladder alone looks for the limit: with a helix, unequal pitch or process damping."""
 
 
 @dataclass(frozen=True)
@@ -48,10 +50,12 @@ class SecondLook:
 NOTHING = SecondLook(np.nan, np.nan, "none", "unresolved")
 
 
-def second_look(system: DelaySystem, speed: float, claimed: float, max_depth: float, first: float) -> SecondLook:
+def second_look(
+    system: DelaySystem, speed: float, claimed: float, max_depth: float, first: float, *, ratio: float = DENSE
+) -> SecondLook:
     """Find the lowest limit of one speed from multipliers alone.
 
-    A ladder of depths 5 % apart, closer about the depth that was claimed, is climbed until a cut is unstable; between
+    A ladder of depths, closer about the depth that was claimed, is climbed until a cut is unstable; between
     the last two rungs the limit is halved. It counts as verified where more nodes and, for straight edges at equal
     pitch, semi-discretisation find the same. Otherwise the highest stable rung is a lower bound.
 
@@ -67,8 +71,10 @@ def second_look(system: DelaySystem, speed: float, claimed: float, max_depth: fl
         m.
     first
         Lowest rung, m.
+    ratio
+        Of two depths of the ladder.
     """
-    rungs = ladder(first, max_depth, DENSE)
+    rungs = ladder(first, max_depth, ratio)
     if np.isfinite(claimed):
         close = claimed * (1 + np.concatenate([-np.geomspace(1e-5, 2e-2, 8), np.geomspace(1e-5, 2e-2, 8)]))
         rungs = np.unique(np.concatenate([rungs, close[(close > first) & (close < max_depth)]]))
@@ -126,10 +132,6 @@ def _described(system: DelaySystem, speed: float, limit: float) -> SecondLook:
         frequency, kind = critical_motion(system, speed, limit)
         return SecondLook(limit, frequency, kind, "verified")
     operator = period_operator(system, np.array([2 * np.pi / (system.process.teeth * speed)]))
-    here = np.zeros(1, dtype=np.int64)
-    values = np.linalg.eigvals(monodromies(operator, here, np.array([limit]))[0])
+    values = np.linalg.eigvals(monodromies(operator, np.zeros(1, dtype=np.int64), np.array([limit]))[0])
     value = complex(values[np.argmax(np.abs(values))])
-    kind = kind_of(value)
-    theta = np.pi if kind == "period-doubling" else abs(float(np.angle(value)))
-    crossing = Crossings(here, np.array([limit]), np.array([theta]), np.ones(1, dtype=bool))
-    return SecondLook(limit, float(strongest_lines(system, operator, crossing)[0]), kind, "verified")
+    return SecondLook(limit, strongest_line(system, speed, limit, value), kind_of(value), "verified")

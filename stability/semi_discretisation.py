@@ -11,6 +11,7 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
+from .chatter_frequency import strongest_line
 from .delay_system import DelaySystem, delay_system
 from .engagement import Piece, engagement_pieces
 from .multipliers import Multipliers
@@ -206,12 +207,5 @@ def semi_discretisation(
             low, high = (middle, high) if found(speed, middle).stable else (low, middle)
         critical = found(speed, high)
         limits[k], kinds[k] = high, critical.bifurcation
-        chatter[k] = _nearest_line(structure, complex(critical.values[0]), critical.tooth_period)
+        chatter[k] = strongest_line(delay_system(structure, process), float(speed), high, complex(critical.values[0]))
     return StabilityLobes(speeds, limits, chatter, tuple(kinds), "semi-discretization")
-
-
-def _nearest_line(model: ModalModel, multiplier: complex, period: float) -> float:
-    """Of the lines ``(theta + 2 pi k) / tau``, the one where the structure moves most, Hz."""
-    top = int(np.ceil(1.5 * model.natural_frequencies.max() * period)) + 1
-    lines = np.abs((np.angle(multiplier) / (2 * np.pi) + np.arange(-top, top + 1)) / period)
-    return float(lines[np.argmax(np.linalg.norm(model.receptance(lines), axis=(1, 2)))])

@@ -1,7 +1,7 @@
 """The 3 x 3 tip receptance that a stability solver works on, from a modal model or a measured FRF."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,12 +29,15 @@ class ToolReceptance:
         Lowest and highest frequency it is known at, Hz.
     warnings
         One sentence each.
+    open_above
+        Whether it may be evaluated above ``span`` too, as a modal model.
     """
 
     evaluate: Callable[[Real], Complex]
     grid: Real
     span: tuple[float, float]
     warnings: tuple[str, ...] = ()
+    open_above: bool = False
 
 
 def tool_receptance(structure: Frf | ModalModel, *, node: str | None = None) -> ToolReceptance:
@@ -155,7 +158,33 @@ def _from_model(model: ModalModel, placed: Callable[[Complex], Complex]) -> Tool
     def evaluate(frequencies: Real) -> Complex:
         return placed(model.receptance(frequencies))
 
-    return ToolReceptance(evaluate, grid, (low, high))
+    return ToolReceptance(evaluate, grid, (low, high), open_above=True)
+
+
+def reaching(source: ToolReceptance, force: Real, max_depth: float) -> ToolReceptance:
+    """A modal model's receptance followed up to where no depth that is asked for can close the loop.
+
+    That is where ``2 a |force| |H|`` stays below 1: at high spindle speed a damped structure chatters far above its
+    natural frequencies, since cutting stiffens it. A measured FRF ends where it ends.
+
+    Parameters
+    ----------
+    source
+        Receptance.
+    force : (3, 3), Pa
+        Force per depth and motion.
+    max_depth
+        m.
+    """
+    if not source.open_above:
+        return source
+    gain = 2 * max_depth * float(np.linalg.norm(force, 2))
+    above = np.geomspace(source.span[1], 1e3 * source.span[1], 700)[1:]
+    closing = gain * np.linalg.norm(source.evaluate(above), 2, axis=(1, 2)) > 1
+    if not closing.any():
+        return source
+    above = above[: int(np.flatnonzero(closing)[-1]) + 2]
+    return replace(source, grid=np.append(source.grid, above), span=(source.span[0], float(above[-1])))
 
 
 def _from_frf(frf: Frf, placed: Callable[[Complex], Complex]) -> ToolReceptance:

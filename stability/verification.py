@@ -37,16 +37,17 @@ class Verification:
 
 
 def ladder(first: float, top: float, ratio: float = RUNG) -> Real:
-    """Depths between ``first`` and ``top`` (m), geometric, both included.
+    """Depths from ``first`` up to ``top`` (m), each ``ratio`` times the one below it, and the top itself.
 
     Examples
     --------
-    >>> ladder(1.0, 2.0, 1.5).round(3).tolist()
-    [1.0, 1.414, 2.0]
+    >>> ladder(1.0, 2.0, 1.5).tolist()
+    [1.0, 1.5, 2.0]
     """
     if top <= first:
         return np.array([top])
-    return np.asarray(np.geomspace(first, top, int(np.ceil(np.log(top / first) / np.log(ratio))) + 1))
+    count = int(np.ceil(np.log(top / first) / np.log(ratio) - 1e-9))
+    return np.append(first * ratio ** np.arange(count), top)
 
 
 def verify(system: DelaySystem, speeds: Real, limits: Real, max_depth: float, first: float) -> Verification:

@@ -11,7 +11,7 @@ from foundation import InputError
 from modal_fit import ModalModel
 
 from .stability_lobes import StabilityLobes
-from .tool_receptance import ToolReceptance, tool_receptance
+from .tool_receptance import ToolReceptance, reaching, tool_receptance
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -25,7 +25,8 @@ def zero_order(
     With an eigenvalue lambda(w) of ``alpha_0 H``, the depth is ``1 / (K_tc lambda (1 - exp(-i w tau)))`` where that is
     real and positive. Roots of its imaginary part are bracketed on every continuous branch of eigenvalues and refined
     on the structure itself, so no grid error remains for a modal model (Budak & Altintas 1998; Mohammadi & Ahmadi,
-    Eq. 5). Averaged coefficients cannot show period doubling.
+    Eq. 5). A modal model is followed up to where the loop's gain is too small for any depth asked for. Averaged
+    coefficients cannot show period doubling; the warnings say so.
 
     Parameters
     ----------
@@ -44,10 +45,10 @@ def zero_order(
     """
     refuse_varied(process, "the zero-order solution", "use nyquist or collocation", takes=("helix",))
     speeds = checked_speeds(spindle_speeds, max_depth)
-    source = tool_receptance(structure)
+    alpha = process.ktc * average_directional_matrix(process)
+    source = reaching(tool_receptance(structure), alpha, max_depth)
     limits = np.full(len(speeds), np.inf)
     chatter = np.full(len(speeds), np.nan)
-    alpha = process.ktc * average_directional_matrix(process)
     grid = source.grid
     branches = _branches(alpha @ source.evaluate(grid))
     candidates = [_candidates(grid, branches, 2 * np.pi / (process.teeth * speed), max_depth) for speed in speeds]
@@ -60,7 +61,17 @@ def zero_order(
             if depths[index] <= max_depth:
                 limits[owner[index]], chatter[owner[index]] = depths[index], frequencies[index]
     bifurcations = tuple("hopf" if np.isfinite(limit) else "none" for limit in limits)
-    return StabilityLobes(speeds, limits, chatter, bifurcations, "zero-order", source.warnings)
+    return StabilityLobes(speeds, limits, chatter, bifurcations, "zero-order", (*source.warnings, averaged(process)))
+
+
+def averaged(process: MillingProcess) -> str:
+    """What a solution with averaged coefficients cannot see, as a sentence for its warnings."""
+    share = (process.exit_angle - process.start_angle) * process.teeth / (2 * np.pi)
+    return (
+        "cutting coefficients are averaged over the tooth period: period doubling is not seen, and where teeth cut for "
+        f"a part of the time (here {min(share, 1):.0%}) or doublings lie low the limits can be several times too high; "
+        "plan no cut on them"
+    )
 
 
 def checked_speeds(spindle_speeds: Real, max_depth: float) -> Real:

@@ -11,7 +11,9 @@ from estimation import Frf, to_receptance
 from foundation import InputError
 from modal_fit import ModalModel
 from stability import (
+    ModeCouplingLimit,
     StabilityLobes,
+    certified_lobes,
     collocation,
     mode_coupling_limit,
     multi_frequency,
@@ -38,7 +40,10 @@ OF_MODELS: dict[str, Callable[[ModalModel, MillingProcess, Speeds, float], Stabi
 }
 """Solvers that need a modal model."""
 
-LOBE_METHODS = (*OF_ANY, *OF_MODELS)
+CERTIFIED = "certified"
+"""The default: ``stability.certified_lobes``, each limit of a modal model verified."""
+
+LOBE_METHODS = (CERTIFIED, *OF_ANY, *OF_MODELS)
 
 
 def speed_axis(lowest: float, highest: float, count: int) -> NDArray[np.float64]:
@@ -61,11 +66,13 @@ def compute_lobes(
     process: MillingProcess,
     spindle_speeds: NDArray[np.float64],
     max_depth: float,
-    method: str = "zero-order",
+    method: str = CERTIFIED,
     watch: Watch = silent,
     name: str = "the structure",
 ) -> StabilityLobes:
-    """Depth limit at each spindle speed (rad/s), up to ``max_depth`` (m); ``name`` is that of the file, for messages.
+    """Depth limit at each spindle speed (rad/s), up to ``max_depth`` (m), certified unless a solver is named.
+
+    ``name`` is that of the file, for messages.
 
     Raises
     ------
@@ -89,6 +96,8 @@ def compute_lobes(
 def _solved(
     known: Frf | ModalModel, process: MillingProcess, spindle_speeds: Speeds, max_depth: float, method: str
 ) -> StabilityLobes:
+    if method == CERTIFIED:
+        return certified_lobes(known, process, spindle_speeds, max_depth)
     if method in OF_ANY:
         return OF_ANY[method](known, process, spindle_speeds, max_depth)
     if isinstance(known, Frf):
@@ -96,13 +105,37 @@ def _solved(
     return OF_MODELS[method](known, process, spindle_speeds, max_depth)
 
 
+def lobes_summary(lobes: StabilityLobes, max_depth: float) -> str:
+    """Lowest limit, and of how many speeds the limit is verified, a lower bound, not verified or unresolved."""
+    known = np.isfinite(lobes.depth_limits)
+    told = f"no limit up to {1e3 * max_depth:.3g} mm"
+    if known.any():
+        lowest = int(np.where(known, lobes.depth_limits, np.inf).argmin())
+        told = f"lowest limit {1e3 * lobes.depth_limits[lowest]:.3g} mm at {lobes.spindle_speeds_rpm[lowest]:.0f} rpm"
+        if lobes.status[lowest] == "lower-bound":
+            told += " (a lower bound)"
+    elif np.isnan(lobes.depth_limits).any():
+        told = "no limit known"
+    names = {"verified": "verified", "not-verified": "not verified", "lower-bound": "a lower bound only"}
+    counts = [
+        f"{lobes.status.count(status)} {word}"
+        for status, word in (names | {"unresolved": "unresolved"}).items()
+        if status in lobes.status
+    ]
+    return f"{told}; of {len(lobes.status)} speeds {', '.join(counts)}"
+
+
 def mode_coupling_line(model: ModalModel, process: MillingProcess, max_depth: float) -> str:
-    """One sentence on whether two modes couple at any depth up to ``max_depth`` (m), at every spindle speed alike."""
+    """One sentence on whether two modes couple at any depth up to ``max_depth`` (m) if no tooth cuts into waves."""
     if model.residuals is not None and model.residuals.upper.any():
         return "mode coupling: not computed, the model has a residual flexibility"
-    found = mode_coupling_limit(model, process, max_depth)
+    return f"mode coupling in a cut without regeneration: {_coupling(mode_coupling_limit(model, process, max_depth))}"
+
+
+def _coupling(found: ModeCouplingLimit) -> str:
     if found.kind == "none":
-        return f"mode coupling: none up to {1e3 * max_depth:.3g} mm"
+        return "none"
+    beside = "the limits of the lobes hold where a tooth cuts into the waves of the one before"
     if found.kind == "fold":
-        return f"mode coupling: from {1e3 * found.depth:.3g} mm the cutting force exceeds the structure's stiffness"
-    return f"mode coupling: from {1e3 * found.depth:.3g} mm on at {found.frequency:.4g} Hz, at every spindle speed"
+        return f"from {1e3 * found.depth:.3g} mm the cutting force exceeds the structure's stiffness; {beside}"
+    return f"from {1e3 * found.depth:.3g} mm at {found.frequency:.4g} Hz; {beside}"

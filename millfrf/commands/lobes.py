@@ -20,15 +20,20 @@ def lobes(
     max_depth: Annotated[float, typer.Option("--max-depth", metavar="M", help="Largest depth looked at, m.")],
     out: Output,
     method: Annotated[
-        str, typer.Option("--method", help="zero-order, nyquist, multi-frequency, collocation or semi-discretization.")
-    ] = "zero-order",
+        str,
+        typer.Option(
+            "--method",
+            help="certified (collocation verified by multipliers; of an FRF multi-frequency), or a solver by name: "
+            "zero-order, nyquist, multi-frequency, collocation or semi-discretization.",
+        ),
+    ] = "certified",
 ) -> None:
     """Stability lobes from a modal model or straight from a measured FRF."""
     from estimation import read_frf
     from modal_fit import ModalModel, read_modal_model
     from stability import write_lobes
 
-    from ..chain.lobes import compute_lobes, mode_coupling_line, speed_axis
+    from ..chain.lobes import compute_lobes, lobes_summary, mode_coupling_line, speed_axis
     from ..file_kinds import FRF, MODEL, kind_of
     from ..gate import check_depth, check_speeds, lowest_frequency, read_checked_cutting, stored_doubts
     from ..progress import bar
@@ -49,10 +54,6 @@ def lobes(
     write_lobes(out, result, provenance=of_lobes([dynamics, cutting], asked))
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)
-    lowest = result.depth_limits.argmin()
-    typer.echo(
-        f"wrote {out}: lowest limit {1e3 * result.depth_limits[lowest]:.3g} mm "
-        f"at {result.spindle_speeds_rpm[lowest]:.0f} rpm"
-    )
+    typer.echo(f"wrote {out}: {lobes_summary(result, max_depth)}")
     if kind == MODEL:
         typer.echo(mode_coupling_line(read_modal_model(dynamics), process, max_depth))

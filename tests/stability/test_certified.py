@@ -7,11 +7,19 @@ from benchmarks_of_literature import HALF_DOWN, RPM, benchmark_cut, one_degree_o
 from cutting import MillingProcess
 from modal_fit import ModalModel
 from replay_data import table_one_model
-from stability import StabilityLobes, certified, certified_lobes, collocation, multipliers
+from stability import (
+    StabilityLobes,
+    certified,
+    certified_lobes,
+    collocation,
+    multipliers,
+    nyquist_limits,
+    zero_order,
+)
 from stability.stability_limits import StabilityLimits
 
 SLOT = MillingProcess(4, 0.0127, np.pi / 2, 700e6, 0.17, 0.33, 0.0, np.pi, 1e-4)
-SPEEDS = np.linspace(510, 550, 9) * RPM
+SPEEDS = np.array([510.0, 528.0, 545.0]) * RPM
 
 
 def test_a_robot_in_a_slot_is_verified_at_every_speed_whatever_the_largest_depth() -> None:
@@ -82,3 +90,39 @@ def test_a_helical_cut_is_verified_and_does_not_depend_on_the_largest_depth() ->
     one, other = (certified_lobes(model, process, speeds, deepest) for deepest in (0.004, 0.02))
     assert set(one.status) == {"verified"}
     np.testing.assert_allclose(one.depth_limits, other.depth_limits, rtol=1e-4)
+
+
+def _low_immersion() -> MillingProcess:
+    return MillingProcess(2, 0.0127, np.pi / 2, 119e6, 0.17, 0.33, np.pi - np.arccos(0.98), np.pi, 1.5e-4)
+
+
+def test_an_frf_alone_is_not_verified_and_its_stated_error_is_told() -> None:
+    """a/D = 0.01: the FRF's band ends before the harmonics do; the stated error holds the true one."""
+    speeds = np.array([900.0, 2000.0]) * RPM
+    exact = certified_lobes(table_one_model(), _low_immersion(), speeds, 0.1)
+    lobes = certified_lobes(table_one_model().frf(np.arange(2.0, 80.0, 0.125)), _low_immersion(), speeds, 0.1)
+    assert set(exact.status) == {"verified"}
+    assert lobes.status == ("not-verified",) * 2
+    told = [line for line in lobes.warnings if "stated error is up to" in line]
+    share = float(told[0].split("up to ")[1].split("%")[0]) / 100
+    assert np.abs(lobes.depth_limits / exact.depth_limits - 1).max() < share < 0.1
+    assert any("above 79.88 Hz, where the FRF ends, still matter" in line for line in lobes.warnings)
+
+
+def test_speeds_too_slow_for_an_frf_are_unresolved() -> None:
+    frf = table_one_model().frf(np.arange(2.0, 80.0, 0.25))
+    lobes = certified_lobes(frf, HALF_DOWN, np.array([5.0, 1200.0]) * RPM, 0.006)
+    assert lobes.status == ("unresolved", "not-verified")
+    assert np.isnan(lobes.depth_limits[0])
+    assert any("too many harmonics" in line for line in lobes.warnings)
+
+
+def test_averaged_coefficients_are_unsafe_here_and_say_so() -> None:
+    """Half-immersion of two teeth at 1050 rpm: the certified limit is a period doubling at three quarters of theirs."""
+    speeds = np.array([1050.0]) * RPM
+    limit = certified_lobes(table_one_model(), HALF_DOWN, speeds, 0.006)
+    assert limit.bifurcations == ("period-doubling",)
+    for solver in (zero_order, nyquist_limits):
+        lobes = solver(table_one_model(), HALF_DOWN, speeds, 0.006)
+        assert lobes.depth_limits[0] > 1.3 * limit.depth_limits[0]
+        assert "period doubling is not seen" in lobes.warnings[-1]

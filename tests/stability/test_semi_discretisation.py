@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from benchmarks_of_literature import HALF_DOWN, RPM, benchmark_cut, one_degree_of_freedom
 
+from cutting import MillingProcess
 from foundation import InputError
 from replay_data import table_one_model
-from stability import multipliers, semi_discretisation, semi_discretised_multipliers
+from stability import collocation, multipliers, semi_discretisation, semi_discretised_multipliers
 
 
 def radius(steps: int, order: int, cut: tuple[float, str], rpm: float, depth: float) -> float:
@@ -62,3 +63,14 @@ def test_absurd_input_is_refused_in_one_line() -> None:
             semi_discretised_multipliers(model, cut, **given)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="needs a modal model"):
         semi_discretisation(table_one_model().frf(np.arange(1.0, 50.0)), HALF_DOWN, np.array([80.0]), 0.01)
+
+
+def test_its_chatter_frequency_is_the_strongest_line_of_collocation() -> None:
+    """A line is strong where force and receptance both are: the receptance alone named mirror lines."""
+    for process, rpm in ((HALF_DOWN, 800.0), (SLOT_OF_FOUR, 260.0), (SLOT_OF_FOUR, 540.0)):
+        speed = np.array([rpm]) * RPM
+        here, there = (solve(table_one_model(), process, speed, 2e-3) for solve in (semi_discretisation, collocation))
+        np.testing.assert_allclose(here.chatter_frequencies, there.chatter_frequencies, rtol=2e-3)
+
+
+SLOT_OF_FOUR = MillingProcess(4, 0.0127, np.pi / 2, 700e6, 0.17, 0.33, 0.0, np.pi, 1e-4)

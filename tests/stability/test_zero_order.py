@@ -12,7 +12,16 @@ from estimation import Frf
 from foundation import FileFormatError, InputError
 from modal_fit import ModalModel
 from replay_data import table_one_model
-from stability import StabilityLobes, is_stable, nyquist_limits, read_lobes, tool_receptance, write_lobes, zero_order
+from stability import (
+    StabilityLobes,
+    collocation,
+    is_stable,
+    nyquist_limits,
+    read_lobes,
+    tool_receptance,
+    write_lobes,
+    zero_order,
+)
 
 HALF_DOWN = MillingProcess(2, 0.0127, np.pi / 2, 119e6, 0.17, 0.33, np.pi / 2, np.pi, 0.15e-3)
 RPM = 2 * np.pi / 60
@@ -151,3 +160,19 @@ def test_absurd_input_is_refused(structure: Frf | ModalModel, speed: float, dept
 def test_columns_of_unequal_length_are_refused() -> None:
     with pytest.raises(InputError, match="unequal lengths"):
         StabilityLobes(np.ones(2), np.ones(2), np.ones(2), ("hopf",), "zero-order")
+
+
+def test_a_damped_structure_at_high_speed_has_the_limits_of_nyquist_and_collocation() -> None:
+    """Its chatter lies far above three times the natural frequency, where the search used to end."""
+    poles = 2 * np.pi * np.array([-7.5 + 20.1j])
+    shape = np.array([[1.0, 0.4, 0.2]])
+    model = ModalModel(poles, shape * (2 * np.pi * 21.4) ** 2 / 1e6 / (2j * poles.imag), shape + 0j, TCP, TCP)
+    cut = MillingProcess(4, 0.0127, np.pi / 2, 3e8, 0.3, 0.1, 0.0, np.pi, 1e-4)
+    speeds = np.array([3000.0, 4000.0]) * np.pi / 30
+    found = zero_order(model, cut, speeds, 0.4)
+    assert (found.chatter_frequencies > 3 * 21.4).all()
+    np.testing.assert_allclose(found.depth_limits, nyquist_limits(model, cut, speeds, 0.4).depth_limits, rtol=1e-3)
+    np.testing.assert_allclose(found.depth_limits, collocation(model, cut, speeds, 0.4).depth_limits, rtol=0.3)
+
+
+TCP = ("T:+X", "T:+Y", "T:+Z")
