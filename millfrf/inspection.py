@@ -10,7 +10,7 @@ import numpy as np
 from acquisition import Recording
 from estimation import read_frf
 from modal_fit import read_modal_model
-from stability import read_lobes
+from stability import STATUSES, read_lobes
 
 from .file_kinds import CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
 from .gate import read_checked_cutting
@@ -135,10 +135,13 @@ def _lobes(path: str | os.PathLike[str]) -> Findings:
     if not len(lobes.spindle_speeds):
         return Findings(LOBES, "stability lobes", concerns=("the table holds no spindle speed",))
     rpm, depths = lobes.spindle_speeds_rpm, lobes.depth_limits
-    summary = (
-        f"stability lobes at {len(rpm)} speeds, {rpm.min():.0f} to {rpm.max():.0f} rpm, lowest limit "
-        f"{1e3 * depths.min():.3g} mm at {rpm[depths.argmin()]:.0f} rpm"
-    )
+    summary = f"stability lobes at {len(rpm)} speeds, {rpm.min():.0f} to {rpm.max():.0f} rpm"
+    known = np.isfinite(depths)
+    if known.any():
+        lowest = int(np.where(known, depths, np.inf).argmin())
+        summary += f", lowest limit {1e3 * depths[lowest]:.3g} mm at {rpm[lowest]:.0f} rpm"
+    counts = [f"{lobes.status.count(name)} {name}" for name in STATUSES if name in lobes.status]
+    summary += f"; {', '.join(counts)}"
     concerns = ("no depth limit at any speed",) if not np.isfinite(depths).any() else ()
     return Findings(LOBES, summary, concerns=concerns)
 

@@ -15,12 +15,13 @@ from .nyquist import is_stable, nyquist_limits, unstable_poles
 from .recommended_cut import RecommendedCut, certified_cut, lowered, recommended_cut
 from .semi_discretisation import semi_discretisation, semi_discretised_multipliers
 from .stability_limits import StabilityLimits
-from .stability_lobes import StabilityLobes
+from .stability_lobes import STATUSES, StabilityLobes
 from .tool_receptance import ToolReceptance, tool_receptance
 from .uncertainty import depth_errors, probability_of_stability
 from .zero_order import zero_order
 
 __all__ = [
+    "STATUSES",
     "ChatterVerdict",
     "DelaySystem",
     "Evidence",

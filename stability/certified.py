@@ -67,8 +67,11 @@ def _of_frf(frf: Frf, process: MillingProcess, speeds: Real, max_depth: float) -
         known.bifurcations,
     )
     first = np.unique(limits.speed, return_index=True)[1]
-    worst = float((limits.error[first] / limits.depth[first]).max(initial=0.0))
-    told = f"from an FRF alone, limits are not verified; their stated error is up to {worst:.1%}: fit a model to verify"
+    share = limits.error[first] / limits.depth[first] if len(first) else np.zeros(1)
+    told = (
+        f"from an FRF alone, limits are not verified; their stated error is up to {share.max():.1%} (median "
+        f"{np.median(share):.1%}): fit a model to verify"
+    )
     if not reached.all():
         told += f"; below {slowest_speed(frf, process) * 30 / np.pi:.4g} rpm they would need too many harmonics"
     status = tuple(np.where(reached, "not-verified", "unresolved").tolist())
