@@ -136,10 +136,13 @@ def run_demo(options: DemoOptions, watch: Watch = silent, say: Callable[[str], o
     say("drawing lobes and report ...")
     structures: dict[str, Frf | ModalModel] = {"identified": identified, "hammer": tip, "true": true}
     for name, structure in structures.items():
-        lobes = compute_lobes(structure, CUTTER, speed_axis(300, 2400, 211), MAX_DEPTH, watch=watch)
+        lobes = compute_lobes(structure, CUTTER, speed_axis(300, 2400, 211), MAX_DEPTH, "zero-order", watch)
         write_lobes(folder / f"lobes_{name}.csv", lobes)
     compared = np.array(COMPARED_RPM) * RPM
-    limits = {name: compute_lobes(structure, CUTTER, compared, MAX_DEPTH) for name, structure in structures.items()}
+    limits = {
+        name: compute_lobes(structure, CUTTER, compared, MAX_DEPTH, "zero-order")
+        for name, structure in structures.items()
+    }
     _draw_lobes(folder)
     report = _report(folder, sweeps, watch)
     return DemoResult(identified, true, limits, report, time.perf_counter() - started)

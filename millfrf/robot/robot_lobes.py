@@ -11,7 +11,7 @@ from modal_fit import ModalModel, Residuals
 from robot_model import in_posture, read_robot
 from stability import write_lobes
 
-from ..chain.lobes import compute_lobes, lobes_summary, speed_axis
+from ..chain.lobes import compute_lobes, speed_axis
 from ..commands.options import check_output
 from ..figures.embed import save_figure
 from ..figures.lobes_figure import lobes_figure
@@ -67,7 +67,11 @@ def write_lobes_in_posture(
     write_lobes(out, found)
     for warning in found.warnings:
         typer.echo(f"warning: {warning}", err=True)
-    typer.echo(f"wrote {out}: {lobes_summary(found, max_depth)}")
+    lowest = found.depth_limits.argmin()
+    typer.echo(
+        f"wrote {out}: lowest limit {1e3 * found.depth_limits[lowest]:.3g} mm "
+        f"at {found.spindle_speeds_rpm[lowest]:.0f} rpm"
+    )
     if picture is not None:
         save_figure(lobes_figure({method: found}), picture)
         typer.echo(f"wrote {picture}")
