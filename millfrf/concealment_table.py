@@ -17,7 +17,11 @@ def found_names(diagnosis: dict[str, Any]) -> tuple[str, ...]:
 
 
 def judgement(hidden: str, diagnosis: dict[str, Any]) -> str:
-    """``right``, ``right within a class``, ``right, and more``, ``abstained``, ``missed`` or ``wrong``."""
+    """How an answer stands to what was hidden.
+
+    ``right``, ``right, in part`` (named, with more left than it may), ``right within a class``, ``right, and more``,
+    ``abstained``, ``missed`` or ``wrong``.
+    """
     names, verdict = found_names(diagnosis), diagnosis["verdict"]
     if hidden == FOREIGN:
         return "right" if verdict == "unexplained" else "missed" if verdict == "none" else "wrong"
@@ -26,7 +30,7 @@ def judgement(hidden: str, diagnosis: dict[str, Any]) -> str:
     if verdict == "unexplained":
         return "abstained"
     if names == (hidden,):
-        return "right"
+        return "right" if verdict == "explained" else "right, in part"
     if hidden in names:
         return "right, and more"
     if verdict == "none":
@@ -55,7 +59,7 @@ def concealment_table(result: ConcealResult) -> Table:
         ("effect", hidden.name, ", ".join(found_names(diagnosis)) or "none"),
         ("where", "" if hidden.direction is None else _place({"direction": hidden.direction}), places),
         ("direction error", "", "" if angle is None else f"{angle:.1f} deg"),
-        ("numbers", _numbers(hidden.parameters), "\n".join(_numbers(cause["parameters"]) for cause in causes)),
+        ("numbers", _numbers(hidden.parameters), "\n".join(_with_errors(cause) for cause in causes)),
         ("cannot be told from", "", ", ".join(diagnosis["equivalents"])),
         ("error held out", "", f"{100 * gain['before']:.3g} % to {100 * gain['after']:.3g} %"),
         ("noise there", "", f"{100 * gain['noise_floor']:.3g} %"),
@@ -75,6 +79,15 @@ def _place(location: dict[str, Any]) -> str:
 
 def _numbers(parameters: dict[str, Any]) -> str:
     return "\n".join(f"{name} {_number(value)}" for name, value in parameters.items())
+
+
+def _with_errors(cause: dict[str, Any]) -> str:
+    """Numbers that were found with their standard errors."""
+    errors = cause.get("standard_errors", {})
+    return "\n".join(
+        f"{name} {_number(value)}" + (f" ± {errors[name]:.2g}" if name in errors else "")
+        for name, value in cause["parameters"].items()
+    )
 
 
 def _number(value: Any) -> str:

@@ -1,16 +1,19 @@
 """When a fitted cause is worth accepting, and when so much is left that none is named."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .diagnosis import Improvement
 from .explanation import Cause, Explanation
 from .fitting import Fit, fit
 from .leftover import Leftover
 from .physics import ChainPhysics, LimitedPhysics
 from .windowed_lines import WindowedLines
+
+Real = NDArray[np.float64]
 
 LEAST_EVIDENCE = 20.0
 """Gain in score below which nothing is accepted: odds of some twenty thousand to one."""
@@ -52,6 +55,21 @@ class Option:
 def gains(option: Option, current: Fit) -> bool:
     """Whether an option has the least evidence that counts."""
     return option.fitted.score <= current.score - LEAST_EVIDENCE
+
+
+def impossible(option: Option) -> str:
+    """Why the numbers of an option's last cause cannot be, beyond their errors; empty where they can."""
+    causes = option.fitted.explanation.causes
+    if option.name == "missing_mode" or not causes:
+        return ""
+    cause = causes[-1]
+    said: Callable[[Real, Real], str] | None = getattr(cause.physics, "impossible", None)
+    if said is None:
+        return ""
+    first = option.fitted.explanation.size - cause.size
+    spread = np.sqrt(np.maximum(np.diag(option.fitted.covariance)[first : first + len(cause.values)], 0.0))
+    steps = np.array([parameter.unit_step for parameter in cause.physics.parameters])
+    return said(cause.values, CLEAR * spread * steps)
 
 
 def plainest(options: list[Option]) -> Option | None:
@@ -97,15 +115,6 @@ def evidence_needed(current: Fit, base: Fit) -> float:
     a_law = any(cause.direction is not None for cause in current.explanation.causes)
     share = AFTER_A_LAW if a_law else SMALL
     return max(LEAST_EVIDENCE, share * (base.score - current.score))
-
-
-def holds_elsewhere(improvement: Improvement, current: Fit, base: Fit) -> bool:
-    """Whether what causes gained where they were fitted is seen on the held-out recording too.
-
-    Causes that gained little there but stand nearer to the lab's belief than a general refit predict no better, and
-    need not.
-    """
-    return base.misfit - current.misfit < LEAST_EVIDENCE or improvement.evidence > HELD_OUT
 
 
 def worth_it(option: Option, current: Fit, base: Fit, lines: list[WindowedLines]) -> bool:

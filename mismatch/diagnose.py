@@ -9,24 +9,27 @@ from threadpoolctl import threadpool_limits
 
 from modal_fit import ModalModel
 
-from .acceptance import LEAST_EVIDENCE, Option, gains, holds_elsewhere, plainest, unexplained, worth_it
+from .acceptance import LEAST_EVIDENCE, Option, gains, impossible, plainest, worth_it
 from .beyond_model import beyond_model
 from .compared_band import compared_band
+from .confirmed import confirmed
 from .diagnosis import AcceptedCause, Candidate, Diagnosis
 from .explanation import Explanation
 from .fault_repair import repair_plain_faults, with_tones_settled
 from .fitting import Fit, fit
-from .held_out import HeldOut, held_out_improvement
+from .form_spread import with_form_spread
+from .held_out import Recordings, held_out_improvement, scored
 from .leftover import Leftover, leftover
 from .linear_part import with_linear_part
 from .options import Round, fitted_options
 from .physics import ChainPhysics, JointPhysics, Physics, library
 from .pruning import pruned
-from .reporting_numbers import accepted_cause, accepted_mode, modal_deviation
+from .reporting_numbers import accepted_cause, accepted_mode, modal_deviation, with_final_numbers
 from .settling import settled
 from .shape_of_model import LabError, ModelShape
 from .trial import Trial
 from .true_forces import without_force_noise
+from .verdict import verdict_of
 from .windowed_lines import WindowedLines, windowed_lines
 
 Real = NDArray[np.float64]
@@ -106,26 +109,28 @@ def _diagnosed(model: ModalModel, trials: Sequence[Trial], settings: Settings, t
     lines, base, faults = repair_plain_faults(lines, base)
     search = _search(lines, base, faults, causes, tell)
     tell("held-out recording")
-    search, held_out = _that_hold_elsewhere(search, lines)
-    current, accepted, candidates = search.steps[-1], search.accepted, search.candidates
-    accepted = with_tones_settled(current, whole, accepted, decay)
+    recordings = Recordings(lines, whole)
+    (steps, accepted), rejected, held_out = confirmed(recordings, search.steps, search.accepted)
+    current, candidates = steps[-1], search.candidates + rejected
     tell("what is left")
-    deviation = _deviation(lines, current)
+    told = with_form_spread(current, lines)
+    accepted = with_tones_settled(current, whole, with_final_numbers(told, accepted), decay)
+    elsewhere = held_out.linear, held_out.improved
+    held_out = scored(recordings, elsewhere, current.noises, accepted)
+    deviation = _deviation(lines, told)
     if deviation is not None:
         accepted.append(deviation)
     left = leftover(current.explanation, lines)
-    abstains = unexplained(current.explanation, left, search.before)
-    if abstains:
+    verdict = verdict_of(current, accepted, left, search.before, held_out.improvement)
+    if verdict == "unexplained":
         candidates += [Candidate(one.name, one.evidence, "rejected", one.location) for one in accepted]
         accepted, current, left = [], base, search.before
-        held_out = held_out_improvement(lines, base.explanation, base.noises)
-    verdict = "unexplained" if abstains else "explained" if accepted else "none"
-    ranked = tuple(sorted(candidates, key=lambda one: -one.evidence))
+        held_out = held_out_improvement(Recordings(whole, whole), base.explanation, base.noises)
     return Diagnosis(
         verdict,
         tuple(accepted),
-        ranked,
-        search.equivalents,
+        tuple(sorted(candidates, key=lambda one: -one.evidence)),
+        search.equivalents if accepted else (),
         held_out.improvement,
         left.share,
         base,
@@ -134,6 +139,7 @@ def _diagnosed(model: ModalModel, trials: Sequence[Trial], settings: Settings, t
         (held_out.linear, held_out.improved),
         band=max(bands, key=lambda band: band.high),
         doubts=beyond_model(base.explanation, lines),
+        measured=tuple(whole),
     )
 
 
@@ -194,7 +200,11 @@ def _search(
         if not worth_it(best, current, base, lines):
             break
         line = best.fitted.score + LEAST_EVIDENCE / 2
-        rivals = [option.name for option in one.options if option.name != best.name and option.fitted.score < line]
+        rivals = [
+            option.name
+            for option in one.options
+            if option.name != best.name and option.fitted.score < line and not impossible(option)
+        ]
         equivalents = equivalents or tuple(dict.fromkeys(rivals))
         accepted.append(_describe(best, current))
         failed = one.sighted and not any(_gaining_law(option, current) for option in one.options)
@@ -209,7 +219,7 @@ def _search(
 
 
 def _best(one: Round, current: Fit) -> Option | None:
-    best = plainest(one.options)
+    best = plainest([option for option in one.options if not impossible(option)])
     return best if best is not None and gains(best, current) else None
 
 
@@ -225,18 +235,6 @@ def _linear(causes: dict[str, Physics]) -> dict[str, Physics]:
 
 def _laws(causes: dict[str, Physics]) -> dict[str, Physics]:
     return {name: one for name, one in causes.items() if isinstance(one, JointPhysics)}
-
-
-def _that_hold_elsewhere(search: _Search, lines: list[WindowedLines]) -> tuple[_Search, HeldOut]:
-    """Let go of causes, the last first, until those left are seen on a held-out recording too."""
-    steps, accepted, candidates = list(search.steps), list(search.accepted), list(search.candidates)
-    while True:
-        held_out = held_out_improvement(lines, steps[-1].explanation, steps[-1].noises)
-        if len(steps) == 1 or len(lines) == 1 or holds_elsewhere(held_out.improvement, steps[-1], steps[0]):
-            return replace(search, steps=steps, accepted=accepted, candidates=candidates), held_out
-        steps.pop()
-        last = accepted.pop()
-        candidates.append(Candidate(last.name, last.evidence, "rejected", last.location))
 
 
 def _deviation(lines: list[WindowedLines], current: Fit) -> AcceptedCause | None:

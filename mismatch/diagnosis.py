@@ -62,11 +62,15 @@ class Improvement:
     noise_floor
         Root mean square noise there.
     p_value
-        That the improved model is no better than the refitted one, from blocks of a few seconds.
+        That the improved model is no better than the one it is compared with (``against``), from blocks of a few
+        seconds, every channel in units of its noise.
     interval
         95 % interval of ``after / before``.
     evidence
         Gain in misfit there over the refitted model, by numbers fitted to the other recordings; 0 where there are none.
+    against
+        ``refitted``, or ``nominal`` where nothing but modal parameters was found, or a cause that differs from a refit
+        in the lab's belief alone.
     """
 
     held_out: str
@@ -77,6 +81,7 @@ class Improvement:
     p_value: float
     interval: tuple[float, float]
     evidence: float = 0.0
+    against: str = "refitted"
 
 
 @dataclass(frozen=True)
@@ -108,6 +113,8 @@ class Diagnosis:
         In which model and recordings were compared, and why; None: not stated.
     doubts
         Sentences that a reader must see beside the verdict.
+    measured
+        The recordings with tones and clipping as they were measured; empty: as ``lines``.
     """
 
     verdict: str
@@ -123,3 +130,4 @@ class Diagnosis:
     located: dict[str, Any] = field(default_factory=dict)
     band: ComparedBand | None = None
     doubts: tuple[str, ...] = ()
+    measured: tuple[WindowedLines, ...] = ()

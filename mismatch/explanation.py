@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +86,13 @@ class Cause:
         assert isinstance(self.physics, JointPhysics)
         assert self.motion is not None
         return self.physics.law(self.values, self.motion)
+
+
+def direction_of(cause: Cause) -> dict[str, Any]:
+    """Location of a joint, as a diagnosis states it; the largest entry is positive."""
+    assert cause.direction is not None
+    direction = cause.direction * np.sign(cause.direction[np.argmax(np.abs(cause.direction))])
+    return {"direction": [round(float(x), 6) for x in direction]}
 
 
 def across(direction: Real) -> Real:

@@ -58,6 +58,8 @@ def _tone_cause(tone: Tone, lines: WindowedLines) -> AcceptedCause:
     parameters |= {f"amplitude_{name}": float(value) for name, value in zip(names, tone.amplitudes, strict=True)}
     width = lines.trial.rate / len(lines.window)
     errors = {"frequency_hz": width * float(np.sqrt(6 / tone.gain)) / np.pi}
+    known = [(name, float(one)) for name, one in zip(names, tone.spread, strict=True) if np.isfinite(one)]
+    errors |= {f"amplitude_{name}": one for name, one in known}
     return AcceptedCause("unmeasured_excitation", {"channels": list(names)}, parameters, errors, tone.gain)
 
 

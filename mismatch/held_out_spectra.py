@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from .assessment import through_structure
 from .diagnosis import Diagnosis
-from .explanation import predict_lines
+from .held_out import residual_lines
 from .residual_maps import band_edges
+from .shown_faults import FAULTS
 from .windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
@@ -47,19 +48,20 @@ class HeldOutSpectra:
 
 def held_out_spectra(diagnosis: Diagnosis) -> HeldOutSpectra:
     """Spectra of the recording named by the diagnosis' improvement, both models fitted to the others only."""
-    lines = list(diagnosis.lines)
+    lines = list(diagnosis.measured or diagnosis.lines)
     names = [one.trial.name for one in lines]
     kept = names.index(diagnosis.improvement.held_out)
     here, final = lines[kept], diagnosis.final
     before, after = diagnosis.elsewhere
-    shown = predict_lines(after, here).response
+    faults = [cause for cause in diagnosis.physics if cause.name in FAULTS]
+    rests = residual_lines(before, here), residual_lines(after, here, faults)
     covariance = final.noises[kept].covariance(here.frequencies, through_structure(final.explanation, here))
     edges = band_edges([here], BANDS_PER_OCTAVE, 3)
     power = [
         np.abs(here.measured) ** 2,
-        np.abs(shown) ** 2,
-        np.abs(here.measured - predict_lines(before, here).response) ** 2,
-        np.abs(here.measured - shown) ** 2,
+        np.abs(here.measured - rests[1]) ** 2,
+        np.abs(rests[0]) ** 2,
+        np.abs(rests[1]) ** 2,
         np.real(np.einsum("kii->ki", covariance)),
     ]
     densities = [_density(one, here, edges) for one in power]

@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
 from .acceptance import LEAST_EVIDENCE, Option
 from .diagnosis import Candidate
-from .explanation import Cause
+from .explanation import direction_of
 from .fitting import Fit, fit
 from .joint_direction import find_direction
 from .joint_screening import Screened, screen_joints
@@ -120,10 +119,3 @@ def _simulated(lines: list[WindowedLines], near: Fit) -> Option | None:
     except np.linalg.LinAlgError:
         return None
     return Option(answer_name(last.physics), direction_of(fitted.explanation.causes[-1]), fitted)
-
-
-def direction_of(cause: Cause) -> dict[str, Any]:
-    """Location of a joint, as a diagnosis states it; the largest entry is positive."""
-    assert cause.direction is not None
-    direction = cause.direction * np.sign(cause.direction[np.argmax(np.abs(cause.direction))])
-    return {"direction": [round(float(x), 6) for x in direction]}

@@ -10,6 +10,7 @@ from scipy.signal.windows import hann
 
 from .cell_regression import moving_power
 from .explanation import Explanation, predict_lines
+from .repeated_part import repeated_share
 from .windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
@@ -49,7 +50,8 @@ def leftover(explanation: Explanation, lines: list[WindowedLines]) -> Leftover:
     (what a nonlinearity spreads). The share is what the last two carry, less what they carry by chance, when the
     prediction is shifted in time against the residual. Where forces were replaced by what they say of the true ones,
     the forces as measured are tried too, and what moves with both counts: the replaced ones lack force where it swells
-    from little, the measured ones bring their noise.
+    from little, the measured ones bring their noise. Of forces that repeat, what the residual repeats with them moves
+    with the signal too (:func:`repeated_share`): a steady test has no times of more and of less signal.
 
     Parameters
     ----------
@@ -64,7 +66,7 @@ def leftover(explanation: Explanation, lines: list[WindowedLines]) -> Leftover:
         measured = one.with_measured_forces()
         if not np.array_equal(measured.force_here, one.force_here):
             moving = np.minimum(moving, _moving(explanation, measured))
-        found.append(moving)
+        found.append(np.maximum(moving, _repeating(explanation, one)))
     share, power = np.concatenate(found).mean(axis=0)
     return Leftover(float(share), float(power))
 
@@ -85,6 +87,15 @@ def _moving(explanation: Explanation, one: WindowedLines) -> Real:
         share = np.clip(own - np.quantile(shifted, CHANCE), 0.0, whole) / whole
         found.append([share, np.clip(own - np.median(shifted), 0.0, whole) / size])
     return np.array(found)
+
+
+def _repeating(explanation: Explanation, one: WindowedLines) -> Real:
+    """Share of the residual's power and of the response's that repeats with the forces, (n_responses, 2)."""
+    share = repeated_share(explanation, one)
+    if not share.any():
+        return np.zeros((len(share), 2))
+    rest = np.sum(np.abs(one.measured - predict_lines(explanation, one).response) ** 2, axis=0)
+    return np.column_stack([share, share * rest / np.sum(np.abs(one.measured) ** 2, axis=0)])
 
 
 def _shifts(count: int) -> list[int]:

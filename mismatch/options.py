@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from .acceptance import NOISE_LIKE, SMALL, Option, evidence_needed, gains, unexplained
+from .acceptance import NOISE_LIKE, SMALL, Option, evidence_needed, gains, impossible, unexplained
 from .chain_screening import ScreenedChain, screen_chains
 from .diagnosis import Candidate
 from .fitting import Fit
@@ -77,7 +77,7 @@ def fitted_options(
             gained = current.score - best.fitted.score if best is not None else 0.0
             options += joint_options(lines, current, sighted, least, gained)
     weighed += sighted.weighed
-    weighed += [Candidate(one.name, current.score - one.fitted.score, "fitted", one.location) for one in options]
+    weighed += [_weighed(one, current) for one in options]
     return Round(options, weighed, sighted.gain > 0)
 
 
@@ -97,8 +97,15 @@ def _screened(
     return [one for one in chains if (one.cause.physics.name, one.cause.place) not in taken], mode, sighted
 
 
+def _weighed(one: Option, current: Fit) -> Candidate:
+    """A fitted option as it is told; one whose numbers cannot be says so."""
+    reason = impossible(one)
+    place = one.location | ({"impossible": reason} if reason else {})
+    return Candidate(one.name, current.score - one.fitted.score, "impossible" if reason else "fitted", place)
+
+
 def _best(options: list[Option], current: Fit) -> Option | None:
-    best = min(options, key=lambda option: option.fitted.score, default=None)
+    best = min((one for one in options if not impossible(one)), key=lambda one: one.fitted.score, default=None)
     return best if best is not None and gains(best, current) else None
 
 

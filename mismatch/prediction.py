@@ -4,13 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, rfft
+from scipy.fft import irfft
 
 from modal_fit import ModalModel
 
 from .explanation import predict_lines
 from .physics_terms import explanation_of
-from .saturation import saturated
+from .shown_faults import with_faults
 from .trial import Trial, band_of
 from .windowed_lines import windowed_lines
 
@@ -60,17 +60,8 @@ def predict(model: ModalModel, trial: Trial) -> Prediction:
     decay = float((-model.poles.real).min())
     lines = windowed_lines(trial, band, decay)
     n = len(trial.force)
-    response = irfft(predict_lines(explanation, lines).spectrum, n=lines.padded, axis=0)[:n]
-    time = np.arange(n) / trial.rate
-    for term in model.physics:
-        if term["name"] == "unmeasured_excitation":
-            frequency = float(term["parameters"]["frequency_hz"])
-            response = response + _tone(trial.response - response, time, frequency, lines.start)
-    for term in model.physics:
-        if term["name"] == "clipping":
-            column = trial.channels.index(term["location"]["channel"]) - trial.force.shape[1]
-            limit, sharpness = (float(term["parameters"].get(name, np.inf)) for name in ("limit", "sharpness"))
-            response[:, column] = saturated(response[:, column], limit, sharpness)
+    response = np.asarray(irfft(predict_lines(explanation, lines).spectrum, n=lines.padded, axis=0)[:n])
+    response = with_faults(response, trial, lines.start, model.physics)
     measured, shown = (lines.cut(signal) for signal in (trial.response, response))
     rest, power = np.abs(measured - shown) ** 2, np.abs(measured) ** 2
     return Prediction(
@@ -80,15 +71,3 @@ def predict(model: ModalModel, trial: Trial) -> Prediction:
         float(np.sqrt(rest.sum() / power.sum())),
         band,
     )
-
-
-def _tone(rest: Real, time: Real, frequency: float, start: int) -> Real:
-    """Sinusoid of the frequency nearest ``frequency`` that is in the residual, (n_samples, n_responses)."""
-    kept, late = rest[start:], time[start:]
-    fine = 8 * len(kept)
-    spectrum = np.abs(rfft(kept * np.hanning(len(kept))[:, None], n=fine, axis=0)) ** 2
-    axis = np.arange(fine // 2 + 1) / fine / (late[1] - late[0])
-    near = np.abs(axis - frequency) < 2.0 / (late[-1] - late[0])
-    exact = float(axis[near][np.argmax(spectrum[near].sum(axis=1))]) if near.any() else frequency
-    waves = np.column_stack([np.cos(2 * np.pi * exact * time), np.sin(2 * np.pi * exact * time)])
-    return np.asarray(waves @ np.linalg.lstsq(waves[start:], kept, rcond=None)[0])

@@ -43,7 +43,7 @@ def pruned(
     place = len(steps) - 3
     while place >= 0 and len(steps) > 2:
         base, last, cause = steps[0], steps[-1], accepted[faults + place]
-        less = fit(lines, _without(last.explanation, cause), last.noises, iterations=ITERATIONS)
+        less = fit(lines, without_cause(last.explanation, cause), last.noises, iterations=ITERATIONS)
         if less.score - last.score < evidence_needed(less, base):
             rejected.append(Candidate(cause.name, less.score - last.score, "rejected", cause.location))
             accepted = accepted[: faults + place] + accepted[faults + place + 1 :]
@@ -52,7 +52,8 @@ def pruned(
     return steps, accepted, rejected
 
 
-def _without(explanation: Explanation, cause: AcceptedCause) -> Explanation:
+def without_cause(explanation: Explanation, cause: AcceptedCause) -> Explanation:
+    """An explanation without one of its causes."""
     if cause.name == "missing_mode":
         shape, u = without_added(explanation.shape), explanation.u
         kept_u = np.concatenate([u[: shape.modal_size], u[explanation.shape.modal_size :]])

@@ -6,26 +6,53 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .diagnosis import AcceptedCause
-from .explanation import Cause
+from .explanation import Cause, direction_of
 from .fitting import Fit
 from .physics import LimitedPhysics, answer_name
+from .shown_faults import FAULTS
 
 Real = NDArray[np.float64]
 
 
-def accepted_cause(fitted: Fit, location: dict[str, object], evidence: float) -> AcceptedCause:
-    """The last cause of a fit with its numbers and their standard errors (to first order)."""
-    cause = fitted.explanation.causes[-1]
-    first = fitted.explanation.size - cause.size
-    spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[first:], 0.0))
+def accepted_cause(fitted: Fit, location: dict[str, object], evidence: float, place: int = -1) -> AcceptedCause:
+    """One cause of a fit, the last if not told, with its numbers and their standard errors (to first order)."""
+    causes = fitted.explanation.causes
+    cause, place = causes[place], place % len(causes)
+    first = fitted.explanation.size - sum(one.size for one in causes[place:])
+    covariance = fitted.covariance[first : first + cause.size, first : first + cause.size]
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     parameters, errors = {}, {}
     # beyond a limit that the motion sets a number changes nothing, and its error says so
     for parameter, value, error in zip(cause.physics.parameters, _held(cause), spread, strict=False):
         parameters[parameter.name] = float(value)
         errors[parameter.name] = float(error * parameter.unit_step * (abs(value) if parameter.logarithmic else 1.0))
-    derived, their_errors = _derived(cause, fitted.covariance[first:, first:])
+    derived, their_errors = _derived(cause, covariance)
     parameters, errors = parameters | derived, errors | their_errors
     return AcceptedCause(answer_name(cause.physics), dict(location), parameters, errors, evidence)
+
+
+def with_final_numbers(fitted: Fit, accepted: list[AcceptedCause]) -> list[AcceptedCause]:
+    """Accepted causes with the numbers, errors and directions of the final fit, which is that of the improved model.
+
+    Parameters
+    ----------
+    fitted
+        With all accepted causes.
+    accepted
+        In the order found, as they were when they were found; plain faults are left as they are.
+    """
+    told, place = [], 0
+    for one in accepted:
+        if one.name in FAULTS:
+            told.append(one)
+        elif one.name == "missing_mode":
+            told.append(accepted_mode(fitted, one.evidence))
+        else:
+            direction = fitted.explanation.causes[place].direction
+            location = one.location if direction is None else direction_of(fitted.explanation.causes[place])
+            told.append(accepted_cause(fitted, location, one.evidence, place))
+            place += 1
+    return told
 
 
 def _held(cause: Cause) -> Real:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft
 from scipy.ndimage import maximum_filter, median_filter
+from scipy.stats import t as student
 
 from .assessment import levels, through_structure
 from .explanation import predict_lines
@@ -47,11 +48,32 @@ class Tone:
         Of each response, mean over recordings.
     gain
         Twice the log likelihood gained.
+    spread : (n_responses,)
+        Standard error of the amplitudes: how far recordings differ, for a mean over few of them.
     """
 
     frequency: float
     amplitudes: Real
     gain: float
+    spread: Real
+
+
+def mean_and_error(sizes: list[Real]) -> tuple[Real, Real]:
+    """Mean over recordings of amplitudes (n_responses,) each, and its standard error: 1.96 of it make 95 %.
+
+    The spread is widened by Student's t and not divided by the number of recordings, as a tone that changes from one
+    to the next has no one amplitude; of a single recording no error is known (not a number).
+
+    Examples
+    --------
+    >>> mean, error = mean_and_error([np.array([1.0]), np.array([1.2]), np.array([1.1])])
+    >>> float(mean[0].round(3)), float(error[0].round(3))
+    (1.1, 0.22)
+    """
+    mean = np.asarray(np.mean(sizes, axis=0))
+    if len(sizes) < 2:
+        return mean, np.full(len(mean), np.nan)
+    return mean, np.asarray(np.std(sizes, axis=0, ddof=1) * student.ppf(0.975, len(sizes) - 1) / 1.96)
 
 
 def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
@@ -76,7 +98,8 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
         exact = sharp_frequency(_rests(fitted, lines), [one.trial.rate for one in lines], frequency)
         # the lines beside it seemed to stand out as much; how strong it is does not depend on how far it leaks
         shown = [_at(above_neighbours(power, NEAR), one, exact) for one, power in zip(lines, powers, strict=True)]
-        return Tone(exact, _amplitudes(fitted, lines, exact), 2 * float(np.sum(shown)))
+        sizes, spread = mean_and_error(_amplitudes(fitted, lines, exact))
+        return Tone(exact, sizes, 2 * float(np.sum(shown)), spread)
     return None
 
 
@@ -225,11 +248,11 @@ def force_contrast(lines: WindowedLines) -> Real:
     return np.asarray(maximum_filter(above_neighbours(power, NEAR), 3))
 
 
-def _amplitudes(fitted: Fit, lines: list[WindowedLines], frequency: float) -> Real:
+def _amplitudes(fitted: Fit, lines: list[WindowedLines], frequency: float) -> list[Real]:
     found = []
     for one in lines:
         rest = one.measured - predict_lines(fitted.explanation, one).response
         k = int(np.argmin(np.abs(one.frequencies - frequency)))
         power = np.sum(np.abs(rest[max(0, k - 2) : k + 3]) ** 2, axis=0)
         found.append(2 * np.sqrt(power / len(one.window)))
-    return np.asarray(np.mean(found, axis=0))
+    return found

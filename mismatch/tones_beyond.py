@@ -4,7 +4,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .explanation import Explanation, predict_lines
-from .tones import NEAR, REACH, TONE_CONTRAST, Tone, is_comb, seen_together, sharp_contrast, sharp_frequency
+from .tones import (
+    NEAR,
+    REACH,
+    TONE_CONTRAST,
+    Tone,
+    is_comb,
+    mean_and_error,
+    seen_together,
+    sharp_contrast,
+    sharp_frequency,
+)
 from .windowed_lines import WindowedLines, windowed_lines
 
 Complex = NDArray[np.complex128]
@@ -70,4 +80,5 @@ def _tone(above: list[WindowedLines], rests: list[Complex], near: float, contras
         k = int(np.argmin(np.abs(one.frequencies - frequency)))
         power = np.sum(np.abs(rest[max(0, k - 2) : k + 3]) ** 2, axis=0)
         sizes.append(2 * np.sqrt(power / len(one.window)))
-    return Tone(frequency, np.asarray(np.mean(sizes, axis=0)), 2 * contrast)
+    mean, spread = mean_and_error(sizes)
+    return Tone(frequency, mean, 2 * contrast, spread)

@@ -109,13 +109,32 @@ def summary(diagnosis: Diagnosis) -> list[str]:
         lines.append(f"{cause.name}{f' ({place})' if place else ''}: {numbers}; evidence {cause.evidence:.0f}")
     if diagnosis.equivalents:
         lines.append(f"cannot be told from: {', '.join(diagnosis.equivalents)}")
+    if diagnosis.verdict == "partly explained":
+        lines.append(
+            f"{100 * diagnosis.improvement.after:.3g} % of the held-out response is still not predicted, more than a "
+            "whole explanation may leave"
+        )
+    lines += [
+        f"{one.name} is not told: {one.location['impossible']}"
+        for one in diagnosis.candidates
+        if one.stage == "impossible"
+    ][:1]
     if diagnosis.verdict == "unexplained":
         lines.append(
             f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal: a cause is missing"
         )
-    gain = diagnosis.improvement
-    lines.append(
-        f"error on {gain.held_out}, held out: {100 * gain.before:.3g} % nominal, {100 * gain.refitted:.3g} % refitted, "
-        f"{100 * gain.after:.3g} % improved, noise {100 * gain.noise_floor:.3g} %, p = {gain.p_value:.2g}"
-    )
+    lines.append(_error_line(diagnosis))
     return lines
+
+
+def _error_line(diagnosis: Diagnosis) -> str:
+    """Errors on the recording held out."""
+    gain = diagnosis.improvement
+    said = (
+        f"{100 * gain.before:.3g} % nominal, {100 * gain.refitted:.3g} % refitted, {100 * gain.after:.3g} % improved, "
+        f"noise {100 * gain.noise_floor:.3g} %"
+    )
+    if len(diagnosis.lines) < 2:
+        return f"error on {gain.held_out}, the only recording, so not held out: {said}"
+    test = f", p = {gain.p_value:.2g} that improved is no better than {gain.against}" if diagnosis.physics else ""
+    return f"error on {gain.held_out}, held out: {said}{test}"

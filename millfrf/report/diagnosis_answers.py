@@ -52,18 +52,39 @@ def number(value: float, error: float | None = None) -> str:
 def verdict_sentence(diagnosis: Diagnosis) -> str:
     """The whole result in one sentence."""
     gain = diagnosis.improvement
-    found = " and ".join(f"{words(cause.name)} ({next_test(cause.name).meaning})" for cause in diagnosis.physics)
+    found = " and ".join(f"{named(cause)} ({next_test(cause.name).meaning})" for cause in diagnosis.physics)
+    left = f"{100 * gain.after:.3g} % of the response on the held-out recording"
     if diagnosis.verdict == "none":
         return f"Nothing is missing: {next_test('none').meaning}."
     if diagnosis.verdict == "unexplained":
-        part = f" beside {found}" if found else ""
-        return f"Unexplained: {next_test('unexplained').meaning}{part}; no physics is named for it."
+        return f"Unexplained: {next_test('unexplained').meaning}; no physics is named for it. The model leaves {left}."
+    several = len(diagnosis.physics) > 1
     fall = (
-        f"; with {'it' if len(diagnosis.physics) == 1 else 'them'}, the error on the held-out recording falls from "
+        f"; with {'them' if several else 'it'}, the error on the held-out recording falls from "
         f"{100 * gain.before:.3g} % to {100 * gain.after:.3g} %, noise being {100 * gain.noise_floor:.3g} %"
     )
     fall = fall if gain.after < gain.before else ""
+    if diagnosis.verdict == "partly explained":
+        return (
+            f"Only partly explained: the model leaves out {found}{fall}. {'They help' if several else 'It helps'}, but "
+            f"{left} is still not predicted, more than a whole explanation may leave: something else is missing too, "
+            f"or {'these are' if several else 'this is'} not quite what is there."
+        )
     return f"The model leaves out {found}{fall}."
+
+
+def named(cause: AcceptedCause) -> str:
+    """Name of a cause; of a tone with its frequency.
+
+    Examples
+    --------
+    >>> named(AcceptedCause("unmeasured_excitation", {}, {"frequency_hz": 23.456}, {"frequency_hz": 0.01}, 80.0))
+    'unmeasured excitation at 23.456 ± 0.01 Hz'
+    """
+    if cause.name != "unmeasured_excitation":
+        return words(cause.name)
+    shown = number(cause.parameters["frequency_hz"], cause.standard_errors.get("frequency_hz"))
+    return f"{words(cause.name)} at {shown} Hz"
 
 
 def answers(diagnosis: Diagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
@@ -79,7 +100,7 @@ def answers(diagnosis: Diagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
 
 def where(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Place of each cause, then what the maps located."""
-    said = [f"{first_word(cause.name)}: {place(diagnosis, cause)}." for cause in diagnosis.physics]
+    said = [f"{named(cause)[:1].upper()}{named(cause)[1:]}: {place(diagnosis, cause)}." for cause in diagnosis.physics]
     if diagnosis.band is not None:
         said.append(f"Model and recordings are {diagnosis.band.sentence}.")
     located = diagnosis.located
@@ -160,20 +181,33 @@ def what(diagnosis: Diagnosis) -> tuple[str, ...]:
 
 def how_sure(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Evidence, and what it is worth on data that was held out."""
-    gain = diagnosis.improvement
     said = [
         f"{first_word(cause.name)}: evidence {cause.evidence:.0f} (twice the logarithm of the odds; 20 is the "
         "least that is accepted)."
         for cause in diagnosis.physics
     ]
-    said.append(
-        f"On {gain.held_out}, which the fit did not see, the error is {100 * gain.before:.3g} % of the response for "
-        f"the nominal model, {100 * gain.refitted:.3g} % refitted, {100 * gain.after:.3g} % for the final one; noise "
-        f"is {100 * gain.noise_floor:.3g} %. Final over nominal: {gain.interval[0]:.3g} to {gain.interval[1]:.3g} "
-        f"(95 % interval); that the causes do not help has p = {gain.p_value:.2g}."
-    )
+    said.append(_errors(diagnosis))
     said.append(f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal.")
     return tuple(said)
+
+
+def _errors(diagnosis: Diagnosis) -> str:
+    """Errors on the recording held out, and the test that was made on them."""
+    gain = diagnosis.improvement
+    told = (
+        f"the error is {100 * gain.before:.3g} % of the response for the nominal model, {100 * gain.refitted:.3g} % "
+        f"refitted, {100 * gain.after:.3g} % for the final one; noise is {100 * gain.noise_floor:.3g} %."
+    )
+    if len(diagnosis.lines) < 2:
+        return f"On {gain.held_out}, the only recording, {told} Nothing was held out, so nothing confirms this."
+    told = (
+        f"On {gain.held_out}, which the fit did not see, {told} Final over nominal: {gain.interval[0]:.3g} to "
+        f"{gain.interval[1]:.3g} (95 % interval)."
+    )
+    if not diagnosis.physics:
+        return told
+    than = "the refitted" if gain.against == "refitted" else "the nominal"
+    return f"{told} Chance that the final model is no better there than {than} one: p = {gain.p_value:.2g}."
 
 
 def rivals(diagnosis: Diagnosis) -> list[tuple[str, float]]:
@@ -198,7 +232,12 @@ def what_else(diagnosis: Diagnosis) -> tuple[str, ...]:
         top = max(cause.evidence for cause in diagnosis.physics)
         ending = f"less by {top - evidence:.0f}" if evidence < top else "but it was the weaker answer in its round"
         said.append(f"The nearest rival that was fitted is {words(name)} with evidence {evidence:.0f}, {ending}.")
-    elif others:
+    said += [
+        f"{first_word(one.name)} would fit with evidence {one.evidence:.0f}, but {one.location['impossible']}."
+        for one in diagnosis.candidates
+        if one.stage == "impossible"
+    ][:2]
+    if others and not diagnosis.physics:
         said.append(f"Nearest, but not accepted: {words(others[0][0])} with evidence {others[0][1]:.0f}.")
     for cause in diagnosis.physics[:1]:
         physics = form_of(cause.name, cause.parameters)
@@ -220,18 +259,21 @@ def which_test(diagnosis: Diagnosis) -> tuple[str, ...]:
 def warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
     """What should make a reader careful."""
     gain, said = diagnosis.improvement, [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in diagnosis.doubts]
-    final = diagnosis.final.explanation
-    improved = final.causes or final.shape.added
     if len(diagnosis.lines) < 2:
         said.append("There is a single recording: nothing could be held out, and errors are those of the fit.")
     elif len(diagnosis.lines) < 3:
         said.append("There are two recordings only: how the residual grows with the level is known from two points.")
-    if improved and gain.p_value > 0.01:
+    if diagnosis.physics and len(diagnosis.lines) > 1 and gain.p_value > 0.01:
         said.append(f"On the held-out recording the improvement is not significant (p = {gain.p_value:.2g}).")
+    if not diagnosis.physics and gain.refitted > max(gain.before, 1.5 * gain.noise_floor):
+        said.append(
+            "Refitted without the recording that was held out, the model predicts it worse than the nominal one does: "
+            "the other recordings alone do not determine its modes, so keep the nominal model."
+        )
     if gain.after > 1.5 * gain.noise_floor:
         said.append(
             f"On the held-out recording the final model's error is {gain.after / gain.noise_floor:.2g} times the noise."
         )
-    if diagnosis.verdict == "explained" and diagnosis.leftover > 0.1:
+    if "explained" in diagnosis.verdict and diagnosis.physics and diagnosis.leftover > 0.1:
         said.append(f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal.")
     return tuple(said)

@@ -10,6 +10,7 @@ from mismatch import Candidate, Diagnosis
 from mismatch.free_form_law import free_form_laws
 from mismatch.held_out_spectra import held_out_spectra
 from mismatch.locate import significant_cells
+from mismatch.recording_errors import recording_errors
 from mismatch.residual_view import ResidualView
 
 from ..figures.diagnosis_growth import growth_figure
@@ -25,16 +26,10 @@ MOST_CANDIDATES = 15
 
 
 def location_section(view: ResidualView) -> Section:
-    """Maps of the residual, and a table by recording."""
+    """Maps of the residual."""
     diagnosis = view.diagnosis
     located = diagnosis.located
     level = 100 * located["family_wise_level"]
-    rows = tuple(
-        (row["recording"], f"{row['force_rms_n']:.4g}", f"{row['before']:.3g}", f"{row['after']:.3g}")
-        for row in located["levels"]
-    )
-    columns = ("recording", "force, rms (N)", "nominal model, refitted", "final model")
-    table = Table("Residual power over noise power (1: only noise is left)", columns, rows)
     mask = significant_cells(located, view.before.ratio.shape)
     maps = _picture(
         channel_map_figure(view, mask),
@@ -45,7 +40,7 @@ def location_section(view: ResidualView) -> Section:
     times = _picture(
         time_map_figure(view), "The same over time and frequency, all channels together.", "Residual by time"
     )
-    return Section("Where the residual sits", (), (table,), (maps, times))
+    return Section("Where the residual sits", (), (), (maps, times))
 
 
 def growth_section(diagnosis: Diagnosis) -> Section:
@@ -82,16 +77,28 @@ def law_section(diagnosis: Diagnosis) -> Section:
 
 def held_out_section(diagnosis: Diagnosis) -> Section:
     """Errors and spectra on the recording that was held out."""
-    gain = diagnosis.improvement
-    rows = (
-        ("nominal", f"{100 * gain.before:.3g}", f"{gain.before / gain.noise_floor:.3g}"),
-        ("nominal, refitted", f"{100 * gain.refitted:.3g}", f"{gain.refitted / gain.noise_floor:.3g}"),
-        ("final", f"{100 * gain.after:.3g}", f"{gain.after / gain.noise_floor:.3g}"),
-        ("noise", f"{100 * gain.noise_floor:.3g}", "1"),
+    rows = tuple(
+        (
+            f"{one.recording}{' (held out)' if one.held_out else ''}",
+            f"{one.force:.4g}",
+            *(f"{100 * error:.3g}" for error in (one.nominal, one.refitted, one.final, one.noise)),
+            f"{one.final / one.noise:.3g}",
+        )
+        for one in recording_errors(diagnosis)
     )
-    table = Table(
-        f"Error on {gain.held_out}, all channels together", ("model", "error (% of response)", "over noise"), rows
+    columns = (
+        "recording",
+        "force, rms (N)",
+        "nominal (%)",
+        "refitted (%)",
+        "final (%)",
+        "noise (%)",
+        "final over noise",
     )
+    without = "Error as a share of the response, all channels together"
+    if len(diagnosis.lines) > 1:
+        without += f"; fitted without {diagnosis.improvement.held_out}"
+    table = Table(without, columns, rows)
     spectra = held_out_spectra(diagnosis)
     caption = (
         f"{spectra.recording}: measured and predicted response, and what each model leaves of it, fitted to the other "
@@ -116,18 +123,20 @@ def number_section(diagnosis: Diagnosis) -> Section:
 
 def candidate_section(diagnosis: Diagnosis) -> Section:
     """What was weighed."""
-    accepted = {cause.name for cause in diagnosis.physics}
+    accepted = {cause.name: cause.evidence for cause in diagnosis.physics}
     rows, seen = [], set()
     for one in sorted(diagnosis.candidates, key=lambda one: (one.stage != "fitted", -one.evidence)):
         key = (one.name, one.stage, str(one.location) if "channel" in one.location else "")
         if key in seen or not np.isfinite(one.evidence):
             continue
         seen.add(key)
-        status = "accepted" if one.name in accepted and one.stage == "fitted" else ""
-        rows.append((words(one.name), one.stage, f"{one.evidence:.0f}", _short_place(one), status))
+        told = one.name in accepted and one.stage == "fitted"
+        evidence = accepted[one.name] if told else one.evidence
+        rows.append((words(one.name), one.stage, f"{evidence:.0f}", _short_place(one), "accepted" if told else ""))
     sentence = (
         "Screened: gain in misfit to first order, before a fit. Fitted: gain in evidence after all numbers were fitted "
-        "anew and the joint simulated freely; the larger, the better. Of each cause the best round is shown."
+        "anew and the joint simulated freely; the larger, the better. Of each cause the best round is shown; of an "
+        "accepted one the evidence it was accepted with. Impossible: fitted, but with numbers that nothing real has."
     )
     table = Table(
         "Causes that were weighed", ("cause", "stage", "evidence", "place", ""), tuple(rows[:MOST_CANDIDATES])
@@ -138,7 +147,7 @@ def candidate_section(diagnosis: Diagnosis) -> Section:
 def _short_place(one: Candidate) -> str:
     if "direction" in one.location:
         return "(" + ", ".join(f"{value:.2f}" for value in one.location["direction"]) + ")"
-    return str(one.location.get("channel", ""))
+    return str(one.location.get("impossible", one.location.get("channel", "")))
 
 
 def _picture(figure: Figure, caption: str, alternative: str) -> Picture:

@@ -45,5 +45,11 @@ class DynamometerAxes:
         found = {axis: resonance_of(float(values[k]), float(values[3])) for k, axis in enumerate("xyz")}
         return {f"{axis}_{name}": value for axis, one in found.items() for name, value in one.items()}
 
+    def impossible(self, values: Real, margin: Real) -> str:
+        """Why these numbers cannot be, beyond a margin for their errors; empty where they can."""
+        if values[3] >= -margin[3]:
+            return ""
+        return f"a dynamometer cannot have a negative damping, {values[3]:.3g} s"
+
 
 PHYSICS = DynamometerAxes()

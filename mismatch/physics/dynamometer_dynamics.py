@@ -40,5 +40,11 @@ class DynamometerDynamics:
         """Resonance and damping ratio."""
         return resonance_of(float(values[0]), float(values[1]))
 
+    def impossible(self, values: Real, margin: Real) -> str:
+        """Why these numbers cannot be, beyond a margin for their errors; empty where they can."""
+        if values[0] <= 0 or values[1] >= -margin[1]:
+            return ""
+        return f"a dynamometer cannot have a damping ratio of {self.derived(values)['damping_ratio']:.3g}"
+
 
 PHYSICS = DynamometerDynamics()

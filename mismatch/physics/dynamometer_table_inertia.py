@@ -36,5 +36,11 @@ class DynamometerTableInertia:
             moved[column, rows.index(axis)] = values[0]
         return Chain(feedback=s[:, None, None] ** 2 * moved)
 
+    def impossible(self, values: Real, margin: Real) -> str:
+        """Why these numbers cannot be, beyond a margin for their errors; empty where they can."""
+        if values[0] >= -margin[0]:
+            return ""
+        return f"a table cannot have a mass of {values[0]:.3g} kg; a tool lighter than the model's is other modes"
+
 
 PHYSICS = DynamometerTableInertia()

@@ -130,6 +130,15 @@ class LimitedPhysics(Protocol):
         ...
 
 
+@runtime_checkable
+class BoundedPhysics(Protocol):
+    """A cause whose numbers may have a sign that nothing real has: it is then said to be impossible, and not told."""
+
+    def impossible(self, values: Real, margin: Real) -> str:
+        """Why numbers cannot be, beyond a margin (n_parameters,) for their errors; empty where they can."""
+        ...
+
+
 Physics = ChainPhysics | JointPhysics
 
 

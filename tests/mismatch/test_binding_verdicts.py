@@ -1,0 +1,184 @@
+"""Verdicts bind: what a held-out recording must confirm, what an answer may leave, and numbers that cannot be."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from concealed_recordings import RATE, Concealed, forces, linear_acceleration, trial
+
+from millfrf.report.diagnosis_answers import named, verdict_sentence
+from mismatch import Diagnosis, Explanation, LabError, ModelShape, Trial, band_of, diagnose, windowed_lines
+from mismatch.acceptance import LEAST_EVIDENCE
+from mismatch.confirmed import helps
+from mismatch.diagnosis import AcceptedCause, Improvement
+from mismatch.fitting import Fit, fit
+from mismatch.held_out import block_powers
+from mismatch.leftover import leftover
+from mismatch.physics import library
+from mismatch.recording_errors import recording_errors
+from mismatch.verdict import MOST_LEFT, MOST_OF_RESPONSE, leaves_too_much, share_left, verdict_of
+from modal_fit import ModalModel
+
+TONE = 11.37
+
+
+@pytest.fixture(scope="module")
+def with_tone(model: ModalModel) -> Diagnosis:
+    """A steady tone of a tenth to a half of the response, from a machine nearby."""
+    rng, made = np.random.default_rng(21), []
+    for name, level in (("low", 20.0), ("high", 60.0)):
+        force = forces(rng, level, 24.0)
+        clean = linear_acceleration(model, force)
+        shaken = clean + 0.08 * np.sin(2 * np.pi * TONE * np.arange(len(force)) / RATE + rng.uniform(0, 6))[:, None]
+        made.append(trial(name, force, shaken, rng))
+    return diagnose(model, made)
+
+
+def test_the_p_value_of_a_tone_agrees_with_its_error(with_tone: Diagnosis) -> None:
+    """The error falls, and so the test says that it falls: both are of the recording as it was measured."""
+    gain = with_tone.improvement
+    assert [cause.name for cause in with_tone.physics] == ["unmeasured_excitation"]
+    assert gain.after < 0.7 * gain.refitted
+    assert gain.after < 1.3 * gain.noise_floor
+    assert gain.against == "refitted"
+    assert gain.p_value < 0.01
+    assert gain.interval[0] <= gain.after / gain.before <= gain.interval[1]
+
+
+def test_a_tone_is_told_with_its_frequency(with_tone: Diagnosis) -> None:
+    cause = with_tone.physics[0]
+    assert cause.parameters["frequency_hz"] == pytest.approx(TONE, abs=0.01)
+    assert set(cause.parameters) == set(cause.standard_errors)
+    shown = f"at {cause.parameters['frequency_hz']:.4f}"
+    assert shown in named(cause)
+    assert shown in verdict_sentence(with_tone)
+
+
+def test_errors_of_the_held_out_recording_are_told_once(with_tone: Diagnosis) -> None:
+    gain = with_tone.improvement
+    (held,) = (one for one in recording_errors(with_tone) if one.held_out)
+    assert held.recording == gain.held_out
+    told = (held.nominal, held.refitted, held.final)
+    assert told == pytest.approx((gain.before, gain.refitted, gain.after), rel=1e-9)
+    assert held.noise == pytest.approx(gain.noise_floor, rel=1e-9)
+
+
+def test_powers_in_blocks_sum_to_that_of_the_lines(with_tone: Diagnosis) -> None:
+    lines = with_tone.lines[0]
+    whole = float(np.sum(np.abs(lines.measured) ** 2))
+    assert block_powers(lines, lines.measured).sum() == pytest.approx(whole, rel=1e-9)
+
+
+def _gain(before: float, refitted: float, after: float, noise: float, p: float, evidence: float) -> Improvement:
+    return Improvement("mid", before, refitted, after, noise, p, (0.1, 2.0), evidence)
+
+
+def _fit(misfit: float) -> Fit:
+    fitted: Fit = object.__new__(Fit)
+    object.__setattr__(fitted, "misfit", misfit)
+    return fitted
+
+
+@pytest.mark.parametrize(
+    ("gain", "gained", "told"),
+    [
+        (_gain(0.5, 0.2, 0.1, 0.1, 1e-6, 900.0), 1000.0, True),
+        (_gain(0.526, 0.48, 0.491, 0.3, 0.98, 2000.0), 60000.0, False),  # the error rises over that of a refit
+        (_gain(0.5, 0.2, 0.19, 0.1, 0.4, 900.0), 1000.0, False),  # it falls by chance
+        (_gain(0.5, 0.2, 0.1, 0.1, 1e-6, 2.0), 1000.0, False),  # likelier nowhere but where it was fitted
+        (_gain(0.17, 0.015, 0.016, 0.015, 0.6, 0.0), LEAST_EVIDENCE / 2, True),  # a gain error: as good as any refit
+        (_gain(0.015, 0.015, 0.016, 0.015, 0.6, 0.0), LEAST_EVIDENCE / 2, False),  # no better than the nominal model
+    ],
+)
+def test_what_a_held_out_recording_must_confirm(gain: Improvement, gained: float, told: bool) -> None:
+    assert helps(gain, _fit(-gained), _fit(0.0)) is told
+
+
+def test_what_an_answer_may_leave() -> None:
+    assert not leaves_too_much(_gain(0.3, 0.2, 0.1, 0.1, 0.0, 99.0))
+    assert leaves_too_much(_gain(0.799, 0.943, 0.558, 0.25, 0.0, 99.0))
+    assert leaves_too_much(_gain(0.9, 0.5, MOST_OF_RESPONSE + 0.01, 0.3, 0.0, 99.0))  # noise, or not: nothing shows it
+    half = _gain(0.2, 0.2, 0.1, 0.05, 0.0, 99.0)
+    assert share_left(half) == pytest.approx(0.2)
+    assert share_left(half) > MOST_LEFT
+    assert leaves_too_much(half)
+
+
+def test_a_quarter_of_the_response_left_is_not_none(
+    small_model: ModalModel,
+    trial_of: Callable[[ModalModel, str, float, int], Trial],
+    hand_made: Callable[[ModalModel, list[Trial]], Diagnosis],
+) -> None:
+    known = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1)])
+    left = leftover(known.final.explanation, list(known.lines))
+    good, bad = _gain(0.1, 0.1, 0.1, 0.1, 1.0, 0.0), _gain(0.5, 0.5, 0.5, 0.5, 1.0, 0.0)
+    assert verdict_of(known.final, [], left, left, good) == "none"
+    assert verdict_of(known.final, [], left, left, bad) == "unexplained"
+    tone = [AcceptedCause("unmeasured_excitation", {}, {"frequency_hz": 9.0}, {"frequency_hz": 0.1}, 99.0)]
+    assert verdict_of(known.final, tone, left, left, good) == "explained"
+    assert verdict_of(known.final, tone, left, left, bad) == "partly explained"
+
+
+def test_impossible_numbers_are_said_to_be_so() -> None:
+    table, margin = library()["dynamometer_table_inertia"], np.array([0.5])
+    assert "-14.8 kg" in table.impossible(np.array([-14.8]), margin)
+    assert table.impossible(np.array([-0.4]), margin) == ""
+    assert table.impossible(np.array([14.8]), margin) == ""
+    force_cell, slack = library()["dynamometer_dynamics"], np.array([1e-8, 1e-5])
+    assert "damping" in force_cell.impossible(np.array([2e-6, -1e-3]), slack)
+    assert force_cell.impossible(np.array([2e-6, 1e-4]), slack) == ""
+    axes, room = library()["dynamometer_axes"], np.full(4, 1e-5)
+    assert "damping" in axes.impossible(np.array([2e-6, 2e-6, 2e-6, -1e-3]), room)
+
+
+def test_a_table_of_negative_mass_is_not_told(model: ModalModel) -> None:
+    """A structure that lacks 4 kg at the tip: the mass fits best, and no table weighs minus 4 kg."""
+    made = []
+    rng = np.random.default_rng(31)
+    for name, level in (("low", 20.0), ("high", 60.0)):
+        force = forces(rng, level, 24.0)
+        n = len(force)
+        s = 2j * np.pi * np.fft.rfftfreq(2 * n, 1 / RATE)[:, None, None]
+        receptance = model.receptance(s[:, 0, 0].imag / 2 / np.pi)
+        lighter = np.linalg.solve(np.eye(2) - 4.0 * s**2 * receptance, receptance)
+        spectrum = np.einsum("kpq,kq->kp", s**2 * lighter, np.fft.rfft(force, n=2 * n, axis=0))
+        made.append(trial(name, force, np.fft.irfft(spectrum, n=2 * n, axis=0)[:n], rng))
+    found = diagnose(model, made)
+    assert "dynamometer_table_inertia" not in [cause.name for cause in found.physics]
+    reasons = [one.location["impossible"] for one in found.candidates if one.stage == "impossible"]
+    assert any("a table cannot have a mass of -" in reason for reason in reasons)
+
+
+def _periodic(model: ModalModel, law: bool) -> Trial:
+    """Four periods of 8 s."""
+    rng = np.random.default_rng(41)
+    force = np.tile(forces(rng, 40.0, 8.0), (4, 1))
+    if law:
+        response = Concealed(lambda x, v: 25 * float(np.tanh(v / 2e-3)), np.array([0.8, -0.6])).acceleration(
+            model, force
+        )
+    else:
+        response = linear_acceleration(model, force)
+    return trial("steady", force, response, rng)
+
+
+@pytest.mark.parametrize("law", [False, True])
+def test_what_repeats_with_the_force_is_no_noise(model: ModalModel, law: bool) -> None:
+    """A steady periodic test has no times of more and of less signal; a missing law repeats, noise does not."""
+    one = _periodic(model, law)
+    lines = [windowed_lines(one, band_of(model, RATE), float((-model.poles.real).min()))]
+    shape = ModelShape(model, LabError())
+    base = fit(lines, Explanation(shape, np.zeros(shape.size)))
+    share = leftover(base.explanation, lines).share
+    assert share > 0.7 if law else share < 0.05
+
+
+def test_accepted_numbers_are_those_of_the_improved_model(model: ModalModel, linear_trials: list[Trial]) -> None:
+    """A gain error found in a model that is off too: told numbers and final explanation are one."""
+    wrong = [replace(one, response=one.response * np.array([1.0, 1.25])) for one in linear_trials]
+    found = diagnose(model, wrong)
+    causes = [cause for cause in found.physics if cause.name == "gain_error"]
+    assert len(causes) == 1
+    held = [cause for cause in found.final.explanation.causes if cause.physics.name == "gain_error"]
+    assert causes[0].parameters["gain_minus_one"] == pytest.approx(float(held[0].values[0]), rel=1e-9)
