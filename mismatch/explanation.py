@@ -12,7 +12,7 @@ from modal_fit import ModalModel
 
 from .joint_law import JointLaw, JointMotion
 from .joint_simulation import JointResponse, common_axes, driven_force, joint_response
-from .physics import Chain, ChainPhysics, JointPhysics, Physics
+from .physics import Chain, ChainPhysics, JointPhysics, LimitedPhysics, Physics
 from .shape_of_model import ModelShape
 from .windowed_lines import WindowedLines, displacement_at, receptance_at
 
@@ -93,6 +93,13 @@ def direction_of(cause: Cause) -> dict[str, Any]:
     assert cause.direction is not None
     direction = cause.direction * np.sign(cause.direction[np.argmax(np.abs(cause.direction))])
     return {"direction": [round(float(x), 6) for x in direction]}
+
+
+def held_values(cause: Cause) -> Real:
+    """The numbers that a law goes by, brought within what its name means."""
+    if isinstance(cause.physics, LimitedPhysics) and cause.motion is not None:
+        return cause.physics.held(cause.values, cause.motion)
+    return cause.values
 
 
 def across(direction: Real) -> Real:

@@ -1,6 +1,6 @@
 """What numbers owe to the form of the law: how far parts of the recordings disagree on them beyond noise."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,15 +10,19 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from .assessment import through_structure
-from .explanation import predict_lines
-from .fitting import Fit
+from .explanation import held_values, predict_lines
+from .fitting import Fit, fit
 from .held_out import block_slices
 from .jacobian import jacobian
 from .noise_model import NoiseModel, whitening
+from .physics import JointPhysics
 from .windowed_lines import WindowedLines
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+
+WIDER, WORSE = 15, 20.0
+"""Steps at most of a fit of a wider form, and score by which it may be worse: else it did not end."""
 
 PARTS = 3
 """Of each recording, by how hard the structure moves: weak, middle, strong."""
@@ -33,12 +37,13 @@ NORMAL = 1.959964
 def with_form_spread(fitted: Fit, lines: Sequence[WindowedLines]) -> Fit:
     """A fit whose covariance holds, beside the noise, what its numbers owe to the form of their laws.
 
-    A law of another form is matched best by other numbers where the motion is small than where it is large. Each
-    recording is cut into blocks of time, and these are put into a weak, a middle and a strong part; each part g has its
-    own answer ``theta_g = theta + N_g^-1 J_g^T V^-1 r_g`` for every number, to first order and with the modes held.
-    Where the parts disagree beyond their noise (Cochran's Q), the variance between them (DerSimonian & Laird 1986,
-    Controlled Clinical Trials 7) is added, widened by Student's t for the few parts: it is not divided by their number,
-    as a wrong form does not average out.
+    A law that has a wider form, one shape number more, is fitted in that form too: what its numbers then differ, and
+    how much less surely they are known, counts. And a law of another form is matched best by other numbers where the
+    motion is small than where it is large. Each recording is cut into blocks of time, and these are put into a weak, a
+    middle and a strong part; each part g has its own answer ``theta_g = theta + N_g^-1 J_g^T V^-1 r_g`` for every
+    number, to first order and with the modes held. Where the parts disagree beyond their noise (Cochran's Q), the
+    variance between them (DerSimonian & Laird 1986, Controlled Clinical Trials 7) is added, widened by Student's t for
+    the few parts: it is not divided by their number, as a wrong form does not average out.
 
     Parameters
     ----------
@@ -53,10 +58,41 @@ def with_form_spread(fitted: Fit, lines: Sequence[WindowedLines]) -> Fit:
     told = told[(told < shape.modal_size) | (told >= shape.size)]
     modal = np.concatenate([np.arange(first, first + 2) for first in range(0, believed, shape.per_mode)])
     extra = np.zeros(fitted.explanation.size)
-    extra[modal] = _between(fitted, lines, modal)
+    extra += _of_wider_forms(fitted, list(lines))
+    extra[modal] += _between(fitted, lines, modal)
     if len(told):
-        extra[told] = _between(fitted, lines, told)
+        extra[told] += _between(fitted, lines, told)
     return replace(fitted, covariance=fitted.covariance + np.diag(extra))
+
+
+def _of_wider_forms(fitted: Fit, lines: list[WindowedLines]) -> Real:
+    """Variance that each number gains when its law may take a wider form, (size,).
+
+    The wider law is fitted like the named one; what its number differs, squared, and how much less surely it is known
+    are what the named number owes to the form.
+    """
+    extra = np.zeros(fitted.explanation.size)
+    at = fitted.explanation.shape.size
+    for place, cause in enumerate(fitted.explanation.causes):
+        own, at = slice(at, at + len(cause.values)), at + cause.size
+        make: Callable[[], tuple[JointPhysics, float]] | None = getattr(cause.physics, "wider", None)
+        if make is None:
+            continue
+        physics, shape_number = make()
+        wider = replace(cause, physics=physics, values=np.append(held_values(cause), shape_number))
+        causes = list(fitted.explanation.causes)
+        causes[place] = wider
+        try:
+            again = fit(lines, replace(fitted.explanation, causes=tuple(causes)), fitted.noises, iterations=WIDER)
+        except np.linalg.LinAlgError:
+            continue
+        if again.score > fitted.score + WORSE:
+            continue
+        there = again.explanation.causes[place].coordinates()[: len(cause.values)]
+        moved = there - cause.coordinates()[: len(cause.values)]
+        gained = np.diag(again.covariance)[own] - np.diag(fitted.covariance)[own]
+        extra[own] = moved**2 + np.maximum(gained, 0.0)
+    return extra
 
 
 def _between(fitted: Fit, lines: Sequence[WindowedLines], which: NDArray[np.int64]) -> Real:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft
 from scipy.stats import wilcoxon
 
+from .acceptance import HELD_OUT
 from .assessment import least_misfit, through_structure
 from .diagnosis import AcceptedCause, Improvement
 from .explanation import Explanation, predict_lines
@@ -125,7 +126,7 @@ def scored(
     if len(recordings.mended) > 1 and whole:
         mended = recordings.mended[kept]
         evidence = least_misfit(linear, mended) - least_misfit(improved, mended)
-    against = "refitted" if whole and (faults or evidence > 0) else "nominal"
+    against = "refitted" if whole and (faults or evidence > HELD_OUT) else "nominal"
     rival = rests[1] if against == "refitted" else rests[0]
     improvement = Improvement(
         here.trial.name,

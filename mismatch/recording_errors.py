@@ -51,8 +51,8 @@ def recording_errors(diagnosis: Diagnosis) -> tuple[RecordingError, ...]:
         )
         power = float(np.sum(np.abs(one.measured) ** 2))
         covariance = noise.covariance(one.frequencies, through_structure(improved, one))
-        errors = [float(np.sqrt(np.sum(np.abs(rest) ** 2) / power)) for rest in rests]
+        nominal, refitted, final = (float(np.sqrt(np.sum(np.abs(rest) ** 2) / power)) for rest in rests)
         floor = float(np.sqrt(np.sum(np.trace(covariance, axis1=1, axis2=2).real) / power))
         held = one.trial.name == diagnosis.improvement.held_out and len(diagnosis.lines) > 1
-        found.append(RecordingError(one.trial.name, held, one.trial.level, *errors, floor))
+        found.append(RecordingError(one.trial.name, held, one.trial.level, nominal, refitted, final, floor))
     return tuple(found)

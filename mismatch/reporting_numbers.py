@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .diagnosis import AcceptedCause
-from .explanation import Cause, direction_of
+from .explanation import Cause, direction_of, held_values
 from .fitting import Fit
-from .physics import LimitedPhysics, answer_name
+from .physics import answer_name
 from .shown_faults import FAULTS
 
 Real = NDArray[np.float64]
@@ -23,7 +23,7 @@ def accepted_cause(fitted: Fit, location: dict[str, object], evidence: float, pl
     spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     parameters, errors = {}, {}
     # beyond a limit that the motion sets a number changes nothing, and its error says so
-    for parameter, value, error in zip(cause.physics.parameters, _held(cause), spread, strict=False):
+    for parameter, value, error in zip(cause.physics.parameters, held_values(cause), spread, strict=False):
         parameters[parameter.name] = float(value)
         errors[parameter.name] = float(error * parameter.unit_step * (abs(value) if parameter.logarithmic else 1.0))
     derived, their_errors = _derived(cause, covariance)
@@ -53,13 +53,6 @@ def with_final_numbers(fitted: Fit, accepted: list[AcceptedCause]) -> list[Accep
             told.append(accepted_cause(fitted, location, one.evidence, place))
             place += 1
     return told
-
-
-def _held(cause: Cause) -> Real:
-    """The numbers that a law goes by."""
-    if isinstance(cause.physics, LimitedPhysics) and cause.motion is not None:
-        return cause.physics.held(cause.values, cause.motion)
-    return cause.values
 
 
 def _derived(cause: Cause, covariance: Real) -> tuple[dict[str, float], dict[str, float]]:

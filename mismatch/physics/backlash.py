@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from ..joint_law import JointLaw, JointMotion
 from .protocol import Parameter
+from .smooth_backlash import SmoothBacklash
 
 Real = NDArray[np.float64]
 
@@ -23,6 +24,10 @@ class Backlash:
         "stiffness_hardening",
         "stiffness_softening",
     )
+
+    def wider(self) -> tuple[SmoothBacklash, float]:
+        """The law with one shape number more, and the number at which it is as this one, or nearly."""
+        return SmoothBacklash(), 8.0
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
         """Shapes to try, amplitude 1."""

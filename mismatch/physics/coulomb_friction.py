@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from ..joint_law import JointLaw, JointMotion
 from .protocol import DRY, Parameter
+from .wider_forms import SHARPNESS, WiderFriction
 
 Real = NDArray[np.float64]
 
@@ -23,6 +24,10 @@ class CoulombFriction:
         "hysteresis",
         "quadratic_damping",
     )
+
+    def wider(self) -> tuple[WiderFriction, float]:
+        """The law with one shape number more, and the number at which it is as this one, or nearly."""
+        return WiderFriction((*self.parameters, SHARPNESS)), 2.6
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
         """Shapes to try, amplitude 1."""

@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from ..joint_law import JointLaw, JointMotion
 from .protocol import DRY, Parameter
+from .wider_forms import SPREAD, WiderPresliding
 
 Real = NDArray[np.float64]
 
@@ -34,6 +35,10 @@ class PreslidingFriction:
         "hysteresis",
         "quadratic_damping",
     )
+
+    def wider(self) -> tuple[WiderPresliding, float]:
+        """The law with one shape number more, and the number at which it is as this one, or nearly."""
+        return WiderPresliding((*self.parameters, SPREAD)), 0.8
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
         """Shapes to try, amplitude 1."""

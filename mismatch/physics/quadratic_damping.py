@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from ..joint_law import JointLaw, JointMotion
 from .protocol import Parameter
+from .wider_forms import POWER, WiderDamping
 
 Real = NDArray[np.float64]
 
@@ -17,6 +18,10 @@ class QuadraticDamping:
     source = "Worden & Tomlinson, Nonlinearity in Structural Dynamics, section 2.2"
     parameters = (Parameter("damping_ns2_per_m2", "N s^2/m^2", 0.1, 0.0, 1e12, logarithmic=True),)
     confusable_with = ("coulomb_friction",)
+
+    def wider(self) -> tuple[WiderDamping, float]:
+        """The law with one shape number more, and the number at which it is as this one, or nearly."""
+        return WiderDamping((*self.parameters, POWER)), 2.0
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
         """Shapes to try, amplitude 1."""

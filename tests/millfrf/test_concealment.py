@@ -66,6 +66,7 @@ def diagnosis(verdict: str, *names: str, equivalents: tuple[str, ...] = ()) -> d
         ("none", diagnosis("none"), "right"),
         ("none", diagnosis("explained", "backlash"), "wrong"),
         ("backlash", diagnosis("explained", "backlash"), "right"),
+        ("backlash", diagnosis("partly explained", "backlash"), "right, in part"),
         ("backlash", diagnosis("explained", "backlash", "clipping"), "right, and more"),
         ("backlash", diagnosis("explained", "hysteresis", equivalents=("backlash",)), "right within a class"),
         ("backlash", diagnosis("explained", "hysteresis"), "wrong"),

@@ -8,6 +8,9 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from millfrf.chain.fit import FitOptions, fit_recordings
+from mismatch import diagnose, read_trials
+
 pytestmark = pytest.mark.shared_data
 
 
@@ -72,3 +75,18 @@ def test_linear_model_of_the_mirror_holds_at_its_own_amplitude_only(shared_data:
     assert mirror.left_over(folder, frf, 100) > 0.1
     assert noise < 3e-5
     assert distortion > 30 * noise
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("band", [(4.0, 10.0), (2.0, 15.0)])
+def test_no_confident_wrong_answer_on_an_aircraft(shared_data: Path, band: tuple[float, float]) -> None:
+    """F-16 ground vibration: a bolted interface that the library cannot imitate; its periods repeat to 1 %, so that
+    what is left is no noise. A table's mass, a gain or a resonating force cell are no answer."""
+    files = [shared_data / "f16-ground-vibration" / f"level_{level}.h5" for level in (1, 3)]
+    model = fit_recordings(files[:1], FitOptions(band)).model
+    found = diagnose(model, read_trials(files, model))
+    assert found.verdict == "unexplained"
+    assert found.physics == ()
+    assert found.leftover > 0.9
+    assert found.band is not None
+    assert found.band.edges == band
