@@ -8,10 +8,7 @@ from pathlib import Path
 from acquisition import Recording
 from cutting import MillingProcess
 from foundation import InputError
-from mismatch import AcceptedCause
 from mismatch.cutting_causes import (
-    COEFFICIENTS,
-    CutDiagnosis,
     diagnose_cut,
     read_cut_recording,
     write_cut_diagnosis,
@@ -23,10 +20,7 @@ from ..gate import check_depth, check_one_speed, check_recordings, read_checked_
 from ..progress import bar
 from ..report.cut_diagnosis_page import write_cut_report
 from ..result_folder import refuse_file
-from ..tables import with_error
-
-UNITS = {"radial_offset_m": ("µm", 1e6), "angle_rad": ("deg", 180 / math.pi), "coefficient_n_per_m": ("kN/m", 1e-3)}
-"""How numbers are told to a reader: unit and factor from SI."""
+from .diagnosis_words import summary
 
 
 @dataclass(frozen=True)
@@ -90,46 +84,3 @@ def _checked(paths: Sequence[Path], process: MillingProcess, asking: Asking) -> 
         if "force" in kinds and kinds & {"acceleration", "velocity", "displacement"}:
             judged.append(path)  # what the others lack is said where it is needed
     return doubts + (check_recordings(judged, stream=asking.stream, watch=bar) if judged else [])
-
-
-def summary(found: CutDiagnosis) -> list[str]:
-    """A few lines for the terminal and the head of the report."""
-    better = found.improvement
-    lines = [f"verdict: {found.verdict}", _sentence(found), *(describe(cause) for cause in found.physics)]
-    if found.equivalents:
-        lines.append(f"cannot be told from: {', '.join(found.equivalents)}")
-    lines += [f"{one.name} was {one.stage}" for one in found.candidates if one.stage != "fitted"]
-    changed = "" if found.verdict == "unexplained" or not found.final.freed else f", {100 * better.after:.3g} % with it"
-    lines.append(
-        f"error of the force on blocks of time held out: {100 * better.before:.3g} % as computed, "
-        f"{100 * better.refitted:.3g} % with coefficients refitted{changed}; noise {100 * better.noise_floor:.3g} %"
-    )
-    return lines
-
-
-def describe(cause: AcceptedCause) -> str:
-    """One cause with its numbers, in a user's units."""
-    if cause.name == COEFFICIENTS:
-        names = cause.location["coefficients"]
-        numbers = [f"{name} {cause.parameters[name]:.4g} ± {cause.standard_errors[name]:.2g}" for name in names]
-    else:
-        numbers = [told(name, value, cause.standard_errors[name]) for name, value in cause.parameters.items()]
-    return f"{cause.name}: {', '.join(numbers)}; evidence {cause.evidence:.0f}"
-
-
-def told(name: str, value: float, error: float) -> str:
-    """One number with its error and unit."""
-    unit, factor = UNITS.get(name, ("", 1.0))
-    text = with_error(factor * value, factor * error)
-    return f"{name.rsplit('_', 1)[0] if unit else name} {text} {unit}".strip().replace("_n_per", "").replace("_", " ")
-
-
-def _sentence(found: CutDiagnosis) -> str:
-    left = 100 * found.leftover
-    if found.verdict == "none":
-        return "the computed force agrees with the measured one within noise and a lab's errors: nothing to change"
-    if found.verdict == "unexplained":
-        return (
-            f"the computed force is wrong in a way that no known cause explains; {left:.0f} % of the error stands out"
-        )
-    return f"the computed force leaves out what follows; {left:.0f} % of the error still stands out of the noise"

@@ -70,7 +70,7 @@ def cut_orders_figure(found: CutDiagnosis) -> Figure:
 
 def shown_fit(found: CutDiagnosis) -> CutFit:
     """What the improved cutting file stands for."""
-    return found.base if found.verdict == "unexplained" else found.final
+    return found.final
 
 
 def _draw(axes: Axes, orders: Real, values: Real, look: dict[str, object]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from foundation import writing_whole_file
-from mismatch.cutting_causes import CutDiagnosis
+from mismatch.cutting_causes import SIGNIFICANT, CutDiagnosis
 from mismatch.cutting_causes.force_coefficients import NAMES
 
 from ..figures.cut_diagnosis_figure import cut_orders_figure, cut_turn_figure
@@ -55,6 +55,12 @@ def _warnings(found: CutDiagnosis) -> list[str]:
         f"Coefficients are taken to be off by {100 * found.setting.belief.error:g} %, each spectral line of a right "
         f"computed force by {100 * found.setting.force_error:g} %; what is smaller is not named."
     ]
+    warnings.append(
+        f"A cause is told if it lowers the error of the force on blocks held out with p < {SIGNIFICANT:g}. Its ± is "
+        "one standard error: the fit's own, the spread between halves of the blocks and between bands of frequency, "
+        "and the largest shift with another cause free."
+    )
+    warnings += [f"{one.name} chatters: {one.reason}." for one in found.chatter if one.unstable]
     if any(one.stage.startswith("not weighed") for one in found.candidates):
         warnings.append("Not every cause could be weighed; see the table of candidates.")
     if any(lines.recording.motion and lines.recording.motion.origin == "model" for lines in found.setting.lines):
@@ -78,8 +84,10 @@ def _by_order(found: CutDiagnosis) -> Section:
         picture = as_data_uri(cut_orders_figure(found))
     caption = "Amplitude of the force and of what is left of it; teeth of equal chips give multiples of their number."
     better = found.improvement
-    columns = ("as computed", "coefficients refitted", "with causes", "noise")
-    numbers = (better.before, better.refitted, better.after, better.noise_floor)
+    columns: tuple[str, ...] = ("as computed", "coefficients refitted", "noise")
+    numbers: tuple[float, ...] = (better.before, better.refitted, better.noise_floor)
+    if found.final.freed:
+        columns, numbers = (*columns[:2], "with causes", "noise"), (*numbers[:2], better.after, better.noise_floor)
     row = tuple(f"{100 * number:.3g}" for number in numbers)
     table = Table("Error on blocks of time that were not fitted (% of the force)", columns, (row,))
     return Section("By spindle order", (), (table,), (Picture(picture, caption, "Error by spindle order"),))

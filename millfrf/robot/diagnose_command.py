@@ -28,7 +28,7 @@ def diagnose(
     ] = None,
     payload_at: Annotated[
         tuple[float, float, float] | None,
-        typer.Option("--payload-at", metavar="X Y Z", help="Where a payload would hang, m from the tip, tool frame."),
+        typer.Option("--payload-at", metavar="X Y Z", help="Place of a payload, m from the tip, tool frame; else any."),
     ] = None,
     rigid_links: Annotated[
         bool, typer.Option("--rigid-links", help="Question the model with rigid links: is their flexibility missing?")
@@ -39,7 +39,7 @@ def diagnose(
     ] = (0.01, 0.15, 0.05),
     stream: Annotated[str | None, typer.Option("--stream", help="Sample clock.")] = None,
 ) -> None:
-    """Which is wrong in a robot's model: joint stiffness, link flexibility, payload, posture, damping?"""
+    """Which is wrong in a robot's model: joint stiffness, link flexibility, payload, tool, posture, damping?"""
     from mismatch import LabError
 
     from .diagnosing import Asking, diagnose_robot_files

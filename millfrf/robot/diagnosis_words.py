@@ -16,8 +16,8 @@ SENTENCES = {
     ),
     "class": "one of several changes explains the recordings; they cannot say which",
     "partly explained": (
-        "changes lower the error on recordings left out, but leave more than an explanation may: "
-        "something else is wrong too, and the numbers may stand in for it"
+        "changes lower the error on recordings left out, but leave more than an explanation may, or raise it on one of "
+        "them: something else is wrong too, and the numbers may stand in for it"
     ),
 }
 

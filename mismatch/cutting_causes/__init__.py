@@ -1,7 +1,9 @@
 """Which physics a computed cutting force leaves out: measured forces of a cut against those of a cutting process."""
 
-from .cut_diagnosis import FORCE_ERROR, diagnose_cut
+from .cut_chatter import CutChatter
+from .cut_diagnosis import FORCE_ERROR, NOISE_LIKE, diagnose_cut
 from .cut_diagnosis_file import cut_diagnosis_content, write_cut_diagnosis, write_improved_cut
+from .cut_held_out import SIGNIFICANT
 from .cut_reading import read_cut_recording
 from .cut_recording import CutRecording, cut_recording
 from .cut_results import COEFFICIENTS, CutDiagnosis
@@ -10,6 +12,9 @@ from .spindle_law import SpindleLaw
 __all__ = [
     "COEFFICIENTS",
     "FORCE_ERROR",
+    "NOISE_LIKE",
+    "SIGNIFICANT",
+    "CutChatter",
     "CutDiagnosis",
     "CutRecording",
     "SpindleLaw",

@@ -9,10 +9,12 @@ import numpy as np
 from cutting import MillingProcess
 from foundation import InputError
 
-from ..acceptance import CLEAR, EXPLAINED, LEAST_EVIDENCE
+from ..acceptance import CLEAR, LEAST_EVIDENCE
 from ..diagnosis import AcceptedCause, Candidate
+from .cut_chatter import CutChatter, chatter_of
+from .cut_errors import form_errors
 from .cut_fit import CutFit, fit_cut
-from .cut_held_out import fit_halves, improvement
+from .cut_held_out import Halves, fit_halves, improvement, lowers
 from .cut_leftover import CutLeftover, leftover
 from .cut_recording import CutRecording
 from .cut_results import COEFFICIENTS, CutDiagnosis
@@ -34,7 +36,10 @@ ODD = 3.0
 """Laboratory's errors by which a coefficient must be off to be named."""
 
 NOISE_LIKE = 0.08
-"""Share of a residual force that may stand out of noise and usual error by chance."""
+"""Share of a residual force that may stand out of noise and usual error by chance, or beside an explanation."""
+
+PARTLY = 0.5
+"""Share of what stood out that causes must take away to be told at all."""
 
 FORCE_ERROR = 0.01
 """Share by which each spectral line of a right computed force is still off."""
@@ -52,8 +57,10 @@ def diagnose_cut(
 
     Coefficients are refitted within ``coefficient_error`` first. A cause is accepted if it lowers the score
     ``2 sum |W r|^2 + |u|^2 + n ln N`` by 20, stands out of its own error by four, and, fitted to either half of the
-    blocks of time, lowers the misfit of the other halves by 10 together. What is left and is neither noise nor usual
-    error makes the verdict ``unexplained``, and then nothing is named.
+    blocks of time, lowers the misfit of the other halves by 10 together; all together must lower the error of the
+    force there with p < 0.01. Where more is left than noise and usual error the verdict is ``partly explained`` if
+    causes took away half of it, else ``unexplained``, and then nothing is named. A recording that chatters is not
+    explained by a force that repeats: the verdict is ``unexplained``, and ``chatter`` says why.
 
     Parameters
     ----------
@@ -84,10 +91,15 @@ def diagnose_cut(
     known = all(recording.motion is not None for recording in recordings)
     causes, closed = _weighable(process, known)
     start = started(setting, [(cause, cause.stated(process)) for cause in causes])
-    setting, start = _with_noise(setting, start, [cause.name for cause in causes])
+    chatter = tuple(chatter_of(recording, process) for recording in recordings)
+    shaken = any(one.unstable for one in chatter)
+    setting, start = _with_noise(setting, start, [] if shaken else [cause.name for cause in causes])
     base = fit_turned(setting, start, ())
+    if shaken:
+        stages = [Candidate(cause.name, 0.0, "not weighed: a recording chatters") for cause in causes]
+        return _result(setting, start, base, base, [], stages + closed, chatter)
     final, rounds = search(setting, base, [cause.name for cause in causes])
-    return _result(setting, start, base, final, rounds, closed)
+    return _result(setting, start, base, final, rounds, closed, chatter)
 
 
 def _weighable(process: MillingProcess, known: bool) -> tuple[list[CutPhysics], list[Candidate]]:
@@ -122,22 +134,36 @@ def _result(
     final: CutFit,
     rounds: list[list[Round]],
     closed: list[Candidate],
+    chatter: tuple[CutChatter, ...],
 ) -> CutDiagnosis:
     nominal = fit_cut(setting, start, (), refit=False)
-    before, after = (leftover(setting, one.attempt) for one in (base, final))
-    physics = [*_accepted(setting, final, rounds), *_coefficients(setting, final)]
-    verdict = "explained" if physics else "none"
-    if after.share > NOISE_LIKE and after.power > (1 - EXPLAINED) * before.power:
-        verdict, physics = "unexplained", []
-    halves = [
-        fit_halves(setting, one.attempt, one.freed, refit=refit)
-        for one, refit in ((nominal, False), (base, True), (final, True))
-    ]
-    candidates = _weighed(final, rounds) + closed
+    halves = [fit_halves(setting, nominal.attempt, (), refit=False), fit_halves(setting, base.attempt, ())]
+    halves.append(halves[1] if final is base else fit_halves(setting, final.attempt, final.freed))
+    named = bool(final.freed) and lowers(setting, halves[1], halves[2])
+    kept = final if named else base
+    before, after = (leftover(setting, one.attempt) for one in (base, kept))
+    odd = _coefficients(setting, kept) if lowers(setting, halves[0], halves[1]) else []
+    verdict = _verdict(named or bool(odd), chatter, before, after)
+    told = verdict in ("explained", "partly explained")
+    physics = [*(_accepted(setting, final, rounds, halves[2]) if named else []), *odd] if told else []
+    shown, left = (kept, after) if told else (base, before)
+    better = improvement(setting, halves[0], halves[1], halves[2] if shown is final else halves[1])
     return CutDiagnosis(
-        verdict, tuple(physics), tuple(candidates), _equivalents(final, rounds), improvement(setting, *halves),
-        after.share, _located(before), setting, nominal, base, final,
+        verdict, tuple(physics), tuple(_weighed(shown, rounds) + closed),
+        _equivalents(final, rounds) if shown is final else (), better,
+        left.share, _located(before), setting, nominal, base, shown, chatter,
     )  # fmt: skip
+
+
+def _verdict(named: bool, chatter: Sequence[CutChatter], before: CutLeftover, after: CutLeftover) -> str:
+    """See :class:`CutDiagnosis`."""
+    if any(one.unstable for one in chatter):
+        return "unexplained"
+    if not named:
+        return "none" if before.share <= NOISE_LIKE else "unexplained"
+    if after.share <= NOISE_LIKE:
+        return "explained"
+    return "partly explained" if after.power <= (1 - PARTLY) * before.power else "unexplained"
 
 
 def _weighed(final: CutFit, rounds: list[list[Round]]) -> list[Candidate]:
@@ -150,15 +176,16 @@ def _weighed(final: CutFit, rounds: list[list[Round]]) -> list[Candidate]:
     return found
 
 
-def _accepted(setting: CutSetting, final: CutFit, rounds: list[list[Round]]) -> list[AcceptedCause]:
+def _accepted(setting: CutSetting, final: CutFit, rounds: list[list[Round]], halves: Halves) -> list[AcceptedCause]:
     last = {one.name: one.evidence for ranked in rounds for one in ranked}
     moving = any(cause_of(final.attempt, name).moves for name in final.freed)
     # what noise of the motion does a second time it has done a first time: the error that no residual shows
     again = fit_cut(setting.noisier(), final.attempt, final.freed) if moving else final
+    form = form_errors(setting, final, halves, rounds[-1])
     found = []
     for name in final.freed:
         values = final.attempt.values(name)
-        shifted = np.diag((again.attempt.values(name) - values) ** 2)
+        shifted = np.diag((again.attempt.values(name) - values) ** 2 + form[name].together)
         covariance = covariance_of(setting, final, name) + shifted
         told = cause_of(final.attempt, name).told(values, covariance, setting.belief.process)
         found.append(AcceptedCause(name, {}, *told, last[name]))

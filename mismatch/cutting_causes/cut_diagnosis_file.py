@@ -21,6 +21,10 @@ def cut_diagnosis_content(diagnosis: CutDiagnosis) -> dict[str, Any]:
             "depth_m": setting.depth,
             "coefficient_error": setting.belief.error,
             "force_error": setting.force_error,
+            "chatter": [
+                {"name": one.name, "kind": one.kind, "frequency_hz": _number(one.frequency), "reason": one.reason}
+                for one in diagnosis.chatter
+            ],
             "recordings": [
                 {
                     "name": lines.recording.name,
@@ -34,6 +38,10 @@ def cut_diagnosis_content(diagnosis: CutDiagnosis) -> dict[str, Any]:
             ],
         },
     }
+
+
+def _number(value: float) -> float | None:
+    return value if np.isfinite(value) else None
 
 
 def write_cut_diagnosis(path: str | os.PathLike[str], diagnosis: CutDiagnosis) -> None:

@@ -16,6 +16,9 @@ Real = NDArray[np.float64]
 FOLDS = (slice(0, None, 2), slice(1, None, 2))
 """Every other block; each half is tested with numbers fitted to the other."""
 
+SIGNIFICANT = 0.01
+"""Chance below which the error of blocks held out is taken to have fallen."""
+
 Halves = tuple[CutFit, CutFit]
 
 
@@ -44,7 +47,7 @@ def improvement(setting: CutSetting, nominal: Halves, base: Halves, final: Halve
     total = sum(float(np.sum(np.abs(lines.measured) ** 2)) for lines in setting.lines)
     floor = sum(noise.floor.sum() * lines.blocks for noise, lines in zip(setting.noise, setting.lines, strict=True))
     gains = _tested(base) - _tested(final)
-    p_value = float(ttest_1samp(gains, 0.0, alternative="greater").pvalue) if np.ptp(gains) > 0 else 1.0
+    p_value = _chance(_tested(base), _tested(final))
     names = ", ".join(lines.recording.name for lines in setting.lines)
     errors = [float(np.sqrt(one.sum() / total)) for one in (before, refitted, after)]
     return Improvement(
@@ -57,6 +60,18 @@ def improvement(setting: CutSetting, nominal: Halves, base: Halves, final: Halve
         _interval(np.sqrt(after / before)),
         float(gains.sum()),
     )
+
+
+def lowers(setting: CutSetting, without: Halves, with_it: Halves) -> bool:
+    """Whether the error of the force on blocks that were not fitted falls, and by more than chance."""
+    falls = float(_powers(setting, with_it).sum()) < float(_powers(setting, without).sum())
+    return falls and _chance(_tested(without), _tested(with_it)) < SIGNIFICANT
+
+
+def _chance(without: Real, with_it: Real) -> float:
+    """p-value that the misfit of blocks does not fall: Student's test of its fall."""
+    gains = without - with_it
+    return float(ttest_1samp(gains, 0.0, alternative="greater").pvalue) if np.ptp(gains) > 0 else 1.0
 
 
 def _tested(halves: Halves) -> Real:

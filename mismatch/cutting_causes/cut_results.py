@@ -6,6 +6,7 @@ from typing import Any
 from cutting import MillingProcess
 
 from ..diagnosis import AcceptedCause, Candidate, Improvement
+from .cut_chatter import CutChatter
 from .cut_fit import CutFit
 from .cut_setting import CutSetting
 
@@ -20,7 +21,9 @@ class CutDiagnosis:
     Parameters
     ----------
     verdict
-        ``none``, ``explained`` or ``unexplained``.
+        ``none``: nothing is left out; ``explained``: the causes leave noise and usual error; ``partly explained``: they
+        take away half or more of what stands out, and leave more than that; ``unexplained``: none of them does, or a
+        recording chatters.
     physics
         Accepted causes in the order found, then ``force_coefficients`` if they are odd.
     candidates
@@ -37,7 +40,9 @@ class CutDiagnosis:
     setting
         Recordings, cutter, noise.
     nominal, base, final
-        As the file says; coefficients refitted; with the causes.
+        As the file says; coefficients refitted; with the causes that are told.
+    chatter
+        What each recording says about the stability of its cut.
     """
 
     verdict: str
@@ -51,13 +56,14 @@ class CutDiagnosis:
     nominal: CutFit
     base: CutFit
     final: CutFit
+    chatter: tuple[CutChatter, ...] = ()
 
     def improved_process(self) -> MillingProcess:
         """The cutting file's process with refitted coefficients and the accepted causes that it has a place for.
 
         Nothing but coefficients changes where no cause is named.
         """
-        shown = self.base if self.verdict == "unexplained" else self.final
+        shown = self.final
         process = self.setting.belief.process_at(shown.attempt.deviations)
         for cause, values in shown.attempt.acting:
             if cause.name in shown.freed:

@@ -64,7 +64,7 @@ def diagnose_robot(
     rigid_links
         Question the model with its links made rigid; the file's sections are then a candidate.
     payload_at : (3,), m
-        Where a payload would hang, from the tip in the tool frame; None: at the tip.
+        Where a payload would hang, from the tip in the tool frame; None: fitted with its mass.
     sensor : (3,), m
         Housing sensor from the tip, in the recordings' axes; needed where motion of the housing was recorded.
     error

@@ -1,4 +1,4 @@
-"""A milling simulator of its own, sharing no code with the package: runout, regeneration and process damping."""
+"""A milling simulator of its own, sharing no code with the package: runout, regeneration, process damping, helix."""
 
 import math
 from dataclasses import dataclass
@@ -8,6 +8,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
+
+SLICES = 8
+"""Along a helical edge."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,7 @@ class Mill:
     frequencies: tuple[float, float, float] = (17.0, 19.0, 60.0)
     stiffness: tuple[float, float, float] = (4e5, 6e5, 2e6)
     ratio: float = 0.04
+    helix: float = 0.0
 
 
 def simulated(mill: Mill, seconds: float, noise: float, seed: int) -> tuple[Real, Real, float]:
@@ -42,6 +46,7 @@ def simulated(mill: Mill, seconds: float, noise: float, seed: int) -> tuple[Real
         round(seconds / step), step, per_tooth, np.array(mill.offsets), natural, natural**2 / stiffness, mill.ratio,
         (mill.start, mill.leave, mill.feed, mill.depth, mill.ktc, mill.krc, mill.kac, mill.feedback,
          mill.damping / (math.pi * mill.rpm / 60 * mill.diameter)),
+        1 if mill.helix == 0 else SLICES, math.tan(mill.helix) * mill.depth * 2 / mill.diameter,
     )  # fmt: skip
     rng = np.random.default_rng(seed)
     noisy = [one + noise * one.std(axis=0) * rng.standard_normal(one.shape) for one in (force, acceleration)]
@@ -58,11 +63,13 @@ def _march(
     inverse_mass: Real,
     ratio: float,
     cut: tuple[float, ...],
+    slices: int,
+    lag: float,
 ) -> tuple[Real, Real]:
     start, leave, feed, depth, ktc, krc, kac, feedback, rub = cut
     teeth = len(offsets)
     x, v, a = np.zeros(3), np.zeros(3), np.zeros(3)
-    surface = np.zeros((per_tooth, teeth))
+    surface = np.zeros((per_tooth, teeth, slices))
     force, acceleration = np.zeros((n, 3)), np.zeros((n, 3))
     turn = 2 * math.pi / teeth / per_tooth
     for i in range(n):
@@ -71,26 +78,28 @@ def _march(
         half = v + 0.5 * step * a
         total = np.zeros(3)
         slot = i % per_tooth
-        before = surface[slot].copy()
-        for j in range(teeth):
-            phi = (turn * i + 2 * math.pi * j / teeth) % (2 * math.pi)
-            low, high = max(phi - turn / 2, start), min(phi + turn / 2, leave)
-            if high <= low:
-                surface[slot, j] = 0.0
-                continue
-            sine, cosine = math.sin(phi), math.cos(phi)
-            edge = feedback * (x[0] * sine + x[1] * cosine) + offsets[j]
-            ahead = before[(j + 1) % teeth] if i >= per_tooth else offsets[(j + 1) % teeth]
-            chip = edge - ahead + feed * sine
-            surface[slot, j] = edge if chip > 0 else ahead - feed * sine
-            if chip > 0:
-                width = depth * (high - low) / turn
-                tangential = width * ktc * chip
-                rubbing = width * rub * (half[0] * sine + half[1] * cosine)
-                radial = krc * tangential + rubbing
-                total[0] += -tangential * cosine - radial * sine
-                total[1] += tangential * sine - radial * cosine
-                total[2] += -kac * tangential
+        for k in range(slices):
+            behind = lag * (k + 0.5) / slices if slices > 1 else 0.0
+            before = surface[slot, :, k].copy()
+            for j in range(teeth):
+                phi = (turn * i + 2 * math.pi * j / teeth - behind) % (2 * math.pi)
+                low, high = max(phi - turn / 2, start), min(phi + turn / 2, leave)
+                if high <= low:
+                    surface[slot, j, k] = 0.0
+                    continue
+                sine, cosine = math.sin(phi), math.cos(phi)
+                edge = feedback * (x[0] * sine + x[1] * cosine) + offsets[j]
+                ahead = before[(j + 1) % teeth] if i >= per_tooth else offsets[(j + 1) % teeth]
+                chip = edge - ahead + feed * sine
+                surface[slot, j, k] = edge if chip > 0 else ahead - feed * sine
+                if chip > 0:
+                    width = depth / slices * (high - low) / turn
+                    tangential = width * ktc * chip
+                    rubbing = width * rub * (half[0] * sine + half[1] * cosine)
+                    radial = krc * tangential + rubbing
+                    total[0] += -tangential * cosine - radial * sine
+                    total[1] += tangential * sine - radial * cosine
+                    total[2] += -kac * tangential
         for p in range(3):
             new = inverse_mass[p] * total[p] - natural[p] ** 2 * x[p] - 2 * ratio * natural[p] * half[p]
             v[p] = half[p] + 0.5 * step * new
