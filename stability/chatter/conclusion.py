@@ -6,7 +6,7 @@ from dataclasses import replace
 from .course import Course, course_of
 from .evidence import Evidence
 from .families import TOLERANCE, Family, largest_motion
-from .sorting import Sorted, sort_families
+from .sorting import UNMODULATED, Sorted, sort_families
 from .teeth import alternation, alternation_course
 from .verdict import DOUBLING, HOPF, INCONCLUSIVE, STABLE, ChatterVerdict
 
@@ -17,9 +17,14 @@ HUGE = 0.5
 FLUCTUATING = 0.6
 """Standard deviation of a line's power over its mean from which it is noise rather than a limit cycle."""
 ALTERNATING = 0.5
-"""Size of the motion that alternates from tooth to tooth, over that which does not, from which it is not overlooked."""
+"""Size of the motion that alternates from tooth to tooth, over that which does not, from which teeth said to be equal
+double their period."""
+OVERLOOKED = 0.05
+"""Size of that motion below which it is not told."""
 HIDDEN = 0.15
 """Share of the motion that a line could have and not stand out of the noise, from which nothing is concluded."""
+NEAR_A_MODE = 0.2
+"""Relative distance from a natural frequency within which a large line is the structure's, side lines or not."""
 IRREGULAR = 0.5
 """Share of the motion that does not repeat from which a recording is not called stable."""
 _SILENT = 1e-3  # p-value of the orders above which they do not stand out
@@ -32,17 +37,20 @@ def concluded(
     found = sort_families(evidence)
     verdict = ChatterVerdict(STABLE, evidence.deviation, math.nan, math.nan, foreign=found.foreign)
     if found.suspects:
-        verdict = _of_suspect(found.suspects[0], evidence, verdict)
+        verdict = _of_suspect(found.suspects[0], evidence, natural, verdict)
         if verdict.kind in (HOPF, DOUBLING):
             line = largest_motion(found.suspects[0].lines, derivatives, natural)
-            return replace(verdict, frequency=line.frequency)
+            named = tuple(tone for tone in found.foreign if tone.name != UNMODULATED)  # others may be chatter's own
+            return replace(verdict, frequency=line.frequency, foreign=named)
         if verdict.kind == INCONCLUSIVE:
             return verdict
     verdict = _of_alternation(evidence, runout, verdict)
     return verdict if verdict.kind != STABLE else _of_quiet(evidence, found, verdict)
 
 
-def _of_suspect(family: Family, evidence: Evidence, verdict: ChatterVerdict) -> ChatterVerdict:
+def _of_suspect(
+    family: Family, evidence: Evidence, natural: tuple[float, ...], verdict: ChatterVerdict
+) -> ChatterVerdict:
     """Whether lines that may be chatter are."""
     course = course_of(evidence.revolutions, family.lines[0].order)
     verdict = replace(verdict, growth=course.growth, p_value=family.p_value, share=family.share)
@@ -50,7 +58,8 @@ def _of_suspect(family: Family, evidence: Evidence, verdict: ChatterVerdict) -> 
     if course.dies_out:
         reason = f"{at} dies out: its last eighth is {course.growth:.2g} times the first"
         return replace(verdict, kind=STABLE, reason=reason)
-    if len(family.lines) == 1 and not course.grows:
+    near = min((abs(family.lines[0].frequency / mode - 1) for mode in natural), default=math.inf) < NEAR_A_MODE
+    if len(family.lines) == 1 and not course.grows and not near:
         reason = (
             f"{at} has no side lines at the tooth passing, as a foreign tone has none, but is as large as chatter; "
             "record the machine without cutting and see whether it is still there"
@@ -61,8 +70,10 @@ def _of_suspect(family: Family, evidence: Evidence, verdict: ChatterVerdict) -> 
         return replace(verdict, kind=INCONCLUSIVE, reason=f"{at} {doubt}")
     teeth = evidence.revolutions.teeth
     doubled = abs(family.place - teeth / 2) < TOLERANCE * evidence.spectrum.resolution
-    sides = f"{len(family.lines) - 1} side lines at the tooth passing"
-    reason = f"{at} has {sides}" + (" and grows" if course.grows else " and does not die out")
+    sides = (
+        f"has {len(family.lines) - 1} side lines at the tooth passing" if len(family.lines) > 1 else "is near a mode"
+    )
+    reason = f"{at} {sides}" + (" and grows" if course.grows else " and does not die out")
     return replace(verdict, kind=DOUBLING if doubled else HOPF, reason=reason)
 
 
@@ -83,23 +94,26 @@ def _doubt(family: Family, course: Course) -> str:
 def _of_alternation(evidence: Evidence, runout: bool, verdict: ChatterVerdict) -> ChatterVerdict:
     """Period doubling of an even number of teeth, whose lines are orders of the spindle."""
     size = alternation(evidence.late)
-    if not size > ALTERNATING or evidence.alternation_p_value > _SILENT:
+    if not size > OVERLOOKED or evidence.alternation_p_value > _SILENT:
         return verdict
     course = alternation_course(evidence.revolutions)
-    teeth = evidence.revolutions.teeth
-    frequency = 0.5 * teeth * evidence.track.mean_frequency
+    frequency = 0.5 * evidence.revolutions.teeth * evidence.track.mean_frequency
     told = f"the motion that alternates from tooth to tooth is {size:.2g} times that which does not"
-    verdict = replace(verdict, growth=course.growth, p_value=evidence.alternation_p_value)
+    doubled = replace(
+        verdict, kind=DOUBLING, growth=course.growth, p_value=evidence.alternation_p_value, frequency=frequency
+    )
     if course.grows:
-        return replace(verdict, kind=DOUBLING, frequency=frequency, reason=f"{told}, and grows")
-    if not runout:
+        return replace(doubled, reason=f"{told}, and grows")
+    if not runout and size > ALTERNATING:
         warning = f"{told}; runout, which the cutting file does not state, would look the same"
-        return replace(verdict, kind=DOUBLING, frequency=frequency, reason=told, warnings=(warning,))
+        return replace(doubled, reason=told, warnings=(warning,))
+    if runout and size < ALTERNATING:
+        return replace(verdict, warnings=(f"{told}; it is taken for runout",))
     reason = (
         f"{told}: period doubling, or runout that shakes the structure at {frequency:.2f} Hz; "
-        "record the entry, or cut at half the depth: runout shrinks with depth, chatter vanishes"
+        "record the entry, or cut at half the depth: runout shakes less there, chatter vanishes"
     )
-    return replace(verdict, kind=INCONCLUSIVE, reason=reason)
+    return replace(doubled, kind=INCONCLUSIVE, frequency=math.nan, reason=reason)
 
 
 def _of_quiet(evidence: Evidence, found: Sorted, verdict: ChatterVerdict) -> ChatterVerdict:

@@ -11,6 +11,8 @@ Real = NDArray[np.float64]
 
 PARTS = 8
 """Parts into which a recording is divided."""
+_RISE = np.log(3.0)
+_STRAIGHT = 0.97  # correlation of a growing line's logarithm with time; eight sizes of noise have it once in 30000
 _SPREAD = 1.5  # lines of resolution of a part on either side of the line that still count
 
 
@@ -39,9 +41,13 @@ class Course:
 
     @property
     def grows(self) -> bool:
-        """Whether it rises by half or more over the first half of the recording, and again over the second."""
-        first, middle, last = self.sizes[0], self.sizes[3:5].mean(), self.sizes[-1]
-        return bool(middle > 1.5 * first and last > 1.5 * middle)
+        """Whether it rises threefold or more, as straight on a logarithmic scale as noise hardly ever does."""
+        logarithm = np.log(np.maximum(self.sizes, 1e-300))
+        if logarithm.std() < 1e-9:
+            return False
+        along = np.arange(PARTS)
+        rise = float(np.polyfit(along, logarithm, 1)[0]) * (PARTS - 1)
+        return bool(rise > _RISE and np.corrcoef(along, logarithm)[0, 1] > _STRAIGHT)
 
     @property
     def steadiness(self) -> float:

@@ -11,6 +11,9 @@ MAINS = (50.0, 60.0)
 """Frequencies of the power supply, Hz."""
 _MAINS_ERROR = 0.004  # relative, beside the resolution of the spectrum
 _MAINS_HARMONICS = 20
+_WIDEST = 0.5  # Hz; a line that is known less well is not named by its frequency
+UNMODULATED = "tone without side lines at the tooth passing"
+"""Name of a tone that is known by nothing else."""
 SMALL = 0.03
 """Share of the motion below which lines do not matter: no limit cycle is as small."""
 TOO_LARGE = 0.3
@@ -84,7 +87,7 @@ def _foreign_name(family: Family, evidence: Evidence) -> str:
     if mains and (alone or (len(family.lines) == 2 and family.share < _CHANCE)):
         return mains
     if alone and family.share < TOO_LARGE:
-        return "tone without side lines at the tooth passing"
+        return UNMODULATED
     return ""
 
 
@@ -92,7 +95,10 @@ def mains_name(frequency: float, width: float) -> str:
     """``mains (3 x 50 Hz)`` where a frequency (Hz, known within ``width``) is one of the supply's; else empty."""
     for mains in MAINS:
         number = round(frequency / mains)
-        if 1 <= number <= _MAINS_HARMONICS and abs(frequency - number * mains) < width + _MAINS_ERROR * mains:
+        if (
+            1 <= number <= _MAINS_HARMONICS
+            and abs(frequency - number * mains) < min(width, _WIDEST) + _MAINS_ERROR * mains
+        ):
             return f"mains ({number} x {mains:g} Hz)"
     return ""
 

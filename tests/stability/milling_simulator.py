@@ -65,10 +65,15 @@ class SimulatedCut:
 
 @dataclass(frozen=True)
 class Motion:
-    """Samples of acceleration (m/s^2) in x and y, and how much the last two turns differ, over their size."""
+    """Samples of acceleration (m/s^2) in x and y, and what the last 20 turns say without any filter or noise.
+
+    ``unrepeated`` is the size of what differs from turn to turn, ``alternating`` of what changes its sign from tooth to
+    tooth (even numbers of teeth), both over the size of the motion.
+    """
 
     acceleration: Real
-    difference: float
+    unrepeated: float
+    alternating: float
 
 
 def simulate(cut: SimulatedCut, tooth_periods: int, rate: float, *, steps: int = 800, skip: int = 0) -> Motion:
@@ -96,9 +101,15 @@ def simulate(cut: SimulatedCut, tooth_periods: int, rate: float, *, steps: int =
     even = np.arange(begin, times[-1], 1 / (rate * fold))
     fine = np.column_stack([np.interp(even, times, history[:, column]) for column in range(2)])
     samples = decimate(fine, fold, ftype="fir", axis=0) if fold > 1 else fine
-    turn = cut.teeth * steps
-    last, before = history[-turn:], history[-2 * turn : -turn]
-    return Motion(np.asarray(samples), float((last - before).std() / last.std()))
+    return Motion(np.asarray(samples), *_repeats(history, cut.teeth, steps))
+
+
+def _repeats(history: Real, teeth: int, steps: int) -> tuple[float, float]:
+    turns = history[-20 * teeth * steps :].reshape(20, teeth, steps, 2)
+    mean = turns.mean(axis=0)
+    size = (turns - turns.mean(axis=(0, 1, 2))).std()
+    signs = np.where(np.arange(teeth) % 2, -1.0, 1.0)[:, None, None] if teeth % 2 == 0 else np.zeros((teeth, 1, 1))
+    return float((turns - mean).std() / size), float(np.sqrt(((mean * signs).mean(axis=0) ** 2).mean()) / size)
 
 
 @njit(cache=False)

@@ -8,6 +8,8 @@ from milling_simulator import SimulatedCut, simulate
 
 from stability import multipliers
 
+LEAST_CHATTER = 0.05
+"""Share of the motion below which the chatter of an unstable cut counts as none."""
 FAR_FROM_ONE = 0.02
 """Stable cuts have a largest multiplier of at most 1 less this, unstable ones of at least 1 plus this."""
 
@@ -53,8 +55,8 @@ def random_structure(rng: np.random.Generator) -> SimulatedCut:
 
 
 def depth_with(cut: SimulatedCut, size: float) -> float:
-    """Least depth (m) at which the largest multiplier has this modulus; NaN where none has below 1 m."""
-    depths = np.geomspace(1e-6, 1.0, 121)
+    """Least depth (m) at which the largest multiplier has this modulus; NaN where none has below 0.1 m."""
+    depths = np.geomspace(1e-5, 0.1, 81)
     sizes = np.array([abs(largest_multiplier(cut, float(depth))) for depth in depths])
     above = np.flatnonzero(sizes >= size)
     if not len(above) or above[0] == 0:
@@ -69,8 +71,9 @@ def depth_with(cut: SimulatedCut, size: float) -> float:
 def random_cut(rng: np.random.Generator, *, stable: bool) -> DisturbedCut:
     """A simulated cut of 400 to 900 tooth periods with noise, runout, tones, speed error and drift.
 
-    A stable cut whose undisturbed twin does not repeat from turn to turn is drawn again: runout then makes teeth leave
-    the cut, and the multiplier of equal teeth is not its own.
+    The multiplier is that of equal teeth that stay in the cut. Drawn again are stable cuts whose twin without noise
+    does not repeat from turn to turn (runout makes teeth leave the cut), and unstable ones whose twin chatters by less
+    than 5 % of the motion (teeth that leave the thin end of the chip hold the chatter, or runout does).
     """
     while True:
         cut = random_structure(rng)
@@ -83,10 +86,15 @@ def random_cut(rng: np.random.Generator, *, stable: bool) -> DisturbedCut:
             continue
         rate = float(cut.frequencies.max()) * rng.uniform(8, 25)
         periods = int(rng.integers(400, 900))
-        if stable and simulate(replace(cut, uneven=0.0), periods, rate).difference > 0.01:
+        multiplier = largest_multiplier(cut, depth)
+        doubles = abs(multiplier.imag) < 1e-6 * abs(multiplier)
+        twin = simulate(replace(cut, uneven=0.0), periods, rate)
+        if stable and twin.unrepeated > 0.01:
+            continue
+        if not stable and max(twin.unrepeated, twin.alternating * doubles) < LEAST_CHATTER:
             continue
         motion = simulate(cut, periods, rate, skip=int(rng.integers(0, 100)))
-        return disturbed(cut, motion.acceleration, rate, largest_multiplier(cut, depth), rng)
+        return disturbed(cut, motion.acceleration, rate, multiplier, rng)
 
 
 def disturbed(

@@ -1,0 +1,99 @@
+"""Random cuts of an independent simulator with noise, runout, tones and wrong speeds: false alarms and misses."""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+import pytest
+from random_cuts import DisturbedCut, random_cut
+
+from stability import ChatterVerdict, classify_cut
+
+CHATTER = ("hopf", "period-doubling")
+
+
+@dataclass
+class Score:
+    """Numbers of cuts: stable and unstable, told right, told wrong; all others are inconclusive."""
+
+    stable: int = 0
+    unstable: int = 0
+    false_alarms: int = 0
+    called_stable: int = 0
+    undecided_stable: int = 0
+    undecided_unstable: int = 0
+
+    @property
+    def misses(self) -> int:
+        """Unstable cuts that are not called chatter, inconclusive ones among them."""
+        return self.called_stable + self.undecided_unstable
+
+
+def judge(cut: DisturbedCut, *, with_model: bool = True) -> ChatterVerdict:
+    """As the command does with a cutting file, and with or without ``--model``."""
+    return classify_cut(
+        cut.samples,
+        cut.rate,
+        cut.stated_speed,
+        cut.cut.teeth,
+        runout=cut.cut.runout > 0,
+        derivatives=(2, 2),
+        natural_frequencies=tuple(cut.cut.frequencies) if with_model else (),
+    )
+
+
+def note(score: Score, cut: DisturbedCut, found: ChatterVerdict) -> None:
+    """Add a verdict."""
+    undecided = found.kind == "inconclusive"
+    if abs(cut.multiplier) < 1:
+        score.stable += 1
+        score.false_alarms += found.kind in CHATTER
+        score.undecided_stable += undecided
+    else:
+        score.unstable += 1
+        score.called_stable += found.kind == "stable"
+        score.undecided_unstable += undecided
+
+
+def test_the_simulator_decays_as_the_multipliers_say() -> None:
+    """So that the trial's truth and its simulator, which share nothing, stand for the same cuts."""
+    from dataclasses import replace
+
+    from milling_simulator import simulate
+    from random_cuts import depth_with, random_structure
+
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        cut = random_structure(rng)
+        cut = replace(cut, depth=depth_with(cut, 0.97), feed=1e-3)
+        places = 400
+        motion = simulate(cut, 300, cut.rpm / 60 * cut.teeth * places, steps=places).acceleration
+        periods = motion[: len(motion) // places * places].reshape(-1, 2 * places)
+        change = np.linalg.norm(np.diff(periods, axis=0), axis=1)[60:200]
+        rate = np.exp(np.polyfit(np.arange(len(change)), np.log(change), 1)[0])
+        assert rate == pytest.approx(0.97, abs=0.002)
+
+
+def test_eight_random_cuts() -> None:
+    score = Score()
+    for number in range(8):
+        rng = np.random.default_rng([15, number])
+        cut = random_cut(rng, stable=number % 2 == 0)
+        note(score, cut, judge(cut))
+    assert score == Score(stable=4, unstable=4)
+
+
+@pytest.mark.slow
+def test_two_hundred_random_cuts() -> None:
+    with_model, without = Score(), Score()
+    for number in range(200):
+        cut = random_cut(np.random.default_rng([2026, number]), stable=number % 2 == 0)
+        for score, found in ((with_model, judge(cut)), (without, judge(cut, with_model=False))):
+            note(score, cut, found)
+            if (found.kind == "stable") != (abs(cut.multiplier) < 1):
+                print(number, score is with_model, cut.cut.teeth, cut.multiplier, pi, found.kind, found.reason)
+    print(with_model, without, sep="\n")
+    assert (with_model.stable, with_model.unstable) == (100, 100)
+    assert with_model.false_alarms <= 1
+    assert without.false_alarms <= 1
+    assert with_model.misses <= 5
