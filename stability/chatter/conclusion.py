@@ -10,7 +10,7 @@ from .sorting import UNMODULATED, Sorted, sort_families
 from .teeth import alternation, alternation_course
 from .verdict import DOUBLING, HOPF, INCONCLUSIVE, STABLE, ChatterVerdict
 
-LARGE = 0.15
+LARGE = 0.2
 """Share of the motion from which steady lines that the teeth modulate are chatter."""
 HUGE = 0.5
 """Share of the motion from which they are chatter even where their size fluctuates."""

@@ -76,7 +76,7 @@ class Motion:
     alternating: float
 
 
-def simulate(cut: SimulatedCut, tooth_periods: int, rate: float, *, steps: int = 800, skip: int = 0) -> Motion:
+def simulate(cut: SimulatedCut, tooth_periods: int, rate: float, *, steps: int = 500, skip: int = 0) -> Motion:
     """Mill from rest for a number of tooth periods; record behind an anti-aliasing filter from ``skip`` periods on."""
     n = tooth_periods * steps
     pitch = 2 * pi / cut.teeth

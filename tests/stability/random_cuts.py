@@ -56,20 +56,23 @@ def random_structure(rng: np.random.Generator) -> SimulatedCut:
 
 def depth_with(cut: SimulatedCut, size: float) -> float:
     """Least depth (m) at which the largest multiplier has this modulus; NaN where none has below 0.1 m."""
-    depths = np.geomspace(1e-5, 0.1, 81)
-    sizes = np.array([abs(largest_multiplier(cut, float(depth))) for depth in depths])
-    above = np.flatnonzero(sizes >= size)
-    if not len(above) or above[0] == 0:
+    low = 1e-5
+    if abs(largest_multiplier(cut, low)) >= size:
         return float("nan")
-    low, high = depths[above[0] - 1], depths[above[0]]
-    for _ in range(30):
-        middle = np.sqrt(low * high)
-        low, high = (low, middle) if abs(largest_multiplier(cut, float(middle))) >= size else (middle, high)
+    for high in np.geomspace(1e-5, 0.1, 41)[1:]:
+        if abs(largest_multiplier(cut, float(high))) >= size:
+            break
+        low = float(high)
+    else:
+        return float("nan")
+    for _ in range(14):
+        middle = float(np.sqrt(low * high))
+        low, high = (low, middle) if abs(largest_multiplier(cut, middle)) >= size else (middle, high)
     return float(np.sqrt(low * high))
 
 
 def random_cut(rng: np.random.Generator, *, stable: bool) -> DisturbedCut:
-    """A simulated cut of 400 to 900 tooth periods with noise, runout, tones, speed error and drift.
+    """A simulated cut of 300 to 600 tooth periods with noise, runout, tones, speed error and drift.
 
     The multiplier is that of equal teeth that stay in the cut. Drawn again are stable cuts whose twin without noise
     does not repeat from turn to turn (runout makes teeth leave the cut), and unstable ones whose twin chatters by less
@@ -85,15 +88,16 @@ def random_cut(rng: np.random.Generator, *, stable: bool) -> DisturbedCut:
         if not np.isfinite(depth):
             continue
         rate = float(cut.frequencies.max()) * rng.uniform(8, 25)
-        periods = int(rng.integers(400, 900))
+        periods = int(rng.integers(300, 600))
         multiplier = largest_multiplier(cut, depth)
         doubles = abs(multiplier.imag) < 1e-6 * abs(multiplier)
-        twin = simulate(replace(cut, uneven=0.0), periods, rate)
+        skip = int(rng.integers(0, 100))
+        motion = simulate(cut, periods + skip, rate, skip=skip)
+        twin = simulate(replace(cut, uneven=0.0), periods + skip, rate) if cut.uneven else motion
         if stable and twin.unrepeated > 0.01:
             continue
         if not stable and max(twin.unrepeated, twin.alternating * doubles) < LEAST_CHATTER:
             continue
-        motion = simulate(cut, periods, rate, skip=int(rng.integers(0, 100)))
         return disturbed(cut, motion.acceleration, rate, multiplier, rng)
 
 

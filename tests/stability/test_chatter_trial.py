@@ -1,15 +1,17 @@
 """Random cuts of an independent simulator with noise, runout, tones and wrong speeds: false alarms and misses."""
 
-from dataclasses import dataclass
-from math import pi
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from random_cuts import DisturbedCut, random_cut
+from milling_simulator import simulate
+from random_cuts import DisturbedCut, depth_with, random_cut, random_structure
 
 from stability import ChatterVerdict, classify_cut
 
 CHATTER = ("hopf", "period-doubling")
+NEAR = "near a mode"
+"""In the reason of verdicts that stand on the model."""
 
 
 @dataclass
@@ -57,11 +59,6 @@ def note(score: Score, cut: DisturbedCut, found: ChatterVerdict) -> None:
 
 def test_the_simulator_decays_as_the_multipliers_say() -> None:
     """So that the trial's truth and its simulator, which share nothing, stand for the same cuts."""
-    from dataclasses import replace
-
-    from milling_simulator import simulate
-    from random_cuts import depth_with, random_structure
-
     rng = np.random.default_rng(0)
     for _ in range(3):
         cut = random_structure(rng)
@@ -84,16 +81,23 @@ def test_eight_random_cuts() -> None:
 
 
 @pytest.mark.slow
-def test_two_hundred_random_cuts() -> None:
+def test_two_hundred_random_cuts(capsys: pytest.CaptureFixture[str]) -> None:
     with_model, without = Score(), Score()
     for number in range(200):
         cut = random_cut(np.random.default_rng([2026, number]), stable=number % 2 == 0)
-        for score, found in ((with_model, judge(cut)), (without, judge(cut, with_model=False))):
-            note(score, cut, found)
-            if (found.kind == "stable") != (abs(cut.multiplier) < 1):
-                print(number, score is with_model, cut.cut.teeth, cut.multiplier, pi, found.kind, found.reason)
-    print(with_model, without, sep="\n")
-    assert (with_model.stable, with_model.unstable) == (100, 100)
-    assert with_model.false_alarms <= 1
-    assert without.false_alarms <= 1
+        found = judge(cut)
+        blind = judge(cut, with_model=False) if NEAR in found.reason else found
+        note(with_model, cut, found)
+        note(without, cut, blind)
+        with capsys.disabled():
+            if (blind.kind == "stable") != (abs(cut.multiplier) < 1) or blind.kind == "inconclusive":
+                print(
+                    f"cut {number}: multiplier {cut.multiplier:.3f}, {cut.cut.teeth} teeth: {blind.kind}: {blind.reason}"
+                )
+    with capsys.disabled():
+        print(f"with the model: {with_model}", f"without: {without}", sep="\n")
+    for score in (with_model, without):
+        assert (score.stable, score.unstable) == (100, 100)
+        assert score.false_alarms <= 1
+        assert score.called_stable <= 5
     assert with_model.misses <= 5
