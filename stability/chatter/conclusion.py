@@ -11,7 +11,11 @@ from .teeth import alternation, alternation_course
 from .verdict import DOUBLING, HOPF, INCONCLUSIVE, STABLE, ChatterVerdict
 
 LARGE = 0.2
-"""Share of the motion from which steady lines that the teeth modulate are chatter."""
+"""Share of the motion from which lines that the teeth modulate are chatter even where they are not sharp."""
+LEAST = 0.05
+"""Share of the motion from which sharp and steady lines are a limit cycle."""
+STEADY = 0.3
+"""Standard deviation of a line's power over its mean up to which it is a limit cycle."""
 HUGE = 0.5
 """Share of the motion from which they are chatter even where their size fluctuates."""
 FLUCTUATING = 0.6
@@ -79,7 +83,8 @@ def _of_suspect(
 
 def _doubt(family: Family, course: Course) -> str:
     """Why lines with side lines may not be chatter; empty where they are."""
-    if course.grows:
+    limit_cycle = family.sharp and course.steadiness < STEADY and family.share > LEAST
+    if course.grows or limit_cycle:
         return ""
     if family.share < LARGE:
         return (

@@ -12,6 +12,9 @@ Real = NDArray[np.float64]
 
 TOLERANCE = 1.2
 """Lines of resolution by which lines of one family may differ."""
+SHARP = 0.75
+"""Sharpness from which a line is a periodic motion rather than noise through a lightly damped mode."""
+_SHARP_SIDES = 2
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,12 @@ class Family:
     lines: tuple[Line, ...]
     share: float
     place: float
+
+    @property
+    def sharp(self) -> bool:
+        """Whether the strongest line and two or more side lines are as narrow as the record is long."""
+        sharp_sides = sum(line.sharpness > SHARP for line in self.lines[1:])
+        return self.lines[0].sharpness > SHARP and sharp_sides >= _SHARP_SIDES
 
     @property
     def p_value(self) -> float:

@@ -30,12 +30,15 @@ class Line:
         Root mean square, in the unit of the samples.
     p_value
         Probability that noise with the recording's own local floor has a line as strong anywhere in the spectrum.
+    sharpness
+        Power within two lines of resolution over that within ten: 1 for a tone or a limit cycle, a quarter for noise.
     """
 
     order: float
     frequency: float
     amplitude: Real
     p_value: float
+    sharpness: float
 
 
 @dataclass(frozen=True)
@@ -143,4 +146,5 @@ def _line(spectrum: Spectrum, peak: int, p_value: float, frequency: float) -> Li
     shift = (2 * above - top) / (above + top) if above > below else -(2 * below - top) / (below + top)
     order = (peak + float(np.clip(shift, -1.0, 1.0))) * spectrum.resolution
     amplitude = np.sqrt(spectrum.power[max(peak - 2, 0) : peak + 3].sum(axis=0))
-    return Line(order, order * frequency, amplitude, p_value)
+    beside = total[max(peak - 10, 0) : peak + 11].sum()
+    return Line(order, order * frequency, amplitude, p_value, float((amplitude**2).sum() / beside))

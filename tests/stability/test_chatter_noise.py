@@ -1,5 +1,6 @@
 """What must not be taken for chatter, and what must, on cuts of a simulator that shares no code with the project."""
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -53,3 +54,40 @@ def test_pure_noise_is_not_judged() -> None:
     found = classify_cut(np.random.default_rng(2).standard_normal((20000, 2)), RATE, STATED, 2)
     assert found.kind == "inconclusive"
     assert "no order of the spindle" in found.reason
+
+
+def test_hopf_chatter_with_runout_is_found_with_its_frequency() -> None:
+    cut = replace(CUT, depth=4.5e-3, runout=20e-6)
+    samples = simulate(cut, 500, RATE, skip=100).acceleration
+    noise = 0.2 * samples.std(axis=0) * np.random.default_rng(3).standard_normal(samples.shape)
+    found = classify_cut(samples + noise, RATE, 1.008 * STATED, 2, derivatives=(2, 2), natural_frequencies=(18.0, 27.0))
+    assert found.kind == "hopf"
+    assert found.p_value < 1e-6
+    assert found.spindle_speed == pytest.approx(STATED, rel=3e-4)
+    expected = np.array([[18.0], [27.0]]) * [0.95, 1.2]
+    assert any(low < found.frequency < high for low, high in expected)
+
+
+def test_two_unequal_teeth_that_may_double_their_period_are_not_called_stable() -> None:
+    cut = replace(CUT, rpm=1050.0, depth=3.5e-3, runout=20e-6)
+    samples = simulate(cut, 500, RATE, skip=100).acceleration
+    found = classify_cut(samples, RATE, cut.rpm * pi / 30, 2)
+    assert found.kind == "inconclusive"
+    assert "runout" in found.reason
+    equal = simulate(replace(cut, runout=0.0), 500, RATE, skip=100).acceleration
+    doubled = classify_cut(equal, RATE, cut.rpm * pi / 30, 2, runout=False)
+    assert doubled.kind == "period-doubling"
+    assert doubled.frequency == pytest.approx(17.5, abs=0.05)
+    assert "runout" in doubled.warnings[0]
+
+
+def test_a_drifting_speed_is_followed() -> None:
+    samples = simulate(replace(CUT, drift=4e-3), 500, RATE, skip=100).acceleration
+    found = classify_cut(samples, RATE, 0.99 * STATED, 2)
+    assert found.kind == "stable"
+    assert found.drift == pytest.approx(4e-3 * 5 / 6, rel=0.1)
+
+
+def test_a_record_of_another_speed_says_so() -> None:
+    found = classify_cut(stable(), RATE, 1.05 * STATED, 2)
+    assert found.kind == "inconclusive"
