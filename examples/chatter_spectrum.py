@@ -49,10 +49,10 @@ def draw(axes: Axes, samples: NDArray[np.float64], title: str) -> ChatterVerdict
     axes.semilogy(frequencies[shown], np.sqrt(left[shown]), color="C0", lw=0.6, label="what does not repeat")
     axes.semilogy(frequencies[shown], np.sqrt(spectrum.floor[shown, 1]), color="k", lw=1.2, label="floor of the noise")
     for tone in found.foreign:
-        axes.annotate(tone.name, (tone.frequency, 0.12), (tone.frequency + 2.5, 0.5), arrowprops={"arrowstyle": "-"})
+        axes.annotate(tone.name, (tone.frequency, 0.06), (tone.frequency + 4.5, 0.35), arrowprops={"arrowstyle": "-"})
     if np.isfinite(found.frequency):
         text = f"chatter\n{found.frequency:.2f} Hz"
-        axes.annotate(text, (found.frequency, 1.0), (found.frequency + 2.5, 1.6), arrowprops={"arrowstyle": "-"})
+        axes.annotate(text, (found.frequency, 0.8), (found.frequency + 2.5, 1.5), arrowprops={"arrowstyle": "-"})
     axes.set(xlim=(0, 90), ylim=(2e-4, 6), ylabel="share of the motion (rms)", title=f"{title}: {found.kind}")
     return found
 
@@ -64,7 +64,7 @@ def main(picture: Path) -> None:
         found = draw(axes, recorded(depth), f"{1e3 * depth:g} mm deep")
         line = "" if np.isnan(found.frequency) else f" at {found.frequency:.2f} Hz"
         print(f"{1e3 * depth:g} mm: {found.kind}{line}, spindle {found.spindle_speed / RPM:.2f} rpm; {found.reason}")
-    figure.axes[0].legend(loc="upper right", frameon=False)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
     figure.axes[1].set_xlabel("frequency (Hz)")
     figure.savefig(picture, dpi=150)
 

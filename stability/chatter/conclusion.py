@@ -14,7 +14,7 @@ LARGE = 0.2
 """Share of the motion from which lines that the teeth modulate are chatter even where they are not sharp."""
 LEAST = 0.05
 """Share of the motion from which sharp and steady lines are a limit cycle."""
-STEADY = 0.3
+STEADY = 0.45
 """Standard deviation of a line's power over its mean up to which it is a limit cycle."""
 HUGE = 0.5
 """Share of the motion from which they are chatter even where their size fluctuates."""
@@ -31,6 +31,7 @@ NEAR_A_MODE = 0.2
 """Relative distance from a natural frequency within which a large line is the structure's, side lines or not."""
 IRREGULAR = 0.5
 """Share of the motion that does not repeat from which a recording is not called stable."""
+_PAIR = 2  # teeth of which an eccentric spindle makes one cut more and one less, turn by turn
 _SILENT = 1e-3  # p-value of the orders above which they do not stand out
 
 
@@ -112,7 +113,7 @@ def _of_alternation(evidence: Evidence, runout: bool, verdict: ChatterVerdict) -
     if not runout and size > ALTERNATING:
         warning = f"{told}; runout, which the cutting file does not state, would look the same"
         return replace(doubled, reason=told, warnings=(warning,))
-    if runout and size < ALTERNATING:
+    if runout and size < ALTERNATING and evidence.revolutions.teeth == _PAIR:
         return replace(verdict, warnings=(f"{told}; it is taken for runout",))
     reason = (
         f"{told}: period doubling, or runout that shakes the structure at {frequency:.2f} Hz; "

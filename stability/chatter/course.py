@@ -51,8 +51,8 @@ class Course:
 
     @property
     def steadiness(self) -> float:
-        """Standard deviation of the power over its mean, in the second half; 1 for noise, small for a limit cycle."""
-        power = self.sizes[PARTS // 2 :] ** 2
+        """Standard deviation of the power over its mean, after the first quarter: 1 for noise, small for a limit cycle."""
+        power = self.sizes[PARTS // 4 :] ** 2
         return float(power.std() / max(power.mean(), 1e-300))
 
 

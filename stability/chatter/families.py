@@ -12,7 +12,7 @@ Real = NDArray[np.float64]
 
 TOLERANCE = 1.2
 """Lines of resolution by which lines of one family may differ."""
-SHARP = 0.75
+SHARP = 0.85
 """Sharpness from which a line is a periodic motion rather than noise through a lightly damped mode."""
 _SHARP_SIDES = 2
 
