@@ -51,7 +51,7 @@ class Course:
 
     @property
     def steadiness(self) -> float:
-        """Standard deviation of the power over its mean, after the first quarter: 1 for noise, small for a limit cycle."""
+        """Standard deviation of the power over its mean after the first quarter: 1 for noise, 0 for a limit cycle."""
         power = self.sizes[PARTS // 4 :] ** 2
         return float(power.std() / max(power.mean(), 1e-300))
 
