@@ -12,6 +12,7 @@ from .sensors import (
     milling_sensors,
     tip_accelerometers,
 )
+from .settling import Settling, settle
 from .speed_profiles import ConstantSpeed, DriftingSpeed, LinearSweep, SpeedProfile
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "Material",
     "MillingCell",
     "Sensor",
+    "Settling",
     "SpeedProfile",
     "default_structure",
     "dynamometer",
@@ -29,6 +31,7 @@ __all__ = [
     "housing_accelerometers",
     "milling_sensors",
     "table_one_model",
+    "settle",
     "tip_accelerometers",
     "tip_model",
 ]
