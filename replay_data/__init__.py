@@ -30,8 +30,8 @@ __all__ = [
     "hammer_sensors",
     "housing_accelerometers",
     "milling_sensors",
-    "table_one_model",
     "settle",
+    "table_one_model",
     "tip_accelerometers",
     "tip_model",
 ]

@@ -1,7 +1,7 @@
 """Does a cut settle? The milling loop run at one depth and speed until the motion repeats itself tooth by tooth."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,7 +55,7 @@ def settle(structure: ModalModel, process: MillingProcess, depth: float, spindle
     Parameters
     ----------
     structure
-        Receptance with responses and excitations ``TCP:+X +Y +Z``.
+        Receptance with responses and excitations ``TCP:+X +Y +Z``; of residuals, a flexibility alone.
     process
         Cutter, engagement, feed.
     depth, spindle_speed
@@ -72,7 +72,9 @@ def settle(structure: ModalModel, process: MillingProcess, depth: float, spindle
     passing = 2 * math.pi / (process.teeth * spindle_speed)
     highest = float(np.abs(structure.poles).max()) / (2 * math.pi)
     steps = max(STEPS[0], math.ceil(STEPS[1] * highest * passing))
-    dynamics = discretise(structure, passing / steps)
+    dynamics = discretise(replace(structure, residuals=None), passing / steps)
+    if structure.residuals is not None:
+        dynamics = dynamics._replace(immediate=dynamics.immediate + structure.residuals.upper)
     memory = empty_memory(len(structure.poles), process.teeth, steps)
     tip = [structure.responses.index(label) for label in TOOL_TIP]
     output = 2 * np.stack([structure.right.real, -structure.right.imag], axis=1)[:, :, tip].reshape(-1, len(tip))

@@ -7,6 +7,7 @@ from .collocation import collocation, collocation_limits, lowest_limits
 from .delay_system import DelaySystem, delay_system
 from .limit_band import LimitBand, limit_band
 from .limit_samples import drawn, sampled_limits
+from .limit_sensitivity import LimitSensitivity, limit_sensitivities
 from .lobes_file import read_lobes, write_lobes
 from .mode_coupling import ModeCouplingLimit, mode_coupling_limit
 from .multi_frequency import multi_frequency, multi_frequency_limits
@@ -27,6 +28,7 @@ __all__ = [
     "Evidence",
     "ForeignTone",
     "LimitBand",
+    "LimitSensitivity",
     "ModeCouplingLimit",
     "Multipliers",
     "RecommendedCut",
@@ -46,6 +48,7 @@ __all__ = [
     "gather_evidence",
     "is_stable",
     "limit_band",
+    "limit_sensitivities",
     "lowered",
     "lowest_limits",
     "mode_coupling_limit",

@@ -28,6 +28,11 @@ SPREAD = (0.65, 1.5)
 """Ratio of the samples' spread to the first-order error that 39 samples show by chance, three standard errors wide."""
 
 
+LARGE, JUMP, BESIDE = 0.15, 0.02, 0.01
+"""Relative error of a limit, relative jump of the chatter's frequency, and share of the speed around a jump, that make
+draws necessary."""
+
+
 @dataclass(frozen=True)
 class LimitBand:
     """95 % interval of the depth limit at each speed.
@@ -53,9 +58,9 @@ def limit_band(
 ) -> LimitBand:
     """95 % interval of each limit of ``certified_lobes``, from errors of the structure and the coefficients.
 
-    Of a modal model 39 draws are solved besides the first order; a speed at which they contradict it (where two lobes
-    meet, beside a notch, where no limit was found) has their smallest and largest limit instead. Of an FRF there are no
-    draws: the first order alone.
+    Where the first order may fail (two lobes meet nearby, no limit was found, the error is large) 39 draws of a modal
+    model are solved; a speed at which they contradict the first order has their smallest and largest limit instead. Of
+    an FRF there are no draws: the first order alone.
 
     Parameters
     ----------
@@ -77,13 +82,28 @@ def limit_band(
     known = np.isfinite(low) & np.array([status != "unresolved" for status in lobes.status], dtype=bool)
     basis = np.where(known, "first-order", "none").astype(object)
     low, high = np.where(known, low, np.nan), np.where(known, high, np.nan)
-    if isinstance(structure, ModalModel):
-        samples = sampled_limits(structure, process, lobes.spindle_speeds, max_depth, SAMPLES, seed)
-        solved = ~np.isnan(samples).any(axis=0)
-        chosen = solved & ~(known & _agree(samples, lobes.depth_limits, errors, half))
-        low[chosen], high[chosen] = samples.min(axis=0)[chosen], samples.max(axis=0)[chosen]
+    doubted = np.flatnonzero(_doubted(lobes, errors))
+    if isinstance(structure, ModalModel) and len(doubted):
+        samples = sampled_limits(structure, process, lobes.spindle_speeds[doubted], max_depth, SAMPLES, seed)
+        agree = _agree(samples, lobes.depth_limits[doubted], errors[doubted], half[doubted])
+        replaced = (samples > 0).all(axis=0) & ~(known[doubted] & agree)
+        chosen = doubted[replaced]
+        low[chosen], high[chosen] = samples[:, replaced].min(axis=0), samples[:, replaced].max(axis=0)
         basis[chosen] = "samples"
     return LimitBand(lobes.spindle_speeds, low, high, tuple(str(one) for one in basis))
+
+
+def _doubted(lobes: StabilityLobes, errors: Real) -> NDArray[np.bool_]:
+    """Speeds with no or a large error, and those close to where the chatter's frequency or kind changes."""
+    speeds, frequency = lobes.spindle_speeds, lobes.chatter_frequencies
+    doubted = ~(errors < LARGE * lobes.depth_limits)
+    kinds = np.array(lobes.bifurcations)
+    jumps = (kinds[1:] != kinds[:-1]) | ~(np.abs(np.diff(frequency)) < JUMP * frequency[1:])
+    for k in np.flatnonzero(jumps):
+        near = (speeds > speeds[k] * (1 - BESIDE)) & (speeds < speeds[k + 1] * (1 + BESIDE))
+        near[max(0, k - 1) : k + 3] = True
+        doubted |= near
+    return np.asarray(doubted)
 
 
 def _agree(samples: Real, limits: Real, errors: Real, half: Real) -> NDArray[np.bool_]:

@@ -10,7 +10,8 @@ from foundation import InputError
 from modal_fit import ModalModel
 from modal_fit.uncertainty import pack_parameters, unpack_parameters
 
-from .certified import certified_lobes
+from .collocation import lowest_limits
+from .multipliers import multipliers
 
 Real = NDArray[np.float64]
 
@@ -69,7 +70,10 @@ def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> 
 def sampled_limits(
     model: ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float, count: int, seed: int = 0
 ) -> Real:
-    """Certified limits of ``count`` draws, (count, n_speeds), m; infinite above ``max_depth``, NaN where not resolved.
+    """Lowest limits of ``count`` draws, (count, n_speeds), m; infinite above ``max_depth``, 0 where not resolved.
+
+    By the solver of :func:`certified_lobes`. In place of its ladder each draw is asked once more for its multipliers
+    at the lowest of its limits; a draw that is not stable just below it counts with 0.
 
     Parameters
     ----------
@@ -86,5 +90,10 @@ def sampled_limits(
     """
     limits = np.empty((count, len(spindle_speeds)))
     for k, (one, cut) in enumerate(drawn(model, process, count, seed)):
-        limits[k] = certified_lobes(one, cut, spindle_speeds, max_depth).depth_limits
+        found = lowest_limits(one, cut, spindle_speeds, max_depth).lowest()
+        limits[k] = np.where([status == "unresolved" for status in found.status], 0.0, found.depth_limits)
+        worst = int(np.argmin(limits[k]))
+        below = 0.999 * min(float(limits[k, worst]), max_depth)
+        if not multipliers(one, cut, float(spindle_speeds[worst]), below).stable:
+            limits[k, worst] = 0.0
     return limits

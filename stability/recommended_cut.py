@@ -26,7 +26,7 @@ FINE = 25
 SAMPLED_SPEEDS = 7
 """Of these, the ones with the lowest limits and both ends, at which draws are solved."""
 
-LOOKED_AT = (60, 8)
+LOOKED_AT = (24, 5)
 """Most speeds whose drift is computed, and most that are sampled."""
 
 
@@ -212,6 +212,6 @@ def _of_draws(
     chosen = np.unique([*order[: SAMPLED_SPEEDS - 2], 0, len(fine) - 1])
     count = draws_for(confidence)
     samples = sampled_limits(structure, process, fine[chosen], depth, count, seed)
-    lowest = np.minimum(np.nan_to_num(samples, nan=0.0, posinf=depth), depth).min(axis=1)
+    lowest = np.minimum(samples, depth).min(axis=1)
     rank = max(1, math.floor((1 - confidence) * (count + 1) + 1e-9))
     return float(np.sort(lowest)[rank - 1])

@@ -7,7 +7,6 @@ from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
 
-import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from foundation import writing_whole_file
@@ -19,7 +18,7 @@ from .collect import Collected, collect
 from .comparison_section import comparison_section
 from .measurement_sections import channel_section, file_section, settings_section, setup_section
 from .result_sections import frf_section, input_section, mode_section
-from .stability_section import lobes_section
+from .stability_section import stability_findings
 
 
 @dataclass(frozen=True)
@@ -70,10 +69,12 @@ def report_text(collected: Collected, options: ReportOptions, watch: Watch = sil
     """The page as text."""
     reference = None if options.reference is None else read_modal_model(options.reference)
     channels, concerns = channel_section(collected, watch)
+    with watch("stability"):
+        stability = stability_findings(collected)
     sections = (
         mode_section(collected),
         comparison_section(collected),
-        lobes_section(collected),
+        stability.section,
         frf_section(collected, options.band, reference),
         input_section(collected, options.band, watch),
         settings_section(collected),
@@ -86,15 +87,15 @@ def report_text(collected: Collected, options: ReportOptions, watch: Watch = sil
         title=options.title,
         written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
-        brief=_in_brief(collected),
-        warnings=_warnings(collected, concerns),
+        brief=[*_in_brief(collected), *stability.brief],
+        warnings=_warnings(collected, [*stability.warnings, *concerns]),
         sections=[section for section in sections if not section.empty],
         versions=versions(),
     )
 
 
 def _in_brief(collected: Collected) -> list[str]:
-    """The result in two or three sentences."""
+    """The modes in a sentence."""
     sentences = []
     for file, model in collected.models[-1:]:
         modes = ", ".join(
@@ -102,13 +103,6 @@ def _in_brief(collected: Collected) -> list[str]:
             for frequency, zeta in zip(model.natural_frequencies, model.damping_ratios, strict=True)
         )
         sentences.append(f"{file.path.name} has {len(model.poles)} modes: {modes}.")
-    for file, lobes in collected.lobes[:1]:
-        if np.isfinite(lobes.depth_limits).any():
-            lowest = int(np.argmin(lobes.depth_limits))
-            sentences.append(
-                f"{file.path.name}: the lowest depth limit is {1e3 * lobes.depth_limits[lowest]:.2f} mm at "
-                f"{lobes.spindle_speeds_rpm[lowest]:.0f} rpm, chatter at {lobes.chatter_frequencies[lowest]:.2f} Hz."
-            )
     return sentences
 
 

@@ -1,56 +1,103 @@
-"""The section on stability: lobes with their band, a recommended cut, and where two measurements differ in advice."""
+"""The section on stability: lobes held against the certified limits, their band, a recommended cut, and where two measurements differ in advice."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from cutting import MillingProcess
-from estimation import Frf
-from foundation import InputError
-from modal_fit import ModalModel
-from stability import RecommendedCut, StabilityLobes, depth_errors, recommended_cut, zero_order
+from stability import StabilityLobes
 
 from ..figures.embed import as_data_uri
 from ..figures.lobes_figure import Band, lobes_figure
 from ..tables import Table
 from .collect import Collected
+from .lobes_check import CheckedLobes, checked_lobes, lobes_warnings
+from .recommendation import recommendation
 from .section import Picture, Section
-
-CONFIDENCE, DRIFT = 0.95, 0.02
-"""Of the recommended cut: probability of stability, and relative drift of the spindle's speed."""
 
 DIFFERS = 0.1
 """Relative difference of two depth limits that counts as different advice."""
 
 
-def lobes_section(collected: Collected) -> Section:
-    """All lobes in one figure and one table, with the band of the first where its structure is among the files."""
+@dataclass(frozen=True)
+class StabilityFindings:
+    """The section on stability, and what of it stands at the head of the page.
+
+    Parameters
+    ----------
+    section
+        Figure, tables, sentences.
+    brief
+        One sentence each.
+    warnings
+        One sentence each.
+    """
+
+    section: Section
+    brief: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+def stability_findings(collected: Collected) -> StabilityFindings:
+    """All lobes in one figure and one table, held against the certified limits; the most exact ones lead."""
     if not collected.lobes:
-        return Section("Stability lobes")
-    curves = {file.label: lobes for file, lobes in collected.lobes}
+        return StabilityFindings(Section("Stability lobes"))
+    checked = checked_lobes(collected)
+    curves = dict(one.headline for one in checked)
+    advised = recommendation(checked[0])
     sentences = [_cutter(file.path.name, process) for file, process in collected.cutting]
-    band, cut = _band(collected)
-    if cut is not None:
-        sentences.append(
-            f"Most material at {100 * CONFIDENCE:.0f} % confidence of stability, the speed drifting by "
-            f"{100 * DRIFT:.0f} %: {1e3 * cut.depth:.2f} mm at {cut.spindle_speed * 30 / math.pi:.0f} rpm "
-            "(zero-order limit less its error; the errors of the cutting coefficients are not in it)."
-        )
-    tables = [_lobes_table(collected)]
-    first_file, first = collected.lobes[0]
-    for file, lobes in collected.lobes[1:]:
-        table = advice_table(first, lobes, first_file.label, file.label)
+    sentences += [_method(one) for one in checked] + list(advised.sentences)
+    tables = [_lobes_table(curves)]
+    (first_name, first), *others = curves.items()
+    for name, lobes in others:
+        table = advice_table(first, lobes, first_name, name)
         if table.rows:
             tables.append(table)
         else:
-            sentences.append(
-                f"{first_file.label} and {file.label} advise the same within {100 * DIFFERS:.0f} % at every speed."
-            )
+            sentences.append(f"{first_name} and {name} advise the same within {100 * DIFFERS:.0f} % at every speed.")
+    drawn = curves | {f"{one.file.label}, as given": one.given for one in checked if one.wrong}
     caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
-    if band is not None:
-        caption += f" Light band: 95 % interval of {next(iter(curves))}, from the covariance of its modal model."
-    picture = Picture(as_data_uri(lobes_figure(curves, band=band)), caption, "Stability lobes")
-    return Section("Stability lobes", tuple(sentences), tuple(tables), (picture,))
+    band = None
+    if advised.band is not None:
+        low, high = advised.band.low, np.minimum(advised.band.high, 1.5 * checked[0].max_depth)
+        band = Band(first.spindle_speeds_rpm, low, high)
+        drawn_speeds = advised.band.basis.count("samples")
+        caption += f" Light band: 95 % interval of {first_name}"
+        caption += f"; at {drawn_speeds} speeds from draws of its errors." if drawn_speeds else ", to first order."
+    picture = Picture(as_data_uri(lobes_figure(drawn, band=band)), caption, "Stability lobes")
+    section = Section("Stability lobes", tuple(sentences), tuple(tables), (picture,))
+    warnings = (*lobes_warnings(checked, collected), *advised.warnings)
+    return StabilityFindings(section, _brief(first_name, first), warnings)
+
+
+def lobes_section(collected: Collected) -> Section:
+    """The section alone; see :func:`stability_findings`."""
+    return stability_findings(collected).section
+
+
+def _brief(name: str, lobes: StabilityLobes) -> tuple[str, ...]:
+    if not np.isfinite(lobes.depth_limits).any():
+        return ()
+    lowest = int(np.nanargmin(lobes.depth_limits))
+    kind = ", period doubling" if lobes.bifurcations[lowest] == "period-doubling" else ""
+    return (
+        f"{name}: the lowest depth limit is {1e3 * lobes.depth_limits[lowest]:.2f} mm at "
+        f"{lobes.spindle_speeds_rpm[lowest]:.0f} rpm, chatter at {lobes.chatter_frequencies[lowest]:.2f} Hz{kind}.",
+    )
+
+
+def _method(one: CheckedLobes) -> str:
+    """Which method a file's limits are of, and what they are worth."""
+    status = {name: one.given.status.count(name) for name in dict.fromkeys(one.given.status)}
+    counted = ", ".join(f"{count} {name}" for name, count in status.items())
+    if one.structure is None:
+        return f"{one.file.path.name}: {one.method}; limits by status: {counted}."
+    worth = "not those of the cut" if one.wrong else "the certified ones"
+    return (
+        f"{one.file.path.name}: {one.method}, of {one.structure[0].path.name}; its limits are {worth} (by status: "
+        f"{counted})."
+    )
 
 
 def advice_table(first: StabilityLobes, second: StabilityLobes, first_name: str, second_name: str) -> Table:
@@ -60,7 +107,10 @@ def advice_table(first: StabilityLobes, second: StabilityLobes, first_name: str,
     speeds = second.spindle_speeds[inside]
     ours = np.interp(speeds, first.spindle_speeds, np.nan_to_num(first.depth_limits, posinf=1e3))
     theirs = np.nan_to_num(second.depth_limits[inside], posinf=1e3)
-    ratio = theirs / ours
+    known = ~np.isnan(np.interp(speeds, first.spindle_speeds, first.depth_limits)) & ~np.isnan(
+        second.depth_limits[inside]
+    )
+    ratio = np.where(known, theirs, 1.0) / np.where(known, ours, 1.0)
     differs = np.abs(np.log(ratio)) > np.log(1 + DIFFERS)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], differs.astype(int), [0]])))
     rows = []
@@ -92,58 +142,20 @@ def _cutter(name: str, p: MillingProcess) -> str:
     )
 
 
-def _band(collected: Collected) -> tuple[Band | None, RecommendedCut | None]:
-    """The band of the first lobes, by whichever structure among the files gives them."""
-    first = collected.lobes[0][1]
-    structures: list[ModalModel | Frf] = [model for _, model in collected.models if model.covariance is not None]
-    for _, process in collected.cutting:
-        for structure in structures:
-            found = _errors(structure, process, first)
-            if found is None:
-                continue
-            lobes, errors = found
-            half = 1.96 * np.nan_to_num(errors)
-            band = Band(lobes.spindle_speeds_rpm, lobes.depth_limits - half, lobes.depth_limits + half)
-            try:
-                return band, recommended_cut(lobes, errors, confidence=CONFIDENCE, drift=DRIFT)
-            except InputError:
-                return band, None
-    return None, None
-
-
-def _errors(
-    structure: ModalModel | Frf, process: MillingProcess, lobes: StabilityLobes
-) -> tuple[StabilityLobes, np.ndarray] | None:
-    """Zero-order lobes of a structure and their errors, if these are the lobes that were given."""
-    finite = lobes.depth_limits[np.isfinite(lobes.depth_limits)]
-    if not len(finite):
-        return None
-    try:
-        again = zero_order(structure, process, lobes.spindle_speeds, 1.01 * float(finite.max()))
-        errors = depth_errors(structure, process, again)
-    except InputError:  # another point of the structure, or another quantity
-        return None
-    both = np.isfinite(again.depth_limits) & np.isfinite(lobes.depth_limits)
-    if not both.any() or not np.allclose(again.depth_limits[both], lobes.depth_limits[both], rtol=1e-3):
-        return None
-    return again, errors
-
-
-def _lobes_table(collected: Collected, most: int = 12) -> Table:
-    """Depth limits at up to twelve speeds of the first curve, the others interpolated."""
-    first = collected.lobes[0][1]
+def _lobes_table(curves: dict[str, StabilityLobes], most: int = 12) -> Table:
+    """Depth limits at up to twelve speeds of the first curve, the others at the same speeds."""
+    first = next(iter(curves.values()))
     rpm = first.spindle_speeds_rpm
     chosen = np.unique(np.linspace(0, len(rpm) - 1, min(most, len(rpm))).round().astype(int))
     columns = ["spindle speed (rpm)"]
-    for file, _ in collected.lobes:
-        columns += [f"{file.label} (mm)"]
-    columns += ["chatter frequency (Hz)", "type"]
+    columns += [f"{name} (mm)" for name in curves]
+    columns += ["chatter frequency (Hz)", "type", "status"]
     rows = []
     for k in chosen:
-        depths = [_depth_at(lobes.spindle_speeds_rpm, lobes.depth_limits, rpm[k]) for _, lobes in collected.lobes]
+        depths = [_depth_at(lobes.spindle_speeds_rpm, lobes.depth_limits, rpm[k]) for lobes in curves.values()]
         frequency = first.chatter_frequencies[k]
         shown = f"{frequency:.2f}" if np.isfinite(frequency) else ""
-        rows.append((f"{rpm[k]:.0f}", *depths, shown, first.bifurcations[k]))
+        rows.append((f"{rpm[k]:.0f}", *depths, shown, first.bifurcations[k], first.status[k]))
     return Table("", tuple(columns), tuple(rows))
 
 
@@ -152,4 +164,6 @@ def _depth_at(rpm: np.ndarray, depths: np.ndarray, wanted: float) -> str:
     nearest = int(np.argmin(np.abs(rpm - wanted)))
     if abs(rpm[nearest] - wanted) > 0.5:
         return ""
+    if np.isnan(depths[nearest]):
+        return "not resolved"
     return f"{1e3 * depths[nearest]:.3f}" if np.isfinite(depths[nearest]) else "no limit"

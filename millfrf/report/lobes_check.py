@@ -1,0 +1,169 @@
+"""Lobes files held against the certified limits of the structures beside them: what each is, and which one leads."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cutting import MillingProcess
+from estimation import Frf, to_receptance
+from foundation import InputError
+from modal_fit import ModalModel
+from stability import StabilityLobes, certified_lobes, zero_order
+
+from .collect import Collected, SourceFile
+
+Real = NDArray[np.float64]
+
+FEW = 25
+"""Speeds at which it is found out what a file is of."""
+
+NEAR = 0.02
+"""Median relative difference up to which limits are taken to be of a structure."""
+
+DIFFERS = 0.03
+"""Relative difference from the certified limit that is said aloud."""
+
+CERTIFIED, AVERAGED, UNKNOWN = "time-periodic", "averaged coefficients (zero-order)", "unknown method"
+
+
+@dataclass(frozen=True)
+class CheckedLobes:
+    """A lobes file, and what was found of it.
+
+    Parameters
+    ----------
+    file, given
+        The file and its limits.
+    method
+        ``time-periodic``, ``averaged coefficients (zero-order)`` or ``unknown method``.
+    structure
+        The file and the structure that the limits are of; None where none beside it fits.
+    process
+        The cut that they are of, with ``structure``.
+    certified
+        Certified limits of that structure at the file's speeds; None without one.
+    max_depth
+        Up to which they were looked for, m.
+    """
+
+    file: SourceFile
+    given: StabilityLobes
+    method: str = UNKNOWN
+    structure: tuple[SourceFile, ModalModel | Frf] | None = None
+    process: MillingProcess | None = None
+    certified: StabilityLobes | None = None
+    max_depth: float = 0.0
+
+    @property
+    def differences(self) -> Real:
+        """Relative difference of the file's limits from the certified ones; NaN where one is not known."""
+        if self.certified is None:
+            return np.zeros(len(self.given.depth_limits))
+        return _differences(self.given.depth_limits, self.certified.depth_limits, self.max_depth)
+
+    @property
+    def wrong(self) -> bool:
+        """Whether any limit of the file differs from the certified one by more than three hundredths."""
+        return bool((np.abs(self.differences) > DIFFERS).any())
+
+    @property
+    def exactness(self) -> tuple[int, float]:
+        """Sorting key: time-periodic limits come first, then unknown ones, then averaged ones; verified ones lead."""
+        rank = (CERTIFIED, UNKNOWN, AVERAGED).index(self.method)
+        return rank, -float(np.mean([status == "verified" for status in self.given.status]))
+
+    @property
+    def headline(self) -> tuple[str, StabilityLobes]:
+        """Name and limits that may stand at the head: the certified ones where the file's differ from them."""
+        if self.certified is not None and self.wrong:
+            return f"{self.file.label}, certified", self.certified
+        return self.file.label, self.given
+
+
+def checked_lobes(collected: Collected) -> tuple[CheckedLobes, ...]:
+    """Every lobes file with what it is of, the most exact first (else in the order given)."""
+    found = [_checked(collected, file, lobes) for file, lobes in collected.lobes]
+    return tuple(sorted(found, key=lambda one: one.exactness))
+
+
+def lobes_warnings(checked: tuple[CheckedLobes, ...], collected: Collected) -> list[str]:
+    """What must be said aloud: limits that are not those of the cut, and files that nothing beside them confirms."""
+    warnings = []
+    for one in checked:
+        if one.certified is None:
+            if _structures(collected) and collected.cutting:
+                warnings.append(
+                    f"{one.file.path.name}: its limits are those of no structure and cut among the files, so that they "
+                    "could not be checked; give the model or FRF and the cutting file that they were computed from"
+                )
+        elif one.wrong:
+            warnings.append(_wrong(one))
+    return warnings
+
+
+def _wrong(one: CheckedLobes) -> str:
+    assert one.certified is not None
+    assert one.structure is not None
+    apart = one.differences
+    worst = int(np.argmax(np.where(np.isnan(apart), -1.0, apart)))
+    if apart[worst] <= DIFFERS:
+        worst = int(np.nanargmax(np.abs(apart)))
+    count = int((np.abs(apart) > DIFFERS).sum())
+    return (
+        f"{one.file.path.name} ({one.method}) is not the stability limit of {one.structure[0].path.name}: at "
+        f"{one.given.spindle_speeds_rpm[worst]:.0f} rpm it says {_told(one.given, worst)}, the certified limit is "
+        f"{_told(one.certified, worst)}; {count} of {len(apart)} speeds differ by more than {100 * DIFFERS:.0f} %. "
+        "The report stands on the certified limits; compute the lobes again without --method"
+    )
+
+
+def _told(lobes: StabilityLobes, k: int) -> str:
+    depth = lobes.depth_limits[k]
+    if np.isnan(depth):
+        return "not resolved"
+    if np.isinf(depth):
+        return "no limit"
+    kind = " by period doubling" if lobes.bifurcations[k] == "period-doubling" else ""
+    return f"{1e3 * depth:.2f} mm{kind}"
+
+
+def _structures(collected: Collected) -> list[tuple[SourceFile, ModalModel | Frf]]:
+    """Models and FRFs among the files that lobes can be computed from."""
+    usable: list[tuple[SourceFile, ModalModel | Frf]] = [*collected.models]
+    for file, frf in collected.frfs:
+        try:
+            usable.append((file, to_receptance(frf)))
+        except InputError:  # a transfer
+            continue
+    return usable
+
+
+def _checked(collected: Collected, file: SourceFile, lobes: StabilityLobes) -> CheckedLobes:
+    finite = lobes.depth_limits[np.isfinite(lobes.depth_limits)]
+    if not len(finite):
+        return CheckedLobes(file, lobes)
+    deepest = float(finite.max())
+    few = np.unique(np.linspace(0, len(lobes.spindle_speeds) - 1, FEW).round().astype(int))
+    best: tuple[float, str, tuple[SourceFile, ModalModel | Frf], MillingProcess] | None = None
+    for _, process in collected.cutting:
+        for structure in _structures(collected):
+            for method, solver in ((CERTIFIED, certified_lobes), (AVERAGED, zero_order)):
+                try:
+                    again = solver(structure[1], process, lobes.spindle_speeds[few], 1.01 * deepest)
+                except InputError:  # another point of the structure, or a cut that the solver does not take
+                    continue
+                apart = _differences(lobes.depth_limits[few], again.depth_limits, deepest)
+                distance = float(np.nanmedian(np.abs(apart))) if np.isfinite(apart).any() else np.inf
+                if distance < NEAR and (best is None or distance < best[0]):
+                    best = (distance, method, structure, process)
+    if best is None:
+        return CheckedLobes(file, lobes)
+    _, method, structure, process = best
+    certified = certified_lobes(structure[1], process, lobes.spindle_speeds, 1.01 * deepest)
+    return CheckedLobes(file, lobes, method, structure, process, certified, deepest)
+
+
+def _differences(given: Real, certified: Real, deepest: float) -> Real:
+    """``given / certified - 1``, where what lies above the largest depth looked at counts as that depth."""
+    return np.asarray(np.minimum(given, deepest) / np.minimum(certified, deepest) - 1)
