@@ -49,8 +49,8 @@ class Settling:
 def settle(structure: ModalModel, process: MillingProcess, depth: float, spindle_speed: float) -> Settling:
     """Start the cut from rest and watch ``max |x(t) - x(t - tau)|`` over each tooth period tau.
 
-    Runout is left out (with it teeth differ for ever). Entering the cut is the disturbance. A stable cut forgets it; one
-    that doubles its period or turns (Hopf) does not, whether it grows on or is held by teeth that leave the cut.
+    Runout is left out (with it teeth differ for ever). Entering the cut is the disturbance. A stable cut forgets it. A
+    cut that doubles its period or turns (Hopf) does not, whether it grows on or teeth that leave the cut hold it.
 
     Parameters
     ----------

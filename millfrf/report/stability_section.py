@@ -1,4 +1,4 @@
-"""The section on stability: lobes held against the certified limits, their band, a recommended cut, and where two measurements differ in advice."""
+"""The section on stability: lobes and what they are worth, their band, a recommended cut, where advice differs."""
 
 import math
 from dataclasses import dataclass

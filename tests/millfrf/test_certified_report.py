@@ -71,7 +71,7 @@ def test_the_more_exact_of_two_files_is_the_headline(tmp_path: Path) -> None:
 
 def test_coefficients_errors_are_named_where_they_are_missing_and_used_where_not(tmp_path: Path) -> None:
     advised = []
-    for std in (0.0, 0.05):
+    for std in (0.0, 0.1):
         (tmp_path / str(std)).mkdir()
         cut = replace(HALF, ktc_std=std * HALF.ktc)
         [checked] = checked_lobes(collect(files(tmp_path / str(std), ("certified",), cut)))
