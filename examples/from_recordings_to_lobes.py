@@ -17,7 +17,7 @@ from cutting import MillingProcess
 from estimation import cross_spectra, h1, settings_for, sum_tests
 from modal_fit import ModalModel, fit_polyreference
 from replay_data import LinearSweep, MillingCell, dynamometer, table_one_model, tip_accelerometers
-from stability import StabilityLobes, zero_order
+from stability import StabilityLobes, certified_lobes
 
 RPM = pi / 30
 CUTTER = MillingProcess(
@@ -56,7 +56,7 @@ def limits(files: Sequence[Path]) -> tuple[ModalModel, StabilityLobes]:
     fit = fit_polyreference(h1(sum_tests(tests)), (15.2, 22.5))
     for warning in fit.warnings:
         print("warning:", warning)
-    return fit.model, zero_order(fit.model, CUTTER, np.linspace(600, 2400, 100) * RPM, 10e-3)
+    return fit.model, certified_lobes(fit.model, CUTTER, np.linspace(600, 2400, 100) * RPM, 10e-3)
 
 
 def main() -> None:

@@ -1,9 +1,9 @@
-"""Depth limits over postures: the redundancy of a six-joint robot, and a map of 10 000 places on two processes.
+"""Depth limits over postures: the redundancy of a six-joint robot, and a map of 400 places on two processes.
 
 Run it: `python examples/robot_posture_map.py [NUMBER OF PLACES] [PICTURE.png]`. The first table is what Mousavi et al.
 show in Fig. 11: at one speed and depth, turning tool and table together decides whether the cut chatters. In the paper
-X_0 is vertical and the table turns about Y_0, along which the robot reaches out: about the feed, here. The map's time
-is printed beside that of a plain loop over the zero-order solution, measured on a sample of the same places.
+X_0 is vertical and the table turns about Y_0, along which the robot reaches out: about the feed, here. Limits are the
+certified ones; the map says at how many places averaged coefficients (zero-order) would promise more.
 """
 
 import sys
@@ -53,8 +53,8 @@ def work_area(count: int) -> list[CutPlace]:
     return [tool_down([x, y, 0.8]) for x in np.linspace(0.5, 1.4, side) for y in np.linspace(-0.7, 0.7, side)]
 
 
-def plain_loop(robot: SpatialRobot, places: list[CutPlace]) -> np.ndarray:
-    """The same limits place by place with ``stability.zero_order``."""
+def averaged(robot: SpatialRobot, places: list[CutPlace]) -> np.ndarray:
+    """What the zero-order solution says at the same places, m."""
     limits = np.full(len(places), np.nan)
     for i, place in enumerate(places):
         solutions = wrist_solutions(robot.mechanism, target_of(place))
@@ -64,8 +64,8 @@ def plain_loop(robot: SpatialRobot, places: list[CutPlace]) -> np.ndarray:
     return limits
 
 
-def main(count: int = 10_000, picture: Path | None = None) -> float:
-    """Print both; returns how many times faster the map was than the plain loop."""
+def main(count: int = 400, picture: Path | None = None) -> float:
+    """Print both; returns the share of places at which averaged coefficients promise a tenth more or above."""
     robot = read_spatial_robot("staubli_rx170").robot
     print("angle (deg)   depth limit (mm)")
     angles = np.arange(-90.0, 91.0, 15.0)
@@ -75,20 +75,17 @@ def main(count: int = 10_000, picture: Path | None = None) -> float:
         fine = redundancy(robot, np.linspace(-105.0, 105.0, 85))
         draw_posture_map(picture, fine, MAX_DEPTH, DEPTH, "tool and table about the feed")
     places = work_area(count)
-    sample = places[:: max(1, len(places) // 100)]
-    depth_over_places(robot, sample[:2], HALF_DOWN, SPEED, MAX_DEPTH)  # compiled on a machine's first run
     started = time.perf_counter()
     limits, lowest = depth_over_places(robot, places, HALF_DOWN, SPEED, MAX_DEPTH, workers=2)
     taken = time.perf_counter() - started
-    started = time.perf_counter()
-    plain = plain_loop(robot, sample)
-    plain_taken = (time.perf_counter() - started) * len(places) / len(sample)
-    same = np.nanmax(np.abs(limits[:: max(1, len(places) // 100)] / plain - 1))
     print(f"{len(places)} places, {np.isfinite(limits).sum()} reached: {taken:.1f} s on two processes")
     print(f"lowest frequency {np.nanmin(lowest):.2f} to {np.nanmax(lowest):.2f} Hz")
-    print(f"plain loop {plain_taken:.1f} s, {plain_taken / taken:.1f} times; largest difference {same:.1e}")
-    return plain_taken / taken
+    ratio = averaged(robot, places) / limits
+    ratio = ratio[np.isfinite(ratio)]
+    share = float(np.mean(ratio > 1.1))
+    print(f"zero-order promises over a tenth more at {100 * share:.0f} % of them, up to {ratio.max():.1f} times")
+    return share
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000, Path(sys.argv[2]) if len(sys.argv) > 2 else None)
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 400, Path(sys.argv[2]) if len(sys.argv) > 2 else None)

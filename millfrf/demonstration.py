@@ -22,12 +22,13 @@ from replay_data import (
     milling_sensors,
     tip_model,
 )
-from stability import StabilityLobes, read_lobes, write_lobes
+from stability import StabilityLobes, certified_lobes, read_lobes, write_lobes
 
 from .chain.calibrate import calibrate_model, write_calibration
 from .chain.estimate import EstimateOptions, estimate_recordings, write_estimate
 from .chain.fit import SUBSPACE, FitOptions, fit_model, fit_recordings, write_fit
 from .chain.lobes import compute_lobes, speed_axis
+from .demo_trap import Trap, report_trap, spring_trap, trap_table
 from .figures.lobes_figure import lobes_figure
 from .progress import Watch, silent
 from .report import ReportOptions, write_report
@@ -60,6 +61,9 @@ SUBSPACE_BAND = (13.0, 25.0)
 """Records need no force on every line."""
 
 COMPARED_RPM = (800, 900, 1200, 1600, 2000)
+AXIS_RPM = {"identified": (300, 2400, 141), "hammer": (300, 2400, 36), "true": (300, 2400, 141)}
+"""Fewer speeds where lines of an FRF have to do: they take longer."""
+
 MAX_DEPTH = 10e-3
 
 
@@ -95,6 +99,8 @@ class DemoResult:
         Modal models of the tool tip.
     lobes
         ``identified``, ``hammer`` and ``true``, at :data:`COMPARED_RPM`.
+    trap
+        A cut for which the zero-order limit is unsafe.
     report
         The page.
     seconds
@@ -104,6 +110,7 @@ class DemoResult:
     identified: ModalModel
     true: ModalModel
     lobes: dict[str, StabilityLobes]
+    trap: Trap
     report: Path
     seconds: float
 
@@ -136,20 +143,20 @@ def run_demo(options: DemoOptions, watch: Watch = silent, say: Callable[[str], o
     say("drawing lobes and report ...")
     structures: dict[str, Frf | ModalModel] = {"identified": identified, "hammer": tip, "true": true}
     for name, structure in structures.items():
-        lobes = compute_lobes(structure, CUTTER, speed_axis(300, 2400, 211), MAX_DEPTH, "zero-order", watch)
+        lobes = compute_lobes(structure, CUTTER, speed_axis(*AXIS_RPM[name]), MAX_DEPTH, watch=watch, name=name)
         write_lobes(folder / f"lobes_{name}.csv", lobes)
     compared = np.array(COMPARED_RPM) * RPM
-    limits = {
-        name: compute_lobes(structure, CUTTER, compared, MAX_DEPTH, "zero-order")
-        for name, structure in structures.items()
-    }
+    limits = {name: certified_lobes(structure, CUTTER, compared, MAX_DEPTH) for name, structure in structures.items()}
     _draw_lobes(folder)
     report = _report(folder, sweeps, watch)
-    return DemoResult(identified, true, limits, report, time.perf_counter() - started)
+    say("trying a cut that averaged coefficients call stable ...")
+    trap = spring_trap(identified, true, CUTTER)
+    report_trap(folder, identified, CUTTER, watch)
+    return DemoResult(identified, true, limits, trap, report, time.perf_counter() - started)
 
 
-def comparison_tables(result: DemoResult) -> tuple[Table, Table]:
-    """Modes and depth limits, identified beside true."""
+def comparison_tables(result: DemoResult) -> tuple[Table, Table, Table]:
+    """Modes and depth limits, identified beside true; and the cut for which zero-order is unsafe."""
     rows = []
     for r in nearest_modes(result):
         true_frequency, true_zeta = result.true.natural_frequencies[r[0]], 100 * result.true.damping_ratios[r[0]]
@@ -171,16 +178,29 @@ def comparison_tables(result: DemoResult) -> tuple[Table, Table]:
     depths = tuple(
         (
             f"{rpm}",
-            f"{true[k]:.3f}",
-            f"{found[k]:.3f}",
-            f"{100 * (found[k] / true[k] - 1):+.1f} %",
-            f"{tapped[k]:.3f}",
-            f"{100 * (tapped[k] / true[k] - 1):+.1f} %",
+            _limit(true[k]),
+            _limit(found[k]),
+            _error(found[k], true[k]),
+            _limit(tapped[k]),
+            _error(tapped[k], true[k]),
         )
         for k, rpm in enumerate(COMPARED_RPM)
     )
     headings = ("speed (rpm)", "true (mm)", "milled (mm)", "error", "tapped FRF (mm)", "error ")
-    return modes, Table("Depth limits, half-immersion down-milling", headings, depths)
+    limits = Table("Depth limits, half-immersion down-milling", headings, depths)
+    return modes, limits, trap_table(result.trap)
+
+
+def _limit(depth: float) -> str:
+    """mm, or that there is none up to the largest depth."""
+    return f"{depth:.3f}" if math.isfinite(depth) else f"> {1e3 * MAX_DEPTH:.0f}"
+
+
+def _error(found: float, true: float) -> str:
+    """Relative error, where both are limits."""
+    if math.isinf(found) or math.isinf(true):
+        return "" if math.isinf(found) and math.isinf(true) else ("too low" if math.isinf(true) else "too high")
+    return f"{100 * (found / true - 1):+.1f} %"
 
 
 def nearest_modes(result: DemoResult) -> tuple[tuple[int, int], ...]:

@@ -55,8 +55,9 @@ def diagnosis_lobes_section(diagnosis: Diagnosis, process: MillingProcess | None
     rows = tuple((name, f"{1e3 * depth:.3g}", f"{depth / lowest[names[0]]:.2f}") for name, depth in lowest.items())
     told = "the cut given" if process else "a slot, 2 teeth, K_tc 800 MPa, as no cut was given (--cutting CUT.toml)"
     sentence = (
-        f"For {told}: zero-order limits. Joints count as the spring and damper that come closest to their law at the "
-        "motion of the recording named; faults of the measuring chain are no part of the structure."
+        f"For {told}: zero-order limits, which compare structures and cannot see period doubling: cut by those of "
+        "`millfrf lobes` with the improved model. Joints count as the spring and damper that come closest to their law "
+        "at the motion of the recording named; faults of the measuring chain are no part of the structure."
     )
     columns = ("structure", "depth stable at every speed (mm)", "over nominal")
     table = Table("Depth that is stable at every speed drawn", columns, rows)

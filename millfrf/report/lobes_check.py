@@ -18,8 +18,11 @@ Real = NDArray[np.float64]
 FEW = 25
 """Speeds at which it is found out what a file is of."""
 
-NEAR = 0.02
+NEAR = 0.002
 """Median relative difference up to which limits are taken to be of a structure."""
+
+FOUND = 1e-5
+"""Median relative difference below which no other structure is tried."""
 
 DIFFERS = 0.03
 """Relative difference from the certified limit that is said aloud."""
@@ -149,6 +152,8 @@ def _checked(collected: Collected, file: SourceFile, lobes: StabilityLobes) -> C
     for _, process in collected.cutting:
         for structure in _structures(collected):
             for method, solver in ((CERTIFIED, certified_lobes), (AVERAGED, zero_order)):
+                if best is not None and best[0] < FOUND:
+                    break
                 try:
                     again = solver(structure[1], process, lobes.spindle_speeds[few], 1.01 * deepest)
                 except InputError:  # another point of the structure, or a cut that the solver does not take

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
@@ -10,11 +10,12 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from foundation import writing_whole_file
-from modal_fit import read_modal_model
+from modal_fit import ModalModel, read_modal_model
 
+from ..file_kinds import MODEL
 from ..progress import Watch, silent
-from ..provenance import versions
-from .collect import Collected, collect
+from ..provenance import sha256, versions
+from .collect import Collected, SourceFile, collect
 from .comparison_section import comparison_section
 from .measurement_sections import channel_section, file_section, settings_section, setup_section
 from .result_sections import frf_section, input_section, mode_section
@@ -70,7 +71,7 @@ def report_text(collected: Collected, options: ReportOptions, watch: Watch = sil
     reference = None if options.reference is None else read_modal_model(options.reference)
     channels, concerns = channel_section(collected, watch)
     with watch("stability"):
-        stability = stability_findings(collected)
+        stability = stability_findings(_with_reference(collected, options, reference))
     sections = (
         mode_section(collected),
         comparison_section(collected),
@@ -92,6 +93,15 @@ def report_text(collected: Collected, options: ReportOptions, watch: Watch = sil
         sections=[section for section in sections if not section.empty],
         versions=versions(),
     )
+
+
+def _with_reference(collected: Collected, options: ReportOptions, reference: ModalModel | None) -> Collected:
+    """The reference among the models, so that lobes drawn from it are known."""
+    if reference is None or options.reference is None:
+        return collected
+    path = Path(options.reference)
+    file = SourceFile(path, MODEL, sha256(path), {})
+    return replace(collected, models=(*collected.models, (file, reference)))
 
 
 def _in_brief(collected: Collected) -> list[str]:

@@ -17,7 +17,7 @@ from millfrf.robot.robot_lobes import at_the_tip
 from modal_fit import read_modal_model
 from replay_data import MillingCell
 from robot_model import modal_model_at, read_planar_robot, read_spatial_robot, rigid_model, tool_down
-from stability import read_lobes, zero_order
+from stability import certified_lobes, multipliers, read_lobes
 
 STAUBLI = read_spatial_robot("staubli_rx170").robot
 HALF_DOWN = MillingProcess(2, 0.02, pi / 2, 700e6, 0.3, 0.1, pi / 2, pi, 1e-4)
@@ -41,14 +41,16 @@ def cut(tmp_path: Path) -> str:
 
 
 @pytest.mark.parametrize("process", [HALF_DOWN, FACE], ids=["end mill", "face mill"])
-@pytest.mark.parametrize("rpm", [800.0, 3000.0, 9000.0])
-def test_compiled_limits_are_the_zero_order_solution(process: MillingProcess, rpm: float) -> None:
+@pytest.mark.parametrize("rpm", [3000.0, 6000.0])
+def test_limits_of_postures_are_those_of_the_cut(process: MillingProcess, rpm: float) -> None:
+    """Multipliers just below and above; averaged coefficients miss these limits by up to a factor of two."""
     rng = np.random.default_rng(4)
     low, high = np.radians([-90, -60, 40, -90, 20, -90]), np.radians([90, 60, 140, 90, 120, 90])
-    models = [modal_model_at(STAUBLI, rng.uniform(low, high)) for _ in range(6)]
+    models = [modal_model_at(STAUBLI, rng.uniform(low, high)) for _ in range(4)]
     speed = rpm * pi / 30
-    slow = [float(zero_order(model, process, np.array([speed]), 0.05).depth_limits[0]) for model in models]
-    assert depth_limits(models, process, speed, 0.05) == pytest.approx(slow, rel=1e-7)
+    for model, limit in zip(models, depth_limits(models, process, speed, 0.05), strict=True):
+        assert multipliers(model, process, speed, 0.999 * limit).stable
+        assert not multipliers(model, process, speed, 1.001 * limit).stable
 
 
 def test_turning_the_redundancy_makes_an_unstable_cut_stable() -> None:
@@ -172,7 +174,7 @@ def test_lobes_of_a_planar_robot_are_rigid_across(tmp_path: Path, cut: str) -> N
     chen = read_planar_robot("chen_2026")
     model = at_the_tip(rigid_model(chen.robot, chen.poses["P2"]))
     assert np.abs(model.receptance(np.array([9.0]))[0, 1]).max() == 0
-    limits = zero_order(model, HALF_DOWN, np.array([2000.0, 3000.0]) * pi / 30, 0.05).depth_limits
+    limits = certified_lobes(model, HALF_DOWN, np.array([2000.0, 3000.0]) * pi / 30, 0.05).depth_limits
     assert read_lobes(out).depth_limits == pytest.approx(limits, rel=1e-6)
 
 

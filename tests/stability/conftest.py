@@ -14,5 +14,5 @@ def _load(name: str) -> None:
     spec.loader.exec_module(module)
 
 
-for _name in ("benchmarks_of_literature", "independent_floquet", "milling_simulator", "random_cuts"):
+for _name in ("benchmarks_of_literature", "independent_floquet", "milling_simulator", "random_cuts", "drawn_cuts"):
     _load(_name)
