@@ -198,9 +198,7 @@ def lobes(
         tuple[float, float, int] | None, typer.Option("--angles", metavar="LO HI N", help="Redundancy angles, degrees.")
     ] = None,
     speed: Speed = None,
-    method: Annotated[
-        str, typer.Option("--method", help="Solver, as `millfrf lobes`.  [default: the certified limits]")
-    ] = "",
+    method: Annotated[str, typer.Option("--method", help="Solver of the lobes, as `millfrf lobes`.")] = "certified",
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE.png", help="Picture of the lobes or the posture map.")
     ] = None,

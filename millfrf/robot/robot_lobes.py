@@ -6,13 +6,12 @@ from pathlib import Path
 import numpy as np
 import typer
 
-from cutting import MillingProcess
 from foundation import InputError
 from modal_fit import ModalModel, Residuals
 from robot_model import in_posture, read_robot
-from stability import StabilityLobes, certified_lobes, write_lobes
+from stability import write_lobes
 
-from ..chain.lobes import compute_lobes, speed_axis
+from ..chain.lobes import compute_lobes, lobes_summary, speed_axis
 from ..commands.options import check_output
 from ..figures.embed import save_figure
 from ..figures.lobes_figure import lobes_figure
@@ -63,34 +62,15 @@ def write_lobes_in_posture(
     process, doubts = read_checked_cutting(cutting)
     doubts += check_depth(max_depth, process)
     doubts += check_speeds(speeds, process, lowest_frequency(result.known_model().natural_frequencies))
-    found = _limits(at_the_tip(result.known_model()), process, speed_axis(*speeds), max_depth, method)
+    found = compute_lobes(at_the_tip(result.known_model()), process, speed_axis(*speeds), max_depth, method, bar)
     found = replace(found, warnings=(*doubts, *result.warnings, *found.warnings))
     write_lobes(out, found)
     for warning in found.warnings:
         typer.echo(f"warning: {warning}", err=True)
-    typer.echo(f"wrote {out}: {_lowest(found)}")
+    typer.echo(f"wrote {out}: {lobes_summary(found, max_depth)}")
     if picture is not None:
         save_figure(lobes_figure({found.method: found}), picture)
         typer.echo(f"wrote {picture}")
-
-
-def _limits(
-    model: ModalModel, process: MillingProcess, speeds: np.ndarray, max_depth: float, method: str
-) -> StabilityLobes:
-    """By the method asked for; none: the certified limits."""
-    if method:
-        return compute_lobes(model, process, speeds, max_depth, method, bar)
-    with bar("lobes"):
-        return certified_lobes(model, process, speeds, max_depth)
-
-
-def _lowest(lobes: StabilityLobes) -> str:
-    """The lowest limit in words."""
-    if not np.isfinite(lobes.depth_limits).any():
-        return "no limit found"
-    lowest = int(np.nanargmin(lobes.depth_limits))
-    depth, rpm = 1e3 * lobes.depth_limits[lowest], lobes.spindle_speeds_rpm[lowest]
-    return f"lowest limit {depth:.3g} mm at {rpm:.0f} rpm ({lobes.bifurcations[lowest]}, {lobes.status[lowest]})"
 
 
 def write_map_over_redundancy(
