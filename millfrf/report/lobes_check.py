@@ -15,7 +15,7 @@ from .collect import Collected, SourceFile
 
 Real = NDArray[np.float64]
 
-FEW = 25
+FEW = 9
 """Speeds at which it is found out what a file is of."""
 
 NEAR = 0.002
