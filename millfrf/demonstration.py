@@ -61,7 +61,7 @@ SUBSPACE_BAND = (13.0, 25.0)
 """Records need no force on every line."""
 
 COMPARED_RPM = (800, 900, 1200, 1600, 2000)
-AXIS_RPM = {"identified": (300, 2400, 141), "hammer": (300, 2400, 36), "true": (300, 2400, 141)}
+AXIS_RPM = {"identified": (600, 2400, 91), "hammer": (600, 2400, 19), "true": (600, 2400, 91)}
 """Fewer speeds where lines of an FRF have to do: they take longer."""
 
 MAX_DEPTH = 10e-3

@@ -20,13 +20,13 @@ from .uncertainty import depth_errors, speeds_within, usable_limits
 
 Real = NDArray[np.float64]
 
-FINE = 25
+FINE = 17
 """Speeds inside the drift at which the limits are computed anew."""
 
-SAMPLED_SPEEDS = 7
+SAMPLED_SPEEDS = 5
 """Of these, the ones with the lowest limits and both ends, at which draws are solved."""
 
-LOOKED_AT = (24, 5)
+LOOKED_AT = (8, 2)
 """Most speeds whose drift is computed, and most that are sampled."""
 
 
@@ -105,7 +105,7 @@ def certified_cut(
 ) -> RecommendedCut:
     """As :func:`recommended_cut`, with the limits inside the drift computed anew and tried with draws.
 
-    Speeds are taken in the order of what they promise. The limits of one are computed at 25 speeds inside its drift, so
+    Speeds are taken in the order of what they promise. The limits of one are computed at 17 speeds inside its drift, so
     that no notch between two speeds of ``lobes`` is passed over, and lessened by their errors. Then 99 or more
     structures and coefficients are drawn from their errors, and the depth is lowered to the one at which
     ``confidence`` of them are stable at every speed tried inside the drift (of an FRF there are no draws). What is left
