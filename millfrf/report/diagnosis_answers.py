@@ -109,8 +109,8 @@ def where(diagnosis: Diagnosis) -> tuple[str, ...]:
         return (*said, "No band, channel, time or level has more residual than noise would leave.")
     large = [band for band in bands if band["share"] >= 0.005] or bands[:1]
     shown = "; ".join(
-        f"{band['low_hz']:.3g} to {band['high_hz']:.3g} Hz ({100 * band['share']:.0f} %, strongest near "
-        f"{band['peak_hz']:.3g} Hz)"
+        f"{band['low_hz']:.3g} to {band['high_hz']:.3g} Hz ({100 * band['share']:.0f} %, strongest in the "
+        f"narrow band around {band['peak_hz']:.3g} Hz)"
         for band in large[:3]
     )
     channels = ", ".join(
