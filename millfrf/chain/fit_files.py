@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 from estimation import read_frf
 from foundation import InputError
@@ -13,6 +14,8 @@ from ..file_kinds import FRF, RECORDING, kind_of
 from ..gate import stored_doubts
 from ..progress import Watch, silent
 from .fit import MAX_ORDER, POLYREFERENCE, SUBSPACE, FitOptions, fit_model, fit_recordings
+
+Fit = TypeVar("Fit", ModalFit, SubspaceFit)
 
 
 def fit_files(
@@ -42,12 +45,22 @@ def fit_files(
     kinds = {kind_of(file) for file in files}
     if kinds == {RECORDING}:
         options = options_of(method or SUBSPACE)
-        return fit_recordings(files, options, watch), options
+        return _counted(fit_recordings(files, options, watch), options), options
     if kinds == {FRF} and len(files) == 1:
         options = options_of(method or POLYREFERENCE)
         fit = fit_model(read_frf(files[0]), options, watch, Path(files[0]).name)
+        fit = _counted(fit, options)
         return replace(fit, warnings=(*stored_doubts(files[0]), *fit.warnings)), options
     raise InputError(
         f"cannot fit {len(files)} file{'s' if len(files) != 1 else ''} of {' and '.join(sorted(kinds))}; "
         "give one FRF, or recordings"
     )
+
+
+def _counted(fit: Fit, options: FitOptions) -> Fit:
+    """The fit, with a warning where it has fewer modes than were asked for."""
+    asked, found = options.n_modes, len(fit.model.poles)
+    if asked is None or found >= asked:
+        return fit
+    doubt = f"{asked} modes were asked for, {found} were found in {fit.band[0]:g} to {fit.band[1]:g} Hz"
+    return replace(fit, warnings=(*fit.warnings, doubt))

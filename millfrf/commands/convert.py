@@ -24,6 +24,7 @@ def convert(
     from foundation import InputError
 
     from ..chain.convert_uff import convert_uff, is_uff_conversion
+    from ..gate import doubts_of_rate
     from ..progress import bar
 
     if source.suffix.lower() in CAN_LOGS:
@@ -41,4 +42,6 @@ def convert(
     with bar(f"converting {source.name}") as update:
         written = convert_file(source, target, mapping, progress=update)
     for path in written:
+        for doubt in doubts_of_rate(path):
+            typer.echo(f"warning: {doubt}", err=True)
         typer.echo(f"wrote {path}")

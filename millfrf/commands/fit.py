@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from foundation import InputError
+
 from .options import Output, Stream, check_band, check_output, names
 
 
@@ -36,6 +38,8 @@ def fit(
 
     check_output(out, (".json",), files)
     check_band(band)
+    if modes is not None and modes < 1:
+        raise InputError(f"--modes {modes}: give 1 or more, or leave it out to keep all that are found")
     given = (max_order, modes, names(excitation), names(response), stream)
     result, used = fit_files(files, method, lambda chosen: FitOptions(band, chosen, *given), bar)
     write_fit(out, result, files, used)

@@ -13,7 +13,7 @@ from .lobes_band import check_band_of_lobes
 from .model_and_recordings import check_model_and_recordings
 from .models import check_model, fit_doubts, stored_doubts
 from .plans import check_demand, check_duration
-from .recordings import check_recordings
+from .recordings import check_recordings, doubts_of_rate
 from .sample_rates import check_sample_rates, gain_of
 from .scales import check_scales
 from .spindle import check_depth, check_speed, check_speeds, lowest_frequency
@@ -40,6 +40,7 @@ __all__ = [
     "check_speed",
     "check_speeds",
     "check_tip_and_sensor",
+    "doubts_of_rate",
     "driven_lines",
     "fit_doubts",
     "gain_of",

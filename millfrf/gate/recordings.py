@@ -9,7 +9,8 @@ from estimation import choose_channels
 from foundation import InputError
 
 from ..progress import Watch, silent
-from .signals import ChannelLevel, Look, look
+from .several import check_several
+from .signals import ChannelLevel, Look, look, rate_concerns
 
 BELIEVED = {
     "force": 1e7,
@@ -82,6 +83,7 @@ def check_channels(
     InputError
         As :func:`check_recordings`.
     """
+    check_several(paths)
     doubts, silent_in, alive = [], {}, set()
     for path in paths:
         with Recording(path) as recording:
@@ -100,6 +102,18 @@ def check_channels(
         if name not in alive:
             raise InputError(_dead(file, name, "every sample is 0"))
     return doubts
+
+
+def doubts_of_rate(path: str | os.PathLike[str]) -> list[str]:
+    """Judge the sample rates of a recording that was just made; a file of another kind is not judged."""
+    if Path(path).suffix.lower() not in (".h5", ".hdf5"):
+        return []
+    with Recording(path) as recording:
+        return [
+            f"{Path(path).name}: {text}"
+            for one in recording.streams.values()
+            for text in rate_concerns(one.sample_rate)
+        ]
 
 
 def _look(stream: Stream, names: Sequence[str], watch: Watch) -> Look:

@@ -87,6 +87,9 @@ def _recordings(case: SpatialCase, paths: Sequence[Path], asking: Asking) -> lis
     names = [path.stem for path in paths]
     if len(set(names)) < len(names):
         raise InputError(f"recordings need different names to tell their results apart, not {', '.join(names)}")
+    for path in paths:
+        if not path.is_file():
+            raise InputError(f"no file {path}; check the name")
     axes = np.eye(3) if asking.feed is None else tool_down([0.0, 0.0, 0.0], np.radians(asking.feed)).axes
     postures = [close_loops(case.robot.mechanism, _driven(case, pose)) for pose in asking.poses]
     band = check_band(asking.band) or _band(case, postures)

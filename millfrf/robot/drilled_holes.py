@@ -40,6 +40,9 @@ Real = NDArray[np.float64]
 DOWN = np.array([0.0, 0.0, -1.0])
 """Axis of the drill."""
 
+THINNEST = 1e-4
+"""Thinnest drill that is taken, m."""
+
 
 @dataclass(frozen=True)
 class DrillingArea:
@@ -165,6 +168,8 @@ def _radial(thrust: Real, weight: Real) -> tuple[Real, Real]:
 
 def _check(area: DrillingArea, accuracy: Accuracy) -> None:
     check_positive("drill", 1e3 * area.diameter, "millimetres", 100)
+    if area.diameter < THINNEST:
+        raise InputError(f"--drill {1e3 * area.diameter:g}: give millimetres, {1e3 * THINNEST:g} or more")
     check_positive("feed-per-rev", 1e3 * area.feed, "millimetres", 5)
     check_axis("x", area.x)
     check_axis("y", area.y)

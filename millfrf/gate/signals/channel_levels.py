@@ -15,6 +15,9 @@ NEAR_FULL_SCALE = 0.999
 TWO_LEVELS = 0.5
 """Share of samples at the two extremes above which a channel is a switch or a commanded step, not a clipped signal."""
 
+LEAST_HELD, HELD_SHARE = 256, 0.05
+"""Samples, and share of the record, that a live channel does not stand still for."""
+
 
 @dataclass
 class ChannelLevel:
@@ -35,6 +38,9 @@ class ChannelLevel:
     n_missing: int = 0
     n_overloaded: int = 0
     _origin: float | None = None
+    longest_held: int = 0
+    _held: int = 0
+    _last: float | None = None
     _top: Extreme = field(default_factory=Extreme)
     _bottom: Extreme = field(default_factory=Extreme)
 
@@ -52,10 +58,20 @@ class ChannelLevel:
         self.squares += float(centred @ centred)
         self.lowest = min(self.lowest, float(finite.min()))
         self.highest = max(self.highest, float(finite.max()))
+        self._hold(finite)
         self._top.add(finite)
         self._bottom.add(-finite)
         if self.channel.full_scale:
             self.n_overloaded += int(np.sum(np.abs(finite) >= NEAR_FULL_SCALE * self.channel.full_scale))
+
+    def _hold(self, samples: np.ndarray) -> None:
+        """Follow the longest run of one value, across blocks."""
+        before = samples[:1] if self._last is None else np.array([self._last])
+        changes = np.flatnonzero(np.diff(np.concatenate([before, samples])))
+        ends = np.concatenate([changes, [len(samples)]])
+        runs = np.diff(np.concatenate([[-self._held], ends]))
+        self.longest_held = max(self.longest_held, int(runs.max()))
+        self._held, self._last = int(runs[-1]), float(samples[-1])
 
     @property
     def mean(self) -> float:
@@ -100,6 +116,11 @@ class ChannelLevel:
             )
         if self.n_samples and self.deviation == 0:
             found.append(f"{name}: every sample is {self.mean:g} (dead channel); check cable and supply")
+        elif self.longest_held > max(LEAST_HELD, HELD_SHARE * self.n_samples):
+            found.append(
+                f"{name}: {self.longest_held} samples in a row have the same value: check the cable, and cut that part "
+                "out"
+            )
         full_scale = self.channel.full_scale
         if full_scale and self.n_samples and 0 < self.peak < 1e-3 * full_scale:
             found.append(f"{name}: peak is {100 * self.peak / full_scale:.2g} % of full scale; choose a smaller range")

@@ -13,6 +13,9 @@ from .channel_levels import ChannelLevel
 from .copies import Copies
 from .repeated_rows import RepeatedRows
 
+SLOWEST_RATE = 20.0
+"""Hz: no vibration of a machine is recorded more slowly."""
+
 
 @dataclass(frozen=True)
 class Look:
@@ -41,10 +44,21 @@ class Look:
             f"{other} holds the same samples as {one}; check the cables and the mapping, one of them is not measured"
             for one, other in self.copies.equal_pairs()
         ]
+        found += rate_concerns(sample_rate)
         return found + [
             f"{other} is {one} times a fixed number in every sample; check the cables and the mapping"
             for one, other in self.copies.proportional_pairs()
         ]
+
+
+def rate_concerns(sample_rate: float) -> list[str]:
+    """What looks wrong with a sample rate (Hz)."""
+    if sample_rate >= SLOWEST_RATE:
+        return []
+    return [
+        f"sampled at {sample_rate:.4g} Hz, too slowly for vibration: were times in ms taken as s (time_unit of the "
+        "mapping), or a rate in kHz as Hz?"
+    ]
 
 
 def look(stream: Stream, names: Sequence[str] | None = None, watch: Watch = silent) -> Look:

@@ -1,7 +1,6 @@
 """Ways to spoil good files as a laboratory does: each function takes the folder and the words of the table."""
 
 import json
-import re
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -116,7 +115,7 @@ CHANGES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "offset": lambda x: np.full_like(x, 2.5),
     "huge": lambda x: np.full_like(x, 1e30) * np.sign(x),
     "nan": lambda x: np.where(np.arange(len(x)) == len(x) // 2, np.nan, x),
-    "clipped": lambda x: np.clip(x, np.quantile(x, 0.03), np.quantile(x, 0.97)),
+    "clipped": lambda x: np.clip(x, np.quantile(x, 0.1), np.quantile(x, 0.9)),
     "in g": lambda x: x / 9.80665,
     "in kN": lambda x: x / 1000,
     "reversed": lambda x: -x,
@@ -308,6 +307,7 @@ def model(folder: Path, file: str, change: str) -> None:
         "no mode": lambda: replace(one, poles=one.poles[:0], right=one.right[:0], left=one.left[:0]),
         "two directions": lambda: replace(one, right=one.right[:, :2], responses=one.responses[:2]),
         "mm": lambda: replace(one, right=1e3 * one.right),
+        "far band": lambda: replace(one, band=(2.0, 3.0)),
         "narrow band": lambda: replace(one, band=(15.0, 20.0)),
     }[change]()
     write_modal_model(path, changed)
@@ -342,16 +342,50 @@ def fitted(folder: Path) -> None:
     assert run(["fit", str(folder / "frf.h5"), "--band", "15.2", "22.5", "--out", str(folder / "model.json")]) == 0
 
 
-def rail(folder: Path, start: str) -> None:
-    """A robot on a rail whose posture gives the rail's place as ``start``."""
+RAIL = """
+[[frames]]
+name = "rail"
+antecedent = "0"
+motion = "prismatic"
+alpha_deg = 90.0
+{limits}
+source = "test"
+[[frames]]
+name = "carriage"
+antecedent = "rail"
+motion = "fixed"
+alpha_deg = -90.0
+source = "test"
+"""
+ON_RAIL = """
+[[joints]]
+frame = "rail"
+nodes = [0, 12]
+axial_n_per_m = 5e7
+source = "test"
+[[links]]
+nodes = [12, 13]
+source = "test"
+[[points]]
+node = 13
+frame = "carriage"
+at_m = [0.0, 0.0, 0.0]
+source = "test"
+"""
+
+
+def rail(folder: Path, limits: str) -> None:
+    """A robot on a rail, whose file states the rail's limits by this line."""
     from importlib.resources import files
 
-    content = (files("robot_model") / "robots" / "kuka_kr90_r3100.toml").read_text(encoding="utf-8")
-    frame = '[[frames]]\nname = "rail"\nantecedent = "0"\nmotion = "prismatic"\nsource = "the rail"\n\n'
-    content = content.replace("[[frames]]", frame + "[[frames]]", 1)
-    content = re.sub(r'(name = "1"\nantecedent = )"0"', r'\1"rail"', content, count=1)
-    (folder / "rail.toml").write_text(content, encoding="utf-8")
-    del start
+    text = (files("robot_model") / "robots" / "kuka_kr90_r3100.toml").read_text(encoding="utf-8")
+    text = text.replace('antecedent = "0"\nr_m = 0.675', 'antecedent = "carriage"\nr_m = 0.675')
+    head, tail = text.split("[[frames]]", 1)
+    tail = tail.replace("nodes = [0, 1]", "nodes = [13, 1]", 1)
+    tail = tail.replace("driven_deg = [0.0, -10.0", "driven = [2.0, 0.0, -10.0")
+    (folder / "rail.toml").write_text(
+        head + RAIL.format(limits=limits) + "[[frames]]" + tail + ON_RAIL, encoding="utf-8"
+    )
 
 
 def robot(folder: Path, *lines: str) -> None:
