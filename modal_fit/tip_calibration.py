@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf, FrfCovariance, to_receptance
-from foundation import InputError, shared_band
+from foundation import InputError, MillfrfError, shared_band
 
 from .modal_model import ModalModel, Residuals
 from .polyreference import ModalFit, fit_polyreference
@@ -76,7 +76,15 @@ def calibrate_to_tip(
     _check(model, tip, sensor)
     natural = model.natural_frequencies
     span = band or (0.75 * float(natural.min()), 1.25 * float(natural.max()))
-    fit = fit_polyreference(_joined(tip, sensor), span, max_order=max_order)
+    try:
+        fit = fit_polyreference(_joined(tip, sensor), span, max_order=max_order)
+    except InputError:
+        raise
+    except MillfrfError as error:
+        raise InputError(
+            f"no hammer mode near the in-process modes at {', '.join(f'{f:.4g}' for f in natural)} Hz: {error}; tap the "
+            "same structure in the same pose"
+        ) from error
     n = len(tip.responses)
     chosen, warnings = _matched(model, fit.model, n)
     ratios, errors, replaced = _ratios(fit.model, chosen, n)

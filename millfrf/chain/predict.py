@@ -41,9 +41,7 @@ def predict_file(
     kept = slice(result.run_in, None)
     doubts += check_scales(names, trial.response[kept], result.response[kept])
     setup = with_warnings(setup, doubts)
-    with RecordingWriter(
-        out, (description,), title=title, setup=with_warnings(setup, doubts), overwrite=True
-    ) as writer:
+    with RecordingWriter(out, (description,), title=title, setup=setup) as writer:
         writer.append(name, result.response)
     lines = [f"warning: {doubt}" for doubt in doubts]
     lines += [

@@ -35,7 +35,14 @@ def lobes(
 
     from ..chain.lobes import compute_lobes, lobes_summary, mode_coupling_line, speed_axis
     from ..file_kinds import FRF, MODEL, kind_of
-    from ..gate import check_depth, check_speeds, lowest_frequency, read_checked_cutting, stored_doubts
+    from ..gate import (
+        check_depth,
+        check_speeds,
+        lowest_frequency,
+        read_checked_cutting,
+        rigid_directions,
+        stored_doubts,
+    )
     from ..progress import bar
     from ..provenance import of_lobes
 
@@ -45,7 +52,7 @@ def lobes(
         raise InputError(f"{dynamics} is a file of {kind}; lobes need a modal model or an FRF at the tool tip")
     process, doubts = read_checked_cutting(cutting)
     known = read_frf(dynamics) if kind == FRF else read_modal_model(dynamics)
-    doubts += check_depth(max_depth, process)
+    doubts += [*check_depth(max_depth, process), *rigid_directions(known)]
     mode = lowest_frequency(known.natural_frequencies) if isinstance(known, ModalModel) else None
     doubts += check_speeds(speeds, process, mode)
     result = compute_lobes(known, process, speed_axis(*speeds), max_depth, method, bar, dynamics.name)

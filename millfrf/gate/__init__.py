@@ -7,7 +7,7 @@ be done with what is given, and returns doubts: sentences that a command prints 
 from .belonging import Given, check_belonging
 from .calibrations import check_tip_and_sensor
 from .cutting_data import check_cutting, read_checked_cutting
-from .frfs import check_frf, check_frf_for_fit
+from .frfs import check_frf, check_frf_for_fit, frf_concerns
 from .inputs import check_inputs, check_records, driven_lines
 from .lobes_band import check_band_of_lobes
 from .model_and_recordings import check_model_and_recordings
@@ -16,7 +16,7 @@ from .plans import check_demand, check_duration
 from .recordings import check_recordings, doubts_of_rate
 from .sample_rates import check_sample_rates, gain_of
 from .scales import check_scales
-from .spindle import check_depth, check_speed, check_speeds, lowest_frequency
+from .spindle import check_depth, check_speed, check_speeds, lowest_frequency, rigid_directions
 from .stated_cut import check_one_speed, stated_cut
 
 __all__ = [
@@ -43,9 +43,11 @@ __all__ = [
     "doubts_of_rate",
     "driven_lines",
     "fit_doubts",
+    "frf_concerns",
     "gain_of",
     "lowest_frequency",
     "read_checked_cutting",
+    "rigid_directions",
     "stated_cut",
     "stored_doubts",
 ]

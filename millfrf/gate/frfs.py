@@ -6,6 +6,7 @@ from estimation import Frf
 from foundation import Band, InputError, shared_band
 
 from .passivity import DrivePoint, drive_points, returned_power, rising_phase
+from .sizes import size_doubts
 
 RISING = 0.5
 """Share of the phase's weighted steps that may rise; measured structures have below 0.02, conjugates above 0.98."""
@@ -33,7 +34,7 @@ def check_frf(frf: Frf, name: str = "the FRF") -> list[str]:
     Returns
     -------
     list of str
-        Doubts: drive points that give back part of the power.
+        Doubts: drive points that give back part of the power, or that are softer or stiffer than machines are.
 
     Raises
     ------
@@ -49,7 +50,15 @@ def check_frf(frf: Frf, name: str = "the FRF") -> list[str]:
             f"{name}: the phase rises with frequency on {100 * rising:.0f} % of the energy: the values stand for "
             "exp(-i w t), this program's for exp(+i w t); conjugate the values"
         )
-    return [] if frf.quantity == "transfer" else _check_drive_points(frf, name)
+    return [] if frf.quantity == "transfer" else [*_check_drive_points(frf, name), *size_doubts(frf)]
+
+
+def frf_concerns(frf: Frf, name: str) -> list[str]:
+    """What looks wrong with an FRF, refusals too, for those who only look."""
+    try:
+        return check_frf(frf, name)
+    except InputError as error:
+        return [str(error)]
 
 
 def check_frf_for_fit(frf: Frf, band: Band, name: str = "the FRF") -> list[str]:
@@ -97,7 +106,7 @@ def _check_values(frf: Frf, name: str) -> None:
     if not frf.valid.any():
         raise InputError(f"{name}: no line is valid; estimate it again from tests with independent inputs")
     if not np.abs(frf.values[frf.valid]).any():
-        raise InputError(f"{name}: every value is 0; check the channels it was estimated from")
+        raise InputError(f"{name}: every value is zero; check the channels it was estimated from")
     coherence = frf.multiple_coherence
     if coherence is None:
         return

@@ -43,7 +43,7 @@ def check_model(model: ModalModel, name: str = "the model") -> list[str]:
     Raises
     ------
     InputError
-        No mode, an unstable pole, vectors that are all zero, or a drive point that moves against its own force.
+        No mode, none inside the model's band, an unstable pole, vectors that are all zero, or a drive point that moves against its own force.
     """
     if not len(model.poles):
         raise InputError(f"{name} has no mode; fit it in a band that holds one")
@@ -54,7 +54,18 @@ def check_model(model: ModalModel, name: str = "the model") -> list[str]:
             f"{name}: mode {worst + 1} at {model.natural_frequencies[worst]:.4g} Hz has a damping ratio of "
             f"{100 * zeta[worst]:.3g} %: it is unstable by itself; fit again, or turn the sign of the pole's real part"
         )
+    _check_band(model, name)
     return check_frf(replace(model.frf(_lines(model)), band=None), name)
+
+
+def _check_band(model: ModalModel, name: str) -> None:
+    """Refuse a band that holds none of the modes, as a wrong unit makes it."""
+    natural = model.natural_frequencies
+    if model.band is not None and not ((natural >= 0.8 * model.band[0]) & (natural <= 1.25 * model.band[1])).any():
+        raise InputError(
+            f"{name}: its band of {model.band[0]:g} to {model.band[1]:g} Hz holds none of its modes "
+            f"({natural.min():.4g} to {natural.max():.4g} Hz); correct band_hz, or fit again"
+        )
 
 
 def stored_doubts(path: str | os.PathLike[str]) -> list[str]:

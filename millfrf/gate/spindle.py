@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cutting import MillingProcess
+from estimation import Frf
 from foundation import InputError
+from modal_fit import ModalModel
 
 MOST_RPM = 500_000.0
 """The fastest spindles that mill (air bearings, tools below 1 mm)."""
@@ -98,6 +100,19 @@ def check_depth(depth: float, process: MillingProcess | None = None, what: str =
             "check both; they are in metres"
         ]
     return []
+
+
+def rigid_directions(structure: Frf | ModalModel) -> list[str]:
+    """Doubt a structure that gives no force or no motion in one of X, Y, Z: lobes take the tool as rigid there."""
+    known = [
+        {label.partition(":")[2][-1:] for label in labels} for labels in (structure.responses, structure.excitations)
+    ]
+    missing = [axis for axis in "XYZ" if axis not in known[0] & known[1]]
+    if not missing:
+        return []
+    node = structure.excitations[0].partition(":")[0]
+    named = ", ".join(f"{node}:+{axis}" for axis in missing)
+    return [f"force or motion at {named} is missing: the tool is taken as rigid there; measure all three directions"]
 
 
 def lowest_frequency(natural: NDArray[np.float64]) -> float | None:

@@ -14,7 +14,7 @@ from modal_fit import ModalModel, read_modal_model
 from stability import StabilityLobes, read_lobes
 
 from ..file_kinds import CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
-from ..gate import Given, check_belonging, read_checked_cutting
+from ..gate import Given, check_belonging, frf_concerns, read_checked_cutting
 from ..provenance import read_provenance, sha256
 
 
@@ -58,7 +58,7 @@ class Collected:
     recordings, frfs, models, lobes, cutting
         By kind, with the file each came from.
     doubts
-        Files that do not belong together; one sentence each.
+        Files that do not belong together, and FRFs that look wrong; one sentence each.
     """
 
     files: tuple[SourceFile, ...]
@@ -109,14 +109,17 @@ def collect(paths: Sequence[str | os.PathLike[str]]) -> Collected:
 
     for file in chosen(RECORDING):
         Recording(file.path).close()
+    frfs = tuple((file, read_frf(file.path)) for file in chosen(FRF))
+    doubts = check_belonging([Given(file.path.name, file.kind, file.sha256, file.provenance) for file in files])
+    doubts += [text for file, frf in frfs for text in frf_concerns(frf, file.path.name)]
     return Collected(
         files,
         chosen(RECORDING),
-        tuple((file, read_frf(file.path)) for file in chosen(FRF)),
+        frfs,
         tuple((file, read_modal_model(file.path)) for file in chosen(MODEL)),
         tuple((file, read_lobes(file.path)) for file in chosen(LOBES)),
         tuple((file, read_checked_cutting(file.path)[0]) for file in chosen(CUTTING)),
-        tuple(check_belonging([Given(file.path.name, file.kind, file.sha256, file.provenance) for file in files])),
+        tuple(doubts),
     )
 
 

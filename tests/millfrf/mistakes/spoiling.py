@@ -176,6 +176,15 @@ def missing(folder: Path, file: str, n_samples: int) -> None:
     _rewritten(folder / file, lose)
 
 
+def held(folder: Path, file: str, n_samples: int) -> None:
+    """A buffer was lost, and the driver repeated the last values."""
+    with h5py.File(folder / file, "r+") as opened:
+        samples = opened[SAMPLES][:]
+        middle = len(samples) // 2
+        samples[middle : middle + n_samples] = samples[middle]
+        opened[SAMPLES][...] = samples
+
+
 def without(folder: Path, file: str, *names: str) -> None:
     """Channels that nobody plugged in."""
     with Recording(folder / file) as recording:

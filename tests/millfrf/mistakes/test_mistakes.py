@@ -11,7 +11,7 @@ import pytest
 import spoiling
 from the_table import Mistake, mistakes
 
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.__main__ import BAD_INPUT, DONE, FAILED, run
 
 TABLE = mistakes()
 FOREIGN = re.compile(
@@ -52,7 +52,7 @@ def test_a_mistake_ends_in_a_clear_line(row: Mistake, bench: Path, capsys: pytes
     assert not FOREIGN.search(line), line
     for wanted in row.says:
         assert re.search(wanted, line, re.IGNORECASE), (wanted, line)
-    if code == BAD_INPUT:
+    if code != DONE:
         assert _state(bench) == before
         return
     if row.report:
@@ -70,6 +70,12 @@ def said_line(row: Mistake, code: int, out: str, err: str) -> str:
         assert err.count("\n") == 1, err
         assert len(err) < 600, err
         return err.strip()
+    if row.ends == "failed":
+        assert code == FAILED, (code, out, err)
+        lines = err.splitlines()
+        assert all(line.startswith("warning: ") for line in lines[:-1]), err
+        assert lines[-1].startswith("millfrf: "), err
+        return lines[-1]
     assert code == DONE, (code, err)
     told = out + err if row.command.startswith("inspect") else err
     warnings = [line for line in told.splitlines() if line.startswith("warning: ")]

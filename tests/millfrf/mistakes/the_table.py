@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TABLES = Path(__file__).with_name("tables")
-ENDS = ("refused", "warned", "either")
+ENDS = ("refused", "warned", "either", "failed")
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,8 @@ class Mistake:
     says
         Regular expressions; each is found in the line, capital letters or not.
     ends
-        ``refused``: exit code 2 and one line; ``warned``: exit code 0 and a line ``warning: ...``.
+        ``refused``: exit code 2 and one line; ``warned``: exit code 0 and a line ``warning: ...``;
+        ``either`` of the two; ``failed``: exit code 1 and one line after the warnings.
     report
         Files from which ``report`` makes a page that holds the warning; empty: nothing is made that a report takes.
     page
