@@ -81,9 +81,9 @@ def calibrate_to_tip(
     except InputError:
         raise
     except MillfrfError as error:
+        listed = ", ".join(f"{frequency:.4g}" for frequency in natural)
         raise InputError(
-            f"no hammer mode near the in-process modes at {', '.join(f'{f:.4g}' for f in natural)} Hz: {error}; tap the "
-            "same structure in the same pose"
+            f"no hammer mode near the in-process modes at {listed} Hz: {error}; tap the same structure in the same pose"
         ) from error
     n = len(tip.responses)
     chosen, warnings = _matched(model, fit.model, n)

@@ -7,6 +7,7 @@ import shlex
 import shutil
 from pathlib import Path
 
+import page
 import pytest
 import spoiling
 from the_table import Mistake, mistakes
@@ -92,3 +93,10 @@ def _words(page: Path) -> str:
 
 def _plain(text: str) -> str:
     return " ".join(text.split())
+
+
+def test_the_page_says_what_the_table_says() -> None:
+    told = page.lines_of_page()
+    assert set(told) == {row.did for row in TABLE}
+    for row in TABLE:
+        assert any(all(re.search(wanted, line, re.IGNORECASE) for wanted in row.says) for line in told[row.did]), row
