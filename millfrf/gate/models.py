@@ -43,7 +43,8 @@ def check_model(model: ModalModel, name: str = "the model") -> list[str]:
     Raises
     ------
     InputError
-        No mode, none inside the model's band, an unstable pole, vectors that are all zero, or a drive point that moves against its own force.
+        No mode, none inside the model's band, an unstable pole,
+        vectors that are all zero, or a drive point that moves against its own force.
     """
     if not len(model.poles):
         raise InputError(f"{name} has no mode; fit it in a band that holds one")
