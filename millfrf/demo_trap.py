@@ -19,7 +19,7 @@ RPM = math.pi / 30
 SPEED_RPM, RADIAL_SHARE = 1080.0, 0.1
 """Spindle speed, and radial depth over the cutter's diameter, of the cut that is tried."""
 
-AXIS_RPM = np.linspace(960.0, 1200.0, 25)
+AXIS_RPM = np.linspace(960.0, 1200.0, 13)
 MAX_DEPTH = 10e-3
 
 BELOW = 0.9

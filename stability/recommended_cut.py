@@ -106,7 +106,7 @@ def certified_cut(
     """As :func:`recommended_cut`, with the limits inside the drift computed anew and tried with draws.
 
     Speeds are taken in the order of what they promise. The limits of one are computed at 17 speeds inside its drift, so
-    that no notch between two speeds of ``lobes`` is passed over, and lessened by their errors. Then 99 or more
+    that no notch between two speeds of ``lobes`` is passed over, and lessened by their errors. Then 39 or more
     structures and coefficients are drawn from their errors, and the depth is lowered to the one at which
     ``confidence`` of them are stable at every speed tried inside the drift (of an FRF there are no draws). What is left
     is compared with the next speed's promise.
@@ -159,7 +159,7 @@ def lowered(cut: RecommendedCut, share: float) -> RecommendedCut:
 
 def draws_for(confidence: float) -> int:
     """How many draws tell a quantile: the k-th lowest of n holds with a probability of ``1 - k / (n + 1)``."""
-    return max(99, math.ceil(1 / (1 - confidence)) - 1)
+    return max(39, math.ceil(1 / (1 - confidence)) - 1)
 
 
 def _allowed(lobes: StabilityLobes, errors: Real, confidence: float, drift: float, max_depth: float) -> Real:
