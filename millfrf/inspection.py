@@ -13,7 +13,7 @@ from modal_fit import read_modal_model
 from stability import STATUSES, read_lobes
 
 from .file_kinds import CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
-from .gate import frf_concerns, read_checked_cutting
+from .gate import check_frf, check_model, doubts_of, frf_concerns, read_checked_cutting, stored_doubts
 from .gate.signals import level_table, look
 from .progress import Watch, silent
 from .tables import Table, mode_table
@@ -96,7 +96,7 @@ def _text_table(name: str, values: tuple[np.ndarray, np.ndarray], texts: tuple[s
 
 def _frf(path: str | os.PathLike[str]) -> Findings:
     frf = read_frf(path)
-    f, concerns = frf.frequencies, []
+    f, concerns = frf.frequencies, doubts_of(check_frf, frf, Path(path).name)
     if not frf.valid.all():
         concerns.append(f"{int((~frf.valid).sum())} of {len(f)} lines have no FRF (dependent inputs)")
     concerns += frf_concerns(frf, Path(path).name)
@@ -113,6 +113,7 @@ def _frf(path: str | os.PathLike[str]) -> Findings:
         f"{frf.quantity} in {frf.unit}, {f[0]:g} to {f[-1]:g} Hz in {len(f)} lines, "
         f"excited at {', '.join(frf.excitations)}"
     )
+    concerns += stored_doubts(path)
     table = Table("responses", ("response", "largest value", "at (Hz)", "median multiple coherence"), tuple(rows))
     return Findings(FRF, summary, (table,), tuple(concerns))
 
@@ -124,6 +125,8 @@ def _model(path: str | os.PathLike[str]) -> Findings:
         for r, zeta in enumerate(model.damping_ratios)
         if not 0 < zeta < 0.5
     ]
+    concerns += doubts_of(check_model, model, Path(path).name)
+    concerns += stored_doubts(path)
     summary = (
         f"modal model, {len(model.poles)} modes, {model.quantity} in {model.unit}, responses "
         f"{', '.join(model.responses)}, excitations {', '.join(model.excitations)}"

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cutting import MillingProcess
@@ -53,6 +53,7 @@ def diagnose_files(
     trials = read_trials(recordings, model, stream=stream)
     with watch("diagnosing"):
         diagnosis = diagnose(model, trials, settings)
+    diagnosis = replace(diagnosis, doubts=(*doubts, *diagnosis.doubts))
     with watch("locating"):
         diagnosis, view = with_location(diagnosis, trials, _speeds(recordings))
     folder.mkdir(parents=True, exist_ok=True)
@@ -63,7 +64,7 @@ def diagnose_files(
         write_diagnosis_report(paths[2], view, Path(model_path).name, process)
     missing = [label for label in whole.responses if label not in model.responses]
     note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []
-    return DiagnosisFiles(diagnosis, paths, (*(f"warning: {doubt}" for doubt in doubts), *note, *summary(diagnosis)))
+    return DiagnosisFiles(diagnosis, paths, (*note, *summary(diagnosis)))
 
 
 def nominal_from_simulation(

@@ -10,6 +10,7 @@ from .cutting_data import check_cutting, read_checked_cutting
 from .frfs import check_frf, check_frf_for_fit, frf_concerns
 from .inputs import check_inputs, check_records, driven_lines
 from .lobes_band import check_band_of_lobes
+from .looking import doubts_of
 from .model_and_recordings import check_model_and_recordings
 from .models import check_model, fit_doubts, stored_doubts
 from .plans import check_demand, check_duration
@@ -40,6 +41,7 @@ __all__ = [
     "check_speed",
     "check_speeds",
     "check_tip_and_sensor",
+    "doubts_of",
     "doubts_of_rate",
     "driven_lines",
     "fit_doubts",

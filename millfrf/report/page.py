@@ -13,6 +13,7 @@ from foundation import writing_whole_file
 from modal_fit import ModalModel, read_modal_model
 
 from ..file_kinds import MODEL
+from ..gate import check_frf, check_model, doubts_of, stored_doubts
 from ..progress import Watch, silent
 from ..provenance import sha256, versions
 from .collect import Collected, SourceFile, collect
@@ -122,4 +123,7 @@ def _warnings(collected: Collected, concerns: Sequence[str]) -> list[str]:
         f"{file.path.name}: {warning}" for file in collected.files for warning in file.provenance.get("warnings", [])
     ]
     found += [f"{file.path.name}: {warning}" for file, lobes in collected.lobes for warning in lobes.warnings]
+    found += [doubt for file, frf in collected.frfs for doubt in doubts_of(check_frf, frf, file.path.name)]
+    found += [doubt for file, model in collected.models for doubt in doubts_of(check_model, model, file.path.name)]
+    found += [doubt for file, _ in collected.models for doubt in stored_doubts(file.path)]
     return list(dict.fromkeys([*collected.doubts, *found, *concerns]))
