@@ -13,7 +13,7 @@ from modal_fit import read_modal_model
 from stability import STATUSES, read_lobes
 
 from .file_kinds import CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
-from .gate import check_frf, check_model, doubts_of, frf_concerns, read_checked_cutting, stored_doubts
+from .gate import check_frf, check_model, doubts_of, read_checked_cutting, stored_doubts
 from .gate.signals import level_table, look
 from .progress import Watch, silent
 from .tables import Table, mode_table
@@ -99,7 +99,6 @@ def _frf(path: str | os.PathLike[str]) -> Findings:
     f, concerns = frf.frequencies, doubts_of(check_frf, frf, Path(path).name)
     if not frf.valid.all():
         concerns.append(f"{int((~frf.valid).sum())} of {len(f)} lines have no FRF (dependent inputs)")
-    concerns += frf_concerns(frf, Path(path).name)
     coherence = frf.multiple_coherence
     rows = []
     for p, response in enumerate(frf.responses):

@@ -7,7 +7,7 @@ be done with what is given, and returns doubts: sentences that a command prints 
 from .belonging import Given, check_belonging
 from .calibrations import check_tip_and_sensor
 from .cutting_data import check_cutting, read_checked_cutting
-from .frfs import check_frf, check_frf_for_fit, frf_concerns
+from .frfs import check_frf, check_frf_for_fit
 from .inputs import check_inputs, check_records, driven_lines
 from .lobes_band import check_band_of_lobes
 from .looking import doubts_of
@@ -45,7 +45,6 @@ __all__ = [
     "doubts_of_rate",
     "driven_lines",
     "fit_doubts",
-    "frf_concerns",
     "gain_of",
     "lowest_frequency",
     "read_checked_cutting",

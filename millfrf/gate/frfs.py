@@ -53,14 +53,6 @@ def check_frf(frf: Frf, name: str = "the FRF") -> list[str]:
     return [] if frf.quantity == "transfer" else [*_check_drive_points(frf, name), *size_doubts(frf)]
 
 
-def frf_concerns(frf: Frf, name: str) -> list[str]:
-    """What looks wrong with an FRF, refusals too, for those who only look."""
-    try:
-        return check_frf(frf, name)
-    except InputError as error:
-        return [str(error)]
-
-
 def check_frf_for_fit(frf: Frf, band: Band, name: str = "the FRF") -> list[str]:
     """As :func:`check_frf`, and whether the fit's band (Hz) lies in that of the FRF.
 

@@ -14,7 +14,7 @@ from modal_fit import ModalModel, read_modal_model
 from stability import StabilityLobes, read_lobes
 
 from ..file_kinds import CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
-from ..gate import Given, check_belonging, frf_concerns, read_checked_cutting
+from ..gate import Given, check_belonging, read_checked_cutting
 from ..provenance import read_provenance, sha256
 
 
@@ -111,7 +111,6 @@ def collect(paths: Sequence[str | os.PathLike[str]]) -> Collected:
         Recording(file.path).close()
     frfs = tuple((file, read_frf(file.path)) for file in chosen(FRF))
     doubts = check_belonging([Given(file.path.name, file.kind, file.sha256, file.provenance) for file in files])
-    doubts += [text for file, frf in frfs for text in frf_concerns(frf, file.path.name)]
     return Collected(
         files,
         chosen(RECORDING),

@@ -66,7 +66,7 @@ def exchanged(frf: Frf) -> Frf:
 
 REFUSED: dict[str, tuple[Callable[[Frf], Frf], str]] = {
     "exp(-iwt)": (lambda frf: replace(frf, values=frf.values.conj()), "conjugate the values"),
-    "all zero": (lambda frf: replace(frf, values=0 * frf.values), "every value is 0"),
+    "all zero": (lambda frf: replace(frf, values=0 * frf.values), "every value is zero"),
     "no valid line": (lambda frf: replace(frf, valid=np.zeros(len(AXIS), dtype=bool)), "no line is valid"),
     "negative frequencies": (lambda frf: replace(frf, frequencies=frf.frequencies - 10), "frequencies begin at -9 Hz"),
     "NaN frequencies": (lambda frf: replace(frf, frequencies=frf.frequencies * np.nan), "not finite"),
@@ -170,7 +170,7 @@ MODELS: dict[str, tuple[Callable[[ModalModel], ModalModel], str]] = {
         "has no mode; fit it in a band that holds one",
     ),
     "residues of the wrong sign": (lambda m: replace(m, right=-m.right), "moves against its own force"),
-    "vectors of zero": (lambda m: replace(m, right=0 * m.right), "every value is 0"),
+    "vectors of zero": (lambda m: replace(m, right=0 * m.right), "every value is zero"),
 }
 
 
