@@ -118,6 +118,6 @@ def test_what_cannot_be_used_is_said(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "needs --map" in capsys.readouterr().err
     (tmp_path / "map.toml").write_text(LOG_MAP.replace("dbc", "dbd", 1))
     assert run(["convert", str(tmp_path / "log.blf"), str(tmp_path / "o.h5"), "--map", str(tmp_path / "map.toml")]) == 2
-    assert "key dbc is missing" in capsys.readouterr().err
+    assert "map.toml: dbc is missing; add it" in capsys.readouterr().err
     with pytest.raises(InputError):
         convert(tmp_path / "none.uff", tmp_path / "o.h5", tmp_path / "m.toml")
