@@ -132,7 +132,7 @@ def test_what_the_command_refuses(tmp_path: Path, capsys: pytest.CaptureFixture[
     out = ["--out", str(tmp_path / "out")]
     for arguments, message in (
         ([NAME, recording, *out], "0 postures for 1 recordings"),
-        ([NAME, recording, "--pose", "ready", "--model-error", "0", "1", "1", *out], "three positive"),
+        ([NAME, recording, "--pose", "ready", "--model-error", "0", "1", "1", *out], "give 3 positive shares"),
         (["chen_2026", recording, "--pose", "P1", *out], "planar"),
         ([NAME, recording, "--pose", "ready", "--band", "1", "2", *out], "below 2 Hz"),
         ([NAME, recording, recording, "--pose", "ready", "--pose", "ready", *out], "different names"),

@@ -44,8 +44,20 @@ def test_a_wide_or_unknown_band_is_not_doubted(band: Band | None) -> None:
     assert warnings(band, 6000, 6000, 1) == ""
 
 
-def test_the_lobes_of_the_demonstration_are_not_doubted() -> None:
+def test_averaged_coefficients_have_no_harmonics_to_doubt() -> None:
     assert warnings((13.0, 25.0), 300, 2400, 22) == ""
+
+
+@pytest.mark.parametrize(("band", "doubted"), [((13.0, 25.0), True), ((2.0, 500.0), False)])
+def test_harmonics_outside_the_band_that_move_a_limit_are_said(band: Band, doubted: bool) -> None:
+    speeds = speed_axis(1000, 1400, 5)
+    whole = replace(tip_model(default_structure()), band=(2.0, 500.0))
+    known = compute_lobes(whole if band[1] > 100 else fitted(band), CUTTER, speeds, 0.01)
+    said = " ".join(text for text in known.warnings if "harmonics of the tooth passing outside" in text)
+    assert bool(said) is doubted
+    truth = compute_lobes(whole, CUTTER, speeds, 0.01).depth_limits
+    off = np.abs(known.depth_limits / truth - 1).max()
+    assert bool(off > 0.05) is doubted
 
 
 def test_an_frf_without_a_band_holds_on_its_valid_lines() -> None:
