@@ -14,7 +14,7 @@ def usage_in_words(said: str, arguments: Sequence[str]) -> str:
     said
         By the parser.
     arguments
-        As typed.
+        The words of the command line as they were typed.
 
     Examples
     --------

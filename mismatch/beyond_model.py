@@ -32,7 +32,7 @@ def beyond_model(explanation: Explanation, lines: list[WindowedLines]) -> tuple[
     explanation
         The model, refitted or not.
     lines
-        Recordings.
+        Windowed lines of every recording that is compared.
     """
     model = explanation.model
     if model.band is not None:

@@ -64,7 +64,7 @@ class JudgedCut:
     Parameters
     ----------
     name
-        File name.
+        Name of the recording's file.
     stated_rpm
         Spindle speed that the recording or the user states.
     verdict

@@ -14,7 +14,7 @@ def demo(
         bool, typer.Option("--conceal", help="Hide one effect, drawn and sealed; diagnose; open the seal.")
     ] = False,
 ) -> None:
-    """Mill, record, estimate, fit, calibrate, draw the lobes and report, without hardware, in under a minute."""
+    """Mill, record, estimate, fit, calibrate, draw the lobes and report, without hardware, in about a minute."""
     if conceal:
         _concealed(out, noise, seed)
         return

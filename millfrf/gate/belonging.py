@@ -51,7 +51,7 @@ def check_belonging(files: Sequence[Given]) -> list[str]:
     Returns
     -------
     list of str
-        Doubts.
+        Doubts: sentences for a warning; empty where nothing is odd.
     """
     doubts = [f"{name} is given twice" for name in _twice(files)]
     for file in files:

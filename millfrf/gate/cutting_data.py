@@ -82,7 +82,7 @@ def check_cutting(process: MillingProcess) -> list[str]:
     Returns
     -------
     list of str
-        Doubts.
+        Doubts: sentences for a warning; empty where nothing is odd.
 
     Raises
     ------

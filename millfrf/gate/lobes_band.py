@@ -53,14 +53,14 @@ def check_band_of_lobes(structure: Frf | ModalModel, lobes: StabilityLobes, proc
     structure
         Receptance at the tool tip; without a band nothing is said.
     lobes
-        Its limits.
+        Depth limits of that structure.
     process
         The cut they are for.
 
     Returns
     -------
     list of str
-        Doubts.
+        Doubts: sentences for a warning; empty where nothing is odd.
     """
     band = band_of_structure(structure)
     if band is None:

@@ -36,7 +36,7 @@ def check_model_and_recordings(
     stream
         Sample clock; None: the only one.
     watch
-        Progress bar.
+        Shows progress while samples are read.
 
     Returns
     -------

@@ -30,7 +30,7 @@ def check_demand(
     Parameters
     ----------
     band
-        Hz.
+        Lowest and highest frequency to be excited, Hz.
     depth
         Axial, m.
     noise
@@ -43,7 +43,7 @@ def check_demand(
     Returns
     -------
     list of str
-        Doubts.
+        Doubts: sentences for a warning; empty where nothing is odd.
 
     Raises
     ------

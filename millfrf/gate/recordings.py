@@ -39,7 +39,7 @@ def check_recordings(
     Parameters
     ----------
     paths
-        Recordings.
+        Recording files, in any order.
     stream
         Sample clock; None: the only one.
     excitations, responses
@@ -47,7 +47,7 @@ def check_recordings(
     excluding
         The job leaves out segments with missing, clipped or repeated samples: they are neither refused nor doubted.
     watch
-        Progress bar.
+        Shows progress while samples are read.
 
     Returns
     -------

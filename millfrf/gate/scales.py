@@ -36,7 +36,7 @@ def check_scales(names: Sequence[str], measured: NDArray[np.float64], predicted:
     Returns
     -------
     list of str
-        Doubts.
+        Doubts: sentences for a warning; empty where nothing is odd.
     """
     doubts = []
     centred = [(signal - signal.mean(axis=0)).T for signal in (measured, predicted)]

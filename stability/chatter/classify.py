@@ -40,7 +40,7 @@ def classify_cut(
     samples : (n_samples, n_channels)
         From the time the tool is fully in the cut.
     sample_rate
-        Hz.
+        Samples a second, Hz.
     spindle_speed
         rad/s, within 1 %; it may drift by 1 %.
     teeth

@@ -37,7 +37,7 @@ class Evidence:
     order_p_value
         Probability that noise alone looks as much like orders of the spindle as the recording.
     sample_rate
-        Hz.
+        Samples a second, Hz.
     """
 
     track: SpindleTrack
@@ -75,7 +75,7 @@ def gather_evidence(samples: Real, sample_rate: float, spindle_speed: float, tee
     samples : (n_samples, n_channels)
         Channels that hold no motion are left out.
     sample_rate
-        Hz.
+        Samples a second, Hz.
     spindle_speed
         rad/s, within 1 %.
     teeth

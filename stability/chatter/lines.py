@@ -25,7 +25,7 @@ class Line:
     order
         Frequency over the spindle's.
     frequency
-        Hz.
+        Of the line, Hz.
     amplitude : (n_channels,)
         Root mean square, in the unit of the samples.
     p_value

@@ -68,7 +68,7 @@ def track_spindle(data: Real, sample_rate: float, stated: float) -> SpindleTrack
     data : (n_samples, n_channels)
         Without mean, channels of like size.
     sample_rate
-        Hz.
+        Samples a second, Hz.
     stated
         Revolutions a second, within 1 %.
     """

@@ -15,7 +15,7 @@ class ForeignTone:
     Parameters
     ----------
     frequency
-        Hz.
+        Of the line, Hz.
     share
         Root mean square over the motion's, in the channel where it is largest.
     name

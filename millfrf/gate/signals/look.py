@@ -71,7 +71,7 @@ def look(stream: Stream, names: Sequence[str] | None = None, watch: Watch = sile
     names
         Channels to look at; None: all.
     watch
-        Progress bar.
+        Shows progress while samples are read.
     """
     known = {channel.name: channel for channel in stream.channels}
     chosen = tuple(known) if names is None else tuple(names)
