@@ -46,7 +46,8 @@ def check_belonging(files: Sequence[Given]) -> list[str]:
 
     A file that states its sources is held against the given files of the kinds that it is made of. One of the same
     name but other bytes has changed since; where none is a source, nor made from one of the same sources, the file
-    belongs to something else. Files that state no sources are not judged.
+    belongs to something else. An FRF or a model may also be tied to them by other FRFs and models, as taps are that
+    carried a model to the tool tip. Files that state no sources are not judged.
 
     Returns
     -------
@@ -59,8 +60,21 @@ def check_belonging(files: Sequence[Given]) -> list[str]:
             continue
         for group in MADE_OF.get(file.kind, ()):
             others = [one for one in files if one is not file and one.kind in group]
-            doubts += _judged(file, others)
+            doubts += _judged(file, others, _tied(file, files))
     return doubts
+
+
+def _tied(file: Given, files: Sequence[Given]) -> set[str]:
+    """Hashes of all files that FRFs and models tie to one, step by step; of a table of lobes none but itself."""
+    tied, measured = {file.sha256}, [one for one in files if one.kind in ("frf", "modal model")]
+    if file not in measured:
+        return tied
+    while True:
+        families = [{one.sha256, *one.sources} for one in measured]
+        grown = tied.union(*(family for family in families if family & tied))
+        if grown == tied:
+            return tied
+        tied = grown
 
 
 def _twice(files: Sequence[Given]) -> list[str]:
@@ -68,7 +82,7 @@ def _twice(files: Sequence[Given]) -> list[str]:
     return [file.name for i, file in enumerate(files) if file.sha256 in hashes[:i]]
 
 
-def _judged(file: Given, others: Sequence[Given]) -> list[str]:
+def _judged(file: Given, others: Sequence[Given], tied: set[str]) -> list[str]:
     """One file against those that could be its sources."""
     changed = [one for one in others if one.name in file.sources.values() and one.sha256 not in file.sources]
     if changed:
@@ -76,7 +90,7 @@ def _judged(file: Given, others: Sequence[Given]) -> list[str]:
             f"{file.name} was not made from {one.name} as it is now: the file has changed since; make {file.name} anew"
             for one in changed
         ]
-    if not others or any(_related(file, one) for one in others):
+    if not others or any(one.sha256 in tied or _related(file, one) for one in others):
         return []
     return [
         f"{file.name} was not made from {', '.join(one.name for one in others)} but from "

@@ -18,10 +18,10 @@ from stability import (
     delay_system,
     depth_errors,
     limit_band,
-    limit_sensitivities,
     lowered,
 )
 
+from ..gate import check_band_of_lobes
 from .lobes_check import CheckedLobes
 
 CONFIDENCE, DRIFT = 0.95, 0.02
@@ -29,9 +29,6 @@ CONFIDENCE, DRIFT = 0.95, 0.02
 
 LESS, TIMES = 0.9, 4
 """Share to which a cut that does not settle is lowered, and how often."""
-
-OUTSIDE = 0.05
-"""Share of a limit that stands on lines outside the model's band, from which on it is said."""
 
 TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 
@@ -144,16 +141,7 @@ def _simulated(cut: RecommendedCut, first: RecommendedCut, runs: list[Settling])
 def _outside_band(
     structure: ModalModel | Frf, process: MillingProcess, cut: RecommendedCut, name: str
 ) -> tuple[str, ...]:
-    """A warning where what decides at the cut's speed lies outside the band in which the structure is known."""
-    if structure.band is None:
-        return ()
+    """Warnings where what decides at the cut's speed lies outside the band in which the structure is known."""
     lobes = certified_lobes(structure, process, np.array([cut.spindle_speed]), 3 * cut.depth)
-    [found] = limit_sensitivities(structure, process, lobes)
-    if found is None or found.outside(structure.band) < OUTSIDE:
-        return ()
-    low, high = structure.band
-    return (
-        f"{100 * found.outside(structure.band):.0f} % of the limit at the recommended speed stands on frequencies "
-        f"outside {low:g} to {high:g} Hz, where {name} was not measured; that error is not in the confidence: measure "
-        "a wider band, or try the cut with care",
-    )
+    doubts = check_band_of_lobes(structure, lobes, process)
+    return tuple(f"recommended cut, {name}: {doubt}; that error is not in the confidence" for doubt in doubts)
