@@ -41,19 +41,11 @@ class LimitSensitivity:
     weights : (n_lines, 3, 3), N
     coefficients : (3,)
         da / dK_tc (m/Pa), da / dk_rc and da / dk_ac (m).
-    shares : (n_lines,)
-        What each line's receptance contributes to the depth, by size; together 1.
     """
 
     lines: Real
     weights: Complex
     coefficients: Real
-    shares: Real
-
-    def outside(self, band: tuple[float, float]) -> float:
-        """Share of the limit that stands on lines outside a band (Hz)."""
-        size = np.abs(self.lines)
-        return float(self.shares[(size < band[0]) | (size > band[1])].sum())
 
 
 def limit_sensitivities(
@@ -183,8 +175,7 @@ def _sensitivity(loop: _Loop, depth: float) -> LimitSensitivity | None:
     motion = np.einsum("qij,qj->qi", loop.receptance, force)
     shares = [factor * np.einsum("pi,pqij,qj->", left, change, motion, optimize=True) for change in loop.by_coefficient]
     coefficients = np.real(turned * np.array([gain / loop.process.ktc, *shares]))
-    owed = np.abs(np.real(turned * np.einsum("qij,qij->q", weights, loop.receptance)))
-    return LimitSensitivity(loop.lines, np.asarray(turned * weights), coefficients, owed / owed.sum())
+    return LimitSensitivity(loop.lines, np.asarray(turned * weights), coefficients)
 
 
 def _closing(loop: Complex, moves: NDArray[np.bool_]) -> tuple[complex, Complex, Complex]:

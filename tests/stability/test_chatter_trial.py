@@ -100,4 +100,5 @@ def test_two_hundred_random_cuts(capsys: pytest.CaptureFixture[str]) -> None:
         assert (score.stable, score.unstable) == (100, 100)
         assert score.false_alarms <= 1
         assert score.called_stable <= 5
-    assert with_model.misses <= 15  # 14 inconclusive; 5 were aimed at
+    # missed so far: 14 of 100 are inconclusive, see docs/stability.md
+    assert with_model.misses <= 5
