@@ -2,7 +2,7 @@
 
 from .aligner import Aligner, aligned_blocks, aligned_samples
 from .channel import Channel
-from .conversion import convert
+from .conversion import ArrayFile, CsvOptions, UffLines, convert, open_arrays, read_uff_lines, read_uff_sets
 from .drivers import ReplaySource
 from .errors import DeviceError, DeviceTimeout, Disconnected, DiskFull, DriverMissing, Overrun
 from .event_series import EventSeries
@@ -19,8 +19,10 @@ __all__ = [
     "HOST_AXIS",
     "SAMPLES_AXIS",
     "Aligner",
+    "ArrayFile",
     "Block",
     "Channel",
+    "CsvOptions",
     "DeviceError",
     "DeviceTimeout",
     "Disconnected",
@@ -39,10 +41,14 @@ __all__ = [
     "Source",
     "Stream",
     "StreamDescription",
+    "UffLines",
     "WithFeeds",
     "aligned_blocks",
     "aligned_samples",
     "convert",
+    "open_arrays",
+    "read_uff_lines",
+    "read_uff_sets",
     "record",
     "recover",
 ]

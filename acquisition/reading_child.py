@@ -84,12 +84,17 @@ def read_arrays(path: Path, folder: Path) -> None:
         if isinstance(item, h5py.Dataset) and not name.startswith("#"):
             _look_at(name, item)
             text = item.attrs.get("MATLAB_class") == b"char"
-            value = np.asarray(item[()])
+            value = _as_complex(np.asarray(item[()]))
             fields[name.replace("/", ".")] = "".join(map(chr, value.reshape(-1).astype(int))) if text else value
 
     with h5py.File(path, "r") as file:
         file.visititems(visit)
     _hand_over(fields, folder)
+
+
+def _as_complex(value: Any) -> Any:
+    """MATLAB keeps complex numbers as pairs of fields."""
+    return value["real"] + 1j * value["imag"] if value.dtype.names == ("real", "imag") else value
 
 
 def read_mat(path: Path, folder: Path) -> None:

@@ -138,6 +138,12 @@ class MillingProcess:
         return max(self.pitches) - min(self.pitches) < 1e-9
 
     @property
+    def thickest_chip(self) -> float:
+        """Of a tool that does not vibrate and has no runout, across the tool's axis: ``feed * max sin(phi)``, m."""
+        top = min(max(math.pi / 2, self.start_angle), self.exit_angle)
+        return self.feed_per_tooth * math.sin(top)
+
+    @property
     def coefficient_errors(self) -> tuple[float, float, float]:
         """Standard errors of ``ktc`` (Pa), ``krc`` and ``kac``; all zero where the file gives none."""
         return (self.ktc_std, self.krc_std, self.kac_std)

@@ -1,13 +1,46 @@
 """Spectra, coherence and frequency response functions from recordings: knows nothing of modes."""
 
-from .band_records import BandDecimator, BandRecord, band_record
+from .band_records import BandDecimator, BandRecord, band_record, widest_band
 from .coherence import input_coherence, multiple_coherence, partial_coherence, principal_inputs, virtual_coherence
 from .cross_spectra import CrossSpectra, SpectralSettings
 from .error_in_variables import h2, hv, instrumental_variable
 from .frf import Frf, FrfCovariance
 from .frf_file import read_frf, write_frf
+from .geometry import Geometry, import_geometry, is_geometry_table, read_geometry, write_geometry
 from .h1 import h1, h1_side_by_side
-from .hammer import Tap, exponential_window, find_taps, force_window, without_added_damping
+from .hammer import (
+    Decay,
+    Disagreement,
+    FoundTaps,
+    JudgedTap,
+    MergedTaps,
+    Tap,
+    TapSettings,
+    TapSums,
+    TapTest,
+    answer_decay,
+    choose_segments,
+    exponential_window,
+    find_taps,
+    force_window,
+    found_taps,
+    merge_taps,
+    placed,
+    screened,
+    tap_sums,
+    window_correlation,
+    window_for,
+    without_added_damping,
+)
+from .importing import (
+    FrfMapping,
+    ImportedFrf,
+    import_frf,
+    is_frf_mapping,
+    load_frf_mapping,
+    looks_like_frf,
+    read_frf_uff,
+)
 from .independence import RANK_TOLERANCE, InputIndependence, bands_text, input_independence
 from .integration import displacement_from_acceleration
 from .known_band import known_band
@@ -18,7 +51,7 @@ from .recording_spectra import choose_channels, cross_spectra
 from .spectral_accumulator import SpectralAccumulator
 from .stacking import sum_tests
 from .sweep_plan import SweepDemand, SweepPlan, plan_sweeps, predicted_spectra
-from .uff_file import read_frf_uff, write_frf_uff
+from .uff_file import is_uff_number, uff_node_numbers, write_frf_uff
 from .usable_samples import usable_samples
 from .windows import effective_averages, settings_for
 
@@ -27,17 +60,30 @@ __all__ = [
     "BandDecimator",
     "BandRecord",
     "CrossSpectra",
+    "Decay",
+    "Disagreement",
+    "FoundTaps",
     "Frf",
     "FrfCovariance",
+    "FrfMapping",
+    "Geometry",
+    "ImportedFrf",
     "InputIndependence",
+    "JudgedTap",
+    "MergedTaps",
     "SpectralAccumulator",
     "SpectralSettings",
     "SweepDemand",
     "SweepPlan",
     "Tap",
+    "TapSettings",
+    "TapSums",
+    "TapTest",
+    "answer_decay",
     "band_record",
     "bands_text",
     "choose_channels",
+    "choose_segments",
     "correct_high_pass",
     "cross_spectra",
     "displacement_from_acceleration",
@@ -46,30 +92,48 @@ __all__ = [
     "exponential_window",
     "find_taps",
     "force_window",
+    "found_taps",
     "h1",
     "h1_side_by_side",
     "h2",
     "hv",
+    "import_frf",
+    "import_geometry",
     "input_coherence",
     "input_independence",
     "instrumental_variable",
+    "is_frf_mapping",
+    "is_geometry_table",
+    "is_uff_number",
     "known_band",
+    "load_frf_mapping",
     "local_polynomial",
+    "looks_like_frf",
+    "merge_taps",
     "multiple_coherence",
     "partial_coherence",
+    "placed",
     "plan_sweeps",
     "predicted_spectra",
     "principal_inputs",
     "read_frf",
     "read_frf_uff",
+    "read_geometry",
+    "screened",
     "settings_for",
     "spectrogram",
     "sum_tests",
+    "tap_sums",
     "to_receptance",
     "track_order",
+    "uff_node_numbers",
     "usable_samples",
     "virtual_coherence",
+    "widest_band",
+    "window_correlation",
+    "window_for",
     "without_added_damping",
     "write_frf",
     "write_frf_uff",
+    "write_geometry",
 ]

@@ -20,8 +20,9 @@ def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", proven
     """Write an FRF whole.
 
     Root attributes ``format, format_version, title, provenance, quantity, unit, responses, excitations`` (JSON
-    lists), and where the band is known ``band_hz`` (two numbers); datasets ``frequencies`` (Hz), ``values``
-    (complex), ``valid``, and where known ``multiple_coherence``, ``covariance/response``, ``covariance/excitation``.
+    lists), and where known ``band_hz`` (two numbers) and ``exponential_time_constant_s``; datasets ``frequencies``
+    (Hz), ``values`` (complex), ``valid``, and where known ``multiple_coherence``, ``covariance/response``,
+    ``covariance/excitation``, ``coherence`` (of each entry) and ``averages`` (of each entry).
 
     Raises
     ------
@@ -37,8 +38,11 @@ def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", proven
             file[name] = getattr(frf, name)
         if frf.band is not None:
             file.attrs["band_hz"] = list(frf.band)
-        if frf.multiple_coherence is not None:
-            file["multiple_coherence"] = frf.multiple_coherence
+        if frf.exponential_time_constant is not None:
+            file.attrs["exponential_time_constant_s"] = frf.exponential_time_constant
+        for name in ("multiple_coherence", "coherence", "averages"):
+            if getattr(frf, name) is not None:
+                file[name] = getattr(frf, name)
         if frf.covariance is not None:
             file["covariance/response"] = frf.covariance.response
             file["covariance/excitation"] = frf.covariance.excitation
@@ -85,7 +89,7 @@ def _read(file: h5py.File) -> Frf:
     covariance = None
     if "covariance" in file:
         covariance = FrfCovariance(file["covariance/response"][:], file["covariance/excitation"][:])
-    coherence = file["multiple_coherence"][:] if "multiple_coherence" in file else None
+    time_constant = file.attrs.get("exponential_time_constant_s")
     return Frf(
         np.asarray(file["frequencies"][:], dtype=float),
         np.asarray(file["values"][:], dtype=complex),
@@ -94,7 +98,14 @@ def _read(file: h5py.File) -> Frf:
         str(file.attrs["quantity"]),
         str(file.attrs["unit"]),
         np.asarray(file["valid"][:], dtype=bool),
-        coherence,
+        _optional(file, "multiple_coherence", float),
         covariance,
         tuple(file.attrs["band_hz"]) if "band_hz" in file.attrs else None,
+        _optional(file, "coherence", float),
+        _optional(file, "averages", np.int64),
+        None if time_constant is None else float(time_constant),
     )
+
+
+def _optional(file: h5py.File, name: str, kind: type) -> Any:
+    return np.asarray(file[name][:], dtype=kind) if name in file else None

@@ -32,9 +32,10 @@ def frf_quantity(responses: Sequence[Channel], excitations: Sequence[Channel]) -
 
 
 def to_receptance(frf: Frf) -> Frf:
-    """Displacement over force: divide by ``(i w)^n``, n = 2 for accelerance, 1 for mobility.
+    """Displacement over force: divide by ``s^n``, n = 2 for accelerance, 1 for mobility.
 
-    The line at 0 Hz has no receptance from motion that was differentiated: it is zeroed and not valid.
+    ``s`` is ``i w``, or ``i w + 1/tau`` where an exponential window was used (:attr:`estimation.Frf.laplace`). The line
+    at 0 Hz has no receptance from motion that was differentiated: it is zeroed and not valid.
     A ``transfer`` is returned as it is.
 
     Raises
@@ -46,8 +47,8 @@ def to_receptance(frf: Frf) -> Frf:
         return frf
     if frf.quantity not in DERIVATIVES:
         raise InputError(f"cannot turn {frf.quantity!r} into receptance; use receptance, mobility or accelerance")
-    s = 2j * np.pi * frf.frequencies
-    factor = np.divide(1.0, s ** DERIVATIVES[frf.quantity], out=np.zeros_like(s), where=s != 0)
+    s, moving = frf.laplace, frf.frequencies > 0
+    factor = np.divide(1.0, s ** DERIVATIVES[frf.quantity], out=np.zeros_like(s), where=moving)
     covariance = frf.covariance
     if covariance is not None:
         covariance = FrfCovariance(covariance.response * (np.abs(factor) ** 2)[:, None, None], covariance.excitation)
@@ -56,7 +57,7 @@ def to_receptance(frf: Frf) -> Frf:
         values=frf.values * factor[:, None, None],
         quantity="receptance",
         unit=frf.unit.replace("m/s^2", "m").replace("m/s", "m"),
-        valid=frf.valid & (s != 0),
+        valid=frf.valid & moving,
         covariance=covariance,
     )
 
@@ -80,9 +81,9 @@ def correct_high_pass(frf: Frf, corners: Sequence[float | None]) -> Frf:
         raise InputError(f"{len(corners)} high-pass corners for {len(frf.responses)} responses; give one for each")
     if not any(corners):
         return frf
-    s = 2j * np.pi * frf.frequencies[:, None]
+    s, moving = frf.laplace[:, None], frf.frequencies[:, None] > 0
     corner = 2 * np.pi * np.array([value or 0.0 for value in corners])
-    factor = np.divide(s + corner, s, out=np.ones((len(s), len(corner)), dtype=complex), where=s != 0)
+    factor = np.divide(s + corner, s, out=np.ones((len(s), len(corner)), dtype=complex), where=moving)
     covariance = frf.covariance
     if covariance is not None:
         scaled = covariance.response * factor[:, :, None] * factor.conj()[:, None, :]

@@ -42,7 +42,7 @@ def try_cut(rpm: float, depth_mm: float) -> TriedCut:
     cell = MillingCell(
         table_one_model(), HALF_DOWN, 1e-3 * depth_mm, rpm * RPM, 25.0, sample_rate=RATE, sensors=sensors
     )
-    verdict = classify_cut(cell.samples()[:, 3:], RATE, rpm * RPM, HALF_DOWN.teeth, runout=False)
+    verdict = classify_cut(cell.samples()[:, 3:], RATE, rpm * RPM, HALF_DOWN.teeth, runout=0.0)
     return TriedCut(rpm, 1e-3 * depth_mm, verdict.kind)
 
 

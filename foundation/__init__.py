@@ -6,21 +6,26 @@ Nothing here knows about signals, models or the command line.
 from foundation.atomic_files import writing_whole_file
 from foundation.degrees_of_freedom import DegreeOfFreedom
 from foundation.errors import FileFormatError, InputError, MillfrfError
+from foundation.noted_table import WARNING, apart, warning_lines
 from foundation.table_mistakes import mistake_in_words, shown
-from foundation.units import SI_UNITS, si_factor
+from foundation.units import SI_UNITS, si_factor, unit_factor
 from foundation.valid_band import Band, checked_band, shared_band
 
 __all__ = [
     "SI_UNITS",
+    "WARNING",
     "Band",
     "DegreeOfFreedom",
     "FileFormatError",
     "InputError",
     "MillfrfError",
+    "apart",
     "checked_band",
     "mistake_in_words",
     "shared_band",
     "shown",
     "si_factor",
+    "unit_factor",
+    "warning_lines",
     "writing_whole_file",
 ]

@@ -1,6 +1,8 @@
 """Units are converted where data enters; inside, everything is SI."""
 
+import re
 from functools import cache
+from tokenize import TokenError
 from typing import TYPE_CHECKING
 
 from foundation.errors import InputError
@@ -21,6 +23,12 @@ SI_UNITS = {
     "dimensionless": "1",
 }
 """Quantities a channel may have, with the unit each is kept in."""
+
+_LETTERS = re.compile(r"[\w\s.*/^()+-]+")
+"""What units are written with; pint reads other texts by Python's rules, quotation marks and all."""
+
+_UNREADABLE = (AttributeError, ValueError, AssertionError, TypeError, ArithmeticError, SyntaxError, TokenError)
+"""What pint raises besides its own, since it reads units with Python's tokenizer and calculates with them."""
 
 _SPOKEN = {"g": "standard_gravity", "g0": "standard_gravity", "gn": "standard_gravity", "1": "", "rpm": "rpm"}
 
@@ -66,5 +74,31 @@ def si_factor(quantity: str, unit: str) -> float:
     try:
         registry = _registry()
         return float(registry.Quantity(1.0, spoken).to(_SPOKEN.get(target, target)).magnitude)
-    except (pint.PintError, AttributeError, ValueError, AssertionError, TypeError) as error:
+    except (pint.PintError, *_UNREADABLE) as error:
         raise InputError(f"unit {unit!r} is not a unit of {quantity}; use {target} or one convertible to it") from error
+
+
+def unit_factor(unit: str, target: str) -> float | None:
+    """Return the factor that takes a value in ``unit`` to ``target``; None where ``unit`` is no such unit.
+
+    Parameters
+    ----------
+    unit
+        Any unit, such as one from a file; unlike in :func:`si_factor`, ``g`` is gram here.
+    target
+        A unit that is known to be one, such as ``m/s^2/N``.
+
+    Examples
+    --------
+    >>> unit_factor("mm/kN", "m/N"), unit_factor("mm/kN", "m/s/N"), unit_factor("dB!", "m/N")
+    (1e-06, None, None)
+    """
+    if not _LETTERS.fullmatch(unit):
+        return None
+    import pint
+
+    try:
+        found = _registry().Quantity(1.0, unit)
+        return float(found.to(target).magnitude) if found.is_compatible_with(target) else None
+    except (pint.PintError, *_UNREADABLE):
+        return None

@@ -8,15 +8,17 @@ from pathlib import Path
 
 import h5py
 
+from estimation import is_geometry_table
 from foundation import FileFormatError, InputError
 
 RECORDING, FRF, MODEL, LOBES, CUTTING = "recording", "frf", "modal model", "lobes", "cutting data"
+GEOMETRY = "geometry"
 _FORMATS = {"millfrf.recording": RECORDING, "millfrf.frf": FRF, "millfrf.modal_model": MODEL}
 _LOBES_COLUMNS = ["spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation"]
 
 
 def kind_of(path: str | os.PathLike[str]) -> str:
-    """``recording``, ``frf``, ``modal model``, ``lobes`` or ``cutting data``.
+    """``recording``, ``frf``, ``modal model``, ``lobes``, ``cutting data`` or ``geometry``.
 
     Raises
     ------
@@ -35,8 +37,8 @@ def kind_of(path: str | os.PathLike[str]) -> str:
     kind = _hdf5_kind(file) if h5py.is_hdf5(file) else _text_kind(file)
     if kind is None:
         raise FileFormatError(
-            f"{file} is no recording, FRF, modal model, table of lobes or cutting file; "
-            "turn files of other programs into recordings with 'millfrf convert'"
+            f"{file} is no recording, FRF, modal model, table of lobes, cutting file or geometry; "
+            "turn files of other programs into one of them with 'millfrf convert'"
         )
     return kind
 
@@ -60,9 +62,10 @@ def _text_kind(file: Path) -> str | None:
     if rows and next(csv.reader(rows[:1]))[: len(_LOBES_COLUMNS)] == _LOBES_COLUMNS:
         return LOBES
     try:
-        return CUTTING if "cutting" in tomllib.loads(text) else None
+        table = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
         return None
+    return CUTTING if "cutting" in table else GEOMETRY if is_geometry_table(table) else None
 
 
 def _json_kind(text: str) -> str | None:

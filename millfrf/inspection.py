@@ -6,18 +6,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquisition import Recording
-from estimation import read_frf
+from estimation import Frf, Geometry, read_frf, read_geometry
 from modal_fit import read_modal_model
 from stability import STATUSES, read_lobes
 
-from .file_kinds import CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
+from .file_kinds import CUTTING, FRF, GEOMETRY, LOBES, MODEL, RECORDING, kind_of
 from .gate import check_frf, check_model, doubts_of, read_checked_cutting, stored_doubts
 from .gate.signals import level_table, look
 from .progress import Watch, silent
-from .tables import Table, mode_table
+from .tables import Table, error_table, mode_table
 from .tap_concerns import tap_concerns
+
+LARGEST = 100.0
+"""m; a structure of some hundred millimetres spans more where they are taken for metres."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,7 @@ class Findings:
 
 
 def inspect_file(path: str | os.PathLike[str], watch: Watch = silent) -> Findings:
-    """Look at a recording, an FRF, a model, lobes or a cutting file.
+    """Look at a recording, an FRF, a model, lobes, a cutting file or a geometry.
 
     Raises
     ------
@@ -56,6 +60,7 @@ def inspect_file(path: str | os.PathLike[str], watch: Watch = silent) -> Finding
         MODEL: _model,
         LOBES: _lobes,
         CUTTING: _cutting,
+        GEOMETRY: _geometry,
     }
     return readers[kind](path)
 
@@ -98,23 +103,36 @@ def _frf(path: str | os.PathLike[str]) -> Findings:
     frf = read_frf(path)
     f, concerns = frf.frequencies, doubts_of(check_frf, frf, Path(path).name)
     if not frf.valid.all():
-        concerns.append(f"{int((~frf.valid).sum())} of {len(f)} lines have no FRF (dependent inputs)")
+        concerns.append(
+            f"{int((~frf.valid).sum())} of {len(f)} lines have no FRF (no force there, or dependent inputs)"
+        )
     coherence = frf.multiple_coherence
+    if coherence is None and frf.coherence is not None:
+        coherence = frf.coherence.min(axis=2)
     rows = []
     for p, response in enumerate(frf.responses):
         peak = np.abs(frf.values[:, p]).max(axis=1)
         line = int(np.argmax(np.where(frf.valid, peak, 0.0)))
-        median = "" if coherence is None else f"{np.median(coherence[frf.valid, p]):.3f}"
-        rows.append((response, f"{peak[line]:.3g} {frf.unit}", f"{f[line]:.4g}", median))
-        if coherence is not None and frf.valid.any() and np.median(coherence[frf.valid, p]) < 0.5:
-            concerns.append(f"{response}: median multiple coherence below 0.5; keep only the band that is excited")
+        middle = np.nan if coherence is None else float(np.median(coherence[_inside(frf), p]))
+        rows.append(
+            (response, f"{peak[line]:.3g} {frf.unit}", f"{f[line]:.4g}", "" if np.isnan(middle) else f"{middle:.3f}")
+        )
+        if middle < 0.5:
+            concerns.append(f"{response}: median coherence below 0.5; keep only the band that is excited")
     summary = (
         f"{frf.quantity} in {frf.unit}, {f[0]:g} to {f[-1]:g} Hz in {len(f)} lines, "
         f"excited at {', '.join(frf.excitations)}"
     )
     concerns += stored_doubts(path)
-    table = Table("responses", ("response", "largest value", "at (Hz)", "median multiple coherence"), tuple(rows))
+    table = Table("responses", ("response", "largest value", "at (Hz)", "median coherence"), tuple(rows))
     return Findings(FRF, summary, (table,), tuple(concerns))
+
+
+def _inside(frf: Frf) -> NDArray[np.bool_]:
+    """Valid lines in the band that the FRF states, all valid ones where it states none."""
+    low, high = frf.band or (0.0, np.inf)
+    inside = frf.valid & (frf.frequencies >= low) & (frf.frequencies <= high)
+    return np.asarray(inside if inside.any() else frf.valid)
 
 
 def _model(path: str | os.PathLike[str]) -> Findings:
@@ -130,7 +148,9 @@ def _model(path: str | os.PathLike[str]) -> Findings:
         f"modal model, {len(model.poles)} modes, {model.quantity} in {model.unit}, responses "
         f"{', '.join(model.responses)}, excitations {', '.join(model.excitations)}"
     )
-    return Findings(MODEL, summary, (mode_table(model),), tuple(concerns))
+    by_source = error_table(model)
+    tables = (mode_table(model),) if by_source is None else (mode_table(model), by_source)
+    return Findings(MODEL, summary, tables, tuple(concerns))
 
 
 def _lobes(path: str | os.PathLike[str]) -> Findings:
@@ -157,3 +177,27 @@ def _cutting(path: str | os.PathLike[str]) -> Findings:
         f"Ktc {process.ktc / 1e6:g} MPa, immersion {immersion[0]:g} to {immersion[1]:g} deg"
     )
     return Findings(CUTTING, summary, concerns=tuple(doubts))
+
+
+def _geometry(path: str | os.PathLike[str]) -> Findings:
+    geometry = read_geometry(path)
+    low, high = geometry.positions.min(axis=0), geometry.positions.max(axis=0)
+    spans = ", ".join(f"{axis} {a:g} to {b:g} m" for axis, a, b in zip("XYZ", low, high, strict=True))
+    turned = 0 if geometry.axes is None else sum(not np.allclose(axes, np.eye(3)) for axes in geometry.axes)
+    summary = f"geometry of {len(geometry.nodes)} nodes, {spans}; {turned} with own axes, {len(geometry.lines)} lines"
+    rows = tuple(
+        (name, *(f"{value:.4g}" for value in position))
+        for name, position in zip(geometry.nodes, geometry.positions, strict=True)
+    )
+    table = Table("nodes", ("node", "X (m)", "Y (m)", "Z (m)"), rows)
+    return Findings(GEOMETRY, summary, (table,), tuple(_geometry_concerns(geometry)))
+
+
+def _geometry_concerns(geometry: Geometry) -> list[str]:
+    concerns = []
+    size = float(np.ptp(geometry.positions, axis=0).max())
+    if size > LARGEST:
+        concerns.append(f"the nodes span {size:.4g} m: is the file in mm? Give its unit")
+    if len(geometry.nodes) > 1 and size == 0:
+        concerns.append("all nodes lie at one place; no shape can be drawn on them")
+    return concerns

@@ -4,6 +4,8 @@ import hashlib
 import json
 import os
 import platform
+import re
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -13,6 +15,8 @@ import h5py
 
 from foundation import writing_whole_file
 
+_MADE_BY = "made_by_millfrf"
+_MADE_BY_TABLE = re.compile(rf"^\[{_MADE_BY}\]\nwarnings = \[.*\]\n?", re.MULTILINE)
 LIBRARIES = ("numpy", "scipy", "h5py", "numba", "matplotlib")
 
 
@@ -80,8 +84,17 @@ def _of_lobes(path: Path) -> Any:
 
 
 def with_warnings(setup: str, warnings: Sequence[str]) -> str:
-    """A recording's set-up (TOML text) with the warnings of the job that made it; as it is where there are none."""
+    """A recording's set-up (TOML text) with the warnings of the job that made it; as it is where there are none.
+
+    Warnings of an earlier job stay, each once: a table may stand in a file only once.
+    """
     if not warnings:
         return setup
-    listed = ", ".join(json.dumps(" ".join(warning.split())) for warning in warnings)
-    return f"{setup.rstrip()}\n\n[made_by_millfrf]\nwarnings = [{listed}]\n".lstrip()
+    try:
+        earlier = tomllib.loads(setup).get(_MADE_BY, {}).get("warnings", [])
+    except tomllib.TOMLDecodeError:
+        earlier = []
+    kept = _MADE_BY_TABLE.sub("", setup).rstrip()
+    every = dict.fromkeys([*earlier, *(" ".join(warning.split()) for warning in warnings)])
+    listed = ", ".join(json.dumps(warning) for warning in every)
+    return f"{kept}\n\n[{_MADE_BY}]\nwarnings = [{listed}]\n".lstrip()

@@ -53,7 +53,7 @@ def mode_table(model: ModalModel, title: str = "Modes", band: tuple[float, float
             continue
         spread = (np.nan, np.nan) if errors is None else (2 * errors[0][r], 200 * errors[1][r])
         size = np.abs(model.right[r]).max() * np.abs(model.left[r]).max()
-        peak = size / abs(model.poles[r].real)
+        peak = size / abs(model.poles[r].real) if model.poles[r].real else np.inf
         rows.append(
             (
                 str(r + 1),
@@ -65,6 +65,19 @@ def mode_table(model: ModalModel, title: str = "Modes", band: tuple[float, float
     columns = ("mode", "frequency (Hz)", "damping ratio (%)", "largest resonant term")
     note = " (± 2 standard errors)" if errors is not None else ""
     return Table(title + note, columns, tuple(rows))
+
+
+def error_table(model: ModalModel, title: str = "Standard errors by source") -> Table | None:
+    """Standard errors of each mode by where they come from; None where the model does not say."""
+    if model.errors is None:
+        return None
+    parts = (model.errors.noise, model.errors.points, model.errors.band, model.errors.terms, model.errors.total)
+    rows = []
+    for r, frequency in enumerate(model.natural_frequencies):
+        cells = [f"{part[r, 0]:.2g} / {100 * part[r, 1]:.2g}" if np.isfinite(part[r, 0]) else "-" for part in parts]
+        rows.append((str(r + 1), f"{frequency:.3f}", *cells))
+    columns = ("mode", "frequency (Hz)", "noise", "points left out", "band edges", "out-of-band terms", "total")
+    return Table(f"{title} (Hz / % damping)", columns, tuple(rows))
 
 
 def show(table: Table) -> None:

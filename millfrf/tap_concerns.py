@@ -7,13 +7,8 @@ import numpy as np
 from acquisition import Stream
 from estimation import find_taps
 
+from .gate import IMPULSIVE, LONGEST
 from .gate.signals import ChannelLevel
-
-IMPULSIVE = 12.0
-"""Peak over standard deviation above which a force is taken for taps of a hammer; a cut has less than 6."""
-
-LONGEST = 900.0
-"""Seconds beyond which a recording is no hammer test."""
 
 
 def tap_concerns(stream: Stream, levels: Sequence[ChannelLevel]) -> list[str]:
@@ -32,6 +27,6 @@ def tap_concerns(stream: Stream, levels: Sequence[ChannelLevel]) -> list[str]:
             found.append(
                 f"{level.channel.name}: {len(double)} of {len(taps)} taps hit twice (at {times}; the first after "
                 f"{1e3 * (double[0].second_hit or 0):.1f} ms with {100 * double[0].second_share:.0f} %); "
-                "tap anew or cut them out"
+                "'millfrf tap' leaves them out"
             )
     return found

@@ -127,7 +127,9 @@ class ModelShape:
         residuals = self.nominal.residuals
         if self.outside is not None and u[self.modal_size :].any():
             residuals = self.outside.added(residuals, u[self.modal_size :])
-        return replace(self.nominal, poles=poles, right=right, left=left, residuals=residuals, covariance=None)
+        return replace(
+            self.nominal, poles=poles, right=right, left=left, residuals=residuals, covariance=None, errors=None
+        )
 
     def jacobian(self, u: Real, frequencies: Real, force: Complex, factor: Complex | None = None) -> Complex:
         """Derivative of the displacement lines by u for force lines, (n_lines, n_responses, size).

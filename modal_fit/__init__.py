@@ -3,17 +3,19 @@
 from .comparison import ModePair, compare_modes
 from .modal_model import ModalModel, Residuals
 from .modal_model_file import read_modal_model, write_modal_model
+from .mode_errors import ModeErrors
 from .polyreference import ModalFit, fit_polyreference
 from .shape_measures import modal_assurance, phase_collinearity, phase_deviation, reciprocity_residual
 from .stabilisation import PoleGroup, StabilisationChart
 from .subspace import SubspaceFit, fit_subspace
 from .tip_calibration import TipCalibration, calibrate_to_tip
-from .uff_modes import read_modes_uff, write_modes_uff
+from .uff_modes import import_modes_uff, read_modes_uff, write_modes_uff
 from .uncertainty import derived_covariance, frequency_and_damping_errors
 
 __all__ = [
     "ModalFit",
     "ModalModel",
+    "ModeErrors",
     "ModePair",
     "PoleGroup",
     "Residuals",
@@ -26,6 +28,7 @@ __all__ = [
     "fit_polyreference",
     "fit_subspace",
     "frequency_and_damping_errors",
+    "import_modes_uff",
     "modal_assurance",
     "phase_collinearity",
     "phase_deviation",

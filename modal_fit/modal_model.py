@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 from estimation import Frf
 from foundation import Band, InputError, checked_band
 
+from .mode_errors import ModeErrors
+
 
 @dataclass(frozen=True)
 class Residuals:
@@ -95,6 +97,8 @@ class ModalModel:
     band
         Lowest and highest frequency (Hz) between which the model holds, as a rule those of its fit; None: not known.
         Whoever uses the model outside says so.
+    errors
+        Standard errors of frequencies and damping ratios by where they come from; None: only ``covariance`` is known.
 
     Raises
     ------
@@ -114,6 +118,7 @@ class ModalModel:
     physics: tuple[dict[str, Any], ...] = ()
     delay: float = 0.0
     band: Band | None = None
+    errors: ModeErrors | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "band", checked_band(self.band, "modal model"))
@@ -131,6 +136,8 @@ class ModalModel:
         for name, array in (("poles", self.poles), ("right", self.right), ("left", self.left)):
             if not np.isfinite(array).all():
                 raise InputError(f"modal model: {name} hold NaN or infinity; fit again or mend the file")
+        if self.errors is not None and self.errors.noise.shape != (n_modes, 2):
+            raise InputError(f"modal model: errors of {len(self.errors.noise)} modes, poles of {n_modes}; fit again")
         if n_modes and self.poles.imag.min() < 0:
             raise InputError(
                 f"modal model: pole {self.poles[self.poles.imag.argmin()]:.4g} has a negative imaginary part; "
@@ -155,7 +162,10 @@ class ModalModel:
         InputError
             A frequency of zero where the model has a lower residual (it is infinite there).
         """
-        s = 2j * np.pi * np.asarray(frequencies, dtype=float)
+        return self.at(2j * np.pi * np.asarray(frequencies, dtype=float))
+
+    def at(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Evaluate H anywhere in the Laplace plane (rad/s); shape (n_values, n_responses, n_excitations)."""
         direct = np.einsum("kr,rp,rq->kpq", 1 / (s[:, None] - self.poles), self.right, self.left, optimize=True)
         conjugate = np.einsum(
             "kr,rp,rq->kpq", 1 / (s[:, None] - self.poles.conj()), self.right.conj(), self.left.conj(), optimize=True

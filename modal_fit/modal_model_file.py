@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from foundation import FileFormatError, InputError, writing_whole_file
 
 from .modal_model import ModalModel, Residuals
+from .mode_errors import ModeErrors
 
 FORMAT = "millfrf.modal_model"
 FORMAT_VERSION = 1
@@ -42,6 +43,8 @@ def write_modal_model(path: str | os.PathLike[str], model: ModalModel) -> None:
             content["residuals"]["residues"] = _pairs(model.residuals.residues)
     if model.covariance is not None:
         content["covariance"] = model.covariance.tolist()
+    if model.errors is not None:
+        content["mode_errors"] = _errors_to_json(model.errors)
     if model.delay:
         content["delay_s"] = model.delay
     if model.band is not None:
@@ -113,7 +116,24 @@ def _model(content: dict[str, Any]) -> ModalModel:
         physics=tuple(content.get("physics", ())),
         delay=float(content.get("delay_s", 0.0)),
         band=_band(content),
+        errors=_errors_from_json(content.get("mode_errors")),
     )
+
+
+def _errors_to_json(errors: ModeErrors) -> dict[str, Any]:
+    """Pairs [frequency in Hz, damping ratio] of each mode; null where a part was not examined."""
+    parts = {"noise": errors.noise, "points": errors.points, "band": errors.band, "terms": errors.terms}
+    return {
+        name: [[None if np.isnan(value) else value for value in pair] for pair in part.tolist()]
+        for name, part in parts.items()
+    }
+
+
+def _errors_from_json(stored: dict[str, Any] | None) -> ModeErrors | None:
+    if stored is None:
+        return None
+    parts = [np.asarray(stored[name], dtype=float).reshape(-1, 2) for name in ("noise", "points", "band", "terms")]
+    return ModeErrors(*parts)
 
 
 def _wrong_field(content: dict[str, Any]) -> str:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from estimation import Frf, to_receptance
 from foundation import InputError, MillfrfError
 
+from .frf_fit import NOT_REFINED, REFINED, MatrixFit, default_order, fit_matrix
 from .likelihood_result import best_fit, modal_model_from
 from .matrix_fraction import matrix_fraction_poles
 from .maximum_likelihood import LikelihoodFit
@@ -20,8 +21,8 @@ from .stabilisation import PoleGroup, StabilisationChart, choose_poles, stabilis
 from .transfer_delay import transfer_delay
 
 Complex = NDArray[np.complex128]
-_DELAY_ROUNDS = 4  # the first poles are found with the delay still in
 _NO_VIBRATION = 0.5  # damping ratio above which a pole is taken for a trend
+_DELAY_ROUNDS = 4  # the first poles are found with the delay still in
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ class ModalFit:
         Root mean square misfit over root mean square FRF in the band.
     warnings
         One sentence each.
+    status
+        ``refined``, or ``poly-reference poles`` where the refinement did not hold on lines that it had not seen.
     """
 
     model: ModalModel
@@ -54,15 +57,18 @@ class ModalFit:
     reduced_chi_square: float
     relative_error: NDArray[np.float64]
     warnings: tuple[str, ...]
+    status: str = REFINED
 
 
 def fit_polyreference(
-    frf: Frf, band: tuple[float, float], *, max_order: int = 40, n_modes: int | None = None
+    frf: Frf, band: tuple[float, float], *, max_order: int | None = None, n_modes: int | None = None
 ) -> ModalFit:
     """Fit a modal model to the valid lines of an FRF matrix inside ``band`` (Hz).
 
-    Poles come from the poly-reference least-squares complex frequency method over all orders, are chosen automatically,
-    and are refined together with vectors and out-of-band terms by maximum likelihood on the FRF's covariance.
+    Poles come from the poly-reference least-squares complex frequency method over all orders. Each is tried in its
+    neighbourhood and stays where the data need it. Poles and the vectors of the references are then refined together;
+    all that belongs to one response is eliminated (variable projection), in the quantity that was measured. An FRF
+    with a covariance is refined by maximum likelihood on it (:func:`fit_with_covariance`).
 
     Parameters
     ----------
@@ -71,9 +77,9 @@ def fit_polyreference(
     band
         Hz, 0 < low < high.
     max_order
-        Highest order of the denominator.
+        Highest order of the denominator; None: from the number of lines and references.
     n_modes
-        Keep the ``n_modes`` groups found in most orders; None: as many as there are.
+        Keep the first ``n_modes`` that are found; None: as many as there are.
 
     Raises
     ------
@@ -81,6 +87,34 @@ def fit_polyreference(
         A band without enough valid lines, or an order below 2.
     MillfrfError
         No pole is stable over the orders.
+    """
+    if frf.covariance is not None:
+        return fit_with_covariance(frf, band, 40 if max_order is None else max_order, n_modes)
+    inside = _usable_lines(frf, band, max_order)
+    references = min(len(frf.responses), len(frf.excitations))
+    order = default_order(int(inside.sum()), references) if max_order is None else max_order
+    order = min(order, int(inside.sum()) // 2)
+    delay, advanced = 0.0, frf
+    if frf.quantity == "transfer":
+        delay = _delay(frf, band, order, inside, n_modes)
+        advanced = _advanced(frf, delay)
+    fit = fit_matrix(advanced, inside, band, order, n_modes)
+    model = replace(fit.model, delay=delay)
+    error = relative_error(frf, model, inside)
+    chi = float("nan")
+    warnings = (*_status_warnings(fit), *_warnings(frf, inside, model, band, chi, error))
+    return ModalFit(model, fit.chart, fit.refused, band, chi, error, warnings, fit.status)
+
+
+def fit_with_covariance(frf: Frf, band: tuple[float, float], max_order: int, n_modes: int | None) -> ModalFit:
+    """Fit an FRF whose covariance is known, as stacked milling records give it, by maximum likelihood.
+
+    Parameters
+    ----------
+    frf, band, n_modes
+        As in :func:`fit_polyreference`.
+    max_order
+        Highest order of the denominator.
     """
     receptance = to_receptance(frf)
     inside = _usable_lines(receptance, band, max_order)
@@ -99,14 +133,9 @@ def fit_polyreference(
     dropped = (*dropped, *superfluous)
     model = modal_model_from(fit, band, receptance.responses, receptance.excitations, receptance.unit)
     model = replace(model, delay=delay)
-    error = relative_error(receptance, model, inside)
+    error = _relative_error_of_receptance(receptance, model, inside)
     chi = fit.reduced_chi_square if noise is not None else float("nan")
     return ModalFit(model, chart, dropped, band, chi, error, _warnings(receptance, inside, model, band, chi, error))
-
-
-def _advanced(frf: Frf, delay: float) -> Frf:
-    """The FRF with a delay taken out."""
-    return replace(frf, values=frf.values * np.exp(2j * np.pi * frf.frequencies * delay)[:, None, None])
 
 
 def _poles_over_orders(
@@ -170,15 +199,57 @@ def _strayed(found: Complex, start: Complex, band: tuple[float, float]) -> list[
     ]
 
 
+def _delay(frf: Frf, band: tuple[float, float], order: int, inside: NDArray[np.bool_], n_modes: int | None) -> float:
+    """Delay of a transfer, found in turn with its poles."""
+    delay = 0.0
+    poles = _first_poles(frf, band, order, n_modes)
+    lines, _ = frf_lines(replace(frf, covariance=None), inside)
+    for number in range(_DELAY_ROUNDS):
+        found, before = transfer_delay(poles, lines, band), delay
+        delay = found if number < 2 else (found + before) / 2  # poles and delay can swing about their common value
+        poles = _first_poles(_advanced(frf, delay), band, order, n_modes)
+        if abs(delay - before) < 1e-3 / band[1]:
+            break
+    return delay
+
+
+def _first_poles(frf: Frf, band: tuple[float, float], order: int, n_modes: int | None) -> Complex:
+    """Poles that many orders have, without a refinement."""
+    chart = stabilisation_chart(list(matrix_fraction_poles(frf, band, order)), band)
+    kept, _ = choose_poles(chart)
+    if not kept:
+        raise MillfrfError(
+            f"no pole is stable over orders 1 to {order} between {band[0]:g} and {band[1]:g} Hz; "
+            "widen the band, raise --max-order or average more"
+        )
+    return np.array([group.pole for group in sorted(kept, key=_minus_orders)[:n_modes]])
+
+
+def _advanced(frf: Frf, delay: float) -> Frf:
+    """The FRF with a delay taken out."""
+    return replace(frf, values=frf.values * np.exp(2j * np.pi * frf.frequencies * delay)[:, None, None])
+
+
 def _minus_orders(group: PoleGroup) -> int:
     return -group.n_orders
 
 
-def _usable_lines(frf: Frf, band: tuple[float, float], max_order: int) -> NDArray[np.bool_]:
+def _status_warnings(fit: MatrixFit) -> tuple[str, ...]:
+    """What the refinement says of itself."""
+    if fit.status == NOT_REFINED:
+        return (
+            "the refinement does not hold on lines left out of it: the poles are those of the poly-reference method",
+        )
+    if not fit.converged:
+        return ("the refinement stopped before it converged; treat the error bars as lower bounds",)
+    return ()
+
+
+def _usable_lines(frf: Frf, band: tuple[float, float], max_order: int | None) -> NDArray[np.bool_]:
     low, high = band
     if not 0 < low < high:
         raise InputError(f"band {low:g} to {high:g} Hz is empty or starts at 0; give 0 < low < high")
-    if max_order < 2:
+    if max_order is not None and max_order < 2:
         raise InputError(f"highest order {max_order} leaves no room for a mode; give 2 or more")
     inside = frf.valid & (frf.frequencies >= low) & (frf.frequencies <= high)
     if inside.sum() < 8:
@@ -230,9 +301,18 @@ def _regular(covariance: Complex) -> Complex:
     return np.asarray(matrices + np.einsum("kp,pu->kpu", floor, np.eye(power.shape[1])))
 
 
-def relative_error(frf: Frf, model: ModalModel, inside: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _relative_error_of_receptance(frf: Frf, model: ModalModel, inside: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Root mean square misfit over root mean square FRF, (n_responses, n_excitations)."""
     misfit = frf.values[inside] - model.receptance(frf.frequencies[inside])
+    size = np.sqrt(np.mean(np.abs(frf.values[inside]) ** 2, axis=0))
+    return np.asarray(np.sqrt(np.mean(np.abs(misfit) ** 2, axis=0)) / np.where(size > 0, size, 1.0))
+
+
+def relative_error(frf: Frf, model: ModalModel, inside: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Root mean square misfit over root mean square FRF, in the measured quantity, (n_responses, n_excitations)."""
+    s = frf.laplace[inside]
+    factor = s ** {"mobility": 1, "accelerance": 2}.get(frf.quantity, 0)
+    misfit = frf.values[inside] - factor[:, None, None] * model.at(s)
     size = np.sqrt(np.mean(np.abs(frf.values[inside]) ** 2, axis=0))
     return np.asarray(np.sqrt(np.mean(np.abs(misfit) ** 2, axis=0)) / np.where(size > 0, size, 1.0))
 

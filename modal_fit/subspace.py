@@ -1,5 +1,6 @@
 """`fit_subspace`: recordings to modal model without a spectrum in between: no window, no leakage, stacked tests."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -16,6 +17,8 @@ from .noise_levels import NoiseLevels
 from .record_spectra import record_spectra
 from .stabilisation import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
 
+_BLOCK_ROWS = 25
+_SPARE_ROWS = 1.5  # observability matrix has so many times more rows than the highest order has states
 _SMOOTH = 2  # terms of the polynomial that stands for transients from outside the band
 
 
@@ -56,7 +59,7 @@ def fit_subspace(
     band: tuple[float, float],
     *,
     max_order: int = 30,
-    block_rows: int = 25,
+    block_rows: int | None = None,
     n_modes: int | None = None,
 ) -> SubspaceFit:
     """Fit a modal model to stacked tests with measured forces.
@@ -75,7 +78,8 @@ def fit_subspace(
     max_order
         Highest order of the state-space model (two states a mode).
     block_rows
-        Samples of past and future in the correlations.
+        Samples of past and future in the correlations; None: 25, and more where few responses are to carry the highest
+        order.
     n_modes
         Keep the ``n_modes`` groups found in most orders; None: as many as there are.
 
@@ -87,6 +91,7 @@ def fit_subspace(
         No pole is stable over the orders, or the refinement does not converge.
     """
     spectra = record_spectra(records, band)
+    block_rows = _enough_rows(max_order, len(records[0].responses)) if block_rows is None else block_rows
     blocks = correlation_blocks(records, block_rows)
     if not 2 <= max_order < block_rows * blocks.n_responses:
         raise InputError(
@@ -112,6 +117,17 @@ def fit_subspace(
         () if fit.converged else ("the refinement stopped before it converged; treat the error bars as lower bounds",)
     )
     return SubspaceFit(model, chart, dropped, band, fit.reduced_chi_square, fit.noise, warnings)
+
+
+def _enough_rows(max_order: int, n_responses: int) -> int:
+    """Block rows whose observability matrix holds the highest order; a single sensor needs more than three do.
+
+    Examples
+    --------
+    >>> _enough_rows(30, 3), _enough_rows(30, 1)
+    (25, 45)
+    """
+    return max(_BLOCK_ROWS, math.ceil(_SPARE_ROWS * max_order / n_responses))
 
 
 def _minus_orders(group: PoleGroup) -> int:

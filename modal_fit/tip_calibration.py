@@ -145,6 +145,7 @@ def _joined(tip: Frf, sensor: Frf) -> Frf:
         tip.valid & sensor.valid,
         None,
         covariance,
+        exponential_time_constant=tip.exponential_time_constant,
     )
 
 

@@ -61,7 +61,12 @@ def derived_covariance(model: ModalModel, derived: Callable[[ModalModel], Real])
 
 
 def frequency_and_damping_errors(model: ModalModel) -> tuple[Real, Real] | None:
-    """Standard errors of natural frequencies (Hz) and damping ratios, each (n_modes,); None without a covariance."""
+    """Standard errors of natural frequencies (Hz) and damping ratios, each (n_modes,); None where none is known.
+
+    A model's :class:`ModeErrors` are taken where it has them, else its covariance, which holds the noise alone.
+    """
+    if model.errors is not None:
+        return model.errors.frequency, model.errors.damping
     covariance = derived_covariance(model, _frequencies_and_damping)
     if covariance is None:
         return None

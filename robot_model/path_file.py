@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from foundation import FileFormatError, InputError, writing_whole_file
+from foundation import FileFormatError, InputError, apart, warning_lines, writing_whole_file
 
 from .path_compensation import CompensatedPath, ToolPath
 
@@ -18,6 +18,8 @@ MOMENTS = ("mx_nm", "my_nm", "mz_nm")
 def read_tool_path(path: str | os.PathLike[str]) -> ToolPath:
     """Read a path with the columns ``x_m ... fz_n`` and, optionally, ``mx_nm my_nm mz_nm``.
 
+    Lines that begin with ``#`` are passed over.
+
     Raises
     ------
     InputError
@@ -28,13 +30,15 @@ def read_tool_path(path: str | os.PathLike[str]) -> ToolPath:
     if not Path(path).is_file():
         raise InputError(f"no file {path}; check the name")
     with Path(path).open(newline="", encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
+        lines = stream.readlines()
+    notes = len(lines) - len(apart(lines)[1])
+    rows = list(csv.DictReader(apart(lines)[1]))
     missing = [name for name in COLUMNS if not rows or name not in rows[0]]
     if missing:
         raise FileFormatError(f"{path} lacks the columns {', '.join(missing)}; a path has {', '.join(COLUMNS)}")
-    table = np.array([_numbers(row, number, path) for number, row in enumerate(rows, 2)])
+    table = np.array([_numbers(row, number, path) for number, row in enumerate(rows, notes + 2)])
     if not np.isfinite(table).all():
-        raise FileFormatError(f"{path}: row {int(np.argmin(np.isfinite(table).all(axis=1))) + 2} is not finite")
+        raise FileFormatError(f"{path}: row {int(np.argmin(np.isfinite(table).all(axis=1))) + notes + 2} is not finite")
     large = np.abs(table).max(axis=0)
     if (large[:3] > 20).any():
         raise FileFormatError(
@@ -66,12 +70,14 @@ def write_compensated_path(path: str | os.PathLike[str], result: CompensatedPath
     """Write the corrected path, the forces, and the deviations (m) that were predicted without correction.
 
     ``deviation_*`` is what was corrected, ``weight_*`` the whole deflection under own weight and payload.
+    Warnings stand above the headings, one ``# warning: ...`` a line.
     """
     moved = result.path
     parts = (moved.positions, moved.attitudes, moved.wrenches, result.deviations[:, :3], result.weight[:, :3])
     table = np.hstack(parts)
     names = (*COLUMNS, *MOMENTS, *(f"{what}_{axis}_m" for what in ("deviation", "weight") for axis in "xyz"))
     with writing_whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        stream.writelines(warning_lines(result.warnings))
         writer = csv.writer(stream)
         writer.writerow(names)
         writer.writerows([[f"{value:.9g}" for value in row] for row in table])

@@ -2,7 +2,7 @@
 
 from .boundary import StabilityBoundary, StabilityGrid, stability_grid, trace_boundary
 from .certified import certified_lobes
-from .chatter import ChatterVerdict, Evidence, ForeignTone, classify_cut, gather_evidence
+from .chatter import ChatterVerdict, Evidence, ForeignTone, ModelledCut, classify_cut, gather_evidence
 from .collocation import collocation, collocation_limits, lowest_limits
 from .delay_system import DelaySystem, delay_system
 from .limit_band import LimitBand, limit_band
@@ -30,6 +30,7 @@ __all__ = [
     "LimitBand",
     "LimitSensitivity",
     "ModeCouplingLimit",
+    "ModelledCut",
     "Multipliers",
     "RecommendedCut",
     "StabilityBoundary",

@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import FileFormatError, InputError, writing_whole_file
+from foundation import FileFormatError, InputError, apart, warning_lines, writing_whole_file
 
 from .stability_lobes import StabilityLobes
 
 COLUMNS = ("spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation", "status")
-WARNING, PROVENANCE = "# warning: ", "# provenance: "
+PROVENANCE = "# provenance: "
 OLDER_COLUMNS = COLUMNS[:4]
 """Of files written before limits had a status; it is ``not-verified`` there."""
 
@@ -39,9 +39,8 @@ def write_lobes(path: str | os.PathLike[str], lobes: StabilityLobes, *, provenan
         The folder cannot be written to.
     """
     with writing_whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
-        notes = [f"{WARNING}{' '.join(warning.split())}" for warning in lobes.warnings]
-        notes += [PROVENANCE + provenance] if provenance else []
-        file.writelines(f"{note}\n" for note in notes)
+        file.writelines(warning_lines(lobes.warnings))
+        file.writelines([f"{PROVENANCE}{provenance}\n"] if provenance else [])
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         rows = zip(
@@ -71,13 +70,12 @@ def read_lobes(path: str | os.PathLike[str]) -> StabilityLobes:
         raise InputError(f"no file {path}; check the name")
     try:
         with Path(path).open(encoding="utf-8", newline="") as file:
-            lines = file.readlines()
-        rows = list(csv.reader(line for line in lines if not line.startswith("#")))
+            warnings, lines = apart(file)
+        rows = list(csv.reader(lines))
         if not rows or tuple(rows[0]) not in (COLUMNS, OLDER_COLUMNS):
             raise FileFormatError(f"{path} has columns {rows[:1]}, lobes have {', '.join(COLUMNS)}")
     except (UnicodeDecodeError, csv.Error) as error:
         raise FileFormatError(f"{path} is not a table of lobes: it is no text; give a file that lobes wrote") from error
-    warnings = tuple(line.removeprefix(WARNING).strip() for line in lines if line.startswith(WARNING))
     try:
         return _lobes(rows, warnings)
     except InputError as error:

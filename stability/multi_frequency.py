@@ -349,5 +349,6 @@ def _every_second_line(frf: Frf) -> ToolReceptance | None:
         valid=frf.valid[::2],
         multiple_coherence=None,
         covariance=None,
+        coherence=None,
     )
     return tool_receptance(half) if (half.valid & (half.frequencies > 0)).sum() >= 8 else None

@@ -109,7 +109,8 @@ def certified_cut(
     that no notch between two speeds of ``lobes`` is passed over, and lessened by their errors. Then 39 or more
     structures and coefficients are drawn from their errors, and the depth is lowered to the one at which
     ``confidence`` of them are stable at every speed tried inside the drift (of an FRF there are no draws). What is left
-    is compared with the next speed's promise.
+    is compared with the next speed's promise. Where errors are as large as the limits their first order leaves nothing;
+    then the limits alone are the promise, and draws decide.
 
     Parameters
     ----------
@@ -127,29 +128,74 @@ def certified_cut(
     InputError
         As :func:`recommended_cut`.
     """
-    allowed = _allowed(lobes, errors, confidence, drift, max_depth)
-    promise = [(-float(a * s), 0, float(s), float(a)) for a, s in zip(allowed, lobes.spindle_speeds, strict=True)]
-    heapq.heapify(promise)
-    computed, sampled, last = 0, 0, 2 if isinstance(structure, ModalModel) else 1
-    proven: list[tuple[float, float, float]] = []
-    while promise and computed < LOOKED_AT[0] and sampled < LOOKED_AT[1]:
-        removal, stage, speed, depth = heapq.heappop(promise)
-        if depth <= 0 or (proven and removal >= min(proven)[0]):
-            break
-        if stage == 0:
-            depth = min(depth, _inside_drift(structure, process, speed, confidence, drift, max_depth))
-            computed += 1
-        else:
-            depth = _of_draws(structure, process, speed, depth, confidence, drift, seed)
-            sampled += 1
-        if stage + 1 == last:
-            proven.append((-depth * speed, speed, depth))
-        else:
-            heapq.heappush(promise, (-depth * speed, stage + 1, speed, depth))
-    if not proven or min(proven)[2] <= 0:
+    search = _Search(structure, process, confidence, drift, max_depth, seed)
+    proven = search.best(_allowed(lobes, errors, confidence, drift, max_depth), lobes.spindle_speeds)
+    if proven is None and search.draws:  # errors so large that their first order leaves nothing: draws tell more
+        search = replace(search, first_order=False)
+        proven = search.best(_allowed(lobes, 0 * errors, confidence, drift, max_depth), lobes.spindle_speeds)
+    if proven is None:
         raise InputError(f"no cut is stable with confidence {confidence:g}; measure longer or lower the confidence")
-    removal, speed, depth = min(proven)
-    return RecommendedCut(speed, depth, confidence, -removal, drift, draws_for(confidence) if last == 2 else 0)
+    speed, depth = proven
+    return RecommendedCut(speed, depth, confidence, depth * speed, drift, search.draws)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """What limits inside a drift are computed and drawn of; ``first_order``: lessened by their errors before draws."""
+
+    structure: Frf | ModalModel
+    process: MillingProcess
+    confidence: float
+    drift: float
+    max_depth: float
+    seed: int
+    first_order: bool = True
+
+    @property
+    def draws(self) -> int:
+        return draws_for(self.confidence) if isinstance(self.structure, ModalModel) else 0
+
+    def best(self, allowed: Real, speeds: Real) -> tuple[float, float] | None:
+        """Speed and depth that remove most; None where no depth is left."""
+        promise = [(-float(a * s), 0, float(s), float(a)) for a, s in zip(allowed, speeds, strict=True)]
+        heapq.heapify(promise)
+        computed, sampled, last = 0, 0, 2 if self.draws else 1
+        proven: list[tuple[float, float, float]] = []
+        while promise and computed < LOOKED_AT[0] and sampled < LOOKED_AT[1]:
+            removal, stage, speed, depth = heapq.heappop(promise)
+            if depth <= 0 or (proven and removal >= min(proven)[0]):
+                break
+            if stage == 0:
+                depth = min(depth, self.inside_drift(speed))
+                computed += 1
+            else:
+                depth = self.of_draws(speed, depth)
+                sampled += 1
+            if stage + 1 == last:
+                proven.append((-depth * speed, speed, depth))
+            else:
+                heapq.heappush(promise, (-depth * speed, stage + 1, speed, depth))
+        if not proven or min(proven)[2] <= 0:
+            return None
+        return min(proven)[1:]
+
+    def inside_drift(self, speed: float) -> float:
+        """The depth that the computed limits inside the drift allow."""
+        fine = certified_lobes(self.structure, self.process, _around(speed, self.drift), self.max_depth)
+        errors = depth_errors(self.structure, self.process, fine)
+        return float(_lower(fine, errors if self.first_order else 0 * errors, self.confidence, self.max_depth).min())
+
+    def of_draws(self, speed: float, depth: float) -> float:
+        """The depth, no more than ``depth``, at which ``confidence`` of the draws are stable inside the drift."""
+        assert isinstance(self.structure, ModalModel)
+        fine = _around(speed, self.drift)
+        limits = certified_lobes(self.structure, self.process, fine, 2 * depth).depth_limits
+        order = np.argsort(np.nan_to_num(limits, nan=0.0))
+        chosen = np.unique([*order[: SAMPLED_SPEEDS - 2], 0, len(fine) - 1])
+        samples = sampled_limits(self.structure, self.process, fine[chosen], depth, self.draws, self.seed)
+        lowest = np.minimum(samples, depth).min(axis=1)
+        rank = max(1, math.floor((1 - self.confidence) * (self.draws + 1) + 1e-9))
+        return float(np.sort(lowest)[rank - 1])
 
 
 def lowered(cut: RecommendedCut, share: float) -> RecommendedCut:
@@ -180,38 +226,3 @@ def _lower(lobes: StabilityLobes, errors: Real, confidence: float, max_depth: fl
 
 def _around(speed: float, drift: float) -> Real:
     return np.asarray(speed * (1 + (np.linspace(-drift, drift, FINE) if drift else np.zeros(1))))
-
-
-def _inside_drift(
-    structure: Frf | ModalModel,
-    process: MillingProcess,
-    speed: float,
-    confidence: float,
-    drift: float,
-    max_depth: float,
-) -> float:
-    """The depth that the computed limits inside the drift allow."""
-    fine = certified_lobes(structure, process, _around(speed, drift), max_depth)
-    return float(_lower(fine, depth_errors(structure, process, fine), confidence, max_depth).min())
-
-
-def _of_draws(
-    structure: Frf | ModalModel,
-    process: MillingProcess,
-    speed: float,
-    depth: float,
-    confidence: float,
-    drift: float,
-    seed: int,
-) -> float:
-    """The depth, no more than ``depth``, at which ``confidence`` of the draws are stable inside the drift."""
-    assert isinstance(structure, ModalModel)
-    fine = _around(speed, drift)
-    limits = certified_lobes(structure, process, fine, 2 * depth).depth_limits
-    order = np.argsort(np.nan_to_num(limits, nan=0.0))
-    chosen = np.unique([*order[: SAMPLED_SPEEDS - 2], 0, len(fine) - 1])
-    count = draws_for(confidence)
-    samples = sampled_limits(structure, process, fine[chosen], depth, count, seed)
-    lowest = np.minimum(samples, depth).min(axis=1)
-    rank = max(1, math.floor((1 - confidence) * (count + 1) + 1e-9))
-    return float(np.sort(lowest)[rank - 1])

@@ -126,10 +126,8 @@ def _npz(path: Path) -> dict[str, Any]:
 
 def _tdms(path: Path) -> dict[str, Any]:
     """National Instruments' format: channels by ``group/channel``."""
-    try:
-        from nptdms import TdmsFile
-    except ModuleNotFoundError as error:
-        raise InputError("TDMS files need the package npTDMS; run 'pip install millfrf[formats]'") from error
+    from nptdms import TdmsFile
+
     logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # it prints whole pieces of a damaged file
     with TdmsFile.open(path) as opened:
         return {f"{group.name}/{channel.name}": channel[:] for group in opened.groups() for channel in group.channels()}

@@ -80,5 +80,8 @@ def _self_described(source: Path) -> Content:
         return read_own_csv(source)
     fields = {} if source.suffix.lower() in (".csv", ".txt", ".npy") else open_arrays(source).fields
     if "format" not in fields:
-        raise FileFormatError(f"{source} does not say what its channels are; give a mapping file with --map")
+        raise FileFormatError(
+            f"{source} does not say what its channels are; give a mapping file with --map ([[channels]] of a "
+            "recording, [frf] of FRFs)"
+        )
     return from_fields(fields, source)

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import FileFormatError, InputError
+from foundation import FileFormatError
+
+from .uff_sets import read_uff_sets
 
 _TIME_RESPONSE = 1
 _TRANSLATIONS = {1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ"}
@@ -46,18 +48,10 @@ def read_uff_times(path: Path) -> tuple[dict[str, Any], float]:
 
     Raises
     ------
-    InputError
-        pyuff is not installed.
     FileFormatError
         No time record, unequal rates, or a damaged file.
     """
-    try:
-        import pyuff
-    except ModuleNotFoundError as error:
-        raise InputError("UFF files need the package pyuff; run 'pip install millfrf[formats]'") from error
-    file = pyuff.UFF(str(path))
-    sets = [file.read_sets(int(k)) for k, kind in enumerate(file.get_set_types()) if int(kind) == 58]
-    records = [entry for entry in sets if entry.get("func_type") == _TIME_RESPONSE]
+    records = [entry for entry in read_uff_sets(path, (58,)) if entry.get("func_type") == _TIME_RESPONSE]
     if not records:
         raise FileFormatError(
             f"{path} holds no time record (data set 58, function 1); FRFs are converted without --map"

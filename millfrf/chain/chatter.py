@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Recording
+from acquisition import Channel, Recording
 from cutting import MillingProcess
 from estimation import choose_channels
-from foundation import InputError
-from stability import ChatterVerdict, classify_cut
+from foundation import DegreeOfFreedom, InputError
+from modal_fit import ModalModel
+from stability import ChatterVerdict, ModelledCut, classify_cut
 
 from ..gate import check_one_speed, check_recordings
 from ..progress import Watch, silent
@@ -36,23 +37,34 @@ class CutOptions:
     speed_rpm
         Spindle speed; None: what each recording states.
     runout
-        Whether teeth may cut unequal chips.
+        Radial offset of the spindle's axis, m; NaN: not stated, see :func:`stability.classify_cut`.
+    chip
+        Thickest chip of the cut, m; NaN: not known.
     responses
         Channel names; empty: chosen by quantity.
     stream
         Sample clock; None: the only one.
-    natural_frequencies
-        Of the structure's modes, Hz; with them the line nearest to a mode is the chatter frequency. Empty: not known.
+    model
+        Of the structure; with it the line nearest to a mode is the chatter frequency. Where it is of the tip and the
+        tip's motion was recorded, unequal teeth are judged with it too. None: not known.
+    process
+        Cutter, to go with the model.
     """
 
     teeth: int
     speed_rpm: float | None = None
-    runout: bool = True
+    runout: float = math.inf
+    chip: float = math.nan
     responses: tuple[str, ...] = ()
     stream: str | None = None
-    natural_frequencies: tuple[float, ...] = ()
+    model: ModalModel | None = None
+    process: MillingProcess | None = None
 
 
+MOTION = ("displacement", "velocity", "acceleration")
+"""Quantities whose size tells by how much the chip changes."""
+TIP = "TCP"
+"""Node of the tool's tip."""
 DERIVATIVES = {"acceleration": 2, "velocity": 1}
 """How often a quantity is the time derivative of displacement; 0 for all others."""
 
@@ -102,7 +114,7 @@ def judge_recordings(
         with Recording(path) as recording:
             stream = recording.stream(options.stream)
             _, responses = choose_channels(stream, None, options.responses or None)
-            rpm = _speed(recording, options)
+            rpm, tool = _speed(recording, options), tool_channels(responses)
             with watch(f"judging {Path(path).name}"):
                 samples = stream.read(channels=[channel.name for channel in responses])
                 found = classify_cut(
@@ -112,10 +124,54 @@ def judge_recordings(
                     options.teeth,
                     runout=options.runout,
                     derivatives=[DERIVATIVES.get(channel.quantity, 0) for channel in responses],
-                    natural_frequencies=options.natural_frequencies,
+                    natural_frequencies=() if options.model is None else options.model.natural_frequencies.tolist(),
+                    chip=options.chip if tool else math.nan,
+                    tool=tool,
+                    modelled=modelled_cut(options, responses),
                 )
         cuts.append(JudgedCut(Path(path).name, rpm, found))
     return tuple(cuts)
+
+
+def tool_channels(channels: Sequence[Channel]) -> tuple[int, ...]:
+    """Places of the channels that hold motion across the tool's axis: of the tip, else of the node that comes first."""
+    across = [
+        (number, channel)
+        for number, channel in enumerate(channels)
+        if channel.quantity in MOTION and channel.direction[1:] in ("X", "Y")
+    ]
+    nodes = [channel.node for _, channel in across]
+    if not nodes:
+        return ()
+    chosen = TIP if TIP in nodes else nodes[0]
+    return tuple(number for number, channel in across if channel.node == chosen)
+
+
+def modelled_cut(options: CutOptions, channels: Sequence[Channel]) -> ModelledCut | None:
+    """Cutter and structure where both are of the tip whose motion in X and Y was recorded; else None."""
+    model, process = options.model, options.process
+    if model is None or process is None or math.isnan(options.runout) or model.quantity != "receptance":
+        return None
+    there = {
+        channel.direction[1:]: (number, -1 if channel.direction[:1] == "-" else 1)
+        for number, channel in enumerate(channels)
+        if channel.quantity in MOTION and channel.node == TIP
+    }
+    for axis in "XY":
+        ends = [
+            any((one.node, one.axis) == (TIP, axis) for one in map(DegreeOfFreedom.parse, names))
+            for names in (model.responses, model.excitations)
+        ]
+        if axis not in there or not all(ends):
+            return None
+    columns, signs = zip(there["X"], there["Y"], strict=True)
+    return ModelledCut(process, model, columns, signs)
+
+
+def stated_runout(cutting: str | os.PathLike[str], process: MillingProcess) -> float:
+    """Of a cutting file that was read into ``process``, m; NaN where the file does not state any."""
+    table = tomllib.loads(Path(cutting).read_text(encoding="utf-8"))["cutting"]
+    return process.runout if "runout_m" in table else math.nan
 
 
 def verdict_table(cuts: Sequence[JudgedCut]) -> Table:

@@ -25,7 +25,7 @@ from estimation import (
 )
 from foundation import InputError
 
-from ..gate import check_inputs, check_recordings, check_sample_rates, driven_lines, gain_of
+from ..gate import Segmentation, check_inputs, check_recordings, check_sample_rates, driven_lines, gain_of
 from ..progress import Watch, silent
 from ..provenance import sources, versions
 
@@ -136,6 +136,7 @@ def estimate_recordings(
         excitations=options.excitations,
         responses=options.responses,
         excluding=options.exclude,
+        segments=Segmentation(options.segment, options.overlap, options.window),
         watch=watch,
     )
     tests = spectra_of_tests(paths, options, watch)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from acquisition import Recording
-from estimation import BandRecord, Frf, band_record, choose_channels
+from estimation import BandRecord, Frf, band_record, choose_channels, widest_band
 from foundation import InputError, writing_whole_file
 from modal_fit import (
     ModalFit,
@@ -25,11 +25,12 @@ from ..progress import Watch, silent
 from ..provenance import add_to_json, sources, versions
 
 POLYREFERENCE, SUBSPACE = "polyreference", "subspace"
-MAX_ORDER = {POLYREFERENCE: 40, SUBSPACE: 30}
-"""Highest order where none is asked for."""
+METHODS = (POLYREFERENCE, SUBSPACE)
+SUBSPACE_ORDER = 30
+"""Highest order of the state space where none is asked for."""
 
 KEPT_ABOVE = 1.6
-"""Records are kept up to this multiple of the band's upper end."""
+"""Records are kept up to this multiple of the band's upper end, where their sample rate reaches so far."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +44,7 @@ class FitOptions:
     method
         ``polyreference`` of an FRF, ``subspace`` of recordings.
     max_order
-        Highest order of the denominator or of the state space; None: the method's own.
+        Highest order of the denominator or of the state space; None: by the data, or the method's own.
     n_modes
         Modes to keep; None: as many as are found.
     excitations, responses
@@ -60,11 +61,6 @@ class FitOptions:
     responses: tuple[str, ...] = ()
     stream: str | None = None
 
-    @property
-    def order(self) -> int:
-        """Highest order, by the method where none was asked for."""
-        return MAX_ORDER[self.method] if self.max_order is None else self.max_order
-
 
 def fit_model(frf: Frf, options: FitOptions, watch: Watch = silent, name: str = "the FRF") -> ModalFit:
     """Fit a modal model to an FRF; ``name`` is that of its file, for messages.
@@ -80,7 +76,7 @@ def fit_model(frf: Frf, options: FitOptions, watch: Watch = silent, name: str = 
         raise InputError(f"method {options.method!r} does not fit an FRF; use {POLYREFERENCE}, or give recordings")
     doubts = check_frf_for_fit(frf, options.band, name)
     with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
-        fit = fit_polyreference(frf, options.band, max_order=options.order, n_modes=options.n_modes)
+        fit = fit_polyreference(frf, options.band, max_order=options.max_order, n_modes=options.n_modes)
     poor = fit_doubts(fit.reduced_chi_square, fit.relative_error, fit.warnings)
     return replace(fit, warnings=(*doubts, *fit.warnings, *poor))
 
@@ -109,7 +105,10 @@ def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions,
     )
     with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
         fit = fit_subspace(
-            [record for record, _ in records], options.band, max_order=options.order, n_modes=options.n_modes
+            [record for record, _ in records],
+            options.band,
+            max_order=options.max_order or SUBSPACE_ORDER,
+            n_modes=options.n_modes,
         )
     return replace(fit, warnings=(*doubts, *fit.warnings, *fit_doubts(fit.reduced_chi_square, None)))
 
@@ -119,7 +118,7 @@ def _band_record(path: str | os.PathLike[str], options: FitOptions, watch: Watch
         stream = recording.stream(options.stream)
         channels = choose_channels(stream, options.excitations or None, options.responses or None)
         with watch(f"reading {Path(path).name}", stream.n_samples) as update:
-            highest = KEPT_ABOVE * options.band[1]
+            highest = max(options.band[1], min(KEPT_ABOVE * options.band[1], widest_band(stream.sample_rate)))
             made = band_record(recording, highest, *channels, stream=options.stream, progress=update)
     return made, stream.sample_rate
 
@@ -135,7 +134,7 @@ def write_fit(
         "step": "fit",
         "sources": sources(inputs),
         "method": options.method,
-        "max_order": options.order,
+        "max_order": options.max_order or (int(fit.chart.orders.max()) if len(fit.chart.orders) else None),
         "band_hz": list(fit.band),
         "reduced_chi_square": None if np.isnan(fit.reduced_chi_square) else fit.reduced_chi_square,
         "relative_error": fit.relative_error.tolist() if isinstance(fit, ModalFit) else None,

@@ -13,7 +13,7 @@ from modal_fit import ModalFit, SubspaceFit
 from ..file_kinds import FRF, RECORDING, kind_of
 from ..gate import stored_doubts
 from ..progress import Watch, silent
-from .fit import MAX_ORDER, POLYREFERENCE, SUBSPACE, FitOptions, fit_model, fit_recordings
+from .fit import METHODS, POLYREFERENCE, SUBSPACE, FitOptions, fit_model, fit_recordings
 
 Fit = TypeVar("Fit", ModalFit, SubspaceFit)
 
@@ -40,8 +40,8 @@ def fit_files(
     InputError
         An unknown method, files of mixed kinds, several FRFs, or a method that does not fit the files.
     """
-    if method is not None and method not in MAX_ORDER:
-        raise InputError(f"unknown method {method!r}; use one of {', '.join(MAX_ORDER)}")
+    if method is not None and method not in METHODS:
+        raise InputError(f"unknown method {method!r}; use one of {', '.join(METHODS)}")
     kinds = {kind_of(file) for file in files}
     if kinds == {RECORDING}:
         options = options_of(method or SUBSPACE)

@@ -22,7 +22,7 @@ from stability import (
     zero_order,
 )
 
-from ..gate import check_band_of_lobes, check_frf, check_model
+from ..gate import check_band_of_lobes, check_frf, check_model, check_window_damping
 from ..progress import Watch, silent
 
 Speeds = NDArray[np.float64]
@@ -86,7 +86,11 @@ def compute_lobes(
     known = to_receptance(dynamics) if isinstance(dynamics, Frf) else dynamics
     if known.quantity != "receptance":
         raise InputError(f"lobes need a receptance in m/N at the tool tip; this is a {known.quantity} in {known.unit}")
-    doubts = check_frf(dynamics, name) if isinstance(dynamics, Frf) else check_model(dynamics, name)
+    if isinstance(dynamics, Frf):
+        check_window_damping(dynamics, name)
+        doubts = check_frf(dynamics, name)
+    else:
+        doubts = check_model(dynamics, name)
     with watch(f"lobes, {method}"):
         found = _solved(known, process, spindle_speeds, max_depth, method)
     doubts += check_band_of_lobes(known, found, process)

@@ -14,6 +14,7 @@ from .plan import plan
 from .predict import predict
 from .recover import recover
 from .report import report
+from .tap import tap
 
 COMMANDS = (
     demo,
@@ -23,6 +24,7 @@ COMMANDS = (
     inspect,
     convert,
     estimate,
+    tap,
     fit,
     calibrate,
     lobes,

@@ -10,7 +10,7 @@ from .options import Stream, names
 
 def chatter(
     recordings: Annotated[list[Path], typer.Argument(metavar="REC...", help="Cuts at one constant speed each.")],
-    cutting: Annotated[Path, typer.Option("--cutting", metavar="CUT.toml", help="Cutter: teeth and runout.")],
+    cutting: Annotated[Path, typer.Option("--cutting", metavar="CUT.toml", help="Cutter: teeth, feed and runout.")],
     speed: Annotated[
         float | None, typer.Option("--speed", metavar="RPM", help="Spindle speed; default: what the recording states.")
     ] = None,
@@ -18,7 +18,7 @@ def chatter(
         list[str] | None, typer.Option("--response", help="Channel to judge by; default: all that respond.")
     ] = None,
     model: Annotated[
-        Path | None, typer.Option("--model", metavar="MODEL.json", help="Structure whose modes tell the frequency.")
+        Path | None, typer.Option("--model", metavar="MODEL.json", help="Structure: its modes tell the frequency.")
     ] = None,
     stream: Stream = None,
 ) -> None:
@@ -26,19 +26,31 @@ def chatter(
 
     The spindle is followed in the recording (its speed within 1 % comes from --speed, from events `spindle_speed_rpm`
     or from the set-up), its orders are taken away, and lines that stand out of the noise are named: chatter, or a
-    foreign tone. Where the cutting file gives a runout, teeth are taken to cut unequal chips: with an even number of
-    teeth, period doubling is then only told while it grows.
+    foreign tone. Where the cutting file gives the feed, a vibration is also judged by what it does to the chip. Where
+    it gives a runout, teeth are taken to cut unequal chips: with an even number of teeth, period doubling is then only
+    told while it grows, or where the chip changes by more than runout explains.
     """
+    from math import nan
+
     from modal_fit import read_modal_model
 
-    from ..chain.chatter import CutOptions, doubts_of_cuts, judge_recordings, tone_table, verdict_table
+    from ..chain.chatter import (
+        CutOptions,
+        doubts_of_cuts,
+        judge_recordings,
+        stated_runout,
+        tone_table,
+        verdict_table,
+    )
     from ..gate import read_checked_cutting
     from ..progress import bar
     from ..tables import show
 
     process, doubts = read_checked_cutting(cutting)
-    natural = () if model is None else tuple(float(f) for f in read_modal_model(model).natural_frequencies)
-    options = CutOptions(process.teeth, speed, process.runout > 0, names(response), stream, natural)
+    structure = None if model is None else read_modal_model(model)
+    chip = process.thickest_chip or nan
+    runout = stated_runout(cutting, process)
+    options = CutOptions(process.teeth, speed, runout, chip, names(response), stream, structure, process)
     doubts += doubts_of_cuts(recordings, process, options, bar)
     cuts = judge_recordings(recordings, options, bar)
     for doubt in doubts:

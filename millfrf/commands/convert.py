@@ -1,4 +1,4 @@
-"""`millfrf convert`: files of other programs into recordings, and recordings into other files."""
+"""`millfrf convert`: files of other programs into recordings, FRFs, models and geometries, and back."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,39 +9,44 @@ from .options import check_output
 
 
 def convert(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="File to read.")],
-    target: Annotated[Path, typer.Argument(metavar="OUT", help="File to write; its suffix says the format.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="IN... OUT", help="Files to read, and the file to write; suffixes say the format."),
+    ],
     mapping: Annotated[
-        Path | None, typer.Option("--map", metavar="MAP.toml", help="Which array or column is which channel.")
+        Path | None, typer.Option("--map", metavar="MAP.toml", help="Which array or column is which channel or FRF.")
     ] = None,
 ) -> None:
-    """Convert by suffix: recordings .h5 .npz .npy .mat .tdms .csv .wav .uff into .h5 .npz .mat .csv; FRFs .h5 into
-    .uff and back; modal models .json into .uff and back; CAN logs .blf .asc into the events of a recording.
+    """Convert by suffix: recordings .h5 .npz .npy .mat .tdms .csv .wav .uff into .h5 .npz .mat .csv; FRFs .uff .unv
+    .mat .npz .csv .txt .gz (several files make one matrix) into .h5 .uff; modal models .json into .uff and back;
+    geometries .uff .unv .csv into .toml; CAN logs .blf .asc into the events of a recording.
     """
-    from acquisition import convert as convert_file
     from acquisition.conversion.can_log import SUFFIXES as CAN_LOGS
     from acquisition.conversion.can_log import add_can_log
     from foundation import InputError
 
-    from ..chain.convert_uff import convert_uff, is_uff_conversion
-    from ..gate import doubts_of_rate
+    from ..chain.convert_files import FRF_SUFFIXES, convert_files, is_frf_conversion
+    from ..chain.convert_uff import is_uff_conversion
     from ..progress import bar
 
-    if source.suffix.lower() in CAN_LOGS:
+    if len(files) < 2:
+        raise InputError(f"{files[0]} alone: give files to read and a file to write: millfrf convert IN... OUT")
+    *sources, target = files
+    if sources[0].suffix.lower() in CAN_LOGS and not is_frf_conversion(sources, mapping):
         if mapping is None:
-            raise InputError(f"{source} needs --map MAP.toml with recording, dbc and signals")
-        with bar(f"adding {source.name}") as update:
-            typer.echo(f"wrote {add_can_log(source, target, mapping, update)}")
+            raise InputError(f"{sources[0]} needs --map MAP.toml with recording, dbc and signals")
+        with bar(f"adding {sources[0].name}") as update:
+            typer.echo(f"wrote {add_can_log(sources[0], target, mapping, update)}")
         return
-    if mapping is None and is_uff_conversion(source, target):
-        check_output(target, (".h5", ".hdf5", ".json", ".uff", ".unv"))
-        convert_uff(source, target)
-        typer.echo(f"wrote {target}")
-        return
-
-    with bar(f"converting {source.name}") as update:
-        written = convert_file(source, target, mapping, progress=update)
+    if is_frf_conversion(sources, mapping):
+        check_output(target, FRF_SUFFIXES, sources)
+    elif mapping is None and is_uff_conversion(sources[0], target):
+        check_output(target, (*FRF_SUFFIXES, ".json", ".toml"), sources)
+    with bar(f"converting {sources[0].name}") as update:
+        written, told = convert_files(sources, target, mapping, update)
+    for text in told.inferred:
+        typer.echo(f"note: {text}")
+    for text in told.doubts:
+        typer.echo(f"warning: {text}", err=True)
     for path in written:
-        for doubt in doubts_of_rate(path):
-            typer.echo(f"warning: {doubt}", err=True)
         typer.echo(f"wrote {path}")

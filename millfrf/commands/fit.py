@@ -34,7 +34,7 @@ def fit(
     from ..chain.fit import FitOptions, write_fit
     from ..chain.fit_files import fit_files
     from ..progress import bar
-    from ..tables import mode_table, show
+    from ..tables import error_table, mode_table, show
 
     check_output(out, (".json",), files)
     check_band(band)
@@ -46,4 +46,7 @@ def fit(
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)
     show(mode_table(result.model))
+    by_source = error_table(result.model)
+    if by_source is not None:
+        show(by_source)
     typer.echo(f"wrote {out}")

@@ -7,7 +7,9 @@ import typer
 
 
 def inspect(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Recording, FRF, model, lobes or cutting file.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Recording, FRF, model, lobes, cutting file or geometry.")
+    ],
 ) -> None:
     """Say what is in a file, and what looks wrong: levels, overload, dead channels, missing samples."""
     from ..inspection import inspect_file

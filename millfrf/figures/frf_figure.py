@@ -1,4 +1,4 @@
-"""FRF matrix: magnitude and phase of every entry, multiple coherence beneath, fit and reference over it."""
+"""FRF matrix: magnitude and phase of every entry, coherence beneath, fit and reference over it."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -68,7 +68,8 @@ def frf_figures(curves: FrfCurves) -> tuple[Figure, ...]:
 
 
 def _page(curves: FrfCurves, responses: range, excitations: range) -> Figure:
-    with_coherence = curves.measured.multiple_coherence is not None
+    measured = curves.measured
+    with_coherence = measured.multiple_coherence is not None or measured.coherence is not None
     page = _Page(len(responses), len(excitations), with_coherence)
     limits = _magnitude_limits(curves)
     for column, p in enumerate(responses):
@@ -80,7 +81,7 @@ def _page(curves: FrfCurves, responses: range, excitations: range) -> Figure:
         bottom = phase
         if with_coherence:
             bottom = page.panel(len(excitations), column, COHERENCE)
-            _draw_coherence(bottom, curves, p, outer=column == 0)
+            _draw_coherence(bottom, curves, p, excitations, outer=column == 0)
         bottom.tick_params(labelbottom=True)
         bottom.set_xlabel("Frequency (Hz)")
     page.first.set_xlim(*curves.band)
@@ -123,9 +124,12 @@ class _Page:
 
 def coherent_lines(frf: Frf) -> NDArray[np.bool_]:
     """Valid lines on which some response is mostly explained by the inputs; all valid ones where that is unknown."""
-    if frf.multiple_coherence is None:
+    coherence = frf.multiple_coherence
+    if coherence is None and frf.coherence is not None:
+        coherence = frf.coherence.max(axis=2)
+    if coherence is None:
         return frf.valid
-    coherent = frf.valid & (np.nan_to_num(frf.multiple_coherence).max(axis=1) > 0.8)
+    coherent = frf.valid & (np.nan_to_num(coherence).max(axis=1) > 0.8)
     return np.asarray(coherent) if coherent.any() else frf.valid
 
 
@@ -135,8 +139,9 @@ def _lines(curves: FrfCurves) -> tuple[NDArray[np.float64], NDArray[np.complex12
     inside = (frf.frequencies >= curves.band[0]) & (frf.frequencies <= curves.band[1])
     values = np.where(frf.valid[:, None, None], frf.values, np.nan)[inside]
     deviation = None
-    if frf.covariance is not None:
-        variance = np.where(frf.valid[:, None, None], frf.covariance.variance(), np.nan)
+    known = frf.entry_variance()
+    if known is not None:
+        variance = np.where(frf.valid[:, None, None] & np.isfinite(known), known, np.nan)
         deviation = np.sqrt(np.maximum(variance[inside], 0.0))
     return frf.frequencies[inside], values, deviation
 
@@ -224,13 +229,18 @@ def _label(magnitude: Axes, phase: Axes, frf: Frf, p: int, q: int, *, outer: boo
             axes.yaxis.set_label_coords(-11.5 / (axes.bbox.width / axes.figure.dpi * 25.4), 0.5)
 
 
-def _draw_coherence(axes: Axes, curves: FrfCurves, p: int, *, outer: bool) -> None:
+def _draw_coherence(axes: Axes, curves: FrfCurves, p: int, excitations: range, *, outer: bool) -> None:
+    """The multiple coherence of a response, or the ordinary ones with the excitations of this page."""
     frf = curves.measured
-    assert frf.multiple_coherence is not None
-    axes.plot(frf.frequencies, frf.multiple_coherence[:, p], color=MEASURED, linewidth=0.9)
+    if frf.multiple_coherence is not None:
+        axes.plot(frf.frequencies, frf.multiple_coherence[:, p], color=MEASURED, linewidth=0.9)
+    elif frf.coherence is not None:
+        for q, dashes in zip(excitations, ("-", "--", ":"), strict=False):
+            axes.plot(frf.frequencies, frf.coherence[:, p, q], dashes, color=MEASURED, linewidth=0.9)
     axes.set_ylim(0, 1.05)
     axes.set_yticks([0, 0.5, 1])
-    axes.set_title(f"Multiple coherence of {frf.responses[p]}", pad=3)
+    kind = "Coherence" if frf.multiple_coherence is None else "Multiple coherence"
+    axes.set_title(f"{kind} of {frf.responses[p]}", pad=3)
     axes.tick_params(labelleft=outer)
     if outer:
         axes.set_ylabel("γ² (1)")

@@ -8,6 +8,13 @@ from .belonging import Given, check_belonging
 from .calibrations import check_tip_and_sensor
 from .cutting_data import check_cutting, read_checked_cutting
 from .frfs import check_frf, check_frf_for_fit
+from .hammer import (
+    check_tap_recordings,
+    check_taps_found,
+    check_taps_used,
+    check_window_damping,
+    doubts_of_taps,
+)
 from .inputs import check_inputs, check_records, driven_lines
 from .lobes_band import check_band_of_lobes
 from .looking import doubts_of
@@ -19,9 +26,13 @@ from .sample_rates import check_sample_rates, gain_of
 from .scales import check_scales
 from .spindle import check_depth, check_speed, check_speeds, lowest_frequency, rigid_directions
 from .stated_cut import check_one_speed, stated_cut
+from .taps_in_segments import IMPULSIVE, LONGEST, Segmentation
 
 __all__ = [
+    "IMPULSIVE",
+    "LONGEST",
     "Given",
+    "Segmentation",
     "check_band_of_lobes",
     "check_belonging",
     "check_cutting",
@@ -40,9 +51,14 @@ __all__ = [
     "check_scales",
     "check_speed",
     "check_speeds",
+    "check_tap_recordings",
+    "check_taps_found",
+    "check_taps_used",
     "check_tip_and_sensor",
+    "check_window_damping",
     "doubts_of",
     "doubts_of_rate",
+    "doubts_of_taps",
     "driven_lines",
     "fit_doubts",
     "gain_of",

@@ -35,9 +35,15 @@ def check_tip_and_sensor(
     Raises
     ------
     InputError
-        One FRF given twice, tip and sensor exchanged, or an FRF that :func:`check_frf` refuses.
+        One FRF given twice, tip and sensor exchanged, unlike exponential windows, or an FRF that
+        :func:`check_frf` refuses.
     """
     doubts = check_frf(tip, names[0]) + check_frf(sensor, names[1])
+    if tip.exponential_time_constant != sensor.exponential_time_constant:
+        raise InputError(
+            f"{names[0]} and {names[1]} have different exponential windows ({_window(tip)} and {_window(sensor)}): "
+            "their modes have different damping; make both with one --exponential"
+        )
     if tip.values.shape == sensor.values.shape and _alike(tip, sensor):
         raise InputError(
             f"{names[0]} and {names[1]} hold the same values: one FRF was given as tip and as sensor; give the "
@@ -61,6 +67,11 @@ def check_tip_and_sensor(
             "where it is tapped, so that nothing shows which is the tip's"
         )
     return [*doubts, *_modes_outside(model, tip, sensor)]
+
+
+def _window(frf: Frf) -> str:
+    tau = frf.exponential_time_constant
+    return "none" if tau is None else f"{tau:.4g} s"
 
 
 def _modes_outside(model: ModalModel, tip: Frf, sensor: Frf) -> list[str]:

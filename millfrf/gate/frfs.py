@@ -133,5 +133,6 @@ def _against(frf: Frf, point: DrivePoint, share: float, name: str) -> str:
     response, excitation = frf.responses[point.row], frf.excitations[point.column]
     return (
         f"{name}: {response} moves against its own force at {excitation} on {100 * share:.0f} % of the energy; turn "
-        "the sign of one of the two channels, or exchange force and response if their names are swapped"
+        "the sign of one of the two channels, exchange force and response if their names are swapped, or correct the "
+        "unit if it is another quantity"
     )

@@ -81,7 +81,7 @@ def judged_lines(frf: Frf) -> NDArray[np.bool_]:
 
 def mobility(frf: Frf) -> NDArray[np.complex128]:
     """Velocity over force on every line, (n_frequencies, n_responses, n_excitations)."""
-    s = 2j * np.pi * frf.frequencies
+    s = frf.laplace
     power = POWERS[frf.quantity]
     factor = np.power(s, power, out=np.zeros_like(s), where=s != 0)
     return np.asarray(frf.values * factor[:, None, None])

@@ -11,6 +11,7 @@ from foundation import InputError
 from ..progress import Watch, silent
 from .several import check_several
 from .signals import ChannelLevel, Look, look, rate_concerns
+from .taps_in_segments import Segmentation, refuse_taps
 
 BELIEVED = {
     "force": 1e7,
@@ -32,6 +33,7 @@ def check_recordings(
     excitations: Sequence[str] = (),
     responses: Sequence[str] = (),
     excluding: bool = False,
+    segments: Segmentation | None = None,
     watch: Watch = silent,
 ) -> list[str]:
     """Judge the channels that a job takes from its recordings, file by file.
@@ -46,6 +48,8 @@ def check_recordings(
         Channel names; empty: chosen by quantity as :func:`estimation.choose_channels` does.
     excluding
         The job leaves out segments with missing, clipped or repeated samples: they are neither refused nor doubted.
+    segments
+        Segments over which the job averages; None: it does not.
     watch
         Shows progress while samples are read.
 
@@ -59,14 +63,14 @@ def check_recordings(
     ------
     InputError
         A dead channel (an excitation: dead in every file), samples that are not finite or beyond what a sensor gives,
-        or a channel that copies another.
+        or a channel that copies another; taps of a hammer where segments would spoil them.
     """
 
     def chosen(source: Stream) -> tuple[list[str], list[str]]:
         exciting, responding = choose_channels(source, excitations or None, responses or None)
         return [channel.name for channel in exciting], [channel.name for channel in responding]
 
-    return check_channels(paths, chosen, stream, excluding, watch)
+    return check_channels(paths, chosen, stream, excluding, watch, segments)
 
 
 def check_channels(
@@ -75,6 +79,7 @@ def check_channels(
     stream: str | None = None,
     excluding: bool = False,
     watch: Watch = silent,
+    segments: Segmentation | None = None,
 ) -> list[str]:
     """As :func:`check_recordings`, with the names of exciting and responding channels told by ``chosen``.
 
@@ -94,6 +99,8 @@ def check_channels(
             silent_in.update({name: Path(path).name for name in idle})
             alive |= set(exciting) - set(idle)
             found = _check_stream(source, seen, set(idle), excluding)
+            if segments is not None:
+                refuse_taps(source, seen.levels[: len(exciting)], segments)
             if recording.complete is False:
                 how = f" ({recording.ending})" if recording.ending else ""
                 found.append(f"the recording was not closed in order{how}: its end may be missing")

@@ -1,6 +1,7 @@
 """The sections on the measurement: files, set-up, channels, settings."""
 
 import tomllib
+from collections.abc import Mapping
 from typing import Any
 
 from acquisition import Recording
@@ -98,22 +99,37 @@ def settings_section(collected: Collected) -> Section:
     """How each FRF was estimated."""
     rows = []
     for file, frf in collected.frfs:
-        made = file.provenance
-        if not made:
-            rows.append((file.path.name, *[""] * 6, f"{len(frf.frequencies)}"))
-            continue
-        settings, rate = made["settings"], made["sample_rate_hz"]
-        rows.append(
-            (
-                file.path.name,
-                f"{made['n_tests']}",
-                f"{settings['segment_length'] / rate:.4g} s",
-                f"{settings['window']}, {100 * settings['overlap']:.0f} % overlap",
-                f"{made['n_segments']} ({made['effective_averages']:.1f})",
-                f"{rate / settings['segment_length']:.4g} Hz",
-                made["options"]["stack"],
-                f"{int(frf.valid.sum())} of {len(frf.frequencies)}",
-            )
-        )
+        rows.append((file.path.name, *_settings(file.provenance), f"{int(frf.valid.sum())} of {len(frf.frequencies)}"))
     columns = ("FRF", "tests", "segment", "window", "segments (effective)", "resolution", "stacking", "valid lines")
     return Section("Measurement settings", tables=(Table("", columns, tuple(rows)),) if rows else ())
+
+
+def _settings(made: Mapping[str, Any]) -> tuple[str, ...]:
+    """Tests, segment, window, segments, resolution and stacking of an FRF; empty where its file does not say."""
+    settings = made.get("settings", {})
+    if made.get("step") == "estimate":
+        rate = made["sample_rate_hz"]
+        return (
+            f"{made['n_tests']}",
+            f"{settings['segment_length'] / rate:.4g} s",
+            f"{settings['window']}, {100 * settings['overlap']:.0f} % overlap",
+            f"{made['n_segments']} ({made['effective_averages']:.1f})",
+            f"{rate / settings['segment_length']:.4g} Hz",
+            made["options"]["stack"],
+        )
+    if made.get("step") == "tap":
+        tau, after = settings["time_constant"], settings["force_samples"]
+        force = "force whole" if after is None else f"force to {1e3 * after / settings['sample_rate']:.3g} ms"
+        used = sum(not tap["left_out"] for tap in made["taps"])
+        return (
+            f"{len({tap['file'] for tap in made['taps']})}",
+            f"{settings['segment_s']:.4g} s",
+            f"{force}, {'not windowed' if tau is None else f'exponential, {tau:.4g} s'}",
+            f"{used} taps",
+            f"{1 / settings['segment_s']:.4g} Hz",
+            "by point hit",
+        )
+    if made.get("step") == "convert":
+        names = [source["file"] for source in made["sources"]]
+        return (f"imported from {names[0]}" + (f" and {len(names) - 1} more" if len(names) > 1 else ""), *[""] * 5)
+    return ("",) * 6

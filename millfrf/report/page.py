@@ -18,6 +18,7 @@ from ..progress import Watch, silent
 from ..provenance import sha256, versions
 from .collect import Collected, SourceFile, collect
 from .comparison_section import comparison_section
+from .hammer_section import hammer_section
 from .measurement_sections import channel_section, file_section, settings_section, setup_section
 from .result_sections import frf_section, input_section, mode_section
 from .stability_section import stability_findings
@@ -80,6 +81,7 @@ def report_text(collected: Collected, options: ReportOptions, watch: Watch = sil
         frf_section(collected, options.band, reference),
         input_section(collected, options.band, watch),
         settings_section(collected),
+        hammer_section(collected),
         setup_section(collected),
         channels,
         file_section(collected),

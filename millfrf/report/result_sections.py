@@ -15,7 +15,7 @@ from ..figures.input_figure import input_figure
 from ..figures.mode_figure import mode_figure
 from ..figures.stabilisation_figure import stabilisation_figure
 from ..progress import Watch
-from ..tables import mode_table
+from ..tables import error_table, mode_table
 from .collect import Collected, SourceFile
 from .section import Picture, Section
 
@@ -32,7 +32,7 @@ def frf_section(collected: Collected, band: Band | None, reference: ModalModel |
         known = reference if reference is not None and _knows(reference, shown) else None
         curves = FrfCurves(shown, band or _axis(shown, fit_band), model, known, fit_band)
         for figure in frf_figures(curves):
-            caption = _frf_caption(file, found, known)
+            caption = _frf_caption(file, found, known, spread=shown.entry_variance() is not None)
             pictures.append(Picture(as_data_uri(figure), caption, "FRF magnitude, phase and multiple coherence"))
     return Section("Frequency response functions", pictures=tuple(pictures))
 
@@ -61,14 +61,16 @@ def _axis(frf: Frf, fit_band: Band | None) -> Band:
     return max(first, fit_band[0] - room), min(last, fit_band[1] + room)
 
 
-def _frf_caption(file: SourceFile, model: tuple[SourceFile, ModalModel] | None, reference: ModalModel | None) -> str:
-    text = f"{file.path.name}: magnitude and phase, and multiple coherence of each response with all excitations."
+def _frf_caption(
+    file: SourceFile, model: tuple[SourceFile, ModalModel] | None, reference: ModalModel | None, *, spread: bool
+) -> str:
+    text = f"{file.path.name}: magnitude and phase, and coherence of each response with the excitations."
     if model is not None:
         fitted = model[0].made_from(file) and model[0].provenance.get("step") == "fit"
         text += f" Dashed: model {model[0].path.name}" + (", fitted to these lines." if fitted else ".")
     if reference is not None:
         text += " Dotted: reference."
-    return text + (" Grey: twice the standard deviation of H1." if file.provenance else "")
+    return text + (" Grey: twice the standard deviation of H1." if spread else "")
 
 
 def input_section(collected: Collected, band: Band | None, watch: Watch) -> Section:
@@ -76,6 +78,8 @@ def input_section(collected: Collected, band: Band | None, watch: Watch) -> Sect
     pictures = []
     for file, frf in collected.frfs:
         recordings = collected.recordings_of(file)
+        if file.provenance.get("step") != "estimate":
+            continue
         if not recordings or len(recordings) != len(file.provenance["sources"]) or len(frf.excitations) < 2:
             continue
         tests = spectra_of_tests([recording.path for recording in recordings], _options(file), watch)
@@ -105,6 +109,8 @@ def mode_section(collected: Collected) -> Section:
     tables, pictures, sentences = [], [], []
     for file, model in collected.models:
         tables.append(mode_table(model, f"{file.path.name}"))
+        by_source = error_table(model, f"{file.path.name}: standard errors by source")
+        tables += [] if by_source is None else [by_source]
         sentences += _quality(file)
         if file.provenance.get("step") == "fit":
             pictures.append(_stabilisation(collected, file, model))

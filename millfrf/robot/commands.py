@@ -123,14 +123,17 @@ def stiffness(
     force: Annotated[float, typer.Option("--force", metavar="N", help="Force to deflect it with.")] = 650.0,
     payload: PayloadMass = 0.0,
     payload_at: PayloadAt = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE.json", help="The same as numbers, with the warnings.")
+    ] = None,
 ) -> None:
     """Compliance at the tool tip, softest and stiffest directions, deflection under a force, weight and payload."""
     from .asked_loads import loads_of
     from .postures import Asked
-    from .results import show_stiffness
+    from .statics import show_stiffness
 
     asked = Asked(pose, joints, at, feed, turn, redundancy)
-    show_stiffness(robot, asked, force, loads_of(payload, payload_at), links)
+    show_stiffness(robot, asked, force, loads_of(payload, payload_at), links, out)
 
 
 @robot_app.command()

@@ -1,6 +1,7 @@
 """`millfrf robot deviation`: deviation of drilled holes over a work area, and the position tolerance they need."""
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import typer
 from numpy.typing import NDArray
 
 from cutting import Drill, DrillingLoad, drilling_load, fitted_to_catalogue
-from foundation import InputError, writing_whole_file
+from foundation import InputError, warning_lines, writing_whole_file
 from robot_model import (
     DeviationMap,
     LoadUncertainty,
@@ -108,6 +109,23 @@ class _Holes:
             machining = None
         return UncertaintyBudget(repeatability, across, machining)
 
+    def warnings(self, worst: int) -> list[str]:
+        """What is not known; one sentence each. ``worst``: the hole that needs the largest tolerance."""
+        found, unknown = [], self.budget(worst).unknown
+        if not self.case.robot.bodies and self.loads.weight != "none":
+            found.append(NO_MASSES)
+        if "robot without load" in unknown:
+            found.append(
+                "the robot's file gives no repeatability_m (ISO 9283) and --repeatability MM is not given: "
+                "unknown and left out, so tolerances are lower bounds"
+            )
+        if "machining" in unknown:
+            found.append(
+                f"the uncertainty of machining is known for drills of 8 to 12 mm, not "
+                f"{1e3 * self.area.diameter:g} mm: left out, so tolerances are lower bounds"
+            )
+        return found
+
     def _resting(self, hole: int) -> Real | None:
         robot, payload = self.case.robot, self.loads.payload
         if not robot.bodies or self.loads.weight == "none":
@@ -140,15 +158,16 @@ def show_deviation(
     _show_sizes("deviation under thrust", found.deviations)
     if case.robot.bodies:
         _show_sizes("deflection under weight", found.weight)
-    elif loads.weight != "none":
-        typer.echo(f"warning: {NO_MASSES}", err=True)
     needed = np.full(len(places), np.nan)
     radial = np.maximum(*_radial(found.deviations, weight))
     for hole in np.flatnonzero(found.reached):
         needed[hole] = position_tolerance(float(radial[hole]), holes.budget(int(hole)).work)
     _show_position(holes, weight, needed)
+    warnings = holes.warnings(int(np.nanargmax(needed)))
+    for warning in warnings:
+        typer.echo(f"warning: {warning}", err=True)
     if out is not None:
-        _write_deviations(out, found, needed)
+        _write_deviations(out, found, needed, warnings)
         typer.echo(f"wrote {out}")
     if picture is not None:
         from .picture import draw_deviation
@@ -203,18 +222,6 @@ def _show_position(holes: _Holes, weight: Real, needed: Real) -> None:
         f"{1e3 * needed[worst]:.3f} mm there, {least}{1e3 * np.nanmin(needed):.3f} mm at the best hole; "
         "an IT grade of ISO 286 is of a size, not of a position"
     )
-    if "robot without load" in budget.unknown:
-        typer.echo(
-            "warning: the robot's file gives no repeatability_m (ISO 9283) and --repeatability MM is not given: "
-            "unknown and left out, so tolerances are lower bounds",
-            err=True,
-        )
-    if "machining" in budget.unknown:
-        typer.echo(
-            f"warning: the uncertainty of machining is known for drills of 8 to 12 mm, not "
-            f"{1e3 * holes.area.diameter:g} mm: left out, so tolerances are lower bounds",
-            err=True,
-        )
     if holes.accuracy.allowed is not None:
         allowed = holes.accuracy.allowed
         verdicts = [position_verdict(float(value), allowed, budget.unknown) for value in needed[~np.isnan(needed)]]
@@ -246,8 +253,9 @@ def _show_budget(holes: _Holes, worst: int, budget: UncertaintyBudget) -> None:
     show(Table(title, ("part", "U, k = 2 (um)", "from"), rows))
 
 
-def _write_deviations(out: Path, found: DeviationMap, needed: Real) -> None:
+def _write_deviations(out: Path, found: DeviationMap, needed: Real, warnings: Sequence[str]) -> None:
     with writing_whole_file(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        stream.writelines(warning_lines(warnings))
         writer = csv.writer(stream)
         names = [f"{what}{axis}_m" for what in ("", "deviation_", "weight_") for axis in "xyz"]
         writer.writerow((*names, "position_tolerance_m", *(f"q{i + 1}_deg" for i in range(6))))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cutting import MillingProcess
-from foundation import writing_whole_file
+from foundation import warning_lines, writing_whole_file
 from robot_model import (
     CutPlace,
     PostureMap,
@@ -91,9 +91,13 @@ def _places(
     return limits, lowest
 
 
-def write_posture_map(path: str | os.PathLike[str], found: PostureMap) -> None:
-    """CSV: ``angle_deg, depth_limit_m, lowest_frequency_hz, q1_deg ... q6_deg``; empty cells where not reached."""
+def write_posture_map(path: str | os.PathLike[str], found: PostureMap, warnings: Sequence[str] = ()) -> None:
+    """CSV: ``angle_deg, depth_limit_m, lowest_frequency_hz, q1_deg ... q6_deg``; empty cells where not reached.
+
+    Warnings stand above the headings, one ``# warning: ...`` a line.
+    """
     with writing_whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        stream.writelines(warning_lines(warnings))
         writer = csv.writer(stream)
         writer.writerow(["angle_deg", "depth_limit_m", "lowest_frequency_hz", *(f"q{i + 1}_deg" for i in range(6))])
         for angle, value, frequency, q in zip(found.angles, found.values, found.frequencies, found.q, strict=True):

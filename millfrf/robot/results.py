@@ -12,9 +12,7 @@ from estimation import write_frf
 from foundation import InputError, writing_whole_file
 from modal_fit import write_modal_model
 from robot_model import (
-    PlanarCase,
     PostureResult,
-    SpatialCase,
     cell_structure_at,
     close_loops,
     compensate_path,
@@ -32,7 +30,6 @@ from ..progress import bar
 from ..provenance import add_to_json, versions
 from ..tables import Table, show
 from .asked_loads import Loads, check_axis, check_degrees, check_near, check_places, check_positive
-from .carried import carried_wrench, largest_together
 from .posture_maps import depth_over_places
 from .postures import Asked, mechanism_of, posture_of, spatial
 
@@ -101,51 +98,6 @@ def write_receptance(
         write_frf(out, model.frf(np.linspace(*band, lines)), provenance=json.dumps(provenance))
     warn(result)
     typer.echo(f"wrote {out}: {len(model.poles)} modes from {model.natural_frequencies.min():.2f} Hz")
-
-
-def show_stiffness(robot: str, asked: Asked, force: float, loads: Loads, links: bool = False) -> None:
-    """Compliance table, principal directions, deflection under the force, under weight, and under both."""
-    check_positive("force", force, "newtons", 1e6)
-    case = read_robot(robot)
-    driven, axes = posture_of(case, asked)
-    result = in_posture(case, driven, axes, links=links)
-    names = [label.split(":")[1] for label in result.labels]
-    rows = tuple((name, *(f"{v:.3e}" for v in row)) for name, row in zip(names, result.compliance, strict=True))
-    title = f"Compliance at the tool (m/N, rad/N m), posture {shown_values(mechanism_of(case), driven)}"
-    show(Table(title, ("", *names), rows))
-    moving = [i for i, name in enumerate(names) if "R" not in name]
-    compliance = result.compliance[np.ix_(moving, moving)]
-    values, directions = np.linalg.eigh(compliance)
-    for value, direction in zip(values[::-1], directions.T[::-1], strict=True):
-        parts = ", ".join(f"{names[i][1:]} {d:+.2f}" for i, d in zip(moving, direction, strict=True))
-        typer.echo(f"{1e-6 / value:8.3f} N/um along ({parts})")
-    typer.echo(f"largest deflection under {force:g} N: {1e3 * force * values[-1]:.3f} mm")
-    sag = _show_sag(case, driven, axes, result, loads, [names[i] for i in moving])
-    if sag.any():
-        largest = largest_together(sag[moving], force * compliance)
-        typer.echo(f"largest deflection under weight and {force:g} N together: {1e3 * largest:.3f} mm")
-    warn(result)
-
-
-def _show_sag(
-    case: PlanarCase | SpatialCase,
-    driven: Real,
-    axes: Real | None,
-    result: PostureResult,
-    loads: Loads,
-    names: list[str],
-) -> Real:
-    """Print the deflection under own weight and payload; return their sum over the tool's degrees of freedom."""
-    parts = []
-    if result.own_weight is not None:
-        parts.append(("the robot's own weight (links and bodies of its file)", result.own_weight))
-    if loads.payload.mass:
-        carried = result.compliance @ carried_wrench(case, driven, axes, loads.payload)
-        parts.append((f"a payload of {loads.payload.mass:g} kg", carried))
-    for what, moved in parts:
-        cells = ", ".join(f"{name[1:]} {1e3 * value:+.3f}" for name, value in zip(names, moved, strict=False))
-        typer.echo(f"deflection under {what}: {1e3 * np.linalg.norm(moved[: len(names)]):.3f} mm ({cells})")
-    return np.sum([moved for _, moved in parts], axis=0) if parts else np.zeros(len(result.labels))
 
 
 def write_workspace_map(

@@ -96,14 +96,15 @@ def write_map_over_redundancy(
         raise InputError(f"{angles[2]} angles up to a depth of {max_depth!r} m: both must be positive")
     case = spatial(read_robot(robot))
     process, doubts = read_checked_cutting(cutting)
-    say_doubts([*doubts, *check_depth(max_depth, process), *check_speed(speed, process)])
+    doubts += [*check_depth(max_depth, process), *check_speed(speed, process)]
+    say_doubts(doubts)
     axis = np.radians(np.linspace(*angles))
     with bar("posture map"):
         found = depth_over_redundancy(
             case.robot, cut_place(asked), axis, process, speed * RPM, max_depth, asked.redundancy
         )
     best = found.best()
-    write_posture_map(out, found)
+    write_posture_map(out, found, doubts)
     typer.echo(
         f"wrote {out}: {found.reached.sum()} of {len(axis)} angles reached; best {1e3 * found.values[best]:.3g} mm at "
         f"{np.degrees(axis[best]):.1f} deg, worst {1e3 * np.nanmin(found.values):.3g} mm"

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from .conclusion import concluded
-from .evidence import gather_evidence
+from .fitted_depth import ModelledCut
+from .knowledge import Knowledge
+from .motion import ToolMotion, gather_evidence
 from .verdict import ChatterVerdict
 
 Real = NDArray[np.float64]
@@ -24,16 +26,21 @@ def classify_cut(
     spindle_speed: float,
     teeth: int,
     *,
-    runout: bool = True,
+    runout: float = math.inf,
     derivatives: Sequence[int] = (),
     natural_frequencies: Sequence[float] = (),
+    chip: float = math.nan,
+    tool: Sequence[int] = (),
+    modelled: ModelledCut | None = None,
 ) -> ChatterVerdict:
     """Classify a cut at nearly constant speed from forces or vibration.
 
     The spindle is followed in the recording itself and all its orders are taken away: a stable cut repeats with every
     revolution. What is left is held against its own local noise floor. Chatter is modulated by the teeth: it has lines
     at ``+-f + k f_tooth``; a line without any is a foreign tone. Hopf chatter lies anywhere, period doubling at half
-    the tooth passing (Insperger, Mann, Stepan & Bayly, Int. J. Mach. Tools Manuf. 43, 2003).
+    the tooth passing (Insperger, Mann, Stepan & Bayly, Int. J. Mach. Tools Manuf. 43, 2003). Where the chip is known,
+    a vibration that changes it more, and more steadily, than the noise of a stable cut can is chatter however small its
+    share of the motion is.
 
     Parameters
     ----------
@@ -46,12 +53,21 @@ def classify_cut(
     teeth
         Number of teeth.
     runout
-        Whether teeth may cut unequal chips. With an even number of teeth runout has the lines of period doubling:
-        where they do not grow, the verdict is then ``inconclusive`` instead of ``period-doubling``.
+        Radial offset of the spindle's axis, m; 0: all teeth cut equal chips; infinite: it may have any size. With an
+        even number of teeth runout has the lines of period doubling: where they do not grow, and the chip does not
+        change by more than runout explains, the verdict is ``inconclusive`` instead of ``period-doubling``. NaN: not
+        stated; period doubling is then told with a warning where it is large.
     derivatives : (n_channels,)
         2 for a channel of acceleration, 1 for velocity, 0 for displacement or force; empty: 0.
     natural_frequencies
         Of the structure, Hz. With them the line nearest to a mode gives the frequency; empty: that of largest motion.
+    chip
+        Thickest chip of the cut without vibration, m; NaN: not known.
+    tool
+        Channels that hold the tool's motion across its axis, in m and s; empty: all. Only used with ``chip``.
+    modelled
+        Cutter, structure and channels of the tip: with them an even number of teeth with runout is judged by the depth
+        of cut that the motion speaks for. The verdict is then no test of the model.
 
     Raises
     ------
@@ -63,7 +79,15 @@ def classify_cut(
     evidence = gather_evidence(data[:, moving], sample_rate, spindle_speed, teeth)
     powers = tuple(derivatives) or (0,) * data.shape[1]
     kept = tuple(power for power, moves in zip(powers, moving, strict=True) if moves)
-    verdict = concluded(evidence, runout, kept, tuple(natural_frequencies))
+    known = Knowledge(runout, kept, tuple(natural_frequencies))
+    if math.isfinite(chip) and chip > 0:
+        counted = np.array([not tool or number in tool for number in range(data.shape[1])])[moving]
+        motion = ToolMotion(chip, teeth, evidence.track.mean_frequency, evidence.scales * counted, kept)
+        known = replace(known, motion=motion)
+    if modelled is not None and moving[list(modelled.columns)].all():
+        first, second = (int(moving[:column].sum()) for column in modelled.columns)
+        known = replace(known, modelled=replace(modelled, columns=(first, second)))
+    verdict = concluded(evidence, known)
     speed = 2 * math.pi * evidence.track.mean_frequency
     return replace(verdict, spindle_speed=speed, drift=evidence.track.drift)
 

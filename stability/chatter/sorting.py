@@ -2,9 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from .evidence import Evidence
-from .families import TOLERANCE, Family
-from .lines import Line
+from .motion import TOLERANCE, Evidence, Family, Line
 from .verdict import ForeignTone
 
 MAINS = (50.0, 60.0)
@@ -62,16 +60,16 @@ def _counted(family: Family, evidence: Evidence) -> Family:
     """The family without lines that are too small or that are the supply's beside another of the supply."""
     strongest = family.lines[0]
     size = float((strongest.amplitude**2).sum())
-    hum = bool(_mains(family, 0, evidence))
+    hum = bool(mains_of(strongest, evidence))
     lines = [strongest]
-    for number, line in enumerate(family.lines[1:], start=1):
-        if (line.amplitude**2).sum() > _SIDE**2 * size and not (hum and _mains(family, number, evidence)):
+    for line in family.lines[1:]:
+        if (line.amplitude**2).sum() > _SIDE**2 * size and not (hum and mains_of(line, evidence)):
             lines.append(line)
     return replace(family, lines=tuple(lines))
 
 
-def _mains(family: Family, number: int, evidence: Evidence) -> str:
-    line = family.lines[number]
+def mains_of(line: Line, evidence: Evidence) -> str:
+    """As :func:`mains_name`, to the accuracy with which a recording tells a line's frequency."""
     track = evidence.track
     return mains_name(line.frequency, width_of(line, evidence.spectrum.resolution, track.mean_frequency, track.drift))
 

@@ -6,6 +6,7 @@ STABLE = "stable"
 HOPF = "hopf"
 DOUBLING = "period-doubling"
 INCONCLUSIVE = "inconclusive"
+CHATTER = (HOPF, DOUBLING)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from acquisition import HOST_AXIS, Channel, Events, Recording, RecordingWriter, 
 from acquisition.conversion.array_file import open_arrays
 from estimation import write_frf_uff
 from foundation import FileFormatError
+from modal_fit import write_modes_uff
 from replay_data import table_one_model
 
 OPENER = """
@@ -31,7 +32,7 @@ from millfrf.__main__ import run
 def open_file(group, file):
     arguments = [group["command"], file]
     if group["command"] == "convert":
-        arguments += [file + ".out.h5"] + (["--map", group["map"]] if group["map"] else [])
+        arguments += [file + group["target"]] + (["--map", group["map"]] if group["map"] else [])
     said = io.StringIO()
     with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
         code = run(arguments)
@@ -124,6 +125,28 @@ def _uff_frf(path: Path) -> None:
     write_frf_uff(path, table_one_model().frf(np.arange(1.0, 20.0, 0.5)))
 
 
+def _uff_geometry(path: Path) -> None:
+    pyuff = pytest.importorskip("pyuff")
+    rows = np.arange(6.0)
+    nodes = {"type": 15, "node_nums": rows + 1, "def_cs": 0 * rows, "disp_cs": 0 * rows + 3, "color": 0 * rows}
+    matrix = np.vstack([np.eye(3), np.zeros(3)])
+    systems = {"type": 2420, "CS_sys_labels": [3], "CS_types": [1], "CS_colors": [1], "CS_names": ["C"]}
+    lines = {"type": 82, "trace_num": 1, "n_nodes": 4, "color": 1, "id": "T", "nodes": np.array([1, 2, 0, 5])}
+    sets = [systems | {"CS_matrices": [matrix]}, nodes | {"x": rows + 1, "y": rows, "z": rows**2}, lines]
+    pyuff.UFF(str(path)).write_sets(sets, "add")
+
+
+def _frf_text(path: Path) -> None:
+    frf = table_one_model().frf(np.arange(1.0, 20.0, 0.5))
+    rows = (f"{f:.5f}\t{h.real:.7e}\t{h.imag:.7e}" for f, h in zip(frf.frequencies, frf.values[:, 0, 0], strict=True))
+    path.write_text("Analyser\n\nFrequency\tReal\tImaginary\nHz\tm/N\tm/N\n" + "\n".join(rows) + "\n")
+
+
+def _frf_mat(path: Path) -> None:
+    frf = table_one_model().frf(np.arange(1.0, 20.0, 0.5))
+    savemat(path, {"f": frf.frequencies, "H": frf.values[:, 0, 0]}, do_compression=True)
+
+
 def _mat(path: Path) -> None:
     savemat(path, {"x": SAMPLES})
 
@@ -175,6 +198,8 @@ def _recording_of_others(path: Path) -> None:
         file["events/speed/time"], file["events/speed/value"] = [0.5, 1.0], [6000.0, 6001.0]
 
 
+FRF_MAP = '[frf]\nresponses = ["TCP:+X"]\nexcitations = ["TCP:+X"]\n'
+TARGETS = {"uff modes": ".out.json", "uff geometry": ".out.toml"}
 LOG_MAP = 'recording = "rec.h5"\ndbc = "cell.dbc"\nsignals = [{signal = "Speed"}]\n'
 GUARDED = ("mat of all kinds", "mat compressed", "mat 7.3", "hdf5", "recording of others")
 KINDS = {
@@ -185,6 +210,10 @@ KINDS = {
     "csv": ("convert", ".csv", CHANNEL_MAP, _csv),
     "uff": ("convert", ".uff", WITH_OWN_RATE, _uff),
     "uff frf": ("convert", ".uff", "", _uff_frf),
+    "uff modes": ("convert", ".uff", "", lambda path: write_modes_uff(path, table_one_model())),
+    "uff geometry": ("convert", ".unv", "", _uff_geometry),
+    "frf text": ("convert", ".txt", FRF_MAP, _frf_text),
+    "frf mat": ("convert", ".mat", FRF_MAP + 'unit = "m/N"', _frf_mat),
     "npy": ("convert", ".npy", CHANNEL_MAP, _npy),
     "npz": ("convert", ".npz", CHANNEL_MAP, _npz),
     "mat": ("convert", ".mat", CHANNEL_MAP, _mat),
@@ -230,7 +259,8 @@ def _open_all(folder: Path, numbers: Mapping[str, range]) -> None:
         for number, file in zip(chosen, files, strict=True):
             file.write_bytes(_damaged(whole.read_bytes(), number))
         named = [str(file) for file in (whole, *files)]
-        groups.append({"command": command, "map": str(own / "map.toml") if mapping else "", "files": named})
+        group = {"command": command, "map": str(own / "map.toml") if mapping else "", "files": named}
+        groups.append(group | {"target": TARGETS.get(kind, ".out.h5")})
     environment = {**os.environ, "MALLOC_ARENA_MAX": "1"}
     done = subprocess.run(
         [sys.executable, "-c", OPENER], input=json.dumps(groups), env=environment, capture_output=True, text=True

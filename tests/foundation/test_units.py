@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foundation import SI_UNITS, DegreeOfFreedom, InputError, si_factor
+from foundation import SI_UNITS, DegreeOfFreedom, InputError, si_factor, unit_factor
 
 
 @pytest.mark.parametrize(
@@ -23,10 +23,16 @@ def test_published_factors(quantity: str, unit: str, factor: float) -> None:
     assert si_factor(quantity, unit) == pytest.approx(factor, rel=1e-12)
 
 
-@pytest.mark.parametrize("unit", ["kg", "furlongish", "", "m/", "degC"])
+@pytest.mark.parametrize("unit", ["kg", "furlongish", "", "m/", "degC", "N)", "(N", "N/0", "N N N"])
 def test_a_unit_of_another_kind_is_refused_by_name(unit: str) -> None:
     with pytest.raises(InputError, match="not a unit of force"):
         si_factor("force", unit)
+
+
+@pytest.mark.parametrize("unit", ["m", "furlongish", "", "m/", "m)/N", "(m/N", "m/N/0", "m's/N", "m/N!", "dB"])
+def test_what_is_no_such_unit_has_no_factor(unit: str) -> None:
+    assert unit_factor(unit, "m/N") is None
+    assert unit_factor("mm/kN", "m/N") == pytest.approx(1e-6, rel=1e-12)
 
 
 @given(st.sampled_from(sorted(SI_UNITS)))

@@ -7,7 +7,8 @@ import pytest
 from drawn_cuts import Case, growth, random_case
 from scipy.stats import binom
 
-from stability import certified_cut, certified_lobes, depth_errors, limit_band
+from foundation import InputError
+from stability import certified_cut, certified_lobes, depth_errors, limit_band, recommended_cut
 
 MARGIN = 5e-4
 """By which a depth is moved off the end of a band, so that the integration's own error does not decide."""
@@ -72,6 +73,19 @@ def test_the_integration_agrees_with_the_certified_limits() -> None:
         if np.isfinite(limit):
             assert growth(case.true_model, case.true_cut, 0.995 * limit, float(case.speeds[8])) < 1
             assert growth(case.true_model, case.true_cut, 1.005 * limit, float(case.speeds[8])) > 1
+
+
+def test_errors_as_large_as_the_limits_leave_it_to_the_draws() -> None:
+    """Before: refused, since limit less 1.6 errors was below zero at every speed."""
+    case = random_case(27)
+    lobes = certified_lobes(case.model, case.cut, case.speeds[[18, 24]], case.max_depth)
+    errors, largest = depth_errors(case.model, case.cut, lobes), float(lobes.depth_limits.max())
+    with pytest.raises(InputError, match="no cut is stable"):
+        recommended_cut(lobes, errors, max_depth=largest)
+    cut = certified_cut(case.model, case.cut, lobes, errors, drift=DRIFT, max_depth=largest)
+    assert 0.2 * lobes.depth_limits.min() < cut.depth < lobes.depth_limits.max()
+    assert cut.draws == 39
+    assert growth(case.true_model, case.true_cut, cut.depth, cut.spindle_speed) < 1
 
 
 def test_advice_holds_in_time_for_a_few() -> None:

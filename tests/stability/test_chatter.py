@@ -27,8 +27,7 @@ def cut(rpm: float, depth: float, *, noise: float = 0.0, runout: float = 0.0, se
 
 
 def verdict(rpm: float, depth: float, **options: float) -> ChatterVerdict:
-    runout = bool(options.get("runout"))
-    return classify_cut(cut(rpm, depth, **options), RATE, rpm * pi / 30, 2, runout=runout)
+    return classify_cut(cut(rpm, depth, **options), RATE, rpm * pi / 30, 2, runout=options.get("runout", 0.0))
 
 
 @pytest.mark.parametrize(
@@ -54,7 +53,7 @@ def test_chatter_frequency_is_not_folded() -> None:
 
 def test_a_speed_that_is_half_a_per_cent_off_is_found() -> None:
     samples = cut(900, 1.3e-3, noise=0.01)
-    assert classify_cut(samples, RATE, 904 * pi / 30, 2, runout=False).kind == "stable"
+    assert classify_cut(samples, RATE, 904 * pi / 30, 2, runout=0.0).kind == "stable"
 
 
 def test_short_records_are_refused() -> None:

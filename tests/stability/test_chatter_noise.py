@@ -77,7 +77,7 @@ def test_two_unequal_teeth_that_may_double_their_period_are_not_called_stable() 
     assert found.kind == "inconclusive"
     assert "runout" in found.reason
     equal = simulate(replace(cut, runout=0.0), 500, RATE, skip=100).acceleration
-    doubled = classify_cut(equal, RATE, cut.rpm * pi / 30, 2, runout=False)
+    doubled = classify_cut(equal, RATE, cut.rpm * pi / 30, 2, runout=0.0)
     assert doubled.kind == "period-doubling"
     assert doubled.frequency == pytest.approx(17.5, abs=0.05)
     assert "runout" in doubled.warnings[0]

@@ -11,6 +11,7 @@ from cutting import MillingProcess
 from estimation import Frf, write_frf
 from modal_fit import ModalModel, write_modal_model
 from replay_data import (
+    HammerCell,
     LinearSweep,
     MillingCell,
     default_structure,
@@ -149,3 +150,20 @@ def _recordings(folder: Path) -> None:
         structure, PROCESS, 1e-3, 800 * RPM, 12.0, sample_rate=RATE, sensors=sensors, seed=7, oversampling=8
     )
     record(cell, folder / "steady.h5")
+    _hammer_tests(folder)
+
+
+def _hammer_tests(folder: Path) -> None:
+    """Three files with one hammer, ``tap_x.h5`` ``tap_y.h5`` ``tap_z.h5``: three taps each, on the tool tip."""
+    for number, (force, place) in enumerate(zip(dynamometer(0.001, 2000.0), TOOL_TIP, strict=True)):
+        sensors = (replace(force, name="hammer"), *tip_accelerometers(0.001))
+        cell = HammerCell(
+            default_structure(),
+            directions=[place],
+            taps=3,
+            spacing=2.5,
+            sample_rate=2048.0,
+            sensors=sensors,
+            seed=number,
+        )
+        record(cell, folder / f"tap_{place[-1].lower()}.h5")

@@ -14,11 +14,13 @@ TITLES = {
     "diagnose": "Comparing a model with recordings",
     "estimate": "Estimating FRFs",
     "fit": "Fitting models",
+    "import": "Importing FRFs",
     "inspect": "Looking at files",
     "lobes": "Asking for lobes",
     "plan": "Plans and sessions",
     "report": "Reports",
     "robot": "Robots",
+    "tap": "Hammer tests",
 }
 MARK = "<!-- the table follows: tests/millfrf/mistakes/page.py writes it -->"
 

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from acquisition import Recording, RecordingWriter, StreamDescription
-from estimation import Frf, read_frf, write_frf
+from estimation import Frf, read_frf, write_frf, write_frf_uff
 from modal_fit import read_modal_model, write_modal_model
 
 SAMPLES = "signals/daq/samples"
@@ -116,6 +116,7 @@ CHANGES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "huge": lambda x: np.full_like(x, 1e30) * np.sign(x),
     "nan": lambda x: np.where(np.arange(len(x)) == len(x) // 2, np.nan, x),
     "clipped": lambda x: np.clip(x, np.quantile(x, 0.1), np.quantile(x, 0.9)),
+    "limited": lambda x: np.clip(x, -0.4 * np.abs(x).max(), 0.4 * np.abs(x).max()),
     "in g": lambda x: x / 9.80665,
     "in kN": lambda x: x / 1000,
     "reversed": lambda x: -x,
@@ -132,6 +133,11 @@ def channel(folder: Path, file: str, name: str, **changes: object) -> None:
             if one["name"] == name:
                 one.update(changes)
         stream.attrs["channels"] = json.dumps(described)
+
+
+def unplaced(folder: Path, file: str, name: str) -> None:
+    """A channel that nobody gave a node and a direction."""
+    channel(folder, file, name, node="", direction="")
 
 
 def without_full_scale(folder: Path, file: str) -> None:
@@ -404,3 +410,28 @@ def robot(folder: Path, *lines: str) -> None:
     content = (files("robot_model") / "robots" / "staubli_rx170.toml").read_text(encoding="utf-8")
     (folder / "robot.toml").write_text(content, encoding="utf-8")
     toml(folder, "robot.toml", *lines)
+
+
+def analyser(folder: Path, file: str, unit: str = "m/N", change: str = "") -> None:
+    """The tool tip's first FRF as an analyser exports it, and its mapping; ``conjugated`` for exp(-i w t)."""
+    frf = read_frf(folder / "frf_tip.h5")
+    values = frf.values[:, 0, 0].conj() if change == "conjugated" else frf.values[:, 0, 0]
+    rows = (f"{f:.6e}\t{h.real:.9e}\t{h.imag:.9e}" for f, h in zip(frf.frequencies, values, strict=True))
+    header = f"Analyser\n\nFrequency\tReal\tImaginary\nHz\t{unit}\t{unit}\n"
+    (folder / file).write_text(header + "\n".join(rows) + "\n", encoding="utf-8")
+    labels = f'responses = ["{frf.responses[0]}"]\nexcitations = ["{frf.excitations[0]}"]\n'
+    (folder / "frf.toml").write_text("[frf]\n" + labels, encoding="utf-8")
+
+
+def exported(folder: Path, file: str) -> None:
+    """The tool tip's FRFs as a UFF file."""
+    write_frf_uff(folder / file, read_frf(folder / "frf_tip.h5"), binary=False)
+
+
+def records(folder: Path, file: str) -> None:
+    """The same data sets, called time records (function type 1)."""
+    exported(folder, file)
+    text = (folder / file).read_text(encoding="utf-8")
+    (folder / file).write_text(
+        text.replace("    4         0    0         0", "    1         0    0         0"), encoding="utf-8"
+    )

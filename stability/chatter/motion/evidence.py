@@ -38,6 +38,8 @@ class Evidence:
         Probability that noise alone looks as much like orders of the spindle as the recording.
     sample_rate
         Samples a second, Hz.
+    scales : (n_channels,)
+        Standard deviation of the samples of each channel, by which the evidence's were divided.
     """
 
     track: SpindleTrack
@@ -47,6 +49,7 @@ class Evidence:
     families: tuple[Family, ...]
     order_p_value: float
     sample_rate: float
+    scales: Real
 
     @property
     def alternation_p_value(self) -> float:
@@ -82,14 +85,15 @@ def gather_evidence(samples: Real, sample_rate: float, spindle_speed: float, tee
         Number of teeth.
     """
     data = samples - samples.mean(axis=0)
-    data = data / np.maximum(data.std(axis=0), 1e-300)
+    scales = np.maximum(data.std(axis=0), 1e-300)
+    data = data / scales
     track = track_spindle(data, sample_rate, spindle_speed / (2 * math.pi))
     revolutions = to_revolutions(data, sample_rate, track, teeth)
     late = revolutions.part(revolutions.count // 2, revolutions.count)
     spectrum = spectrum_of(late)
     lines = lines_of(spectrum, track.mean_frequency, LEVEL)
     families = families_of(lines, teeth, spectrum.resolution, late.size)
-    return Evidence(track, revolutions, late, spectrum, families, _order_p_value(late, spectrum), sample_rate)
+    return Evidence(track, revolutions, late, spectrum, families, _order_p_value(late, spectrum), sample_rate, scales)
 
 
 def _order_p_value(late: Revolutions, spectrum: Spectrum, first: int = 1, step: int = 1) -> float:

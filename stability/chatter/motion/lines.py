@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .beside_orders import stand_aside
 from .orders import Revolutions
 
 Real = NDArray[np.float64]
 
 GUARD = 2.5
-"""Lines of resolution on either side of each order in which nothing is looked for."""
+"""Lines of resolution on either side of each order in which only lines that stand aside of it are looked for."""
 MOST_LINES = 80
 """Strongest lines that are kept."""
 _FLOOR_BINS = 60  # at least, over which the floor's median is taken
@@ -94,7 +95,11 @@ def spectrum_of(revolutions: Revolutions, forbidden: tuple[float, ...] = ()) -> 
     power = scale * np.abs(np.fft.rfft(rest * window, axis=0)) ** 2
     orders = np.arange(len(power)) / revolutions.count
     resolution = 1 / revolutions.count
+    order_power = 2 * np.sum(
+        np.abs(np.fft.rfft(revolutions.mean_turn, axis=0) / revolutions.samples.shape[1]) ** 2, axis=1
+    )
     searched = np.abs(orders - np.round(orders)) > GUARD * resolution
+    searched |= stand_aside(power.sum(axis=1), revolutions.count, order_power)
     searched &= orders < 0.42 * revolutions.samples.shape[1]
     for share in forbidden:
         for sign in (1, -1):

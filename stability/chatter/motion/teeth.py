@@ -4,9 +4,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .course import PARTS, Course
+from .lines import Spectrum
 from .orders import Revolutions
+from .tool_motion import ToolMotion
 
 Real = NDArray[np.float64]
+
+_STANDS_OUT = 20.0  # power of an order over the noise from which it counts
 
 
 def alternation(revolutions: Revolutions) -> float:
@@ -27,6 +31,19 @@ def alternation_course(revolutions: Revolutions) -> Course:
     length = revolutions.count // PARTS
     parts = [_alternating(revolutions.part(k * length, (k + 1) * length)) for k in range(PARTS)]
     return Course(np.array([float(np.sqrt(np.mean(part**2))) for part in parts]))
+
+
+def alternating_change(late: Revolutions, spectrum: Spectrum, motion: ToolMotion) -> float:
+    """Root mean square of the chip's change by what alternates from tooth to tooth, over the thickest chip.
+
+    Of orders at odd multiples of half the tooth passing that stand out of the noise; 0 with an odd number of teeth.
+    """
+    if late.teeth % 2:
+        return 0.0
+    power = 2 * np.abs(np.fft.rfft(late.mean_turn, axis=0) / late.mean_turn.shape[0]) ** 2
+    orders = np.arange(late.teeth // 2, int(spectrum.orders[spectrum.searched][-1]) + 1, late.teeth)
+    stands = (power[orders] / spectrum.floor[orders * late.count]).max(axis=1) > _STANDS_OUT
+    return motion.change(orders[stands].astype(float), power[orders[stands]])
 
 
 def _alternating(revolutions: Revolutions) -> Real:

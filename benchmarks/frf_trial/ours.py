@@ -1,0 +1,71 @@
+"""This project's fit as an engine."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation import Frf, FrfCovariance
+from modal_fit import fit_polyreference
+
+from .problem import UNITS, Answer, FoundMode, Problem
+
+
+def find_modes(problem: Problem) -> Answer:
+    """`modal_fit.fit_polyreference` with its defaults, on the quantity as it was measured."""
+    covariance = None
+    if problem.response_covariance is not None and problem.excitation_covariance is not None:
+        covariance = FrfCovariance(problem.response_covariance, problem.excitation_covariance)
+    frf = Frf(
+        problem.frequencies,
+        problem.values,
+        problem.responses,
+        problem.excitations,
+        problem.quantity,
+        UNITS[problem.quantity],
+        np.ones(len(problem.frequencies), dtype=bool),
+        covariance=covariance,
+        coherence=problem.coherence,
+        averages=problem.averages,
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        fit = fit_polyreference(frf, problem.band)
+    status = getattr(fit, "status", None)
+    said = [*fit.warnings, *(f"{one.category.__name__}: {one.message}" for one in caught)]
+    said += [f"status: {status}"] if status is not None else []
+    return Answer(_modes(fit), said=tuple(said))
+
+
+def _modes(fit: Any) -> tuple[FoundMode, ...]:
+    model = fit.model
+    bars = _standard_errors(fit)
+    found = []
+    for k, pole in enumerate(model.poles):
+        shape = tuple((float(x.real), float(x.imag)) for x in model.right[k])
+        frequency, damping = float(abs(pole) / (2 * np.pi)), float(-pole.real / abs(pole))
+        errors = (None, None) if bars is None else (float(bars[0][k]), float(bars[1][k]))
+        found.append(FoundMode(frequency, damping, *errors, shape))
+    return tuple(found)
+
+
+def _standard_errors(fit: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Of frequency (Hz) and damping ratio: those that the fit states, else those of noise from its covariance."""
+    stated = getattr(fit, "errors", None)
+    if stated is not None:
+        return np.asarray(stated.frequency), np.asarray(stated.damping)
+    model = fit.model
+    if model.covariance is None:
+        return None
+    n, size = len(model.poles), np.abs(model.poles)
+    real, imaginary = model.poles.real, model.poles.imag
+    rows = np.zeros((2, n, 2 * n))
+    index = np.arange(n)
+    rows[0, index, index], rows[0, index, n + index] = real / size, imaginary / size
+    rows[0] /= 2 * np.pi
+    rows[1, index, index] = -(imaginary**2) / size**3
+    rows[1, index, n + index] = real * imaginary / size**3
+    part = model.covariance[: 2 * n, : 2 * n]
+    spread = np.sqrt(np.maximum(np.einsum("tki,ij,tkj->tk", rows, part, rows), 0.0))
+    return spread[0], spread[1]

@@ -1,0 +1,164 @@
+"""Spectra of the taps of one test, windowed and summed."""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Channel
+from foundation import Band, InputError
+
+from ..quantities import frf_quantity
+from .cutting_out import segments_of
+from .screening import FoundTaps
+from .segments import TapSettings
+from .windows import exponential_window, force_window
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class TapSums:
+    """Products of the spectra of forces f and responses x, summed over the taps of one test.
+
+    Parameters
+    ----------
+    name
+        Of the test, for messages.
+    frequencies : (n_frequencies,), Hz
+    input_power : (n_frequencies, n_excitations, n_excitations)
+        ``sum f_i conj(f_j)``.
+    cross : (n_frequencies, n_responses, n_excitations)
+        ``sum x_p conj(f_q)``.
+    output_power : (n_frequencies, n_responses)
+        ``sum |x_p|^2``.
+    excitations, responses
+        Degrees of freedom along the axes.
+    counts : (n_excitations,), int
+        Taps that hit each excitation hardest.
+    quantity, unit
+        Of responses over forces.
+    grounded
+        Whether responses hold down to 0 Hz: none of their sensors has a high-pass.
+    """
+
+    name: str
+    frequencies: Real
+    input_power: Complex
+    cross: Complex
+    output_power: Real
+    excitations: tuple[str, ...]
+    responses: tuple[str, ...]
+    counts: NDArray[np.int64]
+    quantity: str
+    unit: str
+    grounded: bool
+
+
+def tap_sums(
+    found: FoundTaps, settings: TapSettings, band: Band | None = None, places: Collection[str] = ()
+) -> TapSums:
+    """Cut, window, transform and sum the usable taps of a test.
+
+    The force is cut off after the contact; where there is an exponential window, force and response are multiplied by
+    it. Known input delays and the sensors' high-passes are taken out, at the ``s = i w + 1/tau`` where the spectra
+    stand. Forces that no tap hit hardest are left out.
+
+    Parameters
+    ----------
+    found
+        At least one usable tap.
+    settings
+        Segments and windows.
+    band
+        Lines to keep, Hz; None: all.
+    places
+        Points that taps of other tests hit: what an oblique tap of this test gives them is a force, too.
+
+    Raises
+    ------
+    InputError
+        No usable tap, two channels at one place, responses of different quantities, or a band without lines.
+    """
+    test, tau = found.test, settings.time_constant
+    if not found.used:
+        raise InputError(f"{test.path.name}: no tap can be used; tap again, or leave the file out")
+    struck = {one.tap.channel for one in found.used}
+    hit = [k for k, one in enumerate(test.excitations) if k in struck or one.degree_of_freedom in places]
+    forces = [test.excitations[k] for k in hit]
+    for channels in (forces, test.responses):
+        _check_places(channels, test.path.name)
+    quantity, unit = frf_quantity(test.responses, forces)
+    f, chosen = _lines(settings, band)
+    s = np.asarray(2j * np.pi * f + (0.0 if tau is None else 1 / tau), dtype=np.complex128)
+    windows = _windows(settings, len(forces), len(test.responses))
+    factors = np.column_stack([_correction(channel, s) for channel in (*forces, *test.responses)])
+    columns = [*hit, *range(len(test.excitations), len(test.excitations) + len(test.responses))]
+    n = len(forces)
+    power, cross = np.zeros((len(f), n, n), complex), np.zeros((len(f), len(test.responses), n), complex)
+    output = np.zeros((len(f), len(test.responses)))
+    for _, samples in segments_of(found, settings):
+        lines = np.fft.rfft(samples[:, columns] * windows, axis=0)[chosen] * factors
+        force, answer = lines[:, :n], lines[:, n:]
+        power += force[:, :, None] * force[:, None, :].conj()
+        cross += answer[:, :, None] * force[:, None, :].conj()
+        output += np.abs(answer) ** 2
+    return TapSums(
+        test.path.name,
+        f,
+        power,
+        cross,
+        output,
+        tuple(channel.degree_of_freedom for channel in forces),
+        tuple(channel.degree_of_freedom for channel in test.responses),
+        np.array([sum(one.tap.channel == k for one in found.used) for k in hit], dtype=np.int64),
+        quantity,
+        unit,
+        not any(channel.high_pass_hz for channel in test.responses),
+    )
+
+
+def _lines(settings: TapSettings, band: Band | None) -> tuple[Real, NDArray[np.bool_]]:
+    f = np.fft.rfftfreq(settings.length, 1 / settings.sample_rate)
+    chosen = np.ones(len(f), dtype=bool) if band is None else (f >= band[0]) & (f <= band[1])
+    if not chosen.any():
+        assert band is not None
+        raise InputError(
+            f"no line lies between {band[0]:g} and {band[1]:g} Hz (segments of {settings.duration:g} s have lines up "
+            f"to {f[-1]:g} Hz, {f[1]:.3g} Hz apart); widen --band"
+        )
+    return np.asarray(f[chosen], dtype=float), chosen
+
+
+def _windows(settings: TapSettings, n_forces: int, n_responses: int) -> Real:
+    """(length, n_forces + n_responses)"""
+    windows = np.ones((settings.length, n_forces + n_responses))
+    if settings.force_samples is not None:
+        duration = settings.force_samples / settings.sample_rate
+        windows[:, :n_forces] = force_window(settings.length, settings.sample_rate, duration)[:, None]
+    if settings.time_constant is not None:
+        windows *= exponential_window(settings.length, settings.sample_rate, settings.time_constant)[:, None]
+    return windows
+
+
+def _correction(channel: Channel, s: Complex) -> Complex:
+    """What a channel's lines are multiplied by: its delay undone, and a response's first-order high-pass."""
+    factor = np.exp(s * (channel.input_delay_s or 0.0))
+    corner = 2 * np.pi * (channel.high_pass_hz or 0.0)
+    if corner and channel.quantity != "force":
+        factor = factor * np.divide(s + corner, s, out=np.ones_like(s), where=s.imag > 0)
+    return np.asarray(factor)
+
+
+def _check_places(channels: Sequence[Channel], file: str) -> None:
+    there: dict[str, str] = {}
+    for channel in channels:
+        place = channel.degree_of_freedom
+        if place in there:
+            raise InputError(
+                f"{file}: channels {there[place]} and {channel.name} are both at {place}; name one of them with "
+                "--excitation or --response, or say in --points where they were"
+            )
+        there[place] = channel.name

@@ -1,0 +1,175 @@
+"""Entries of an FRF matrix, one a response and an excitation, wherever they come from, and the matrix they make."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import DegreeOfFreedom, FileFormatError
+
+from ..frf import Frf
+from .units import SI
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_SAME_AXIS = 1e-5
+"""Relative departure of two frequency axes that are one: headers of UFF files hold six digits."""
+
+_NAMED = 3
+"""Missing entries that a message names; of more it says how many."""
+
+
+@dataclass(frozen=True)
+class FrfEntry:
+    """One FRF as it was read, in SI units.
+
+    Parameters
+    ----------
+    response, excitation
+        ``node:direction``.
+    frequencies : (n_frequencies,), Hz
+    values : (n_frequencies,), complex
+    source
+        File and place in it, for messages.
+    coherence : (n_frequencies,) or None
+        Ordinary coherence.
+    averages
+        0 where it is not known.
+    """
+
+    response: str
+    excitation: str
+    frequencies: Real
+    values: Complex
+    source: str
+    coherence: Real | None = None
+    averages: int = 0
+
+    @property
+    def name(self) -> str:
+        """``response / excitation``."""
+        return f"{self.response} / {self.excitation}"
+
+
+@dataclass(frozen=True)
+class ImportedFrf:
+    """An FRF from another program's files, and what its reader has to say of it.
+
+    Parameters
+    ----------
+    frf
+        In SI units.
+    inferred
+        What the files say by themselves and nobody had to write down, one sentence each.
+    doubts
+        What they do not say and was taken nevertheless, or leave open, one sentence each.
+    """
+
+    frf: Frf
+    inferred: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+
+def assembled(entries: Sequence[FrfEntry], quantity: str, unit: str) -> Frf:
+    """One FRF matrix of all entries; responses and excitations in the order in which they first appear.
+
+    A line at which every entry is 0, or 0 Hz with values that are not finite, has no FRF and is not valid.
+
+    Parameters
+    ----------
+    entries
+        One or more.
+    quantity, unit
+        Of all of them; ``unit`` counts for a ``transfer`` only.
+
+    Raises
+    ------
+    FileFormatError
+        An entry that is given twice or missing, axes that differ, values that are not finite, or no degree of freedom.
+    """
+    first = entries[0]
+    table: dict[tuple[str, str], FrfEntry] = {}
+    for entry in entries:
+        for label in (entry.response, entry.excitation):
+            DegreeOfFreedom.parse(label)
+        twin = table.setdefault((entry.response, entry.excitation), entry)
+        if twin is not entry:
+            raise FileFormatError(f"{entry.source} gives {entry.name} twice, as {twin.source} does; give each FRF once")
+        _require_same_axis(first, entry)
+    responses = tuple(dict.fromkeys(entry.response for entry in entries))
+    excitations = tuple(dict.fromkeys(entry.excitation for entry in entries))
+    _require_all(table, responses, excitations, first.source)
+    rows = [[table[p, q] for q in excitations] for p in responses]
+    values = np.asarray(_stack([[entry.values for entry in row] for row in rows]), dtype=complex)
+    valid = values.any(axis=(1, 2)) & ~_without_line_at_zero(first.frequencies, values)
+    _require_finite(entries, valid)
+    averages = np.array([[entry.averages for entry in row] for row in rows], dtype=np.int64)
+    return Frf(
+        first.frequencies,
+        np.where(valid[:, None, None], values, 0),
+        responses,
+        excitations,
+        quantity,
+        SI.get(quantity, unit),
+        valid,
+        coherence=_coherence(rows, len(first.frequencies)),
+        averages=averages if averages.any() else None,
+    )
+
+
+def _require_same_axis(first: FrfEntry, entry: FrfEntry) -> None:
+    one, other = first.frequencies, entry.frequencies
+    if len(one) == len(other) and np.allclose(one, other, rtol=_SAME_AXIS, atol=1e-9):
+        return
+    raise FileFormatError(
+        f"{entry.source}: {entry.name} has {_axis(other)}, {first.name} in {first.source} has {_axis(one)}; export all "
+        "FRFs on one frequency axis"
+    )
+
+
+def _axis(f: Real) -> str:
+    return f"{len(f)} lines from {f[0]:g} to {f[-1]:g} Hz" if len(f) else "no line"
+
+
+def _require_all(
+    table: dict[tuple[str, str], FrfEntry], responses: Sequence[str], excitations: Sequence[str], source: str
+) -> None:
+    missing = [f"{p} / {q}" for q in excitations for p in responses if (p, q) not in table]
+    if not missing:
+        return
+    more = f" and {len(missing) - _NAMED} more" if len(missing) > _NAMED else ""
+    raise FileFormatError(
+        f"{source}: the matrix of {len(responses)} responses and {len(excitations)} excitations lacks "
+        f"{', '.join(missing[:_NAMED])}{more}; export all of it, or choose responses and excitations in a mapping"
+    )
+
+
+def _without_line_at_zero(f: Real, values: Complex) -> NDArray[np.bool_]:
+    """At 0 Hz analysers divide 0 by 0; a value that is not finite there is no damage."""
+    return np.asarray((f == 0) & ~np.isfinite(values).all(axis=(1, 2)))
+
+
+def _require_finite(entries: Sequence[FrfEntry], valid: NDArray[np.bool_]) -> None:
+    for entry in entries:
+        wrong = np.flatnonzero(valid & ~np.isfinite(entry.values))
+        if len(wrong):
+            raise FileFormatError(
+                f"{entry.source}: {entry.name} holds {entry.values[wrong[0]].real:g} at "
+                f"{entry.frequencies[wrong[0]]:g} Hz; mend or cut that line before converting"
+            )
+
+
+def _coherence(rows: Sequence[Sequence[FrfEntry]], n_lines: int) -> Real | None:
+    """NaN for entries without one; None where no entry has one."""
+    unknown = np.full(n_lines, np.nan)
+    given = [[entry.coherence for entry in row] for row in rows]
+    if all(one is None for row in given for one in row):
+        return None
+    return np.asarray(_stack([[unknown if one is None else one for one in row] for row in given]), dtype=float)
+
+
+def _stack(rows: Sequence[Sequence[NDArray[np.inexact]]]) -> NDArray[np.inexact]:
+    """(n_frequencies, n_responses, n_excitations)."""
+    return np.ascontiguousarray(np.array(rows).transpose(2, 0, 1))

@@ -1,0 +1,233 @@
+"""`FrfMapping`: which array or column of a file is which part of an FRF; a TOML file checked where it enters."""
+
+import os
+import re
+import tomllib
+from collections import Counter
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from foundation import DegreeOfFreedom, InputError, mistake_in_words
+
+_STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+_RANGE = re.compile(r"(?P<prefix>.*?)(?P<first>\d+)\.\.(?P<last>\d+)(?P<rest>:.+)")
+_MOST = 100_000
+
+Place = Annotated[int, Field(ge=1)] | Annotated[str, Field(min_length=1)]
+"""An array's name, a column's heading, or a column's number counted from 1."""
+
+PlaceList = Annotated[tuple[Place, ...], Field(min_length=1)]
+"""One place for each response or each excitation."""
+
+Axis = Literal["frequency", "response", "excitation"]
+
+
+def expanded(labels: tuple[str, ...]) -> tuple[str, ...]:
+    """Degrees of freedom with ranges of numbers written out.
+
+    Raises
+    ------
+    ValueError
+        No degree of freedom, or a range that runs backwards.
+
+    Examples
+    --------
+    >>> expanded(("1..3:+Z", "TIP:-X"))
+    ('1:+Z', '2:+Z', '3:+Z', 'TIP:-X')
+    """
+    found: list[str] = []
+    for label in labels:
+        match = _RANGE.fullmatch(label)
+        if match is None:
+            found.append(label)
+            continue
+        first, last = int(match["first"]), int(match["last"])
+        if not first <= last < first + _MOST:
+            raise ValueError(f"{label!r} runs from {first} to {last}; give the lower number first")
+        found += [f"{match['prefix']}{number}{match['rest']}" for number in range(first, last + 1)]
+    try:
+        for label in found:
+            DegreeOfFreedom.parse(label)
+    except InputError as error:
+        raise ValueError(str(error)) from error
+    return tuple(found)
+
+
+Labels = Annotated[tuple[str, ...], AfterValidator(expanded)]
+Label = Annotated[str, AfterValidator(lambda label: expanded((label,))[0])]
+
+
+class FrfParts(BaseModel):
+    """Where the numbers lie: complex ``values``, or ``real`` and ``imaginary``, or ``magnitude`` and ``phase``."""
+
+    model_config = _STRICT
+    values: Place | PlaceList | None = None
+    real: Place | PlaceList | None = None
+    imaginary: Place | PlaceList | None = None
+    magnitude: Place | PlaceList | None = None
+    phase: Place | PlaceList | None = None
+    coherence: Place | PlaceList | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> "FrfParts":
+        pairs = {"imaginary": ("real", "imaginary"), "phase": ("magnitude", "phase")}
+        for one, other in pairs.values():
+            given = [name for name in (one, other) if getattr(self, name) is not None]
+            if len(given) == 1:
+                raise ValueError(f"{given[0]} is given alone; give {one} and {other}")
+        ways = [name for name in ("values", "real", "magnitude") if getattr(self, name) is not None]
+        if len(ways) > 1:
+            raise ValueError(f"{' and '.join(ways)} are both given; give the FRF in one way")
+        return self
+
+    @property
+    def given(self) -> dict[str, int | str]:
+        """Places by part, of those that are given and no lists."""
+        return {name: place for name in PARTS if isinstance(place := getattr(self, name), int | str)}
+
+    @property
+    def listed(self) -> dict[str, tuple[int | str, ...]]:
+        """Lists of places by part."""
+        return {name: places for name in PARTS if isinstance(places := getattr(self, name), tuple)}
+
+
+PARTS = ("values", "real", "imaginary", "magnitude", "phase", "coherence")
+
+
+class EntryMapping(FrfParts):
+    """One FRF of several.
+
+    Parameters
+    ----------
+    response, excitation
+        Degrees of freedom, ``node:direction``. One of them may be left out where parts are lists: they run along the
+        ``responses`` or ``excitations`` under ``[frf]``.
+    file
+        Name of the file it lies in; None: the only one.
+    record
+        Of a UFF file: the place of its data set, counted from 1.
+    averages
+        Number of averages; None: as ``[frf]`` says.
+    values, real, imaginary, magnitude, phase, coherence
+        Where its numbers lie; as ``[frf]`` says where none of them is given.
+    """
+
+    response: Label | None = None
+    excitation: Label | None = None
+    file: str | None = None
+    record: Annotated[int, Field(ge=1)] | None = None
+    averages: Annotated[int, Field(ge=1)] | None = None
+
+
+class FrfTable(FrfParts):
+    """What holds for all FRFs.
+
+    Parameters
+    ----------
+    quantity
+        Needed for a ``transfer`` only: otherwise the unit tells.
+    unit
+        Of the numbers in the file: ``m/s^2/N``, ``g/N``, ``um/N``; of a ``transfer`` the unit to keep.
+    frequency
+        Array or column of frequencies, in ``frequency_unit``; or instead ``frequency_step_hz`` of evenly spaced lines
+        from ``frequency_start_hz`` on.
+    values, real, imaginary, magnitude, phase, coherence
+        Arrays or columns; ``H[2]`` is the second column of array H. Where file or headings leave no doubt they may be
+        left out. Lists run along ``responses`` or ``excitations``.
+    phase_unit
+        ``deg`` or ``rad``.
+    decibels
+        The magnitude is 20 times the logarithm of the ratio to 1 ``unit``.
+    axes
+        Of arrays with several axes.
+    responses, excitations
+        Degrees of freedom along the axes, in which ``1..68:+Z`` stands for 68 of them; of a UFF file those to take.
+    conjugate
+        The file's phases stand for ``exp(-i w t)``.
+    averages
+        Number of averages behind each FRF.
+    exponential_time_constant_s
+        Of an exponential window on force and response, s, whose damping is still in the FRF.
+    title
+        Of the FRF file that is written.
+    """
+
+    quantity: Literal["receptance", "mobility", "accelerance", "transfer"] | None = None
+    unit: Annotated[str, Field(min_length=1)] | None = None
+    frequency: Place | None = None
+    frequency_unit: Literal["Hz", "kHz", "rad/s"] | None = None
+    frequency_step_hz: Annotated[float, Field(gt=0)] | None = None
+    frequency_start_hz: Annotated[float, Field(ge=0)] = 0.0
+    phase_unit: Literal["deg", "rad"] | None = None
+    decibels: bool | None = None
+    axes: tuple[Axis, ...] | None = None
+    responses: Labels = ()
+    excitations: Labels = ()
+    conjugate: bool = False
+    averages: Annotated[int, Field(ge=1)] | None = None
+    exponential_time_constant_s: Annotated[float, Field(gt=0)] | None = None
+    title: str = ""
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "FrfTable":
+        if self.frequency is not None and self.frequency_step_hz is not None:
+            raise ValueError("give either frequency (an array or column) or frequency_step_hz, one of them")
+        if self.axes is not None and (len(set(self.axes)) != len(self.axes) or "frequency" not in self.axes):
+            raise ValueError(f"axes = {list(self.axes)} must name each axis once, 'frequency' among them")
+        for name in ("responses", "excitations"):
+            twice = [label for label, count in Counter(getattr(self, name)).items() if count > 1]
+            if twice:
+                raise ValueError(f"{name} hold {twice[0]} twice; give each degree of freedom once")
+        return self
+
+
+class TextOptions(BaseModel):
+    """How a text file is written, where it cannot be seen."""
+
+    model_config = _STRICT
+    delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = None
+    decimal: Literal[".", ","] | None = None
+    skip_lines: Annotated[int, Field(ge=0)] = 0
+    encoding: str | None = None
+
+
+class FrfMapping(BaseModel):
+    """The whole mapping file: ``[frf]``, ``[[entries]]`` where FRFs lie apart, ``[csv]`` for texts."""
+
+    model_config = _STRICT
+    frf: FrfTable = FrfTable()
+    entries: tuple[EntryMapping, ...] = ()
+    csv: TextOptions = TextOptions()
+
+    @model_validator(mode="after")
+    def _one_kind(self) -> "FrfMapping":
+        if self.entries and self.frf.axes is not None:
+            raise ValueError("axes are those of one array; leave them out where entries are given")
+        return self
+
+
+def is_frf_mapping(content: Mapping[str, Any]) -> bool:
+    """Whether the content of a mapping file is about FRFs, not recordings."""
+    return "frf" in content or "entries" in content
+
+
+def load_frf_mapping(path: str | os.PathLike[str]) -> FrfMapping:
+    """Read a mapping file.
+
+    Raises
+    ------
+    InputError
+        No such file, no TOML, or a key that is unknown, missing or out of range; one line with file, key and value.
+    """
+    file = Path(path)
+    try:
+        return FrfMapping.model_validate(tomllib.loads(file.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise InputError(f"cannot read mapping {file}: {error.strerror}; check the name") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"mapping {file} is not TOML: {error}") from error
+    except ValidationError as error:
+        raise InputError(f"mapping {file}: {mistake_in_words(error, FrfMapping)}") from error

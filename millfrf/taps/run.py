@@ -1,0 +1,113 @@
+"""From recordings of hammer tests to an FRF: one step after the other."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from estimation import (
+    Decay,
+    FoundTaps,
+    MergedTaps,
+    TapSettings,
+    TapSums,
+    TapTest,
+    answer_decay,
+    choose_segments,
+    found_taps,
+    merge_taps,
+    placed,
+    screened,
+    tap_sums,
+    window_for,
+)
+from foundation import Band, InputError
+
+from ..gate import check_tap_recordings, check_taps_found, check_taps_used, doubts_of_taps
+from ..progress import Watch, silent
+from .options import TapOptions
+from .points_of_files import tests_of
+
+
+@dataclass(frozen=True)
+class TapResult:
+    """An FRF of hammer tests with what it was made from.
+
+    Parameters
+    ----------
+    merged
+        The FRF, in the recordings' own quantity, and the band of each excitation.
+    found
+        Taps of each test, each with the reason where it was left out.
+    settings
+        Segments and windows.
+    decay
+        What was left of the answers at the segments' ends, before the exponential window.
+    warnings
+        One sentence each.
+    """
+
+    merged: MergedTaps
+    found: tuple[FoundTaps, ...]
+    settings: TapSettings
+    decay: Decay
+    warnings: tuple[str, ...]
+
+
+def tap_recordings(paths: Sequence[str | os.PathLike[str]], options: TapOptions, watch: Watch = silent) -> TapResult:
+    """FRF of the taps in one or many recordings.
+
+    Raises
+    ------
+    InputError
+        A file or option that cannot be used; recordings without a usable tap, or of different rates; entries of the
+        matrix that no tap gives.
+    """
+    if not paths:
+        raise InputError("no recording given; name at least one")
+    tests = tests_of(paths, options)
+    doubts = check_tap_recordings(paths, tests, watch)
+    found = _found(tests, watch)
+    settings = choose_segments(
+        found,
+        segment=options.segment,
+        pre_trigger=options.pre_trigger,
+        force_window=options.force_window_seconds,
+    )
+    found = _screened(found, settings, watch)
+    with watch("how long the answers ring"):
+        decay = answer_decay(found, settings)
+    asked = options.time_constant
+    settings = replace(settings, time_constant=window_for(decay.left, settings) if asked is None else asked or None)
+    merged = merge_taps(_sums(found, settings, options.band, watch), settings.time_constant)
+    doubts += doubts_of_taps(merged, found, settings, decay)
+    return TapResult(merged, tuple(found), settings, decay, tuple(dict.fromkeys(doubts)))
+
+
+def _found(tests: Sequence[TapTest], watch: Watch) -> list[FoundTaps]:
+    found = []
+    with watch("finding taps", len(tests)) as update:
+        for number, test in enumerate(tests):
+            found.append(found_taps(test))
+            update(number + 1)
+    check_taps_found(found)
+    return found
+
+
+def _screened(found: Sequence[FoundTaps], settings: TapSettings, watch: Watch) -> list[FoundTaps]:
+    judged = []
+    with watch("judging taps", len(found)) as update:
+        for number, each in enumerate(found):
+            judged.append(screened(placed(each, settings), settings))
+            update(number + 1)
+    check_taps_used(judged)
+    return judged
+
+
+def _sums(found: Sequence[FoundTaps], settings: TapSettings, band: Band | None, watch: Watch) -> list[TapSums]:
+    places = {each.test.excitations[one.tap.channel].degree_of_freedom for each in found for one in each.used}
+    sums = []
+    with watch("spectra of the taps", len(found)) as update:
+        for number, each in enumerate(found):
+            sums.append(tap_sums(each, settings, band, places))
+            update(number + 1)
+    return sums
