@@ -92,8 +92,8 @@ def _fitted(
     selection = select_modes(found, lines, reweigh, look_again, n_modes=n_modes)
     if not selection.taken:
         raise MillfrfError(
-            f"no pole is stable over orders 1 to {max_order} between {band[0]:g} and {band[1]:g} Hz; "
-            "widen the band, raise --max-order or average more"
+            f"no pole is stable over orders 1 to {max_order} between {band[0]:g} and {band[1]:g} Hz "
+            "and lowers the misfit by more than noise would; widen the band, raise --max-order or average more"
         )
     return _finished(frf, chart, selection)
 

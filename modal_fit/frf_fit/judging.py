@@ -177,7 +177,7 @@ def _unneeded(candidate: Candidate, trial: _Trial) -> str:
     n_unknowns = 2 * (trial.lines.values.shape[2] + trial.lines.drive.shape[2])
     lines = trial.lines
     exact = _ROUNDING * float(np.mean(np.abs(lines.values) ** 2))
-    variance = max(trial.after.cost / lines.n_values, exact)
+    variance = max(trial.after.cost / lines.n_values, _variance_at_mode(trial), exact)
     if lines.stated:
         variance = max(variance, float(lines.noise.sum()) / lines.n_values)
     memory = max(trial.after.colour(lines, np.ones(len(lines.s), dtype=bool)), 0.0)  # fewer independent values
@@ -197,6 +197,17 @@ def _unneeded(candidate: Candidate, trial: _Trial) -> str:
     if alike > _ALIKE:
         return f"a copy of the mode at {other:.4g} Hz (assurance {alike:.2f}), and the misfit is more than noise"
     return ""
+
+
+def _variance_at_mode(trial: _Trial) -> float:
+    """Mean squared misfit of a real value on the lines that the last mode lives from.
+
+    Noise may go with the level of the FRF, as that of few averages does. A mode must then outdo the noise at its
+    own resonance, and not the mean over the neighbourhood.
+    """
+    own = mode_power(trial.modes, trial.after.right, trial.lines)[:, -1]
+    per_line = trial.lines.n_values / len(own)
+    return float(own @ trial.after.power(trial.lines) / max(own.sum(), 1e-300)) / per_line
 
 
 def _most_missed(trial: _Trial) -> tuple[float, float, bool]:

@@ -163,8 +163,6 @@ def _without_needless(state: Selection, *, thorough: bool) -> Selection:
     """Try each mode again as a candidate beside all others, the least steady first, and leave out what fails."""
     order = np.argsort([candidate.share for candidate in state.taken], kind="stable")
     for candidate in [state.taken[number] for number in order]:
-        if len(state.modes.poles) < 2:
-            break
         number = next(n for n, one in enumerate(state.taken) if one is candidate)
         others = np.arange(len(state.modes.poles)) != number
         last = state.modes.chosen(others).joined(state.modes.chosen(~others))
