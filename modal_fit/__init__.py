@@ -1,6 +1,13 @@
 """Modal models, their fitting and the calibration to the tool tip: knows nothing of cutting."""
 
 from .comparison import ModePair, compare_modes
+from .indicators import (
+    ComplexModeIndicator,
+    IndicatorPeak,
+    MultivariateModeIndicator,
+    complex_mode_indicator,
+    multivariate_mode_indicator,
+)
 from .modal_model import ModalModel, Residuals
 from .modal_model_file import read_modal_model, write_modal_model
 from .mode_errors import ModeErrors
@@ -13,10 +20,13 @@ from .uff_modes import import_modes_uff, read_modes_uff, write_modes_uff
 from .uncertainty import derived_covariance, frequency_and_damping_errors
 
 __all__ = [
+    "ComplexModeIndicator",
+    "IndicatorPeak",
     "ModalFit",
     "ModalModel",
     "ModeErrors",
     "ModePair",
+    "MultivariateModeIndicator",
     "PoleGroup",
     "Residuals",
     "StabilisationChart",
@@ -24,12 +34,14 @@ __all__ = [
     "TipCalibration",
     "calibrate_to_tip",
     "compare_modes",
+    "complex_mode_indicator",
     "derived_covariance",
     "fit_polyreference",
     "fit_subspace",
     "frequency_and_damping_errors",
     "import_modes_uff",
     "modal_assurance",
+    "multivariate_mode_indicator",
     "phase_collinearity",
     "phase_deviation",
     "read_modal_model",

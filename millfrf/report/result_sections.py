@@ -17,6 +17,7 @@ from ..figures.stabilisation_figure import stabilisation_figure
 from ..progress import Watch
 from ..tables import error_table, mode_table
 from .collect import Collected, SourceFile
+from .indicator_part import has_lines, indicator_part
 from .section import Picture, Section
 
 Band = tuple[float, float]
@@ -114,6 +115,9 @@ def mode_section(collected: Collected) -> Section:
         sentences += _quality(file)
         if file.provenance.get("step") == "fit":
             pictures.append(_stabilisation(collected, file, model))
+            shown, peaks = _indicators(collected, file, model)
+            pictures += shown
+            sentences += peaks
         if len(model.responses) > 1 and len(model.poles):
             caption = (
                 f"{file.path.name}: modal vectors in the complex plane, each scaled to its largest component. Right "
@@ -136,6 +140,17 @@ def _quality(file: SourceFile) -> list[str]:
         text += f"; misfit between {error.min():.2g} and {error.max():.2g} % of each FRF's rms"
     chi = made.get("reduced_chi_square")
     return [text + ("." if chi is None else f"; misfit over noise (reduced chi-square) {chi:.2f}.")]
+
+
+def _indicators(
+    collected: Collected, file: SourceFile, model: ModalModel
+) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
+    """Mode indicators of the FRF that a model was fitted to, where that is among the files."""
+    frf, band = collected.frf_of(file), _band_of(file)
+    if frf is None or band is None or not has_lines(frf, band):
+        return (), ()
+    picture, peaks = indicator_part(file.path.name, frf, model, band)
+    return (picture,), peaks
 
 
 def _stabilisation(collected: Collected, file: SourceFile, model: ModalModel) -> Picture:

@@ -1,0 +1,60 @@
+"""What the report of a fit shows beside modes and charts, on a structure that is known."""
+
+import html
+import importlib.util
+import re
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from estimation import write_frf
+from millfrf.__main__ import run
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "modal_report.py"
+
+
+@pytest.fixture(scope="module")
+def example() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("modal_report", EXAMPLE)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_example_finds_its_modes(example: ModuleType, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    example.main(tmp_path)
+    said = capsys.readouterr().out
+    assert "modes fitted: 22.00 Hz, 48.00 Hz, 48.40 Hz, 71.00 Hz, 104.00 Hz" in said
+    assert "(curve 2)" in said
+    assert (tmp_path / "mode_indicators.png").stat().st_size > 10_000
+
+
+@pytest.fixture(scope="module")
+def folder(example: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """FRF, model of all modes, model of a band's wrong modes, and their reports."""
+    folder = tmp_path_factory.mktemp("modal_report")
+    write_frf(folder / "frf.h5", example.measured())
+    paths = {name: str(folder / name) for name in ("frf.h5", "model.json", "fewer.json")}
+    band = ["--band", "10", "120"]
+    assert run(["fit", paths["frf.h5"], *band, "--out", paths["model.json"]]) == 0
+    assert run(["fit", paths["frf.h5"], *band, "--modes", "2", "--out", paths["fewer.json"]]) == 0
+    for model in ("model", "fewer"):
+        files = [paths["frf.h5"], paths[f"{model}.json"]]
+        assert run(["report", *files, "--out", str(folder / f"{model}.html")]) == 0
+    return folder
+
+
+def words(page: Path) -> str:
+    """Text of a page without marks and pictures."""
+    text = re.sub(r"<style>.*?</style>", " ", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", text)).split())
+
+
+def test_indicators_stand_in_the_report_and_tell_modes_that_were_left_out(folder: Path) -> None:
+    full, fewer = words(folder / "model.html"), words(folder / "fewer.html")
+    assert "mode indicators of the FRF" in full
+    assert "without a mode at" not in full
+    assert "without a mode at" in fewer
