@@ -12,10 +12,12 @@ import numpy as np
 from estimation import Frf
 from millfrf.figures.embed import save_figure
 from millfrf.figures.indicator_figure import indicator_figure
+from millfrf.figures.shape_figure import assurance_figure, compass_figure
 from modal_fit import (
     ModalModel,
     complex_mode_indicator,
     fit_polyreference,
+    mode_shapes,
     multivariate_mode_indicator,
 )
 
@@ -58,9 +60,13 @@ def main(folder: Path) -> None:
     indicator = complex_mode_indicator(frf, BAND)
     picture = indicator_figure(indicator, multivariate_mode_indicator(frf, BAND), model)
     save_figure(picture, folder / "mode_indicators.png")
+    shapes = mode_shapes(model)
+    save_figure(assurance_figure(model, shapes), folder / "auto_mac.png")
+    save_figure(compass_figure(model, shapes), folder / "mode_vectors.png")
     print("modes fitted:", ", ".join(f"{f:.2f} Hz" for f in model.natural_frequencies))
     peaks = [f"{peak.frequency:.1f} Hz (curve {peak.curve})" for peak in indicator.peaks()]
     print("peaks of the CMIF:", ", ".join(peaks))
+    print("MPC:", ", ".join(f"{value:.3f}" for value in shapes.collinearity))
 
 
 if __name__ == "__main__":

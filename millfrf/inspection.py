@@ -16,7 +16,9 @@ from stability import STATUSES, read_lobes
 from .file_kinds import CUTTING, FRF, GEOMETRY, LOBES, MODEL, RECORDING, kind_of
 from .gate import check_frf, check_model, doubts_of, read_checked_cutting, stored_doubts
 from .gate.signals import level_table, look
+from .point_words import points_in_words
 from .progress import Watch, silent
+from .shape_table import shape_table
 from .tables import Table, error_table, mode_table
 from .tap_concerns import tap_concerns
 
@@ -121,7 +123,7 @@ def _frf(path: str | os.PathLike[str]) -> Findings:
             concerns.append(f"{response}: median coherence below 0.5; keep only the band that is excited")
     summary = (
         f"{frf.quantity} in {frf.unit}, {f[0]:g} to {f[-1]:g} Hz in {len(f)} lines, "
-        f"excited at {', '.join(frf.excitations)}"
+        f"excited at {points_in_words(frf.excitations)}"
     )
     concerns += stored_doubts(path)
     table = Table("responses", ("response", "largest value", "at (Hz)", "median coherence"), tuple(rows))
@@ -146,11 +148,11 @@ def _model(path: str | os.PathLike[str]) -> Findings:
     concerns += stored_doubts(path)
     summary = (
         f"modal model, {len(model.poles)} modes, {model.quantity} in {model.unit}, responses "
-        f"{', '.join(model.responses)}, excitations {', '.join(model.excitations)}"
+        f"{points_in_words(model.responses)}, excitations {points_in_words(model.excitations)}"
     )
     by_source = error_table(model)
-    tables = (mode_table(model),) if by_source is None else (mode_table(model), by_source)
-    return Findings(MODEL, summary, tables, tuple(concerns))
+    tables = [table for table in (mode_table(model), by_source, shape_table(model)) if table is not None]
+    return Findings(MODEL, summary, tuple(tables), tuple(concerns))
 
 
 def _lobes(path: str | os.PathLike[str]) -> Findings:

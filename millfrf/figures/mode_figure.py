@@ -34,6 +34,7 @@ def mode_figure(model: ModalModel) -> Figure:
 def _draw(axes: PolarAxes, vector: NDArray[np.complex128], labels: tuple[str, ...]) -> None:
     largest = vector[np.argmax(np.abs(vector))]
     scaled = vector / largest if largest != 0 else vector
+    one_node = len({label.split(":")[0] for label in labels}) == 1
     for number, (component, label) in enumerate(zip(scaled, labels, strict=True)):
         style = {"color": COLOURS[number % len(COLOURS)], "linestyle": LINE_STYLES[number % len(LINE_STYLES)]}
         axes.plot(
@@ -42,7 +43,7 @@ def _draw(axes: PolarAxes, vector: NDArray[np.complex128], labels: tuple[str, ..
             marker="o",
             markevery=[1],
             markersize=3.5,
-            label=label.split(":")[-1],
+            label=label.split(":")[-1] if one_node else label,
             **style,
         )
     axes.set_ylim(0, 1.1)

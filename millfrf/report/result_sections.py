@@ -12,13 +12,13 @@ from ..chain.fit import chart_from_json
 from ..figures.embed import as_data_uri
 from ..figures.frf_figure import FrfCurves, coherent_lines, frf_figures
 from ..figures.input_figure import input_figure
-from ..figures.mode_figure import mode_figure
 from ..figures.stabilisation_figure import stabilisation_figure
 from ..progress import Watch
 from ..tables import error_table, mode_table
 from .collect import Collected, SourceFile
 from .indicator_part import has_lines, indicator_part
 from .section import Picture, Section
+from .shape_part import shape_part
 
 Band = tuple[float, float]
 
@@ -118,12 +118,10 @@ def mode_section(collected: Collected) -> Section:
             shown, peaks = _indicators(collected, file, model)
             pictures += shown
             sentences += peaks
-        if len(model.responses) > 1 and len(model.poles):
-            caption = (
-                f"{file.path.name}: modal vectors in the complex plane, each scaled to its largest component. Right "
-                "and left vectors agree where the structure is reciprocal; components on one line are a real mode."
-            )
-            pictures.append(Picture(as_data_uri(mode_figure(model)), caption, "Modal vectors"))
+        shape_tables, shape_pictures, shape_sentences = shape_part(file.path.name, model)
+        tables += shape_tables
+        pictures += shape_pictures
+        sentences += shape_sentences
     return Section("Modal model", tuple(sentences), tuple(tables), tuple(pictures))
 
 

@@ -29,7 +29,11 @@ def test_the_example_finds_its_modes(example: ModuleType, tmp_path: Path, capsys
     said = capsys.readouterr().out
     assert "modes fitted: 22.00 Hz, 48.00 Hz, 48.40 Hz, 71.00 Hz, 104.00 Hz" in said
     assert "(curve 2)" in said
-    assert (tmp_path / "mode_indicators.png").stat().st_size > 10_000
+    measures = [float(word) for word in said.partition("MPC: ")[2].split(", ")]
+    assert measures[3] < 0.95  # the complex mode, and it alone
+    assert min(measures[:3] + measures[4:]) > 0.99
+    for picture in ("mode_indicators", "auto_mac", "mode_vectors"):
+        assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
 
 
 @pytest.fixture(scope="module")
@@ -58,3 +62,17 @@ def test_indicators_stand_in_the_report_and_tell_modes_that_were_left_out(folder
     assert "mode indicators of the FRF" in full
     assert "without a mode at" not in full
     assert "without a mode at" in fewer
+
+
+def test_shapes_are_measured_in_the_report_and_by_inspect(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    full = words(folder / "model.html")
+    assert "mode shapes (right vectors, 12 points)" in full
+    assert "auto-MAC of the right vectors" in full
+    capsys.readouterr()
+    assert run(["inspect", str(folder / "model.json")]) == 0
+    said = capsys.readouterr().out
+    assert "Mode shapes (right vectors, 12 points)" in said
+    assert "12 points (1:+Z ... 12:+Z)" in said
+    [row] = [line.split() for line in said.partition("Mode shapes")[2].splitlines() if " 71.0" in line]
+    assert float(row[2]) < 0.95
+    assert float(row[3]) > 3
