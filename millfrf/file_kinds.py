@@ -12,13 +12,19 @@ from estimation import is_geometry_table
 from foundation import FileFormatError, InputError
 
 RECORDING, FRF, MODEL, LOBES, CUTTING = "recording", "frf", "modal model", "lobes", "cutting data"
-GEOMETRY = "geometry"
-_FORMATS = {"millfrf.recording": RECORDING, "millfrf.frf": FRF, "millfrf.modal_model": MODEL}
+GEOMETRY, CHATTER = "geometry", "chatter verdicts"
+_FORMATS = {
+    "millfrf.recording": RECORDING,
+    "millfrf.frf": FRF,
+    "millfrf.modal_model": MODEL,
+    "millfrf.chatter": CHATTER,
+}
 _LOBES_COLUMNS = ["spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation"]
 
 
 def kind_of(path: str | os.PathLike[str]) -> str:
-    """``recording``, ``frf``, ``modal model``, ``lobes``, ``cutting data`` or ``geometry``.
+    """``recording``, ``frf``, ``modal model``, ``lobes``, ``cutting data``, ``geometry`` or ``chatter
+    verdicts``.
 
     Raises
     ------
@@ -37,7 +43,7 @@ def kind_of(path: str | os.PathLike[str]) -> str:
     kind = _hdf5_kind(file) if h5py.is_hdf5(file) else _text_kind(file)
     if kind is None:
         raise FileFormatError(
-            f"{file} is no recording, FRF, modal model, table of lobes, cutting file or geometry; "
+            f"{file} is no recording, FRF, modal model, table of lobes, cutting file, geometry or chatter verdicts; "
             "turn files of other programs into one of them with 'millfrf convert'"
         )
     return kind

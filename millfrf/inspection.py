@@ -13,11 +13,14 @@ from estimation import Frf, Geometry, read_frf, read_geometry
 from modal_fit import read_modal_model
 from stability import STATUSES, read_lobes
 
-from .file_kinds import CUTTING, FRF, GEOMETRY, LOBES, MODEL, RECORDING, kind_of
+from .chain.chatter import tone_table, verdict_table
+from .chain.chatter_file import read_cuts
+from .file_kinds import CHATTER, CUTTING, FRF, GEOMETRY, LOBES, MODEL, RECORDING, kind_of
 from .gate import check_frf, check_model, doubts_of, read_checked_cutting, stored_doubts
 from .gate.signals import level_table, look
 from .point_words import points_in_words
 from .progress import Watch, silent
+from .provenance import read_provenance
 from .shape_table import shape_table
 from .tables import Table, error_table, mode_table
 from .tap_concerns import tap_concerns
@@ -63,6 +66,7 @@ def inspect_file(path: str | os.PathLike[str], watch: Watch = silent) -> Finding
         LOBES: _lobes,
         CUTTING: _cutting,
         GEOMETRY: _geometry,
+        CHATTER: _chatter,
     }
     return readers[kind](path)
 
@@ -169,6 +173,15 @@ def _lobes(path: str | os.PathLike[str]) -> Findings:
     summary += f"; {', '.join(counts)}"
     concerns = ("no depth limit at any speed",) if not np.isfinite(depths).any() else ()
     return Findings(LOBES, summary, concerns=concerns)
+
+
+def _chatter(path: str | os.PathLike[str]) -> Findings:
+    cuts = [one.cut for one in read_cuts(path)]
+    tables = [verdict_table(cuts)]
+    if any(cut.verdict.foreign for cut in cuts):
+        tables.append(tone_table(cuts))
+    concerns = read_provenance(path).get("warnings", [])
+    return Findings(CHATTER, f"verdicts on {len(cuts)} cuts", tuple(tables), tuple(str(one) for one in concerns))
 
 
 def _cutting(path: str | os.PathLike[str]) -> Findings:

@@ -52,7 +52,7 @@ def add_to_json(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> 
 
 
 def read_provenance(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """What an FRF, a model or a table of lobes says of its making; empty where it says nothing that can be read."""
+    """What an FRF, a model, lobes or verdicts say of their making; empty where they say nothing that can be read."""
     try:
         if Path(path).suffix.lower() == ".csv":
             stored = _of_lobes(Path(path))
@@ -69,6 +69,19 @@ def read_provenance(path: str | os.PathLike[str]) -> dict[str, Any]:
 def of_lobes(inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any]) -> str:
     """Provenance of a table of lobes as one line of JSON: files with hashes, options, versions."""
     return json.dumps({"step": "lobes", "sources": sources(inputs), "options": dict(options), "versions": versions()})
+
+
+def of_chatter(
+    inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any], warnings: Sequence[str]
+) -> dict[str, Any]:
+    """Provenance of verdicts on cuts: files with hashes, options, warnings, versions."""
+    return {
+        "step": "chatter",
+        "sources": sources(inputs),
+        "options": dict(options),
+        "warnings": list(warnings),
+        "versions": versions(),
+    }
 
 
 def _of_lobes(path: Path) -> Any:

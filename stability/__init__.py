@@ -2,7 +2,16 @@
 
 from .boundary import StabilityBoundary, StabilityGrid, stability_grid, trace_boundary
 from .certified import certified_lobes
-from .chatter import ChatterVerdict, Evidence, ForeignTone, ModelledCut, classify_cut, gather_evidence
+from .chatter import (
+    ChatterVerdict,
+    CutSpectrum,
+    Evidence,
+    ForeignTone,
+    ModelledCut,
+    classify_cut,
+    cut_spectrum,
+    gather_evidence,
+)
 from .collocation import collocation, collocation_limits, lowest_limits
 from .delay_system import DelaySystem, delay_system
 from .limit_band import LimitBand, limit_band
@@ -24,6 +33,7 @@ from .zero_order import zero_order
 __all__ = [
     "STATUSES",
     "ChatterVerdict",
+    "CutSpectrum",
     "DelaySystem",
     "Evidence",
     "ForeignTone",
@@ -43,6 +53,7 @@ __all__ = [
     "classify_cut",
     "collocation",
     "collocation_limits",
+    "cut_spectrum",
     "delay_system",
     "depth_errors",
     "drawn",

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Stream, names
+from .options import Stream, check_output, names
 
 
 def chatter(
@@ -21,6 +21,9 @@ def chatter(
         Path | None, typer.Option("--model", metavar="MODEL.json", help="Structure: its modes tell the frequency.")
     ] = None,
     stream: Stream = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="CHATTER.json", help="Verdicts and spectra, for millfrf report.")
+    ] = None,
 ) -> None:
     """Classify cuts as stable, Hopf chatter, period doubling or inconclusive from their vibration.
 
@@ -28,7 +31,8 @@ def chatter(
     or from the set-up), its orders are taken away, and lines that stand out of the noise are named: chatter, or a
     foreign tone. Where the cutting file gives the feed, a vibration is also judged by what it does to the chip. Where
     it gives a runout, teeth are taken to cut unequal chips: with an even number of teeth, period doubling is then only
-    told while it grows, or where the chip changes by more than runout explains.
+    told while it grows, or where the chip changes by more than runout explains. With --out, verdicts, warnings and
+    spectra are kept for `millfrf report`.
     """
     from math import nan
 
@@ -42,10 +46,15 @@ def chatter(
         tone_table,
         verdict_table,
     )
+    from ..chain.chatter_file import write_cuts
+    from ..chain.chatter_spectra import keep_spectra
     from ..gate import read_checked_cutting
     from ..progress import bar
+    from ..provenance import of_chatter
     from ..tables import show
 
+    if out is not None:
+        check_output(out, (".json",), [*recordings, cutting, *([] if model is None else [model])])
     process, doubts = read_checked_cutting(cutting)
     structure = None if model is None else read_modal_model(model)
     chip = process.thickest_chip or nan
@@ -62,3 +71,9 @@ def chatter(
         typer.echo(f"{cut.name}: {cut.verdict.kind}: {cut.verdict.reason}")
         for doubt in cut.doubts:
             typer.echo(f"warning: {doubt}", err=True)
+    if out is not None:
+        told = [*doubts, *(doubt for cut in cuts for doubt in cut.doubts)]
+        inputs = [*recordings, cutting, *([] if model is None else [model])]
+        asked = {"speed_rpm": speed, "responses": list(options.responses), "stream": stream}
+        write_cuts(out, keep_spectra(recordings, cuts, options, bar), of_chatter(inputs, asked, told))
+        typer.echo(f"wrote {out}")

@@ -10,7 +10,7 @@ from .options import Band, Output, check_band, check_output
 
 def report(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILES...", help="Recordings, FRFs, models, lobes, cutting file.")
+        list[Path], typer.Argument(metavar="FILES...", help="Recordings, FRFs, models, lobes, verdicts, cutting file.")
     ],
     out: Output,
     title: Annotated[str, typer.Option("--title", help="Title of the report.")] = "In-process FRF and modal fit",

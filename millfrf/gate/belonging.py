@@ -37,6 +37,7 @@ MADE_OF: dict[str, tuple[tuple[str, ...], ...]] = {
     "frf": (("recording",),),
     "modal model": (("recording", "frf", "modal model"),),
     "lobes": (("frf", "modal model"), ("cutting data",)),
+    "chatter verdicts": (("cutting data",),),
 }
 """For each kind, groups of kinds that it is made of: one file of each group is expected, where any of it is given."""
 

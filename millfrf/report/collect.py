@@ -13,7 +13,8 @@ from foundation import InputError
 from modal_fit import ModalModel, read_modal_model
 from stability import StabilityLobes, read_lobes
 
-from ..file_kinds import CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
+from ..chain.chatter_file import KeptCut, read_cuts
+from ..file_kinds import CHATTER, CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
 from ..gate import Given, check_belonging, read_checked_cutting
 from ..provenance import read_provenance, sha256
 
@@ -55,7 +56,7 @@ class Collected:
     ----------
     files
         In the order given.
-    recordings, frfs, models, lobes, cutting
+    recordings, frfs, models, lobes, cutting, chatter
         By kind, with the file each came from.
     doubts
         Files that do not belong together, and FRFs that look wrong; one sentence each.
@@ -68,6 +69,7 @@ class Collected:
     lobes: tuple[tuple[SourceFile, StabilityLobes], ...] = ()
     cutting: tuple[tuple[SourceFile, MillingProcess], ...] = field(default=())
     doubts: tuple[str, ...] = ()
+    chatter: tuple[tuple[SourceFile, tuple[KeptCut, ...]], ...] = ()
 
     def model_of(self, file: SourceFile, frf: Frf) -> tuple[SourceFile, ModalModel] | None:
         """The model fitted to an FRF, or else one of the same degrees of freedom."""
@@ -101,7 +103,7 @@ def collect(paths: Sequence[str | os.PathLike[str]]) -> Collected:
         No file, or one that cannot be used.
     """
     if not paths:
-        raise InputError("no file given; name recordings, FRFs, models, lobes or a cutting file")
+        raise InputError("no file given; name recordings, FRFs, models, lobes, verdicts or a cutting file")
     files = tuple(_source(Path(path)) for path in paths)
 
     def chosen(kind: str) -> tuple[SourceFile, ...]:
@@ -119,12 +121,13 @@ def collect(paths: Sequence[str | os.PathLike[str]]) -> Collected:
         tuple((file, read_lobes(file.path)) for file in chosen(LOBES)),
         tuple((file, read_checked_cutting(file.path)[0]) for file in chosen(CUTTING)),
         tuple(doubts),
+        tuple((file, read_cuts(file.path)) for file in chosen(CHATTER)),
     )
 
 
 def _source(path: Path) -> SourceFile:
     kind = kind_of(path)
-    stored = read_provenance(path) if kind in (FRF, MODEL, LOBES) else {}
+    stored = read_provenance(path) if kind in (FRF, MODEL, LOBES, CHATTER) else {}
     if kind == CUTTING:
         stored = {"warnings": read_checked_cutting(path)[1]}
     return SourceFile(path, kind, sha256(path), stored)

@@ -16,6 +16,7 @@ from ..file_kinds import MODEL
 from ..gate import check_frf, check_model, doubts_of, stored_doubts
 from ..progress import Watch, silent
 from ..provenance import sha256, versions
+from .chatter_section import chatter_in_brief, chatter_section
 from .collect import Collected, SourceFile, collect
 from .comparison_section import comparison_section
 from .hammer_section import hammer_section
@@ -78,6 +79,7 @@ def report_text(collected: Collected, options: ReportOptions, watch: Watch = sil
         mode_section(collected),
         comparison_section(collected),
         stability.section,
+        chatter_section(collected),
         frf_section(collected, options.band, reference),
         input_section(collected, options.band, watch),
         settings_section(collected),
@@ -91,7 +93,7 @@ def report_text(collected: Collected, options: ReportOptions, watch: Watch = sil
         title=options.title,
         written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
-        brief=[*_in_brief(collected), *stability.brief],
+        brief=[*_in_brief(collected), *stability.brief, *chatter_in_brief(collected)],
         warnings=_warnings(collected, [*stability.warnings, *concerns]),
         sections=[section for section in sections if not section.empty],
         versions=versions(),

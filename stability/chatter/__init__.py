@@ -1,8 +1,18 @@
 """Was a recorded cut stable?"""
 
 from .classify import classify_cut
+from .cut_spectrum import CutSpectrum, cut_spectrum
 from .fitted_depth import ModelledCut
 from .motion import Evidence, gather_evidence
 from .verdict import ChatterVerdict, ForeignTone
 
-__all__ = ["ChatterVerdict", "Evidence", "ForeignTone", "ModelledCut", "classify_cut", "gather_evidence"]
+__all__ = [
+    "ChatterVerdict",
+    "CutSpectrum",
+    "Evidence",
+    "ForeignTone",
+    "ModelledCut",
+    "classify_cut",
+    "cut_spectrum",
+    "gather_evidence",
+]

@@ -1,5 +1,6 @@
 """`millfrf chatter` on recorded cuts of the simulated cell, speed and teeth as the files state them."""
 
+import html
 from math import pi
 from pathlib import Path
 
@@ -10,8 +11,10 @@ import pytest
 from acquisition import record
 from cutting import MillingProcess
 from millfrf.__main__ import run
+from millfrf.chain.chatter_file import read_cuts
 from modal_fit import write_modal_model
 from replay_data import MillingCell, dynamometer, table_one_model, tip_accelerometers
+from stability import cut_spectrum, gather_evidence
 
 SENSORS = dynamometer(0.0) + tip_accelerometers(0.0)
 CUT = """[cutting]
@@ -63,9 +66,55 @@ def test_frequency_near_a_mode_foreign_tone_and_doubt(tmp_path: Path, capsys: py
             samples[...] = samples[...] + noise + hum
     files = [str(tmp_path / "loud.h5"), str(tmp_path / "idle.h5")]
     options = ["--cutting", str(tmp_path / "cut.toml"), "--model", str(tmp_path / "model.json")]
-    assert run(["chatter", *files, *options]) == 0
+    kept = tmp_path / "chatter.json"
+    assert run(["chatter", *files, *options, "--out", str(kept)]) == 0
     shown = capsys.readouterr()
     assert "hopf" in shown.out
     assert "17.2" in shown.out
     assert "mains (1 x 50 Hz)" in shown.out
     assert "warning: idle.h5: inconclusive: no order of the spindle" in shown.err
+    assert_report_shows(kept, tmp_path / "report.html", shown.err)
+    assert run(["inspect", str(kept)]) == 0
+    assert "verdicts on 2 cuts" in capsys.readouterr().out
+
+
+def assert_report_shows(kept: Path, page: Path, warned: str) -> None:
+    """Every warning, the verdicts in brief, tones, reasons and a spectrum, also without the recordings."""
+    assert run(["report", str(kept), "--out", str(page)]) == 0
+    text = html.unescape(page.read_text(encoding="utf-8"))
+    for line in warned.splitlines():
+        assert line.removeprefix("warning: ") in text
+    assert "loud.h5 hopf at 17.2" in text
+    assert "mains (1 x 50 Hz)" in text
+    assert text.count("Spectra of judged cuts") == 1
+    [first, _] = read_cuts(kept)
+    seen = first.spectrum
+    strongest = np.nanargmax(seen.amplitude)
+    near = np.abs(seen.frequencies - first.cut.verdict.frequency) < 0.3
+    assert np.nanmax(seen.amplitude[near]) > 30 * seen.floor[near].max()
+    assert seen.amplitude[strongest] > seen.floor[strongest]
+    assert first.channel.startswith("tip_a")
+    assert first.unit == "m/s^2"
+
+
+def test_the_spectrum_is_in_the_unit_of_its_channel() -> None:
+    """A tone of 0.3 m/s^2 (rms) at 47.3 Hz beside an order of 2 m/s^2: both stand in the spectrum as they are."""
+    rate, spindle, rng = 1024.0, 10.0, np.random.default_rng(1)
+    time = np.arange(int(30 * rate)) / rate
+    order = 2 * np.sqrt(2) * np.cos(2 * pi * 2 * spindle * time)
+    tone = 0.3 * np.sqrt(2) * np.cos(2 * pi * 47.3 * time)
+    samples = (order + tone + 0.01 * rng.normal(size=len(time)))[:, None]
+    seen = cut_spectrum(gather_evidence(samples, rate, 2 * pi * spindle, 2), 100.0)
+    assert seen.order_amplitudes[np.argmin(np.abs(seen.order_frequencies - 20))] == pytest.approx(2.0, rel=1e-3)
+    near = np.abs(seen.frequencies - 47.3) < 0.4
+    assert np.sqrt(np.nansum(seen.amplitude[near] ** 2)) == pytest.approx(0.3, rel=0.03)
+    assert seen.frequencies[-1] <= 100.0
+
+
+def test_a_file_of_verdicts_that_is_damaged_is_refused_in_a_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "chatter.json").write_text('{"format": "millfrf.chatter", "format_version": 1}', encoding="utf-8")
+    assert run(["report", str(tmp_path / "chatter.json"), "--out", str(tmp_path / "page.html")]) == 2
+    assert "holds no verdicts on cuts" in capsys.readouterr().err
+    assert not (tmp_path / "page.html").exists()

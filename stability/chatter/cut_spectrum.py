@@ -1,0 +1,83 @@
+"""The spectrum in which a cut was judged, in the unit of its channel and small enough to be kept with the verdict."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .motion import Evidence
+
+Real = NDArray[np.float64]
+
+MOST_POINTS = 1500
+"""Points of a stored spectrum; each is the largest of the lines that it stands for."""
+
+
+@dataclass(frozen=True)
+class CutSpectrum:
+    """Spectrum of one channel in the second half of a recording, its spindle orders apart.
+
+    Parameters
+    ----------
+    channel
+        Its number among the channels that were judged.
+    frequencies : (n_points,)
+        Hz, increasing.
+    amplitude : (n_points,)
+        Root mean square of what does not repeat with the revolution, a line of resolution, in the unit of the samples;
+        the largest within a point. NaN where an order of the spindle hides it.
+    floor : (n_points,)
+        The same of the noise.
+    order_frequencies, order_amplitudes : (n_orders,)
+        Orders of the spindle that were taken away: Hz, and root mean square.
+    """
+
+    channel: int
+    frequencies: Real
+    amplitude: Real
+    floor: Real
+    order_frequencies: Real
+    order_amplitudes: Real
+
+
+def cut_spectrum(evidence: Evidence, highest: float) -> CutSpectrum:
+    """The channel in which lines stand out most, up to a frequency.
+
+    Parameters
+    ----------
+    evidence
+        Of the recording, see :func:`gather_evidence`.
+    highest
+        Hz; no more than was searched is shown.
+    """
+    spectrum, spindle = evidence.spectrum, evidence.track.mean_frequency
+    channel = _channel(evidence)
+    scale = float(evidence.scales[channel])
+    searched = spectrum.searched
+    top = min(highest, float(spectrum.orders[searched][-1]) * spindle)
+    shown = spectrum.orders * spindle <= top
+    left = np.where(searched, spectrum.power[:, channel], np.nan)[shown]
+    power, middles = _largest(left), _largest(spectrum.orders[shown] * spindle)
+    floor = _largest(spectrum.floor[shown, channel])
+    turn = evidence.late.mean_turn[:, channel]
+    orders = np.sqrt(2) * np.abs(np.fft.rfft(turn)) / len(turn)
+    places = np.arange(len(orders)) * spindle
+    kept = (places > 0) & (places <= top)
+    return CutSpectrum(
+        channel, middles, scale * np.sqrt(power), scale * np.sqrt(floor), places[kept], scale * orders[kept]
+    )
+
+
+def _channel(evidence: Evidence) -> int:
+    """Where the strongest line has its largest share of the motion; without lines, where least repeats."""
+    if evidence.families:
+        return int(np.argmax(evidence.families[0].lines[0].amplitude / evidence.late.size))
+    return int(np.argmax(evidence.late.residual.std(axis=0) / evidence.late.size))
+
+
+def _largest(values: Real) -> Real:
+    """At most `MOST_POINTS` points, each the largest of equally many neighbours; NaN where all are."""
+    each = -(-len(values) // MOST_POINTS)
+    padded = np.concatenate([values, np.full(-len(values) % each, np.nan)]).reshape(-1, each)
+    largest = np.where(np.isnan(padded), -np.inf, padded).max(axis=1)
+    return np.where(np.isfinite(largest), largest, np.nan)
