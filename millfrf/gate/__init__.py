@@ -21,7 +21,7 @@ from .looking import doubts_of
 from .model_and_recordings import check_model_and_recordings
 from .models import check_model, fit_doubts, stored_doubts
 from .plans import check_demand, check_duration
-from .recordings import check_recordings, doubts_of_rate
+from .recordings import check_channels, check_recordings, doubts_of_rate
 from .sample_rates import check_sample_rates, gain_of
 from .scales import check_scales
 from .spindle import check_depth, check_speed, check_speeds, lowest_frequency, rigid_directions
@@ -45,6 +45,7 @@ __all__ = [
     "check_model",
     "check_model_and_recordings",
     "check_one_speed",
+    "check_channels",
     "check_recordings",
     "check_records",
     "check_sample_rates",

@@ -26,6 +26,10 @@ BELIEVED = {
 accelerometers end at 1e6 m/s^2, dynamometers at 1e6 N)."""
 
 
+NAME_OTHERS = "name the other channels with --excitation and --response"
+"""What a job offers whose channels can be chosen."""
+
+
 def check_recordings(
     paths: Sequence[str | os.PathLike[str]],
     *,
@@ -80,8 +84,11 @@ def check_channels(
     excluding: bool = False,
     watch: Watch = silent,
     segments: Segmentation | None = None,
+    remedy: str = NAME_OTHERS,
 ) -> list[str]:
     """As :func:`check_recordings`, with the names of exciting and responding channels told by ``chosen``.
+
+    ``remedy`` says what to do about a channel that is dead or copies another, besides checking its cable.
 
     Raises
     ------
@@ -98,7 +105,7 @@ def check_channels(
             idle = [level.channel.name for level in seen.levels[: len(exciting)] if level.n_samples and not level.peak]
             silent_in.update({name: Path(path).name for name in idle})
             alive |= set(exciting) - set(idle)
-            found = _check_stream(source, seen, set(idle), excluding)
+            found = _check_stream(source, seen, set(idle), excluding, remedy)
             if segments is not None:
                 refuse_taps(source, seen.levels[: len(exciting)], segments)
             if recording.complete is False:
@@ -107,7 +114,7 @@ def check_channels(
         doubts += [f"{Path(path).name}: {doubt}" for doubt in found]
     for name, file in silent_in.items():
         if name not in alive:
-            raise InputError(_dead(file, name, "every sample is 0"))
+            raise InputError(_dead(file, name, "every sample is 0", remedy))
     return doubts
 
 
@@ -129,21 +136,21 @@ def _look(stream: Stream, names: Sequence[str], watch: Watch) -> Look:
     return look(stream, names, watch)
 
 
-def _check_stream(stream: Stream, seen: Look, idle: set[str], excluding: bool) -> list[str]:
+def _check_stream(stream: Stream, seen: Look, idle: set[str], excluding: bool, remedy: str) -> list[str]:
     """One stream; ``idle`` excitations are zero throughout, which another test of the job may make good."""
     for level in [level for level in seen.levels if level.channel.name not in idle]:
-        _refuse(level, stream.path.name, excluding)
+        _refuse(level, stream.path.name, excluding, remedy)
     for one, other in seen.copies.equal_pairs():
         raise InputError(
             f"{stream.path.name}: channel {other} holds the same samples as {one}; check the cables and the mapping, "
-            "or name the channels that were measured with --excitation and --response"
+            f"or {remedy}"
         )
     if excluding:
         return []
     return [text for text in seen.concerns(stream.sample_rate) if "(dead channel)" not in text]
 
 
-def _refuse(level: ChannelLevel, file: str, excluding: bool) -> None:
+def _refuse(level: ChannelLevel, file: str, excluding: bool, remedy: str) -> None:
     """Refuse a channel that gives nothing or nothing that can be."""
     name, unit = level.channel.name, level.channel.unit
     if level.n_missing and not excluding:
@@ -159,11 +166,8 @@ def _refuse(level: ChannelLevel, file: str, excluding: bool) -> None:
         )
     if level.n_samples == 0 or level.deviation <= 1e-12 * level.peak:
         value = f"every sample is {level.mean:g}" if level.n_samples else "no sample is finite"
-        raise InputError(_dead(file, name, value))
+        raise InputError(_dead(file, name, value, remedy))
 
 
-def _dead(file: str, name: str, value: str) -> str:
-    return (
-        f"{file}: channel {name} is dead ({value}); check cable and supply, or name the other channels with "
-        "--excitation and --response"
-    )
+def _dead(file: str, name: str, value: str, remedy: str) -> str:
+    return f"{file}: channel {name} is dead ({value}); check cable and supply, or {remedy}"

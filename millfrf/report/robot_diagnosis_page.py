@@ -1,6 +1,7 @@
 """The page that a robot's diagnosis leaves behind."""
 
 import os
+from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
@@ -21,7 +22,11 @@ from .section import Picture, Section
 
 
 def write_robot_report(
-    path: str | os.PathLike[str], found: RobotDiagnosis, robot_name: str, summary: list[str]
+    path: str | os.PathLike[str],
+    found: RobotDiagnosis,
+    robot_name: str,
+    summary: list[str],
+    doubts: Sequence[str] = (),
 ) -> None:
     """Write one HTML page, figures inside, that needs no other file and no network.
 
@@ -35,6 +40,8 @@ def write_robot_report(
         For the title.
     summary
         Verdict, a sentence on it, and a line for each cause and held-out recording.
+    doubts
+        About the recordings, one sentence each.
     """
     environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
     names = ", ".join(one.name for one in found.setting.recordings)
@@ -44,7 +51,7 @@ def write_robot_report(
         style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
         verdict=f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",
         answers=[("What was found", summary[2:] or ["Nothing to change."])],
-        warnings=_warnings(found),
+        warnings=[*doubts, *_warnings(found)],
         sections=[_spectra(found), _candidates(found), _postures(found)],
         versions=versions(),
     )

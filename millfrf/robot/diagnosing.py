@@ -12,6 +12,7 @@ from mismatch import LabError
 from mismatch.robot_causes import (
     PosedRecording,
     diagnose_robot,
+    posed_channels,
     read_posed,
     write_robot_diagnosis,
 )
@@ -19,6 +20,7 @@ from modal_fit import write_modal_model
 from robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot, tool_down
 
 from ..commands.options import check_band
+from ..gate import check_channels
 from ..progress import bar
 from ..report.robot_diagnosis_page import write_robot_report
 from ..result_folder import refuse_file
@@ -29,6 +31,9 @@ Real = NDArray[np.float64]
 
 LOWEST, HIGHEST = 0.4, 1.3
 """Band that is compared where none is given: from so many times the first mode to so many times the fourth."""
+
+LEAVE_OUT = "record again, without the channel if that axis is not measured"
+"""Remedy of a channel that cannot be used; all of the tip and the housing are."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +60,8 @@ def diagnose_robot_files(robot: str, paths: Sequence[Path], out: Path, asking: A
     """
     refuse_file(out)
     case = spatial(read_robot(robot))
+    _refuse_unlike(paths, asking)
+    doubts = _doubts(paths, asking.stream)
     recordings = _recordings(case, paths, asking)
     with bar("diagnosing"):
         found = diagnose_robot(
@@ -66,7 +73,7 @@ def diagnose_robot_files(robot: str, paths: Sequence[Path], out: Path, asking: A
             error=asking.error,
         )
     out.mkdir(parents=True, exist_ok=True)
-    write_robot_diagnosis(out / "robot_diagnosis.json", found)
+    write_robot_diagnosis(out / "robot_diagnosis.json", found, doubts)
     improved, offset = found.improved_robot()
     for recording in recordings:
         modes = modes_at(improved, recording.q + offset)
@@ -75,11 +82,20 @@ def diagnose_robot_files(robot: str, paths: Sequence[Path], out: Path, asking: A
         write_modal_model(out / f"model_{recording.name}.json", model)
     lines = summary(found)
     with bar("writing the report"):
-        write_robot_report(out / "report.html", found, case.name, lines)
+        write_robot_report(out / "report.html", found, case.name, lines, doubts)
+    lines += [f"warning: {doubt}" for doubt in doubts]
     return [*lines, f"wrote {out / 'robot_diagnosis.json'}, {out / 'report.html'} and a model for each recording"]
 
 
-def _recordings(case: SpatialCase, paths: Sequence[Path], asking: Asking) -> list[PosedRecording]:
+def _doubts(paths: Sequence[Path], stream: str | None) -> list[str]:
+    """Judge each recording alone: a force that rests in one posture tells nothing there of the robot."""
+    return [
+        doubt for path in paths for doubt in check_channels([path], posed_channels, stream, watch=bar, remedy=LEAVE_OUT)
+    ]
+
+
+def _refuse_unlike(paths: Sequence[Path], asking: Asking) -> None:
+    """One posture a recording, one name a recording, and all of them there."""
     if len(asking.poses) != len(paths):
         raise InputError(
             f"{len(asking.poses)} postures for {len(paths)} recordings; give --pose once for each, in the same order"
@@ -90,6 +106,9 @@ def _recordings(case: SpatialCase, paths: Sequence[Path], asking: Asking) -> lis
     for path in paths:
         if not path.is_file():
             raise InputError(f"no file {path}; check the name")
+
+
+def _recordings(case: SpatialCase, paths: Sequence[Path], asking: Asking) -> list[PosedRecording]:
     axes = np.eye(3) if asking.feed is None else tool_down([0.0, 0.0, 0.0], np.radians(asking.feed)).axes
     postures = [close_loops(case.robot.mechanism, _driven(case, pose)) for pose in asking.poses]
     band = check_band(asking.band) or _band(case, postures)

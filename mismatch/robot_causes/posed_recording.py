@@ -1,14 +1,14 @@
 """`PosedRecording`: one recording, the posture it was made in, and its lines that are compared with a robot's model."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Recording
+from acquisition import Recording, Stream
 from foundation import InputError
 from modal_fit import ModalModel
 
@@ -92,6 +92,20 @@ def posed(
         )
     turn = np.eye(3) if axes is None else np.asarray(axes, dtype=float)
     return PosedRecording(np.asarray(q, dtype=float), turn, tuple(responses), tuple(excitations), lines)
+
+
+def posed_channels(stream: Stream) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the channels that a robot's diagnosis uses: forces at the tip, and motions at the tip or the housing."""
+
+    def named(quantities: Collection[str], labels: Sequence[str]) -> tuple[str, ...]:
+        wanted = {_axis(*label.split(":")) for label in labels}
+        return tuple(
+            c.name
+            for c in stream.channels
+            if c.node and c.quantity in quantities and _axis(c.node, c.direction) in wanted
+        )
+
+    return named(("force",), TIP), named(POWERS, (*TIP, *HOUSING))
 
 
 def read_posed(

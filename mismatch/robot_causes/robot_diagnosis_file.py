@@ -1,6 +1,7 @@
 """Robot diagnosis files: JSON, format ``millfrf.robot_diagnosis`` version 1."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -47,12 +48,12 @@ def _plain(cause: RobotCause) -> dict[str, Any]:
     return content
 
 
-def write_robot_diagnosis(path: str | os.PathLike[str], diagnosis: RobotDiagnosis) -> None:
-    """Write a robot diagnosis whole.
+def write_robot_diagnosis(path: str | os.PathLike[str], diagnosis: RobotDiagnosis, doubts: Sequence[str] = ()) -> None:
+    """Write a robot diagnosis whole, with doubts about its recordings.
 
     Raises
     ------
     InputError
         The folder cannot be written to.
     """
-    write_content(path, robot_diagnosis_content(diagnosis))
+    write_content(path, robot_diagnosis_content(diagnosis) | {"warnings": list(doubts)})

@@ -60,7 +60,7 @@ def cut_spectrum(evidence: Evidence, highest: float) -> CutSpectrum:
     power, middles = _largest(left), _largest(spectrum.orders[shown] * spindle)
     floor = _largest(spectrum.floor[shown, channel])
     turn = evidence.late.mean_turn[:, channel]
-    orders = np.sqrt(2) * np.abs(np.fft.rfft(turn)) / len(turn)
+    orders: Real = np.sqrt(2) * np.abs(np.fft.rfft(turn)).astype(float) / len(turn)
     places = np.arange(len(orders)) * spindle
     kept = (places > 0) & (places <= top)
     return CutSpectrum(

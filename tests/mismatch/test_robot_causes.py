@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -111,17 +112,25 @@ def test_one_direction_in_one_posture_leaves_a_class(tmp_path: Path, capsys: pyt
     truth = with_joint_factor(ROBOT, "1", 0.7)
     trial = milled(truth, POSTURES[0], 0, labels=("TCP:+Y",), seconds=16.0, noise=0.1)
     recording = write(tmp_path / "sideways.h5", trial)
+    with h5py.File(recording, "r+") as file:
+        file.attrs["complete"] = False
     out = tmp_path / "found"
     pose = ",".join(str(angle) for angle in POSTURES[0])
     options = ["--pose", pose, "--band", "5", "22", "--out", str(out)]
     assert run(["robot", "diagnose", NAME, str(recording), *options]) == DONE
-    assert "cannot be told from" in capsys.readouterr().out
+    said = capsys.readouterr()
+    assert "cannot be told from" in said.out
+    doubt = "sideways.h5: the recording was not closed in order: its end may be missing"
+    assert f"warning: {doubt}" in said.err
     content = json.loads((out / "robot_diagnosis.json").read_text())
     assert content["format"] == "millfrf.robot_diagnosis"
     assert content["verdict"] == "class"
     named = {content["causes"][0]["name"], *content["equivalents"]}
     assert named >= {"joint 1 stiffness", "links"}
-    assert "Verdict" in (out / "report.html").read_text()
+    assert content["warnings"] == [doubt]
+    page = (out / "report.html").read_text()
+    assert "Verdict" in page
+    assert doubt in page
     model = read_modal_model(out / "model_sideways.json")
     lowest = modes_at(truth, np.radians(POSTURES[0])).frequencies[0]
     assert model.natural_frequencies[0] == pytest.approx(lowest, rel=0.02)
