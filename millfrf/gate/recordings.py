@@ -70,7 +70,7 @@ def check_recordings(
         or a channel that copies another; taps of a hammer where segments would spoil them.
     """
 
-    def chosen(source: Stream) -> tuple[list[str], list[str]]:
+    def chosen(source: Stream) -> tuple[Sequence[str], Sequence[str]]:
         exciting, responding = choose_channels(source, excitations or None, responses or None)
         return [channel.name for channel in exciting], [channel.name for channel in responding]
 
@@ -79,7 +79,7 @@ def check_recordings(
 
 def check_channels(
     paths: Sequence[str | os.PathLike[str]],
-    chosen: Callable[[Stream], tuple[list[str], list[str]]],
+    chosen: Callable[[Stream], tuple[Sequence[str], Sequence[str]]],
     stream: str | None = None,
     excluding: bool = False,
     watch: Watch = silent,

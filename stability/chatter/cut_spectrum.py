@@ -60,8 +60,8 @@ def cut_spectrum(evidence: Evidence, highest: float) -> CutSpectrum:
     power, middles = _largest(left), _largest(spectrum.orders[shown] * spindle)
     floor = _largest(spectrum.floor[shown, channel])
     turn = evidence.late.mean_turn[:, channel]
-    orders: Real = np.sqrt(2) * np.abs(np.fft.rfft(turn)).astype(float) / len(turn)
-    places = np.arange(len(orders)) * spindle
+    orders = np.asarray(np.sqrt(2) * np.abs(np.fft.rfft(turn)) / len(turn), dtype=float)
+    places = np.arange(len(orders), dtype=float) * spindle
     kept = (places > 0) & (places <= top)
     return CutSpectrum(
         channel, middles, scale * np.sqrt(power), scale * np.sqrt(floor), places[kept], scale * orders[kept]
