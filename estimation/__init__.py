@@ -47,6 +47,7 @@ from .known_band import known_band
 from .local_polynomial import local_polynomial
 from .order_tracking import excitation_map, spectrogram, track_order
 from .quantities import correct_high_pass, to_receptance
+from .reciprocity import ReciprocityPair, SharedPoint, reciprocity_pairs, shared_points
 from .recording_spectra import choose_channels, cross_spectra
 from .spectral_accumulator import SpectralAccumulator
 from .stacking import sum_tests
@@ -71,6 +72,8 @@ __all__ = [
     "InputIndependence",
     "JudgedTap",
     "MergedTaps",
+    "ReciprocityPair",
+    "SharedPoint",
     "SpectralAccumulator",
     "SpectralSettings",
     "SweepDemand",
@@ -119,8 +122,10 @@ __all__ = [
     "read_frf",
     "read_frf_uff",
     "read_geometry",
+    "reciprocity_pairs",
     "screened",
     "settings_for",
+    "shared_points",
     "spectrogram",
     "sum_tests",
     "tap_sums",

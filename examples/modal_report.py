@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from estimation import Frf
+from estimation import Frf, reciprocity_pairs
 from millfrf.figures.embed import save_figure
 from millfrf.figures.indicator_figure import indicator_figure
+from millfrf.figures.reciprocity_figure import reciprocity_figure
 from millfrf.figures.shape_figure import assurance_figure, compass_figure
 from modal_fit import (
     ModalModel,
@@ -20,6 +21,7 @@ from modal_fit import (
     mode_shapes,
     multivariate_mode_indicator,
 )
+from replay_data import table_one_model
 
 BAND = (10.0, 120.0)
 FREQUENCIES = (22.0, 48.0, 48.4, 71.0, 104.0)
@@ -63,6 +65,8 @@ def main(folder: Path) -> None:
     shapes = mode_shapes(model)
     save_figure(assurance_figure(model, shapes), folder / "auto_mac.png")
     save_figure(compass_figure(model, shapes), folder / "mode_vectors.png")
+    robot = table_one_model().frf(np.arange(12.0, 26.0, 0.05))
+    save_figure(reciprocity_figure(reciprocity_pairs(robot), robot.unit), folder / "reciprocity.png")
     print("modes fitted:", ", ".join(f"{f:.2f} Hz" for f in model.natural_frequencies))
     peaks = [f"{peak.frequency:.1f} Hz (curve {peak.curve})" for peak in indicator.peaks()]
     print("peaks of the CMIF:", ", ".join(peaks))

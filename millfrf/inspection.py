@@ -16,11 +16,20 @@ from stability import STATUSES, read_lobes
 from .chain.chatter import tone_table, verdict_table
 from .chain.chatter_file import read_cuts
 from .file_kinds import CHATTER, CUTTING, FRF, GEOMETRY, LOBES, MODEL, RECORDING, kind_of
-from .gate import check_frf, check_model, doubts_of, read_checked_cutting, stored_doubts
+from .gate import (
+    check_frf,
+    check_model,
+    check_model_reciprocity,
+    check_reciprocity,
+    doubts_of,
+    read_checked_cutting,
+    stored_doubts,
+)
 from .gate.signals import level_table, look
 from .point_words import points_in_words
 from .progress import Watch, silent
 from .provenance import read_provenance
+from .reciprocity_tables import pair_table, vector_table
 from .shape_table import shape_table
 from .tables import Table, error_table, mode_table
 from .tap_concerns import tap_concerns
@@ -129,9 +138,11 @@ def _frf(path: str | os.PathLike[str]) -> Findings:
         f"{frf.quantity} in {frf.unit}, {f[0]:g} to {f[-1]:g} Hz in {len(f)} lines, "
         f"excited at {points_in_words(frf.excitations)}"
     )
+    concerns += check_reciprocity(frf, Path(path).name)
     concerns += stored_doubts(path)
+    pairs = pair_table(frf)
     table = Table("responses", ("response", "largest value", "at (Hz)", "median coherence"), tuple(rows))
-    return Findings(FRF, summary, (table,), tuple(concerns))
+    return Findings(FRF, summary, (table,) if pairs is None else (table, pairs), tuple(concerns))
 
 
 def _inside(frf: Frf) -> NDArray[np.bool_]:
@@ -149,13 +160,16 @@ def _model(path: str | os.PathLike[str]) -> Findings:
         if not 0 < zeta < 0.5
     ]
     concerns += doubts_of(check_model, model, Path(path).name)
+    concerns += check_model_reciprocity(model, Path(path).name)
     concerns += stored_doubts(path)
     summary = (
         f"modal model, {len(model.poles)} modes, {model.quantity} in {model.unit}, responses "
         f"{points_in_words(model.responses)}, excitations {points_in_words(model.excitations)}"
     )
     by_source = error_table(model)
-    tables = [table for table in (mode_table(model), by_source, shape_table(model)) if table is not None]
+    tables = [
+        table for table in (mode_table(model), by_source, shape_table(model), vector_table(model)) if table is not None
+    ]
     return Findings(MODEL, summary, tuple(tables), tuple(concerns))
 
 

@@ -11,7 +11,7 @@ from .indicators import (
 from .modal_model import ModalModel, Residuals
 from .modal_model_file import read_modal_model, write_modal_model
 from .mode_errors import ModeErrors
-from .mode_shapes import ModeShapes, mode_complexity, mode_shapes
+from .mode_shapes import ModeReciprocity, ModeShapes, mode_complexity, mode_reciprocity, mode_shapes
 from .polyreference import ModalFit, fit_polyreference
 from .shape_measures import modal_assurance, phase_collinearity, phase_deviation, reciprocity_residual
 from .stabilisation import PoleGroup, StabilisationChart
@@ -27,6 +27,7 @@ __all__ = [
     "ModalModel",
     "ModeErrors",
     "ModePair",
+    "ModeReciprocity",
     "ModeShapes",
     "MultivariateModeIndicator",
     "PoleGroup",
@@ -44,6 +45,7 @@ __all__ = [
     "import_modes_uff",
     "modal_assurance",
     "mode_complexity",
+    "mode_reciprocity",
     "mode_shapes",
     "multivariate_mode_indicator",
     "phase_collinearity",

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import shared_points
+
 from .modal_model import ModalModel
 
 Complex = NDArray[np.complex128]
@@ -54,13 +56,13 @@ def phase_deviation(vectors: Complex) -> NDArray[np.float64]:
 def reciprocity_residual(model: ModalModel) -> NDArray[np.float64]:
     """Share of each mode's residue matrix that is not symmetric, ``|A - A^T| / |A + A^T|``, shape (n_modes,).
 
-    Over degrees of freedom that are both responses and excitations; NaN where there are fewer than two.
+    Over points that are both excited and measured, along one axis in either direction; NaN with fewer than two.
     """
-    shared = [dof for dof in model.responses if dof in model.excitations]
+    shared = shared_points(model.responses, model.excitations)
     if len(shared) < 2:
         return np.full(len(model.poles), np.nan)
-    rows = [model.responses.index(dof) for dof in shared]
-    columns = [model.excitations.index(dof) for dof in shared]
-    residue = np.einsum("rp,rq->rpq", model.right[:, rows], model.left[:, columns])
+    right = model.right[:, [point.row for point in shared]] * [point.response_sign for point in shared]
+    left = model.left[:, [point.column for point in shared]] * [point.excitation_sign for point in shared]
+    residue = np.einsum("rp,rq->rpq", right, left)
     mirrored = residue.transpose(0, 2, 1)
     return np.asarray(np.linalg.norm(residue - mirrored, axis=(1, 2)) / np.linalg.norm(residue + mirrored, axis=(1, 2)))

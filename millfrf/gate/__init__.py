@@ -21,6 +21,7 @@ from .looking import doubts_of
 from .model_and_recordings import check_model_and_recordings
 from .models import check_model, fit_doubts, stored_doubts
 from .plans import check_demand, check_duration
+from .reciprocity import check_model_reciprocity, check_reciprocity, plainly_different, shown_pairs
 from .recordings import check_channels, check_recordings, doubts_of_rate
 from .sample_rates import check_sample_rates, gain_of
 from .scales import check_scales
@@ -45,7 +46,9 @@ __all__ = [
     "check_inputs",
     "check_model",
     "check_model_and_recordings",
+    "check_model_reciprocity",
     "check_one_speed",
+    "check_reciprocity",
     "check_recordings",
     "check_records",
     "check_sample_rates",
@@ -64,8 +67,10 @@ __all__ = [
     "fit_doubts",
     "gain_of",
     "lowest_frequency",
+    "plainly_different",
     "read_checked_cutting",
     "rigid_directions",
+    "shown_pairs",
     "stated_cut",
     "stored_doubts",
 ]

@@ -6,6 +6,7 @@ from estimation import Frf
 from foundation import Band, InputError, shared_band
 
 from .passivity import DrivePoint, drive_points, returned_power, rising_phase
+from .reciprocity import check_reciprocity
 from .sizes import size_doubts
 
 RISING = 0.5
@@ -59,14 +60,15 @@ def check_frf_for_fit(frf: Frf, band: Band, name: str = "the FRF") -> list[str]:
     Returns
     -------
     list of str
-        Doubts of :func:`check_frf`, and where the fit's band reaches beyond the FRF's by a tenth of its width or more.
+        Doubts of :func:`check_frf` and :func:`check_reciprocity`; and where
+        the fit's band reaches beyond the FRF's by a tenth of its width or more.
 
     Raises
     ------
     InputError
         As :func:`check_frf`, or where both bands have nothing in common.
     """
-    doubts = check_frf(frf, name)
+    doubts = [*check_frf(frf, name), *check_reciprocity(frf, name, band)]
     if frf.band is None:
         return doubts
     shared = shared_band(band, frf.band)

@@ -13,7 +13,14 @@ from foundation import writing_whole_file
 from modal_fit import ModalModel, read_modal_model
 
 from ..file_kinds import MODEL
-from ..gate import check_frf, check_model, doubts_of, stored_doubts
+from ..gate import (
+    check_frf,
+    check_model,
+    check_model_reciprocity,
+    check_reciprocity,
+    doubts_of,
+    stored_doubts,
+)
 from ..progress import Watch, silent
 from ..provenance import sha256, versions
 from .chatter_section import chatter_in_brief, chatter_section
@@ -21,6 +28,7 @@ from .collect import Collected, SourceFile, collect
 from .comparison_section import comparison_section
 from .hammer_section import hammer_section
 from .measurement_sections import channel_section, file_section, settings_section, setup_section
+from .reciprocity_section import reciprocity_section
 from .result_sections import frf_section, input_section, mode_section
 from .stability_section import stability_findings
 
@@ -81,6 +89,7 @@ def report_text(collected: Collected, options: ReportOptions, watch: Watch = sil
         stability.section,
         chatter_section(collected),
         frf_section(collected, options.band, reference),
+        reciprocity_section(collected),
         input_section(collected, options.band, watch),
         settings_section(collected),
         hammer_section(collected),
@@ -129,5 +138,7 @@ def _warnings(collected: Collected, concerns: Sequence[str]) -> list[str]:
     found += [f"{file.path.name}: {warning}" for file, lobes in collected.lobes for warning in lobes.warnings]
     found += [doubt for file, frf in collected.frfs for doubt in doubts_of(check_frf, frf, file.path.name)]
     found += [doubt for file, model in collected.models for doubt in doubts_of(check_model, model, file.path.name)]
+    found += [doubt for file, frf in collected.frfs for doubt in check_reciprocity(frf, file.path.name)]
+    found += [doubt for file, model in collected.models for doubt in check_model_reciprocity(model, file.path.name)]
     found += [doubt for file, _ in collected.models for doubt in stored_doubts(file.path)]
     return list(dict.fromkeys([*collected.doubts, *found, *concerns]))

@@ -32,7 +32,7 @@ def test_the_example_finds_its_modes(example: ModuleType, tmp_path: Path, capsys
     measures = [float(word) for word in said.partition("MPC: ")[2].split(", ")]
     assert measures[3] < 0.95  # the complex mode, and it alone
     assert min(measures[:3] + measures[4:]) > 0.99
-    for picture in ("mode_indicators", "auto_mac", "mode_vectors"):
+    for picture in ("mode_indicators", "auto_mac", "mode_vectors", "reciprocity"):
         assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
 
 
@@ -73,6 +73,24 @@ def test_shapes_are_measured_in_the_report_and_by_inspect(folder: Path, capsys: 
     said = capsys.readouterr().out
     assert "Mode shapes (right vectors, 12 points)" in said
     assert "12 points (1:+Z ... 12:+Z)" in said
-    [row] = [line.split() for line in said.partition("Mode shapes")[2].splitlines() if " 71.0" in line]
+    [row] = [
+        line.split()
+        for line in said.partition("Mode shapes")[2].partition("Reciprocity")[0].splitlines()
+        if " 71.0" in line
+    ]
     assert float(row[2]) < 0.95
     assert float(row[3]) > 3
+
+
+def test_pairs_that_were_measured_both_ways_are_compared(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Points 2 and 11 of the beam are hit and measured: reciprocal, but for noise."""
+    full = words(folder / "model.html")
+    assert "FRFs that were measured both ways" in full
+    assert "left against right vectors on 2 shared points" in full
+    capsys.readouterr()
+    assert run(["inspect", str(folder / "frf.h5")]) == 0
+    said = capsys.readouterr().out
+    [row] = [line.split() for line in said.splitlines() if line.strip().startswith("2:Z / 11:Z")]
+    assert float(row[3]) < 5
+    assert float(row[4]) > 0.99
+    assert "not reciprocal" not in said

@@ -295,6 +295,7 @@ FRF_CHANGES: dict[str, Callable[[Frf], Frf]] = {
     "mm": lambda one: replace(one, values=1e3 * one.values),
     "reversed sensor": lambda one: replace(one, values=-one.values),
     "two responses swapped": lambda one: replace(one, values=one.values[:, [1, 0, 2]]),
+    "one entry turned": lambda one: replace(one, values=one.values * [[1, -1, 1], [1, 1, 1], [1, 1, 1]]),
     "another structure": lambda one: replace(one, frequencies=2.3 * one.frequencies),
     "poor": _poor,
     "shorter axis": lambda one: replace(
