@@ -5,6 +5,7 @@ import numpy as np
 from estimation import Frf
 from foundation import Band, InputError, shared_band
 
+from .incoherence import incoherence_doubts
 from .passivity import DrivePoint, drive_points, returned_power, rising_phase
 from .reciprocity import check_reciprocity
 from .sizes import size_doubts
@@ -35,7 +36,8 @@ def check_frf(frf: Frf, name: str = "the FRF") -> list[str]:
     Returns
     -------
     list of str
-        Doubts: drive points that give back part of the power, or that are softer or stiffer than machines are.
+        Doubts: a coherence below a half where nothing else tells the errors; drive points that give back part of the
+        power, or that are softer or stiffer than machines are.
 
     Raises
     ------
@@ -51,7 +53,8 @@ def check_frf(frf: Frf, name: str = "the FRF") -> list[str]:
             f"{name}: the phase rises with frequency on {100 * rising:.0f} % of the energy: the values stand for "
             "exp(-i w t), this program's for exp(+i w t); conjugate the values"
         )
-    return [] if frf.quantity == "transfer" else [*_check_drive_points(frf, name), *size_doubts(frf)]
+    doubts = incoherence_doubts(frf)
+    return doubts if frf.quantity == "transfer" else [*doubts, *_check_drive_points(frf, name), *size_doubts(frf)]
 
 
 def check_frf_for_fit(frf: Frf, band: Band, name: str = "the FRF") -> list[str]:

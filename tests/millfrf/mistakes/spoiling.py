@@ -298,6 +298,7 @@ FRF_CHANGES: dict[str, Callable[[Frf], Frf]] = {
     "one entry turned": lambda one: replace(one, values=one.values * [[1, -1, 1], [1, 1, 1], [1, 1, 1]]),
     "another structure": lambda one: replace(one, frequencies=2.3 * one.frequencies),
     "poor": _poor,
+    "incoherent": lambda one: replace(one, multiple_coherence=np.full(one.values.shape[:2], 0.2), covariance=None),
     "shorter axis": lambda one: replace(
         one,
         frequencies=one.frequencies[::2],
