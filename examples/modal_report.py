@@ -11,6 +11,7 @@ import numpy as np
 
 from estimation import Frf, reciprocity_pairs
 from millfrf.figures.embed import save_figure
+from millfrf.figures.frf_gallery import GalleryEntry, gallery_page
 from millfrf.figures.indicator_figure import indicator_figure
 from millfrf.figures.reciprocity_figure import reciprocity_figure
 from millfrf.figures.shape_figure import assurance_figure, compass_figure
@@ -20,6 +21,7 @@ from modal_fit import (
     fit_polyreference,
     mode_shapes,
     multivariate_mode_indicator,
+    synthesis,
 )
 from replay_data import table_one_model
 
@@ -67,6 +69,17 @@ def main(folder: Path) -> None:
     save_figure(compass_figure(model, shapes), folder / "mode_vectors.png")
     robot = table_one_model().frf(np.arange(12.0, 26.0, 0.05))
     save_figure(reciprocity_figure(reciprocity_pairs(robot), robot.unit), folder / "reciprocity.png")
+    compared = synthesis(frf, model, BAND)
+    entries = [
+        GalleryEntry(
+            f"{frf.responses[p]} / {frf.excitations[q]}",
+            f"{100 * compared.misfit[p, q]:.2g} %",
+            compared.measured[:, p, q],
+            compared.synthesised[:, p, q],
+        )
+        for p, q in compared.ranked()[:8]
+    ]
+    (folder / "frf_gallery.svg").write_text(gallery_page(entries, compared.frequencies).svg(), encoding="utf-8")
     print("modes fitted:", ", ".join(f"{f:.2f} Hz" for f in model.natural_frequencies))
     peaks = [f"{peak.frequency:.1f} Hz (curve {peak.curve})" for peak in indicator.peaks()]
     print("peaks of the CMIF:", ", ".join(peaks))

@@ -16,6 +16,7 @@ from .polyreference import ModalFit, fit_polyreference
 from .shape_measures import modal_assurance, phase_collinearity, phase_deviation, reciprocity_residual
 from .stabilisation import PoleGroup, StabilisationChart
 from .subspace import SubspaceFit, fit_subspace
+from .synthesis import Synthesis, synthesis
 from .tip_calibration import TipCalibration, calibrate_to_tip
 from .uff_modes import import_modes_uff, read_modes_uff, write_modes_uff
 from .uncertainty import derived_covariance, frequency_and_damping_errors
@@ -34,6 +35,7 @@ __all__ = [
     "Residuals",
     "StabilisationChart",
     "SubspaceFit",
+    "Synthesis",
     "TipCalibration",
     "calibrate_to_tip",
     "compare_modes",
@@ -53,6 +55,7 @@ __all__ = [
     "read_modal_model",
     "read_modes_uff",
     "reciprocity_residual",
+    "synthesis",
     "write_modal_model",
     "write_modes_uff",
 ]

@@ -26,10 +26,11 @@ from ..provenance import sha256, versions
 from .chatter_section import chatter_in_brief, chatter_section
 from .collect import Collected, SourceFile, collect
 from .comparison_section import comparison_section
+from .frfs import frf_section
 from .hammer_section import hammer_section
 from .measurement_sections import channel_section, file_section, settings_section, setup_section
 from .reciprocity_section import reciprocity_section
-from .result_sections import frf_section, input_section, mode_section
+from .result_sections import input_section, mode_section
 from .stability_section import stability_findings
 
 

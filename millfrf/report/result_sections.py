@@ -1,77 +1,23 @@
-"""The sections on the results: FRFs, inputs, modes, lobes."""
+"""The sections on the results: inputs and modes."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from estimation import Frf, to_receptance
 from modal_fit import ModalModel
 
 from ..chain.estimate import EstimateOptions, spectra_of_tests
 from ..chain.fit import chart_from_json
 from ..figures.embed import as_data_uri
-from ..figures.frf_figure import FrfCurves, coherent_lines, frf_figures
 from ..figures.input_figure import input_figure
 from ..figures.stabilisation_figure import stabilisation_figure
 from ..progress import Watch
 from ..tables import error_table, mode_table
 from .collect import Collected, SourceFile
+from .frfs import Band, axis_of, band_of, shown_frf
 from .indicator_part import has_lines, indicator_part
 from .section import Picture, Section
 from .shape_part import shape_part
-
-Band = tuple[float, float]
-
-
-def frf_section(collected: Collected, band: Band | None, reference: ModalModel | None) -> Section:
-    """Each FRF with the model that belongs to it."""
-    pictures = []
-    for file, frf in collected.frfs:
-        found = collected.model_of(file, frf)
-        model, fit_band = (None, None) if found is None else (found[1], _band_of(found[0]))
-        shown = _shown(frf, model)
-        known = reference if reference is not None and _knows(reference, shown) else None
-        curves = FrfCurves(shown, band or _axis(shown, fit_band), model, known, fit_band)
-        for figure in frf_figures(curves):
-            caption = _frf_caption(file, found, known, spread=shown.entry_variance() is not None)
-            pictures.append(Picture(as_data_uri(figure), caption, "FRF magnitude, phase and multiple coherence"))
-    return Section("Frequency response functions", pictures=tuple(pictures))
-
-
-def _shown(frf: Frf, model: ModalModel | None) -> Frf:
-    """In the model's quantity where there is one."""
-    return to_receptance(frf) if model is None or model.quantity == "receptance" else frf
-
-
-def _knows(model: ModalModel, frf: Frf) -> bool:
-    return model.unit == frf.unit and bool(set(model.responses) & set(frf.responses))
-
-
-def _band_of(file: SourceFile) -> Band | None:
-    stored = file.provenance.get("band_hz")
-    return None if not stored else (float(stored[0]), float(stored[1]))
-
-
-def _axis(frf: Frf, fit_band: Band | None) -> Band:
-    """The fit's band widened by a fifth of its width on either side, or all lines that show the structure."""
-    valid = frf.frequencies[coherent_lines(frf) & (frf.frequencies > 0)]
-    first, last = (float(valid[0]), float(valid[-1])) if len(valid) else (0.0, float(frf.frequencies[-1]))
-    if fit_band is None:
-        return first, last
-    room = 0.2 * (fit_band[1] - fit_band[0])
-    return max(first, fit_band[0] - room), min(last, fit_band[1] + room)
-
-
-def _frf_caption(
-    file: SourceFile, model: tuple[SourceFile, ModalModel] | None, reference: ModalModel | None, *, spread: bool
-) -> str:
-    text = f"{file.path.name}: magnitude and phase, and coherence of each response with the excitations."
-    if model is not None:
-        fitted = model[0].made_from(file) and model[0].provenance.get("step") == "fit"
-        text += f" Dashed: model {model[0].path.name}" + (", fitted to these lines." if fitted else ".")
-    if reference is not None:
-        text += " Dotted: reference."
-    return text + (" Grey: twice the standard deviation of H1." if spread else "")
 
 
 def input_section(collected: Collected, band: Band | None, watch: Watch) -> Section:
@@ -85,7 +31,7 @@ def input_section(collected: Collected, band: Band | None, watch: Watch) -> Sect
             continue
         tests = spectra_of_tests([recording.path for recording in recordings], _options(file), watch)
         found = collected.model_of(file, frf)
-        axis = band or _axis(frf, _band_of(found[0]) if found else None)
+        axis = band or axis_of(frf, band_of(found[0]) if found else None)
         caption = (
             f"{file.path.name}: (a) power spectra of the inputs; (b) singular values of their spectral matrix, all "
             f"{len(tests)} tests stacked{', and the smallest of each test alone' if len(tests) > 1 else ''}; where the "
@@ -144,7 +90,7 @@ def _indicators(
     collected: Collected, file: SourceFile, model: ModalModel
 ) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
     """Mode indicators of the FRF that a model was fitted to, where that is among the files."""
-    frf, band = collected.frf_of(file), _band_of(file)
+    frf, band = collected.frf_of(file), band_of(file)
     if frf is None or band is None or not has_lines(frf, band):
         return (), ()
     picture, peaks = indicator_part(file.path.name, frf, model, band)
@@ -153,11 +99,10 @@ def _indicators(
 
 def _stabilisation(collected: Collected, file: SourceFile, model: ModalModel) -> Picture:
     frf = collected.frf_of(file)
-    shown = None if frf is None else _shown(frf, model)
+    shown = None if frf is None else shown_frf(frf, model)
     chart = chart_from_json(file.provenance["stabilisation"])
     caption = (
         f"{file.path.name}: stabilisation chart; (a) poles over model order above the summed FRF, (b) damping of the "
-        "poles that are stable in frequency and damping. Vertical lines and diamonds: modes of the fitted model, "
-        "refined by maximum likelihood."
+        "poles that are stable in frequency and damping. Vertical lines and diamonds: modes of the fitted model."
     )
     return Picture(as_data_uri(stabilisation_figure(chart, shown, model)), caption, "Stabilisation chart")

@@ -1,6 +1,6 @@
-"""What a report is made of: sections with sentences, tables and figures."""
+"""What a report is made of: sections with sentences, tables, figures and parts that fold."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..tables import Table
 
@@ -25,6 +25,26 @@ class Picture:
 
 
 @dataclass(frozen=True)
+class Fold:
+    """A part of a section that opens on a click; on paper it is open.
+
+    Parameters
+    ----------
+    title
+        What is in it.
+    tables, pictures
+        In this order.
+    opened
+        Whether it is open from the start.
+    """
+
+    title: str
+    tables: tuple[Table, ...] = ()
+    pictures: tuple[Picture, ...] = ()
+    opened: bool = False
+
+
+@dataclass(frozen=True)
 class Section:
     """One section; empty ones are left out of the page.
 
@@ -32,7 +52,7 @@ class Section:
     ----------
     title
         Heading.
-    sentences, tables, pictures
+    sentences, tables, pictures, folds
         In this order on the page.
     """
 
@@ -40,8 +60,25 @@ class Section:
     sentences: tuple[str, ...] = ()
     tables: tuple[Table, ...] = ()
     pictures: tuple[Picture, ...] = ()
+    folds: tuple[Fold, ...] = ()
 
     @property
     def empty(self) -> bool:
         """Nothing to show."""
-        return not (self.sentences or self.tables or self.pictures)
+        return not (self.sentences or self.tables or self.pictures or self.folds)
+
+    def with_more(
+        self,
+        sentences: tuple[str, ...] = (),
+        tables: tuple[Table, ...] = (),
+        pictures: tuple[Picture, ...] = (),
+        folds: tuple[Fold, ...] = (),
+    ) -> "Section":
+        """The section with more at the end of each kind."""
+        return replace(
+            self,
+            sentences=self.sentences + sentences,
+            tables=self.tables + tables,
+            pictures=self.pictures + pictures,
+            folds=self.folds + folds,
+        )

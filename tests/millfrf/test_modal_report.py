@@ -32,6 +32,7 @@ def test_the_example_finds_its_modes(example: ModuleType, tmp_path: Path, capsys
     measures = [float(word) for word in said.partition("MPC: ")[2].split(", ")]
     assert measures[3] < 0.95  # the complex mode, and it alone
     assert min(measures[:3] + measures[4:]) > 0.99
+    assert (tmp_path / "frf_gallery.svg").read_text(encoding="utf-8").count(" %</text>") == 8
     for picture in ("mode_indicators", "auto_mac", "mode_vectors", "reciprocity"):
         assert (tmp_path / f"{picture}.png").stat().st_size > 10_000
 
@@ -94,3 +95,13 @@ def test_pairs_that_were_measured_both_ways_are_compared(folder: Path, capsys: p
     assert float(row[3]) < 5
     assert float(row[4]) > 0.99
     assert "not reciprocal" not in said
+
+
+def test_many_frfs_are_ranked_and_drawn_page_by_page(folder: Path) -> None:
+    """24 FRFs of the beam: one page of panels, and a table of all of them."""
+    text = (folder / "model.html").read_text(encoding="utf-8")
+    said = words(folder / "model.html")
+    assert "misfit of 24 FRFs between" in said
+    assert "FRFs 1 to 24 of 24, misfit" in said
+    assert len(re.findall(r"<td>\d+</td><td>\d+:\+Z / \d+:\+Z</td>", text)) == 12 + 24
+    assert "above 30 %" in words(folder / "fewer.html")  # three of five modes are missing

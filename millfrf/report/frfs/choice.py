@@ -1,0 +1,35 @@
+"""What is drawn of an FRF: its quantity, its frequency axis, the band of its model."""
+
+from estimation import Frf, to_receptance
+from modal_fit import ModalModel
+
+from ...figures.frf_figure import coherent_lines
+from ..collect import SourceFile
+
+Band = tuple[float, float]
+
+
+def shown_frf(frf: Frf, model: ModalModel | None) -> Frf:
+    """In the model's quantity where there is one."""
+    return to_receptance(frf) if model is None or model.quantity == "receptance" else frf
+
+
+def knows(model: ModalModel, frf: Frf) -> bool:
+    """Whether a model has the unit and some responses of an FRF."""
+    return model.unit == frf.unit and bool(set(model.responses) & set(frf.responses))
+
+
+def band_of(file: SourceFile) -> Band | None:
+    """Band of the fit behind a model, Hz; None where its file does not say."""
+    stored = file.provenance.get("band_hz")
+    return None if not stored else (float(stored[0]), float(stored[1]))
+
+
+def axis_of(frf: Frf, fit_band: Band | None) -> Band:
+    """The fit's band widened by a fifth of its width on either side, or all lines that show the structure."""
+    valid = frf.frequencies[coherent_lines(frf) & (frf.frequencies > 0)]
+    first, last = (float(valid[0]), float(valid[-1])) if len(valid) else (0.0, float(frf.frequencies[-1]))
+    if fit_band is None:
+        return first, last
+    room = 0.2 * (fit_band[1] - fit_band[0])
+    return max(first, fit_band[0] - room), min(last, fit_band[1] + room)
