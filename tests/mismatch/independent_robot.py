@@ -80,6 +80,18 @@ class OtherRobot:
 
 def receptance(robot: OtherRobot, q: Real, frequencies: Real) -> Complex:
     """Motion of the tool tip over force there in the base frame, m/N, (n, 3, 3)."""
+    return of_modes(*modes(robot, q), robot.ratio, frequencies)
+
+
+def of_modes(natural: Real, shapes: Real, ratio: Real | float, frequencies: Real) -> Complex:
+    """Receptance of modes with natural angular frequencies (rad/s) and mass-normalised shapes, m/N, (n, 3, 3)."""
+    omega = 2 * np.pi * np.asarray(frequencies)[:, None]
+    gain = 1 / (natural**2 - omega**2 + 2j * ratio * natural * omega)
+    return np.asarray(np.einsum("kr,pr,qr->kpq", gain, shapes, shapes))
+
+
+def modes(robot: OtherRobot, q: Real) -> tuple[Real, Real]:
+    """Natural angular frequencies (n,), rad/s, and mass-normalised shapes of the tool tip (3, n)."""
     placed = _placed(q)
     mass = np.zeros((9, 9))
     for lump in robot.lumps:
@@ -97,9 +109,7 @@ def receptance(robot: OtherRobot, q: Real, frequencies: Real) -> Complex:
     root = np.linalg.inv(np.linalg.cholesky(mass))
     squares, vectors = np.linalg.eigh(root @ np.diag(springs) @ root.T)
     shapes = tip @ root.T @ vectors
-    omega = 2 * np.pi * np.asarray(frequencies)[:, None]
-    gain = 1 / (squares - omega**2 + 2j * robot.ratio * np.sqrt(squares) * omega)
-    return np.asarray(np.einsum("kr,pr,qr->kpq", gain, shapes, shapes))
+    return np.sqrt(squares), shapes
 
 
 def _placed(q: Real) -> list[Real]:
