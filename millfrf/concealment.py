@@ -23,7 +23,8 @@ from replay_data.joint_march import tip_motion
 from replay_data.posture_robot import posture_robot
 
 from .chain.estimate import EstimateOptions, estimate_recordings, write_estimate
-from .chain.fit import FitOptions, fit_model, write_fit
+from .chain.fit import fit_model, write_fit
+from .chain.fit_options import FitOptions
 from .progress import Watch, silent
 from .seal import open_seal, seal
 

@@ -26,7 +26,8 @@ from stability import StabilityLobes, certified_lobes, read_lobes, write_lobes
 
 from .chain.calibrate import calibrate_model, write_calibration
 from .chain.estimate import EstimateOptions, estimate_recordings, write_estimate
-from .chain.fit import SUBSPACE, FitOptions, fit_model, fit_recordings, write_fit
+from .chain.fit import fit_model, fit_recordings, write_fit
+from .chain.fit_options import SUBSPACE, FitOptions
 from .chain.lobes import compute_lobes, speed_axis
 from .demo_trap import Trap, report_trap, spring_trap, trap_table
 from .figures.lobes_figure import lobes_figure

@@ -12,6 +12,13 @@ from .modal_model import ModalModel, Residuals
 from .modal_model_file import read_modal_model, write_modal_model
 from .mode_errors import ModeErrors
 from .mode_shapes import ModeReciprocity, ModeShapes, mode_complexity, mode_reciprocity, mode_shapes
+from .pole_picking import (
+    CandidateGroup,
+    candidate_groups,
+    fit_picked_poles,
+    read_picked_poles,
+    write_pole_candidates,
+)
 from .polyreference import ModalFit, fit_polyreference
 from .shape_measures import modal_assurance, phase_collinearity, phase_deviation, reciprocity_residual
 from .stabilisation import PoleGroup, StabilisationChart
@@ -22,6 +29,7 @@ from .uff_modes import import_modes_uff, read_modes_uff, write_modes_uff
 from .uncertainty import derived_covariance, frequency_and_damping_errors
 
 __all__ = [
+    "CandidateGroup",
     "ComplexModeIndicator",
     "IndicatorPeak",
     "ModalFit",
@@ -38,9 +46,11 @@ __all__ = [
     "Synthesis",
     "TipCalibration",
     "calibrate_to_tip",
+    "candidate_groups",
     "compare_modes",
     "complex_mode_indicator",
     "derived_covariance",
+    "fit_picked_poles",
     "fit_polyreference",
     "fit_subspace",
     "frequency_and_damping_errors",
@@ -54,8 +64,10 @@ __all__ = [
     "phase_deviation",
     "read_modal_model",
     "read_modes_uff",
+    "read_picked_poles",
     "reciprocity_residual",
     "synthesis",
     "write_modal_model",
     "write_modes_uff",
+    "write_pole_candidates",
 ]

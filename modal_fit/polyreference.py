@@ -90,19 +90,19 @@ def fit_polyreference(
     """
     if frf.covariance is not None:
         return fit_with_covariance(frf, band, 40 if max_order is None else max_order, n_modes)
-    inside = _usable_lines(frf, band, max_order)
+    inside = usable_lines(frf, band, max_order)
     references = min(len(frf.responses), len(frf.excitations))
     order = default_order(int(inside.sum()), references) if max_order is None else max_order
     order = min(order, int(inside.sum()) // 2)
     delay, advanced = 0.0, frf
     if frf.quantity == "transfer":
         delay = _delay(frf, band, order, inside, n_modes)
-        advanced = _advanced(frf, delay)
+        advanced = without_delay(frf, delay)
     fit = fit_matrix(advanced, inside, band, order, n_modes)
     model = replace(fit.model, delay=delay)
     error = relative_error(frf, model, inside)
     chi = float("nan")
-    warnings = (*_status_warnings(fit), *_warnings(frf, inside, model, band, chi, error))
+    warnings = (*status_warnings(fit), *fit_warnings(frf, inside, model, band, chi, error))
     return ModalFit(model, fit.chart, fit.refused, band, chi, error, warnings, fit.status)
 
 
@@ -117,14 +117,14 @@ def fit_with_covariance(frf: Frf, band: tuple[float, float], max_order: int, n_m
         Highest order of the denominator.
     """
     receptance = to_receptance(frf)
-    inside = _usable_lines(receptance, band, max_order)
+    inside = usable_lines(receptance, band, max_order)
     delay, advanced = 0.0, receptance
     chart, kept, dropped = _poles_over_orders(receptance, band, max_order, inside, n_modes)
     lines, _ = frf_lines(replace(receptance, covariance=None), inside)
     for number in range(_DELAY_ROUNDS if receptance.quantity == "transfer" else 0):
         found, before = transfer_delay(np.array([group.pole for group in kept]), lines, band), delay
         delay = found if number < 2 else (found + before) / 2  # poles and delay can swing about their common value
-        advanced = _advanced(receptance, delay)
+        advanced = without_delay(receptance, delay)
         chart, kept, dropped = _poles_over_orders(advanced, band, max_order, inside, n_modes)
         if abs(delay - before) < 1e-3 / band[1]:
             break
@@ -135,7 +135,7 @@ def fit_with_covariance(frf: Frf, band: tuple[float, float], max_order: int, n_m
     model = replace(model, delay=delay)
     error = _relative_error_of_receptance(receptance, model, inside)
     chi = fit.reduced_chi_square if noise is not None else float("nan")
-    return ModalFit(model, chart, dropped, band, chi, error, _warnings(receptance, inside, model, band, chi, error))
+    return ModalFit(model, chart, dropped, band, chi, error, fit_warnings(receptance, inside, model, band, chi, error))
 
 
 def _poles_over_orders(
@@ -207,7 +207,7 @@ def _delay(frf: Frf, band: tuple[float, float], order: int, inside: NDArray[np.b
     for number in range(_DELAY_ROUNDS):
         found, before = transfer_delay(poles, lines, band), delay
         delay = found if number < 2 else (found + before) / 2  # poles and delay can swing about their common value
-        poles = _first_poles(_advanced(frf, delay), band, order, n_modes)
+        poles = _first_poles(without_delay(frf, delay), band, order, n_modes)
         if abs(delay - before) < 1e-3 / band[1]:
             break
     return delay
@@ -225,7 +225,7 @@ def _first_poles(frf: Frf, band: tuple[float, float], order: int, n_modes: int |
     return np.array([group.pole for group in sorted(kept, key=_minus_orders)[:n_modes]])
 
 
-def _advanced(frf: Frf, delay: float) -> Frf:
+def without_delay(frf: Frf, delay: float) -> Frf:
     """The FRF with a delay taken out."""
     return replace(frf, values=frf.values * np.exp(2j * np.pi * frf.frequencies * delay)[:, None, None])
 
@@ -234,7 +234,7 @@ def _minus_orders(group: PoleGroup) -> int:
     return -group.n_orders
 
 
-def _status_warnings(fit: MatrixFit) -> tuple[str, ...]:
+def status_warnings(fit: MatrixFit) -> tuple[str, ...]:
     """What the refinement says of itself."""
     if fit.status == NOT_REFINED:
         return (
@@ -245,7 +245,8 @@ def _status_warnings(fit: MatrixFit) -> tuple[str, ...]:
     return ()
 
 
-def _usable_lines(frf: Frf, band: tuple[float, float], max_order: int | None) -> NDArray[np.bool_]:
+def usable_lines(frf: Frf, band: tuple[float, float], max_order: int | None) -> NDArray[np.bool_]:
+    """Valid lines in a band; refused where they are too few, or where the band or the order makes no sense."""
     low, high = band
     if not 0 < low < high:
         raise InputError(f"band {low:g} to {high:g} Hz is empty or starts at 0; give 0 < low < high")
@@ -317,7 +318,7 @@ def relative_error(frf: Frf, model: ModalModel, inside: NDArray[np.bool_]) -> ND
     return np.asarray(np.sqrt(np.mean(np.abs(misfit) ** 2, axis=0)) / np.where(size > 0, size, 1.0))
 
 
-def _warnings(
+def fit_warnings(
     frf: Frf,
     inside: NDArray[np.bool_],
     model: ModalModel,
@@ -325,6 +326,7 @@ def _warnings(
     chi: float,
     error: NDArray[np.float64],
 ) -> tuple[str, ...]:
+    """What lines, misfit and poles of a fit let one doubt, one sentence each."""
     warnings = []
     asked = (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
     if inside.sum() < asked.sum():

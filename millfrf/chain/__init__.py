@@ -2,7 +2,8 @@
 
 from .calibrate import calibrate_model
 from .estimate import Estimate, EstimateOptions, estimate_recordings
-from .fit import FitOptions, fit_model, fit_recordings
+from .fit import fit_model, fit_recordings
+from .fit_options import FitOptions
 from .lobes import LOBE_METHODS, compute_lobes, speed_axis
 
 __all__ = [

@@ -16,7 +16,8 @@ from ..gate import check_model_and_recordings
 from ..progress import Watch, silent
 from ..report.diagnosis_page import with_location, write_diagnosis_report
 from ..result_folder import refuse_file
-from .fit import SUBSPACE, FitOptions, fit_recordings
+from .fit import fit_recordings
+from .fit_options import SUBSPACE, FitOptions
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,8 @@
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from estimation import BandRecord, Frf, band_record, choose_channels, widest_ban
 from foundation import InputError, writing_whole_file
 from modal_fit import (
     ModalFit,
-    StabilisationChart,
     SubspaceFit,
     fit_polyreference,
     fit_subspace,
@@ -23,43 +21,15 @@ from modal_fit import (
 from ..gate import check_frf_for_fit, check_recordings, check_records, fit_doubts
 from ..progress import Watch, silent
 from ..provenance import add_to_json, sources, versions
-
-POLYREFERENCE, SUBSPACE = "polyreference", "subspace"
-METHODS = (POLYREFERENCE, SUBSPACE)
-SUBSPACE_ORDER = 30
-"""Highest order of the state space where none is asked for."""
-
-KEPT_ABOVE = 1.6
-"""Records are kept up to this multiple of the band's upper end, where their sample rate reaches so far."""
-
-
-@dataclass(frozen=True)
-class FitOptions:
-    """How a model is fitted.
-
-    Parameters
-    ----------
-    band
-        Hz.
-    method
-        ``polyreference`` of an FRF, ``subspace`` of recordings.
-    max_order
-        Highest order of the denominator or of the state space; None: by the data, or the method's own.
-    n_modes
-        Modes to keep; None: as many as are found.
-    excitations, responses
-        Channel names, for recordings; empty: chosen by quantity.
-    stream
-        Sample clock, for recordings; None: the only one.
-    """
-
-    band: tuple[float, float]
-    method: str = POLYREFERENCE
-    max_order: int | None = None
-    n_modes: int | None = None
-    excitations: tuple[str, ...] = ()
-    responses: tuple[str, ...] = ()
-    stream: str | None = None
+from .fit_options import (
+    KEPT_ABOVE,
+    POLYREFERENCE,
+    SUBSPACE,
+    SUBSPACE_ORDER,
+    FitOptions,
+    chart_to_json,
+)
+from .pole_picking import check_picking, fit_picked
 
 
 def fit_model(frf: Frf, options: FitOptions, watch: Watch = silent, name: str = "the FRF") -> ModalFit:
@@ -68,15 +38,20 @@ def fit_model(frf: Frf, options: FitOptions, watch: Watch = silent, name: str = 
     Raises
     ------
     InputError
-        A method that needs recordings, a band without enough lines, or an FRF that :mod:`millfrf.gate` refuses.
+        A method that needs recordings, a band without enough lines, an FRF that :mod:`millfrf.gate` refuses, or picked
+        poles that cannot be.
     MillfrfError
         No stable pole was found.
     """
     if options.method != POLYREFERENCE:
         raise InputError(f"method {options.method!r} does not fit an FRF; use {POLYREFERENCE}, or give recordings")
+    check_picking(options)
     doubts = check_frf_for_fit(frf, options.band, name)
     with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
-        fit = fit_polyreference(frf, options.band, max_order=options.max_order, n_modes=options.n_modes)
+        if options.poles is None:
+            fit = fit_polyreference(frf, options.band, max_order=options.max_order, n_modes=options.n_modes)
+        else:
+            fit = fit_picked(frf, options)
     poor = fit_doubts(fit.reduced_chi_square, fit.relative_error, fit.warnings)
     return replace(fit, warnings=(*doubts, *fit.warnings, *poor))
 
@@ -93,6 +68,8 @@ def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions,
     """
     if options.method != SUBSPACE:
         raise InputError(f"method {options.method!r} does not fit recordings; use {SUBSPACE}, or estimate an FRF first")
+    if options.poles is not None or options.refine:
+        raise InputError("--poles picks poles of an FRF; estimate one from these recordings first")
     doubts = check_recordings(
         paths, stream=options.stream, excitations=options.excitations, responses=options.responses, watch=watch
     )
@@ -134,6 +111,8 @@ def write_fit(
         "step": "fit",
         "sources": sources(inputs),
         "method": options.method,
+        "status": fit.status if isinstance(fit, ModalFit) else None,
+        "picked_poles": None if options.poles is None else sources([options.poles])[0],
         "max_order": options.max_order or (int(fit.chart.orders.max()) if len(fit.chart.orders) else None),
         "band_hz": list(fit.band),
         "reduced_chi_square": None if np.isnan(fit.reduced_chi_square) else fit.reduced_chi_square,
@@ -142,31 +121,9 @@ def write_fit(
         "dropped": [
             {"frequency_hz": g.frequency, "damping_ratio": g.damping_ratio, "reason": g.reason} for g in fit.dropped
         ],
-        "stabilisation": _chart_to_json(fit.chart),
+        "stabilisation": chart_to_json(fit.chart),
         "versions": versions(),
     }
     with writing_whole_file(path) as temporary:
         write_modal_model(temporary, fit.model)
         add_to_json(temporary, provenance)
-
-
-def _chart_to_json(chart: StabilisationChart) -> dict[str, Any]:
-    return {
-        "orders": chart.orders.tolist(),
-        "poles_rad_per_s": np.stack([chart.poles.real, chart.poles.imag], axis=1).round(6).tolist(),
-        "stability": chart.stability.tolist(),
-        "band_hz": list(chart.band),
-    }
-
-
-def chart_from_json(stored: dict[str, Any]) -> StabilisationChart:
-    """The chart that :func:`write_fit` stored, without vectors (no figure needs them)."""
-    poles = np.asarray(stored["poles_rad_per_s"], dtype=float).reshape(-1, 2)
-    low, high = stored["band_hz"]
-    return StabilisationChart(
-        np.asarray(stored["orders"], dtype=np.int64),
-        poles[:, 0] + 1j * poles[:, 1],
-        np.asarray(stored["stability"], dtype=np.int64),
-        np.zeros((len(poles), 0), dtype=complex),
-        (float(low), float(high)),
-    )

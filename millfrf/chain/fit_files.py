@@ -13,7 +13,8 @@ from modal_fit import ModalFit, SubspaceFit
 from ..file_kinds import FRF, RECORDING, kind_of
 from ..gate import stored_doubts
 from ..progress import Watch, silent
-from .fit import METHODS, POLYREFERENCE, SUBSPACE, FitOptions, fit_model, fit_recordings
+from .fit import fit_model, fit_recordings
+from .fit_options import METHODS, POLYREFERENCE, SUBSPACE, FitOptions
 
 Fit = TypeVar("Fit", ModalFit, SubspaceFit)
 

@@ -25,22 +25,36 @@ def fit(
     excitation: Annotated[list[str] | None, typer.Option("--excitation", help="Channel of recordings.")] = None,
     response: Annotated[list[str] | None, typer.Option("--response", help="Channel of recordings.")] = None,
     stream: Stream = None,
+    poles: Annotated[
+        Path | None,
+        typer.Option("--poles", metavar="FILE", help="Poles picked by hand: these, no other."),
+    ] = None,
+    refine: Annotated[bool, typer.Option("--refine", help="Refine picked poles; else they are kept.")] = False,
+    candidates: Annotated[
+        Path | None, typer.Option("--candidates", metavar="FILE.json", help="Write candidate poles for a picker.")
+    ] = None,
 ) -> None:
     """Fit poles, vectors and residuals in a band, with error bars and a stabilisation chart that reports show.
 
     Recordings are fitted as they are, tests stacked, without windows or leakage; that is the more accurate way for
-    heavily damped modes.
+    heavily damped modes. --poles fits exactly the poles that a file names; --candidates writes the poles to pick from.
     """
-    from ..chain.fit import FitOptions, write_fit
+    from modal_fit import ModalFit
+
+    from ..chain.fit import write_fit
     from ..chain.fit_files import fit_files
+    from ..chain.fit_options import FitOptions
+    from ..chain.pole_picking import check_candidates, picked_in_words, write_candidates
     from ..progress import bar
     from ..tables import error_table, mode_table, show
 
-    check_output(out, (".json",), files)
+    check_output(out, (".json",), [*files, *([poles] if poles else [])])
+    if candidates is not None:
+        check_candidates(candidates, out, poles, files)
     check_band(band)
     if modes is not None and modes < 1:
         raise InputError(f"--modes {modes}: give 1 or more, or leave it out to keep all that are found")
-    given = (max_order, modes, names(excitation), names(response), stream)
+    given = (max_order, modes, names(excitation), names(response), stream, poles, refine)
     result, used = fit_files(files, method, lambda chosen: FitOptions(band, chosen, *given), bar)
     write_fit(out, result, files, used)
     for warning in result.warnings:
@@ -49,4 +63,8 @@ def fit(
     by_source = error_table(result.model)
     if by_source is not None:
         show(by_source)
+    if isinstance(result, ModalFit) and poles is not None:
+        typer.echo(picked_in_words(result, used))
     typer.echo(f"wrote {out}")
+    if isinstance(result, ModalFit) and candidates is not None:
+        typer.echo(f"wrote {candidates}: {write_candidates(candidates, result, files[0])} groups of poles to pick from")

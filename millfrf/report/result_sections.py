@@ -7,7 +7,7 @@ import numpy as np
 from modal_fit import ModalModel
 
 from ..chain.estimate import EstimateOptions, spectra_of_tests
-from ..chain.fit import chart_from_json
+from ..chain.fit_options import chart_from_json
 from ..figures.embed import as_data_uri
 from ..figures.input_figure import input_figure
 from ..figures.stabilisation_figure import stabilisation_figure
@@ -79,6 +79,8 @@ def _quality(file: SourceFile) -> list[str]:
         f"{file.path.name}: {made['method']} up to order {made['max_order']}, {made['band_hz'][0]:g} to "
         f"{made['band_hz'][1]:g} Hz"
     )
+    if made.get("picked_poles") is not None:
+        text += f"; {made['status']} ({made['picked_poles']['file']})"
     if made.get("relative_error") is not None:
         error = 100 * np.asarray(made["relative_error"])
         text += f"; misfit between {error.min():.2g} and {error.max():.2g} % of each FRF's rms"

@@ -2,6 +2,7 @@
 
 import html
 import importlib.util
+import json
 import re
 from pathlib import Path
 from types import ModuleType
@@ -105,3 +106,23 @@ def test_many_frfs_are_ranked_and_drawn_page_by_page(folder: Path) -> None:
     assert "FRFs 1 to 24 of 24, misfit" in said
     assert len(re.findall(r"<td>\d+</td><td>\d+:\+Z / \d+:\+Z</td>", text)) == 12 + 24
     assert "above 30 %" in words(folder / "fewer.html")  # three of five modes are missing
+
+
+def test_poles_are_picked_from_candidates_and_the_report_says_so(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frf, band = str(folder / "frf.h5"), ["--band", "10", "120"]
+    paths = {name: str(tmp_path / name) for name in ("a.json", "b.json", "candidates.json", "poles.toml", "r.html")}
+    assert run(["fit", frf, *band, "--out", paths["a.json"], "--candidates", paths["candidates.json"]]) == 0
+    assert "groups of poles to pick from" in capsys.readouterr().out
+    offered = json.loads((tmp_path / "candidates.json").read_text())
+    groups = {one["group"]: one for one in offered["groups"]}
+    taken = [one["group"] for one in offered["poles"]]
+    assert [round(groups[number]["frequency_hz"], 1) for number in taken] == [22.0, 48.0, 48.4, 71.0, 104.0]
+    assert len(offered["stabilisation"]["orders"]) == len(offered["stabilisation"]["poles_rad_per_s"])
+    rows = "".join(f"[[poles]]\ngroup = {number}\n" for number in taken if number != taken[2])
+    (tmp_path / "poles.toml").write_text(f'candidates = "candidates.json"\n{rows}')
+    assert run(["fit", frf, *band, "--poles", paths["poles.toml"], "--refine", "--out", paths["b.json"]]) == 0
+    assert "4 poles picked in poles.toml, refined from there" in capsys.readouterr().out
+    assert run(["report", frf, paths["b.json"], "--out", paths["r.html"]]) == 0
+    assert "picked poles, refined (poles.toml)" in words(tmp_path / "r.html")

@@ -8,7 +8,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from millfrf.chain.fit import FitOptions, fit_recordings
+from millfrf.chain.fit import fit_recordings
+from millfrf.chain.fit_options import FitOptions
 from mismatch import diagnose, read_trials
 
 pytestmark = pytest.mark.shared_data

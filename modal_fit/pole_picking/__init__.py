@@ -1,0 +1,13 @@
+"""Poles that somebody picks: the file that offers candidates, the file that names the choice, and the fit of it."""
+
+from .candidate_groups import CandidateGroup, candidate_groups
+from .picked_fit import fit_picked_poles
+from .poles_file import read_picked_poles, write_pole_candidates
+
+__all__ = [
+    "CandidateGroup",
+    "candidate_groups",
+    "fit_picked_poles",
+    "read_picked_poles",
+    "write_pole_candidates",
+]

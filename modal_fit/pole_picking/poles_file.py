@@ -1,0 +1,168 @@
+"""Files of poles, format ``millfrf.poles`` version 1: a choice by hand, or candidates with the automatic choice."""
+
+import json
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from foundation import Band, FileFormatError, InputError, mistake_in_words, writing_whole_file
+
+from .candidate_groups import CandidateGroup
+
+FORMAT, FORMAT_VERSION = "millfrf.poles", 1
+_STRICT = ConfigDict(extra="forbid", frozen=True)
+
+
+class PickedPole(BaseModel):
+    """One pole: by frequency and damping ratio, or by the number of a group."""
+
+    model_config = _STRICT
+    frequency_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
+    damping_ratio: Annotated[float, Field(gt=0, lt=0.5, allow_inf_nan=False)] | None = None
+    group: Annotated[int, Field(ge=1)] | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> "PickedPole":
+        given = self.frequency_hz is not None, self.damping_ratio is not None
+        if self.group is None and not all(given):
+            raise ValueError("give frequency_hz and damping_ratio (a ratio, not per cent), or group")
+        if self.group is not None and any(given):
+            raise ValueError(f"group = {self.group} names the pole already; leave frequency_hz and damping_ratio out")
+        return self
+
+
+class OfferedGroup(BaseModel):
+    """One group that a picker offers."""
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    group: Annotated[int, Field(ge=1)]
+    frequency_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)]
+    damping_ratio: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)]
+
+
+class PolesFile(BaseModel):
+    """The whole file; what a picker needs beside (``band_hz``, ``stabilisation``, ``provenance``) is passed over."""
+
+    model_config = _STRICT
+    format: Literal["millfrf.poles"] = "millfrf.poles"
+    format_version: Literal[1] = 1
+    poles: Annotated[tuple[PickedPole, ...], Field(min_length=1)]
+    groups: tuple[OfferedGroup, ...] = ()
+    candidates: str | None = None
+    band_hz: tuple[float, float] | None = None
+    stabilisation: dict[str, Any] | None = None
+    provenance: dict[str, Any] | None = None
+
+
+def read_picked_poles(path: str | os.PathLike[str]) -> NDArray[np.complex128]:
+    """Poles (rad/s) that a file names, in its order.
+
+    Groups are those of the file itself, or of the file of candidates that it names, beside it.
+
+    Raises
+    ------
+    InputError
+        No such file, a key that is unknown, missing or out of range, or a group that is not offered.
+    FileFormatError
+        Neither TOML nor JSON.
+    """
+    content = _read(Path(path))
+    groups = {one.group: one for one in content.groups}
+    if content.candidates is not None:
+        beside = Path(path).parent / content.candidates
+        groups = {one.group: one for one in _read(beside).groups}
+    poles = []
+    for number, picked in enumerate(content.poles, start=1):
+        f, zeta = picked.frequency_hz, picked.damping_ratio
+        if picked.group is not None:
+            offered = groups.get(picked.group)
+            if offered is None:
+                raise InputError(f"{Path(path).name}: poles[{number}] {_no_group(picked.group, groups)}")
+            f, zeta = offered.frequency_hz, offered.damping_ratio
+        assert f is not None
+        assert zeta is not None
+        poles.append(2 * np.pi * f * (-zeta + 1j * np.sqrt(1 - zeta**2)))
+    return np.array(poles, dtype=complex)
+
+
+def _no_group(number: int, groups: Mapping[int, OfferedGroup]) -> str:
+    if not groups:
+        return (
+            f"names group {number}, but no groups are offered: name the file that 'millfrf fit --candidates' wrote as "
+            "candidates, or give frequency_hz and damping_ratio"
+        )
+    return f"names group {number}; there are groups {min(groups)} to {max(groups)}"
+
+
+def _read(path: Path) -> PolesFile:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        words = error.strerror if isinstance(error, OSError) else "it is no text"
+        raise InputError(f"cannot read poles {path}: {words}; check the name") from error
+    try:
+        content = json.loads(text) if text.lstrip().startswith("{") else tomllib.loads(text)
+    except (json.JSONDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+        raise FileFormatError(f"poles {path} are neither TOML nor JSON: {error}; write [[poles]] tables") from error
+    if not isinstance(content, dict) or content.get("format", FORMAT) != FORMAT:
+        raise FileFormatError(f"{path} holds no poles; expected format {FORMAT!r}, or [[poles]] tables")
+    try:
+        return PolesFile.model_validate(content)
+    except ValidationError as error:
+        raise InputError(f"{path.name}: {mistake_in_words(error, PolesFile)}") from error
+
+
+def write_pole_candidates(
+    path: str | os.PathLike[str],
+    groups: Sequence[CandidateGroup],
+    band: Band,
+    stabilisation: Mapping[str, Any],
+    provenance: Mapping[str, Any],
+) -> None:
+    """Write candidates for a picker, with the automatic choice as ``poles``: the file is itself a choice.
+
+    Parameters
+    ----------
+    path
+        ``.json``.
+    groups
+        Of :func:`candidate_groups`.
+    band
+        Hz.
+    stabilisation
+        The chart as lists, for a picker to draw.
+    provenance
+        Where the candidates come from.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+    """
+    content = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "band_hz": list(band),
+        "poles": [{"group": one.number} for one in groups if one.taken],
+        "groups": [
+            {
+                "group": one.number,
+                "frequency_hz": one.frequency,
+                "damping_ratio": one.damping_ratio,
+                "n_orders": one.n_orders,
+                "taken": one.taken,
+                "reason": one.reason,
+            }
+            for one in groups
+        ],
+        "stabilisation": dict(stabilisation),
+        "provenance": dict(provenance),
+    }
+    with writing_whole_file(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
