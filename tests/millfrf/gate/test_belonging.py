@@ -34,3 +34,10 @@ def test_one_cutting_file_does_not_tie_lobes_of_another_model() -> None:
     lobes = given("lobes.csv", "lobes", "other.json", "cut.toml")
     [said] = check_belonging([SWEEP, HOUSING, cut, lobes])
     assert said.startswith("lobes.csv was not made from housing.json but from other.json")
+
+
+def test_verdicts_belong_to_their_cutting_file_and_to_any_recordings() -> None:
+    verdicts = given("chatter.json", "chatter verdicts", "cut1.h5", "cut.toml")
+    assert check_belonging([SWEEP, HOUSING, given("cut.toml", "cutting data"), verdicts]) == []
+    [said] = check_belonging([SWEEP, given("other.toml", "cutting data"), verdicts])
+    assert said.startswith("chatter.json was not made from other.toml but from cut1.h5, cut.toml")
