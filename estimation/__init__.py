@@ -44,7 +44,7 @@ from .importing import (
 from .independence import RANK_TOLERANCE, InputIndependence, bands_text, input_independence
 from .integration import displacement_from_acceleration
 from .known_band import known_band
-from .local_polynomial import local_polynomial
+from .local_polynomial import local_half_width, local_polynomial
 from .order_tracking import excitation_map, spectrogram, track_order
 from .quantities import correct_high_pass, to_receptance
 from .reciprocity import ReciprocityPair, SharedPoint, reciprocity_pairs, shared_points
@@ -110,6 +110,7 @@ __all__ = [
     "is_uff_number",
     "known_band",
     "load_frf_mapping",
+    "local_half_width",
     "local_polynomial",
     "looks_like_frf",
     "merge_taps",

@@ -12,6 +12,21 @@ from .frf import Frf, FrfCovariance
 from .quantities import frf_quantity
 
 Complex = NDArray[np.complex128]
+_LINES_AT_ONCE = 2048
+
+
+def local_half_width(n_tests: int, n_excitations: int, degree: int = 2) -> int:
+    """Lines to either side of each that are fitted together: the fewest with 8 equations more than unknowns.
+
+    Neighbouring lines share most of their window of 2 n + 1 lines, so that their errors are correlated.
+
+    Examples
+    --------
+    >>> local_half_width(3, 3), local_half_width(1, 1)
+    (4, 7)
+    """
+    unknowns = (degree + 1) * (n_excitations + n_tests)
+    return int(np.ceil(((unknowns + 8) / n_tests - 1) / 2))
 
 
 def local_polynomial(
@@ -52,7 +67,7 @@ def local_polynomial(
     motions = np.array([_lines(record.response_samples, n_samples) for record in records])
     n_tests, _, n_excitations = forces.shape
     unknowns = (degree + 1) * (n_excitations + n_tests)
-    n = half_width or int(np.ceil(((unknowns + 8) / n_tests - 1) / 2))
+    n = half_width or local_half_width(n_tests, n_excitations, degree)
     inside = np.flatnonzero((frequencies >= band[0]) & (frequencies <= band[1]))
     if len(inside) == 0 or len(frequencies) < 2 * n + 1:
         raise InputError(
@@ -61,12 +76,7 @@ def local_polynomial(
         )
     if (2 * n + 1) * n_tests <= unknowns:
         raise InputError(f"half width {n} gives fewer equations than the {unknowns} unknowns; raise it")
-    centre = np.clip(inside, n, len(frequencies) - 1 - n)  # at either end of the spectrum the window is one-sided
-    around = centre[:, None] + np.arange(-n, n + 1)
-    offset = (around - inside[:, None]) / max(n, 1)
-    design = _design(forces[:, around], offset, degree)
-    target = motions[:, around].transpose(1, 0, 2, 3).reshape(len(inside), -1, motions.shape[2])
-    values, noise, excitation, valid = _solve(design, target, n_excitations)
+    values, noise, excitation, valid = _in_pieces(forces, motions, inside, n, degree)
     quantity, unit = frf_quantity(records[0].responses, records[0].excitations)
     return Frf(
         np.asarray(frequencies[inside]),
@@ -79,6 +89,23 @@ def local_polynomial(
         None,
         FrfCovariance(noise, excitation),
     )
+
+
+def _in_pieces(
+    forces: Complex, motions: Complex, inside: NDArray[np.int64], n: int, degree: int
+) -> tuple[Complex, Complex, Complex, NDArray[np.bool_]]:
+    """Solve around each line; some thousand lines at a time, because each has regressors of its own."""
+    pieces = []
+    for first in range(0, len(inside), _LINES_AT_ONCE):
+        lines = inside[first : first + _LINES_AT_ONCE]
+        centre = np.clip(lines, n, forces.shape[1] - 1 - n)  # at either end of the spectrum the window is one-sided
+        around = centre[:, None] + np.arange(-n, n + 1)
+        offset = (around - lines[:, None]) / max(n, 1)
+        design = _design(forces[:, around], offset, degree)
+        target = motions[:, around].transpose(1, 0, 2, 3).reshape(len(lines), -1, motions.shape[2])
+        pieces.append(_solve(design, target, forces.shape[2]))
+    values, noise, excitation, valid = (np.concatenate(each) for each in zip(*pieces, strict=True))
+    return values, noise, excitation, valid
 
 
 def _check(records: Sequence[BandRecord], band: tuple[float, float], degree: int) -> None:

@@ -22,7 +22,8 @@ from replay_data.concealed_effect import ConcealedEffect, draw_effect, draw_name
 from replay_data.joint_march import tip_motion
 from replay_data.posture_robot import posture_robot
 
-from .chain.estimate import EstimateOptions, estimate_recordings, write_estimate
+from .chain.estimate import estimate_recordings, write_estimate
+from .chain.estimate_options import EstimateOptions
 from .chain.fit import fit_model, write_fit
 from .chain.fit_options import FitOptions
 from .progress import Watch, silent

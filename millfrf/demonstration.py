@@ -25,7 +25,8 @@ from replay_data import (
 from stability import StabilityLobes, certified_lobes, read_lobes, write_lobes
 
 from .chain.calibrate import calibrate_model, write_calibration
-from .chain.estimate import EstimateOptions, estimate_recordings, write_estimate
+from .chain.estimate import estimate_recordings, write_estimate
+from .chain.estimate_options import EstimateOptions
 from .chain.fit import fit_model, fit_recordings, write_fit
 from .chain.fit_options import SUBSPACE, FitOptions
 from .chain.lobes import compute_lobes, speed_axis

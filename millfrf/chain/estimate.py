@@ -3,14 +3,15 @@
 import json
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
+
+import numpy as np
 
 from acquisition import Recording
 from estimation import (
     CrossSpectra,
     Frf,
-    InputIndependence,
     correct_high_pass,
     cross_spectra,
     h1,
@@ -18,6 +19,7 @@ from estimation import (
     h2,
     hv,
     input_independence,
+    instrumental_variable,
     known_band,
     settings_for,
     sum_tests,
@@ -25,70 +27,22 @@ from estimation import (
 )
 from foundation import InputError
 
-from ..gate import Segmentation, check_inputs, check_recordings, check_sample_rates, driven_lines, gain_of
+from ..gate import (
+    Segmentation,
+    check_inputs,
+    check_local_frf,
+    check_recordings,
+    check_sample_rates,
+    driven_lines,
+    gain_of,
+)
 from ..progress import Watch, silent
 from ..provenance import sources, versions
+from .estimate_options import INSTRUMENTAL, LOCAL, TITLES, Estimate, EstimateOptions, check_options
+from .instruments import channels_with_instruments, only_inputs
+from .local_estimate import band_records, judging_spectra, local_frf
 
-STACKS = ("sum", "side-by-side")
-ESTIMATORS: dict[str, Callable[[CrossSpectra], Frf]] = {"h1": h1, "h2": h2, "hv": hv}
-
-
-@dataclass(frozen=True)
-class EstimateOptions:
-    """How recordings are turned into an FRF.
-
-    Parameters
-    ----------
-    segment
-        Duration of a segment, s.
-    overlap, window
-        As in :class:`estimation.SpectralSettings`.
-    stack
-        ``sum`` or ``side-by-side``.
-    excitations, responses
-        Channel names; empty: chosen by quantity.
-    band
-        Lines to keep, Hz; None: all.
-    stream
-        Sample clock; None: the only one.
-    estimator
-        ``h1``, ``h2`` or ``hv``; H2 and Hv sum the tests.
-    exclude
-        Leave out segments with overload, clipping or dropped samples.
-    """
-
-    segment: float = 8.0
-    overlap: float = 0.5
-    window: str = "hann"
-    stack: str = "sum"
-    excitations: tuple[str, ...] = ()
-    responses: tuple[str, ...] = ()
-    band: tuple[float, float] | None = None
-    stream: str | None = None
-    estimator: str = "h1"
-    exclude: bool = False
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """An FRF with what it was made from.
-
-    Parameters
-    ----------
-    frf
-        In the recordings' own quantity (accelerance from accelerations).
-    tests
-        Spectra test by test.
-    independence
-        Of the stacked inputs.
-    warnings
-        One sentence each.
-    """
-
-    frf: Frf
-    tests: tuple[CrossSpectra, ...]
-    independence: InputIndependence
-    warnings: tuple[str, ...]
+SPECTRAL: dict[str, Callable[[CrossSpectra], Frf]] = {"h1": h1, "h2": h2, "hv": hv}
 
 
 def spectra_of_tests(
@@ -124,35 +78,66 @@ def estimate_recordings(
         A file or option that cannot be used, or inputs that are dependent wherever they have power: fewer tests than
         inputs, or tests that are too much alike.
     """
-    if options.stack not in STACKS:
-        raise InputError(f"unknown stack {options.stack!r}; use one of {', '.join(STACKS)}")
-    if options.estimator not in ESTIMATORS:
-        raise InputError(f"unknown estimator {options.estimator!r}; use one of {', '.join(ESTIMATORS)}")
-    if options.stack != "sum" and options.estimator != "h1":
-        raise InputError(f"estimator {options.estimator} takes summed tests only; use --stack sum")
+    check_options(options)
+    if options.estimator == LOCAL:
+        return _local_estimate(paths, options, watch)
+    forces, taken = options.excitations, options
+    if options.estimator == INSTRUMENTAL and paths:
+        names = (options.excitations, options.responses)
+        forces, responses = channels_with_instruments(paths[0], options.stream, names, options.instruments)
+        taken = replace(options, excitations=(*forces, *options.instruments), responses=responses)
     doubts = check_recordings(
         paths,
-        stream=options.stream,
-        excitations=options.excitations,
-        responses=options.responses,
-        excluding=options.exclude,
-        segments=Segmentation(options.segment, options.overlap, options.window),
+        stream=taken.stream,
+        excitations=taken.excitations,
+        responses=taken.responses,
+        excluding=taken.exclude,
+        segments=Segmentation(taken.segment, taken.overlap, taken.window),
         watch=watch,
     )
-    tests = spectra_of_tests(paths, options, watch)
-    names = [Path(path).name for path in paths]
-    doubts += check_sample_rates([gain_of(t, name, t.sample_rate) for t, name in zip(tests, names, strict=True)])
+    tests = spectra_of_tests(paths, taken, watch)
     total = sum_tests(tests)
-    warnings = [*doubts, *check_inputs(total)]
-    frf = ESTIMATORS[options.estimator](total) if options.stack == "sum" else h1_side_by_side(tests)
-    frf = correct_high_pass(frf, [channel.high_pass_hz for channel in total.responses])
-    frf = replace(frf, band=known_band(frf, driven_lines(total)))
+    if options.estimator == INSTRUMENTAL:
+        tests = tuple(only_inputs(test, forces) for test in tests)
+        doubts += [*_rate_doubts(paths, tests), *check_inputs(only_inputs(total, options.instruments))]
+        frf = instrumental_variable(total, options.instruments)
+    else:
+        doubts += [*_rate_doubts(paths, tests), *check_inputs(total)]
+        frf = SPECTRAL[options.estimator](total) if options.stack == "sum" else h1_side_by_side(tests)
     if total.n_excluded:
-        warnings.append(
+        doubts.append(
             f"{total.n_excluded} of {total.n_excluded + total.n_segments} segments hold overload, clipping or dropped "
             "samples and were left out"
         )
-    return Estimate(frf, tests, input_independence(total), tuple(warnings))
+    return _finished(frf, tests, doubts)
+
+
+def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, watch: Watch) -> Estimate:
+    """By local polynomials over whole records; the inputs are judged by spectra as everywhere."""
+    assert options.band is not None
+    names = (options.excitations, options.responses)
+    doubts = check_recordings(
+        paths, stream=options.stream, excitations=names[0], responses=names[1], segments=None, watch=watch
+    )
+    records = band_records(paths, names, options.stream, options.band[1], watch)
+    tests = tuple(lines_of(test, options.band) for test in judging_spectra(records, options.band))
+    doubts += [*_rate_doubts(paths, tests), *check_inputs(sum_tests(tests))]
+    frf = local_frf(records, options.band, watch)
+    return _finished(frf, tests, [*doubts, *check_local_frf(frf, len(records))])
+
+
+def _rate_doubts(paths: Sequence[str | os.PathLike[str]], tests: Sequence[CrossSpectra]) -> list[str]:
+    gains = [gain_of(test, Path(path).name, test.sample_rate) for test, path in zip(tests, paths, strict=True)]
+    return check_sample_rates(gains)
+
+
+def _finished(frf: Frf, tests: tuple[CrossSpectra, ...], doubts: Sequence[str]) -> Estimate:
+    """Without the sensors' high-pass, and with the band in which it is known."""
+    total = sum_tests(tests)
+    frf = correct_high_pass(frf, [channel.high_pass_hz for channel in total.responses])
+    driven = np.interp(frf.frequencies, total.frequencies, driven_lines(total).astype(float)) >= 0.5
+    frf = replace(frf, band=known_band(frf, driven))
+    return Estimate(frf, tests, input_independence(total), tuple(doubts))
 
 
 def write_estimate(
@@ -163,10 +148,12 @@ def write_estimate(
 ) -> None:
     """Write the FRF with its provenance: recordings, settings, averages, warnings, versions."""
     first = estimate.tests[0]
+    length = first.settings.segment_length / first.sample_rate
+    judged_by = {"segment": length} if options.estimator == LOCAL else {}  # it has no segments of its own
     provenance = {
         "step": "estimate",
         "sources": sources(recordings),
-        "options": asdict(options),
+        "options": asdict(options) | judged_by,
         "settings": asdict(first.settings),
         "sample_rate_hz": first.sample_rate,
         "excitation_channels": [channel.name for channel in first.excitations],
@@ -177,7 +164,8 @@ def write_estimate(
         "warnings": list(estimate.warnings),
         "versions": versions(),
     }
-    title = f"{options.estimator.upper()} of {len(recordings)} recording{'s' if len(recordings) != 1 else ''}"
+    count = f"{len(recordings)} recording{'s' if len(recordings) != 1 else ''}"
+    title = f"{TITLES.get(options.estimator, options.estimator.upper())} of {count}"
     write_frf(path, estimate.frf, title=title, provenance=json.dumps(provenance))
 
 

@@ -24,23 +24,35 @@ def estimate(
     band: Band = None,
     stream: Stream = None,
     estimator: Annotated[
-        str, typer.Option("--estimator", help="h1 (noise on responses), h2 (on excitations) or hv (on both).")
+        str, typer.Option("--estimator", help="h1, h2, hv, instrumental-variable or local-polynomial.")
     ] = "h1",
     exclude: Annotated[
         bool, typer.Option("--exclude", help="Leave out segments with overload, clipping or dropped samples.")
     ] = False,
+    instrument: Annotated[
+        list[str] | None,
+        typer.Option("--instrument", help="Channel that drives the forces; of that estimator."),
+    ] = None,
 ) -> None:
     """FRF matrix over one or many tests, with coherence and covariance.
 
     Without names, forces and voltages excite; accelerations, velocities and displacements respond. --band keeps only
     those lines.
+
+    h1: noise on responses. h2: on excitations. hv: on both. instrumental-variable: a disturbance moves the structure
+    and, by feedback, the force; --instrument names what it does not reach. local-polynomial: whole records instead of
+    segments, without leakage, for short records and forces that are rough in frequency.
     """
-    from ..chain.estimate import EstimateOptions, estimate_recordings, write_estimate
+    from ..chain.estimate import estimate_recordings, write_estimate
+    from ..chain.estimate_options import EstimateOptions
     from ..progress import bar
 
     check_output(out, (".h5", ".hdf5"), recordings)
     channels = (names(excitation), names(response))
-    options = EstimateOptions(segment, overlap, window, stack, *channels, check_band(band), stream, estimator, exclude)
+    kept = check_band(band)
+    estimator = estimator.replace("_", "-")
+    given = (segment, overlap, window, stack, *channels, kept, stream, estimator, exclude, names(instrument))
+    options = EstimateOptions(*given)
     result = estimate_recordings(recordings, options, bar)
     write_estimate(out, result, recordings, options)
     for warning in result.warnings:

@@ -17,6 +17,7 @@ from .hammer import (
 )
 from .inputs import check_inputs, check_records, driven_lines
 from .lobes_band import check_band_of_lobes
+from .local_lines import check_local_frf
 from .looking import doubts_of
 from .model_and_recordings import check_model_and_recordings
 from .models import check_model, fit_doubts, stored_doubts
@@ -44,6 +45,7 @@ __all__ = [
     "check_frf",
     "check_frf_for_fit",
     "check_inputs",
+    "check_local_frf",
     "check_model",
     "check_model_and_recordings",
     "check_model_reciprocity",

@@ -6,6 +6,7 @@ from typing import Any
 
 from acquisition import Recording
 
+from ..chain.estimate_options import LOCAL
 from ..figures.embed import as_data_uri
 from ..figures.time_figure import time_figure
 from ..gate.signals import level_table, look
@@ -109,6 +110,8 @@ def _settings(made: Mapping[str, Any]) -> tuple[str, ...]:
     settings = made.get("settings", {})
     if made.get("step") == "estimate":
         rate = made["sample_rate_hz"]
+        if made["options"].get("estimator") == LOCAL:
+            return (f"{made['n_tests']}", "whole records", "none (local polynomials)", "", "", "together")
         return (
             f"{made['n_tests']}",
             f"{settings['segment_length'] / rate:.4g} s",

@@ -6,7 +6,8 @@ import numpy as np
 
 from modal_fit import ModalModel
 
-from ..chain.estimate import EstimateOptions, spectra_of_tests
+from ..chain.estimate import spectra_of_tests
+from ..chain.estimate_options import EstimateOptions
 from ..chain.fit_options import chart_from_json
 from ..figures.embed import as_data_uri
 from ..figures.input_figure import input_figure
