@@ -63,5 +63,5 @@ def _unexplained(name: str, indicator: ComplexModeIndicator, model: ModalModel) 
     one = len(alone) == 1
     return (
         f"{name}: the CMIF has {'a peak' if one else 'peaks'} without a mode at {', '.join(alone)}: a mode that was "
-        "left out (see the dropped poles of the fit), a frequency of the surroundings, or noise.",
+        "left out, a frequency of the surroundings, or noise.",
     )

@@ -15,9 +15,10 @@ from ..figures.stabilisation_figure import stabilisation_figure
 from ..progress import Watch
 from ..tables import error_table, mode_table
 from .collect import Collected, SourceFile
+from .dropped_part import dropped_part
 from .frfs import Band, axis_of, band_of, shown_frf
 from .indicator_part import has_lines, indicator_part
-from .section import Picture, Section
+from .section import Fold, Picture, Section
 from .shape_part import shape_part
 
 
@@ -55,6 +56,7 @@ def _options(file: SourceFile) -> EstimateOptions:
 def mode_section(collected: Collected) -> Section:
     """Modes of each model, quality of the fit, stabilisation, vectors."""
     tables, pictures, sentences = [], [], []
+    folds: list[Fold] = []
     for file, model in collected.models:
         tables.append(mode_table(model, f"{file.path.name}"))
         by_source = error_table(model, f"{file.path.name}: standard errors by source")
@@ -69,7 +71,8 @@ def mode_section(collected: Collected) -> Section:
         tables += shape_tables
         pictures += shape_pictures
         sentences += shape_sentences
-    return Section("Modal model", tuple(sentences), tuple(tables), tuple(pictures))
+        folds += dropped_part(file)
+    return Section("Modal model", tuple(sentences), tuple(tables), tuple(pictures), tuple(folds))
 
 
 def _quality(file: SourceFile) -> list[str]:

@@ -64,6 +64,8 @@ def test_indicators_stand_in_the_report_and_tell_modes_that_were_left_out(folder
     assert "mode indicators of the FRF" in full
     assert "without a mode at" not in full
     assert "without a mode at" in fewer
+    assert "groups of poles that were not taken for modes, and why" in fewer
+    assert "not among the 2 asked for" in fewer
 
 
 def test_shapes_are_measured_in_the_report_and_by_inspect(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
