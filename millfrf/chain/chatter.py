@@ -20,6 +20,8 @@ from ..gate import check_one_speed, check_recordings
 from ..progress import Watch, silent
 from ..tables import Table
 
+OTHERS = "name the other channels with --response"
+"""Remedy of a channel that cannot be used."""
 SPEED_EVENTS = "spindle_speed_rpm"
 """Event series, and key of any table of the set-up, that states the spindle's speed."""
 _SPEED_OFF = 0.002  # relative error of the stated speed from which it is told
@@ -221,7 +223,7 @@ def doubts_of_cuts(
             _, responses = choose_channels(stream, None, options.responses or None)
             doubts += check_one_speed(recording.path.name, recording.setup, process, options.speed_rpm)
         names = [channel.name for channel in responses]
-        doubts += check_recordings([path], stream=options.stream, responses=names, watch=watch)
+        doubts += check_recordings([path], stream=options.stream, responses=names, watch=watch, remedy=OTHERS)
     return doubts
 
 

@@ -16,7 +16,7 @@ from mismatch.cutting_causes import (
 )
 from modal_fit import read_modal_model
 
-from ..gate import check_depth, check_one_speed, check_recordings, read_checked_cutting
+from ..gate import RECORD_AGAIN, check_depth, check_one_speed, check_recordings, read_checked_cutting
 from ..progress import bar
 from ..report.cut_diagnosis_page import write_cut_report
 from ..result_folder import refuse_file
@@ -83,4 +83,6 @@ def _checked(paths: Sequence[Path], process: MillingProcess, asking: Asking) -> 
             kinds = {channel.quantity for channel in recording.stream(asking.stream).channels}
         if "force" in kinds and kinds & {"acceleration", "velocity", "displacement"}:
             judged.append(path)  # what the others lack is said where it is needed
-    return doubts + (check_recordings(judged, stream=asking.stream, watch=bar) if judged else [])
+    if not judged:
+        return doubts
+    return doubts + check_recordings(judged, stream=asking.stream, watch=bar, remedy=RECORD_AGAIN)

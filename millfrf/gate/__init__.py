@@ -23,7 +23,7 @@ from .model_and_recordings import check_model_and_recordings
 from .models import check_model, fit_doubts, stored_doubts
 from .plans import check_demand, check_duration
 from .reciprocity import check_model_reciprocity, check_reciprocity, plainly_different, shown_pairs
-from .recordings import check_channels, check_recordings, doubts_of_rate
+from .recordings import RECORD_AGAIN, check_channels, check_recordings, doubts_of_rate
 from .sample_rates import check_sample_rates, gain_of
 from .scales import check_scales
 from .spindle import check_depth, check_speed, check_speeds, lowest_frequency, rigid_directions
@@ -33,6 +33,7 @@ from .taps_in_segments import IMPULSIVE, LONGEST, Segmentation
 __all__ = [
     "IMPULSIVE",
     "LONGEST",
+    "RECORD_AGAIN",
     "Given",
     "Segmentation",
     "check_band_of_lobes",

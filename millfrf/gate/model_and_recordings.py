@@ -10,7 +10,7 @@ from modal_fit import ModalModel
 
 from ..progress import Watch, silent
 from .models import check_model, stored_doubts
-from .recordings import check_channels
+from .recordings import RECORD_AGAIN, check_channels
 
 EXCITES = ("force", "voltage")
 MOVES = ("displacement", "velocity", "acceleration")
@@ -55,7 +55,7 @@ def check_model_and_recordings(
     def chosen(source: Stream) -> tuple[list[str], list[str]]:
         return _at(source, model.excitations, EXCITES), _at(source, model.responses, MOVES)
 
-    return [*doubts, *check_channels(recordings, chosen, stream, watch=watch)]
+    return [*doubts, *check_channels(recordings, chosen, stream, watch=watch, remedy=RECORD_AGAIN)]
 
 
 def _at(stream: Stream, labels: Sequence[str], quantities: tuple[str, ...]) -> list[str]:

@@ -29,6 +29,9 @@ accelerometers end at 1e6 m/s^2, dynamometers at 1e6 N)."""
 NAME_OTHERS = "name the other channels with --excitation and --response"
 """What a job offers whose channels can be chosen."""
 
+RECORD_AGAIN = "record again, without the channel if that axis is not measured"
+"""Where they cannot."""
+
 
 def check_recordings(
     paths: Sequence[str | os.PathLike[str]],
@@ -39,6 +42,7 @@ def check_recordings(
     excluding: bool = False,
     segments: Segmentation | None = None,
     watch: Watch = silent,
+    remedy: str = NAME_OTHERS,
 ) -> list[str]:
     """Judge the channels that a job takes from its recordings, file by file.
 
@@ -56,6 +60,8 @@ def check_recordings(
         Segments over which the job averages; None: it does not.
     watch
         Shows progress while samples are read.
+    remedy
+        What to do about a channel that is dead or copies another, besides checking its cable.
 
     Returns
     -------
@@ -74,7 +80,7 @@ def check_recordings(
         exciting, responding = choose_channels(source, excitations or None, responses or None)
         return [channel.name for channel in exciting], [channel.name for channel in responding]
 
-    return check_channels(paths, chosen, stream, excluding, watch, segments)
+    return check_channels(paths, chosen, stream, excluding, watch, segments, remedy)
 
 
 def check_channels(
@@ -87,8 +93,6 @@ def check_channels(
     remedy: str = NAME_OTHERS,
 ) -> list[str]:
     """As :func:`check_recordings`, with the names of exciting and responding channels told by ``chosen``.
-
-    ``remedy`` says what to do about a channel that is dead or copies another, besides checking its cable.
 
     Raises
     ------

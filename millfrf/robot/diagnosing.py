@@ -20,7 +20,7 @@ from modal_fit import write_modal_model
 from robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot, tool_down
 
 from ..commands.options import check_band
-from ..gate import check_channels
+from ..gate import RECORD_AGAIN, check_channels
 from ..progress import bar
 from ..report.robot_diagnosis_page import write_robot_report
 from ..result_folder import refuse_file
@@ -31,9 +31,6 @@ Real = NDArray[np.float64]
 
 LOWEST, HIGHEST = 0.4, 1.3
 """Band that is compared where none is given: from so many times the first mode to so many times the fourth."""
-
-LEAVE_OUT = "record again, without the channel if that axis is not measured"
-"""Remedy of a channel that cannot be used; all of the tip and the housing are."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +87,9 @@ def diagnose_robot_files(robot: str, paths: Sequence[Path], out: Path, asking: A
 def _doubts(paths: Sequence[Path], stream: str | None) -> list[str]:
     """Judge each recording alone: a force that rests in one posture tells nothing there of the robot."""
     return [
-        doubt for path in paths for doubt in check_channels([path], posed_channels, stream, watch=bar, remedy=LEAVE_OUT)
+        doubt
+        for path in paths
+        for doubt in check_channels([path], posed_channels, stream, watch=bar, remedy=RECORD_AGAIN)
     ]
 
 
