@@ -13,6 +13,9 @@ from .verdict import CONFIRMED
 
 Found = tuple[list[Fit], list[AcceptedCause]]
 
+BELIEF_ALONE = 0.05
+"""Share of a cause's evidence below which its misfit says nothing: the lab's belief alone tells it from a refit."""
+
 
 def confirmed(
     recordings: Recordings, steps: list[Fit], accepted: list[AcceptedCause]
@@ -56,11 +59,20 @@ def helps(gain: Improvement, current: Fit, base: Fit) -> bool:
     """Whether the causes together lower the error of the held-out recording.
 
     Causes that gained little where they were fitted but stand nearer to the lab's belief than a general refit need not
-    predict better than that; they must predict better than the nominal model.
+    predict better than that; they must predict better than the nominal model, and no worse than the refit where they
+    gained more than chance. (A sensor's gain is a refit of shapes to the last digit: only that the lab was not off by
+    so much in every mode speaks for it.)
     """
     if base.misfit - current.misfit < LEAST_EVIDENCE:
         return gain.after < gain.before
+    if by_belief(base, current) and gain.after < gain.before and gain.evidence > 0:
+        return True
     return gain.evidence > HELD_OUT and gain.after < gain.refitted and gain.p_value < CONFIRMED
+
+
+def by_belief(without: Fit, whole: Fit) -> bool:
+    """Whether hardly any of the evidence for what ``whole`` has and ``without`` has not is a better misfit."""
+    return without.misfit - whole.misfit < max(LEAST_EVIDENCE, BELIEF_ALONE * (without.score - whole.score))
 
 
 def _idle(
@@ -93,8 +105,7 @@ def _idle(
 def _missed(recordings: Recordings, fits: tuple[Fit, Fit], last: Fit, held_out: HeldOut) -> bool:
     """Whether the held-out recording misses a cause: with it (first fit) the error is less than without (second)."""
     whole, less = fits
-    if less.misfit - whole.misfit < LEAST_EVIDENCE:
-        # the lab's belief alone speaks for it
+    if by_belief(less, whole):
         return less.score - whole.score > evidence_needed(less, less)
     here = recordings.mended[recordings.kept]
     rest, without = residual_lines(held_out.improved, here), residual_lines(less.explanation, here)

@@ -15,7 +15,7 @@ from .fitting import Fit, fit
 from .held_out import block_slices
 from .jacobian import jacobian
 from .noise_model import NoiseModel, whitening
-from .physics import JointPhysics
+from .physics import FormedPhysics, JointPhysics
 from .windowed_lines import WindowedLines
 
 Complex = NDArray[np.complex128]
@@ -58,7 +58,7 @@ def with_form_spread(fitted: Fit, lines: Sequence[WindowedLines]) -> Fit:
     told = told[(told < shape.modal_size) | (told >= shape.size)]
     modal = np.concatenate([np.arange(first, first + 2) for first in range(0, believed, shape.per_mode)])
     extra = np.zeros(fitted.explanation.size)
-    extra += _of_wider_forms(fitted, list(lines))
+    extra += _of_wider_forms(fitted, list(lines)) + _of_other_forms(fitted, list(lines))
     extra[modal] += _between(fitted, lines, modal)
     if len(told):
         extra[told] += _between(fitted, lines, told)
@@ -92,6 +92,27 @@ def _of_wider_forms(fitted: Fit, lines: list[WindowedLines]) -> Real:
         moved = there - cause.coordinates()[: len(cause.values)]
         gained = np.diag(again.covariance)[own] - np.diag(fitted.covariance)[own]
         extra[own] = moved**2 + np.maximum(gained, 0.0)
+    return extra
+
+
+def _of_other_forms(fitted: Fit, lines: list[WindowedLines]) -> Real:
+    """Variance that numbers owe to another form of their law, by how likely that form is beside the named one, (size,).
+
+    The squared difference counts by the likelihood of the other form over that of the named one (Bayes' information
+    criterion), and whole where both are as likely: the interval shall hold either.
+    """
+    extra = np.zeros(fitted.explanation.size)
+    at = fitted.explanation.shape.size
+    for number, cause in enumerate(fitted.explanation.causes):
+        own, at = slice(at, at + len(cause.values)), at + cause.size
+        if not isinstance(cause.physics, FormedPhysics):
+            continue
+        for place, values in cause.physics.other_forms(cause.values, cause.place):
+            causes = list(fitted.explanation.causes)
+            causes[number] = replace(cause, place=place, values=values)
+            again = fit(lines, replace(fitted.explanation, causes=tuple(causes)), fitted.noises, iterations=WIDER)
+            moved = again.explanation.causes[number].coordinates() - cause.coordinates()
+            extra[own] += min(1.0, np.exp(-(again.score - fitted.score) / 2)) * moved**2
     return extra
 
 

@@ -11,7 +11,7 @@ from .chain_screening import ScreenedChain
 from .explanation import Cause, Explanation
 from .fitting import Fit, fit
 from .missing_mode import SightedMode
-from .physics import answer_name
+from .physics import FormedPhysics, answer_name
 from .settling import with_chain
 from .side_by_side import side_by_side
 from .windowed_lines import WindowedLines
@@ -78,5 +78,7 @@ def _is_resolved(fitted: Fit, lines: list[WindowedLines]) -> bool:
 
 def channel_of(cause: Cause) -> dict[str, Any]:
     """Location of a linear cause, as a diagnosis states it."""
+    if isinstance(cause.physics, FormedPhysics):
+        return {"form": cause.place or "one stage"}
     kind, _, label = cause.place.partition(" ")
     return {"channel": label, "role": kind} if kind in ("response", "force") else {}

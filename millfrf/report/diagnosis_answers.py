@@ -133,6 +133,8 @@ def place(diagnosis: Diagnosis, cause: AcceptedCause) -> str:
         return f"in a joint that acts along {axes} at {parts[0].node}"
     if "channel" in location:
         return f"in the {location.get('role', 'response')} channel {location['channel']}"
+    if "form" in location:
+        return str(location["form"])
     if "channels" in location:
         return f"in {', '.join(location['channels'])}"
     if "modes" in location:

@@ -4,11 +4,12 @@ import importlib
 import pkgutil
 from collections.abc import Collection
 
-from .protocol import Chain, ChainPhysics, JointPhysics, LimitedPhysics, Parameter, Physics, answer_name
+from .protocol import Chain, ChainPhysics, FormedPhysics, JointPhysics, LimitedPhysics, Parameter, Physics, answer_name
 
 __all__ = [
     "Chain",
     "ChainPhysics",
+    "FormedPhysics",
     "JointPhysics",
     "LimitedPhysics",
     "Parameter",

@@ -35,5 +35,9 @@ class AcCoupling:
         passed = (s / (s + 2 * np.pi * values[0])) ** (2 if place == TWO_STAGES else 1)
         return Chain(response=passed[:, None, None] * np.eye(len(model.responses)))
 
+    def other_forms(self, values: Real, place: str) -> tuple[tuple[str, Real], ...]:
+        """The other number of stages with the same phase well above the corner, ``n f_c / f``."""
+        return (("", 2 * values),) if place == TWO_STAGES else ((TWO_STAGES, values / 2),)
+
 
 PHYSICS = AcCoupling()

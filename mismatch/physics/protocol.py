@@ -158,3 +158,12 @@ def resonance_of(squared_period: float, damping_time: float) -> dict[str, float]
 def axes_of(labels: tuple[str, ...]) -> list[str]:
     """Axis (X, Y or Z) of each degree of freedom."""
     return [DegreeOfFreedom.parse(label).axis for label in labels]
+
+
+@runtime_checkable
+class FormedPhysics(Protocol):
+    """A linear cause whose places are forms of one law, so that its numbers mean another thing at each."""
+
+    def other_forms(self, values: Real, place: str) -> tuple[tuple[str, Real], ...]:
+        """Other places, with the numbers there that come nearest to the given ones here."""
+        ...
