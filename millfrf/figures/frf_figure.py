@@ -18,6 +18,12 @@ from .style import FITTED, MEASURED, TRUE, WIDTH_MM, house_style, new_figure
 PER_PAGE = 3
 """Responses, and excitations, on one page."""
 
+_MANY = 2000
+"""Points from which on dots are drawn as pixels: as outlines they would make a page of tens of megabytes."""
+
+_AROUND = np.concatenate([-np.geomspace(0.05, 30, 25)[::-1], [0.0], np.geomspace(0.05, 30, 25)])
+"""Half widths of a mode's peak around which its curve has points."""
+
 _SYMBOLS = {"receptance": "H", "mobility": "Y", "accelerance": "A"}
 
 
@@ -97,7 +103,7 @@ MAGNITUDE, PHASE, COHERENCE = (0.0, 34.0), (36.5, 17.0), (0.0, 20.0)
 class _Page:
     """Panels placed in millimetres: phase close under its magnitude, entries apart."""
 
-    left, right, gap, top, entry, foot = 16.0, 2.0, 3.5, 11.0, 60.0, 10.0
+    left, right, gap, top, entry, foot = 16.0, 4.5, 3.5, 11.0, 60.0, 10.0
 
     def __init__(self, n_columns: int, n_rows: int, with_coherence: bool) -> None:
         coherence = COHERENCE[1] if with_coherence else -4.0
@@ -146,8 +152,13 @@ def _lines(curves: FrfCurves) -> tuple[NDArray[np.float64], NDArray[np.complex12
     return frf.frequencies[inside], values, deviation
 
 
-def _axis_of(model_band: tuple[float, float]) -> NDArray[np.float64]:
-    return np.linspace(max(model_band[0], 1e-3), model_band[1], 600)
+def _axis_of(model: ModalModel, model_band: tuple[float, float]) -> NDArray[np.float64]:
+    """Frequencies (Hz) dense enough for every peak: evenly over the band, and around each mode."""
+    low, high = max(model_band[0], 1e-3), model_band[1]
+    width = np.abs(model.poles.real) / (2 * np.pi)
+    near = model.natural_frequencies[:, None] + width[:, None] * _AROUND
+    every = np.concatenate([np.linspace(low, high, 600), near.ravel()])
+    return np.unique(every[(every >= low) & (every <= high)])
 
 
 def _models(curves: FrfCurves) -> list[tuple[str, ModalModel, tuple[float, float], dict[str, Any]]]:
@@ -176,10 +187,10 @@ def _draw_entry(magnitude: Axes, phase: Axes, curves: FrfCurves, p: int, q: int)
             label="± 2 standard deviations",
         )
     magnitude.plot(frequencies, size, color=MEASURED, linewidth=0.9, label="Measured")
-    phase.plot(frequencies, angle, ".", color=MEASURED, markersize=1.8)
+    phase.plot(frequencies, angle, ".", color=MEASURED, markersize=1.8, rasterized=len(frequencies) > _MANY)
     for label, model, band, style in _models(curves):
-        axis = _axis_of(band)
-        entry = _entry(model.frf(axis), curves.measured, p, q)
+        axis = _axis_of(model, band)
+        entry = _entry(model, axis, curves.measured, p, q)
         if entry is None:
             continue
         magnitude.plot(axis, np.abs(entry), label=label, **style)
@@ -187,12 +198,14 @@ def _draw_entry(magnitude: Axes, phase: Axes, curves: FrfCurves, p: int, q: int)
     magnitude.set_yscale("log")
 
 
-def _entry(frf: Frf, like: Frf, p: int, q: int) -> NDArray[np.complex128] | None:
-    """The model's entry of the same degrees of freedom, None where it has none."""
-    if like.responses[p] not in frf.responses or like.excitations[q] not in frf.excitations:
+def _entry(model: ModalModel, axis: NDArray[np.float64], like: Frf, p: int, q: int) -> NDArray[np.complex128] | None:
+    """The model's entry of the same degrees of freedom, under the same exponential window; None where it has none."""
+    if like.responses[p] not in model.responses or like.excitations[q] not in model.excitations:
         return None
-    row, column = frf.responses.index(like.responses[p]), frf.excitations.index(like.excitations[q])
-    return np.asarray(frf.values[:, row, column])
+    row, column = model.responses.index(like.responses[p]), model.excitations.index(like.excitations[q])
+    tau = like.exponential_time_constant
+    s = np.asarray(2j * np.pi * axis + (0.0 if tau is None else 1 / tau), dtype=np.complex128)
+    return np.asarray(model.at(s)[:, row, column])
 
 
 def _without_jumps(angle: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -203,15 +216,20 @@ def _without_jumps(angle: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _magnitude_limits(curves: FrfCurves) -> tuple[float, float]:
-    """One scale for all entries, four decades at most, so that strong and weak can be compared."""
+    """One scale for all entries, six decades at most, so that strong and weak can be compared.
+
+    By the lines of the fit where there is one: below them a receptance made of accelerations is noise over w^2.
+    """
     frf = curves.measured
-    inside = (frf.frequencies >= curves.band[0]) & (frf.frequencies <= curves.band[1])
+    low, high = curves.fit_band or curves.band
+    low, high = max(low, curves.band[0]), min(high, curves.band[1])
+    inside = (frf.frequencies >= low) & (frf.frequencies <= high)
     size = np.abs(frf.values[inside & coherent_lines(frf)])
     size = size[np.isfinite(size) & (size > 0)]
     if not len(size):
         return 1e-9, 1e-3
     top = float(size.max()) * 2.5
-    return max(float(np.percentile(size, 1)) / 2.5, top * 1e-4), top
+    return max(float(np.percentile(size, 1)) / 2.5, top * 1e-6), top
 
 
 def _label(magnitude: Axes, phase: Axes, frf: Frf, p: int, q: int, *, outer: bool) -> None:

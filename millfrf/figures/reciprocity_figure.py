@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from estimation import ReciprocityPair
 
@@ -34,7 +35,7 @@ def reciprocity_figure(pairs: Sequence[ReciprocityPair], unit: str) -> Figure:
         figure = new_figure(height, None)
         for number, pair in enumerate(pairs):
             row, column = divmod(number, _COLUMNS)
-            width = (WIDTH_MM - _LEFT - 2 - _GAP * (_COLUMNS - 1)) / _COLUMNS
+            width = (WIDTH_MM - _LEFT - 5 - _GAP * (_COLUMNS - 1)) / _COLUMNS
             left = _LEFT + column * (width + _GAP)
             panels = [
                 figure.add_axes(
@@ -66,6 +67,8 @@ def _draw(magnitude: Axes, difference: Axes, pair: ReciprocityPair, unit: str, *
     difference.set_yticks([0, 100, 200])
     difference.tick_params(labelleft=outer)
     difference.set_xlabel("Frequency (Hz)")
+    difference.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
+    magnitude.xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
     for axes in (magnitude, difference):
         axes.set_xlim(pair.frequencies[0], pair.frequencies[-1])
     if outer:

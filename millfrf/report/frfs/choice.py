@@ -10,8 +10,8 @@ Band = tuple[float, float]
 
 
 def shown_frf(frf: Frf, model: ModalModel | None) -> Frf:
-    """In the model's quantity where there is one."""
-    return to_receptance(frf) if model is None or model.quantity == "receptance" else frf
+    """As a receptance where a model of one is drawn over it, else as it was measured."""
+    return to_receptance(frf) if model is not None and model.quantity == "receptance" else frf
 
 
 def knows(model: ModalModel, frf: Frf) -> bool:
@@ -26,10 +26,13 @@ def band_of(file: SourceFile) -> Band | None:
 
 
 def axis_of(frf: Frf, fit_band: Band | None) -> Band:
-    """The fit's band widened by a fifth of its width on either side, or all lines that show the structure."""
+    """The fit's band widened by a fifth of its width (downwards to half at most), or all lines that show the structure.
+
+    Far below the band a receptance made of accelerations is nothing but noise over w^2.
+    """
     valid = frf.frequencies[coherent_lines(frf) & (frf.frequencies > 0)]
     first, last = (float(valid[0]), float(valid[-1])) if len(valid) else (0.0, float(frf.frequencies[-1]))
     if fit_band is None:
         return first, last
     room = 0.2 * (fit_band[1] - fit_band[0])
-    return max(first, fit_band[0] - room), min(last, fit_band[1] + room)
+    return max(first, fit_band[0] - room, fit_band[0] / 2), min(last, fit_band[1] + room)
