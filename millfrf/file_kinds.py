@@ -12,19 +12,20 @@ from estimation import is_geometry_table
 from foundation import FileFormatError, InputError
 
 RECORDING, FRF, MODEL, LOBES, CUTTING = "recording", "frf", "modal model", "lobes", "cutting data"
-GEOMETRY, CHATTER = "geometry", "chatter verdicts"
+GEOMETRY, CHATTER, POLES = "geometry", "chatter verdicts", "picked poles"
 _FORMATS = {
     "millfrf.recording": RECORDING,
     "millfrf.frf": FRF,
     "millfrf.modal_model": MODEL,
     "millfrf.chatter": CHATTER,
+    "millfrf.poles": POLES,
 }
 _LOBES_COLUMNS = ["spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation"]
 
 
 def kind_of(path: str | os.PathLike[str]) -> str:
-    """``recording``, ``frf``, ``modal model``, ``lobes``, ``cutting data``, ``geometry`` or ``chatter
-    verdicts``.
+    """``recording``, ``frf``, ``modal model``, ``lobes``, ``cutting data``, ``geometry``, ``chatter
+    verdicts`` or ``picked poles``.
 
     Raises
     ------
@@ -71,6 +72,8 @@ def _text_kind(file: Path) -> str | None:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError:
         return None
+    if "poles" in table:
+        return POLES
     return CUTTING if "cutting" in table else GEOMETRY if is_geometry_table(table) else None
 
 

@@ -15,7 +15,7 @@ from stability import STATUSES, read_lobes
 
 from .chain.chatter import tone_table, verdict_table
 from .chain.chatter_file import read_cuts
-from .file_kinds import CHATTER, CUTTING, FRF, GEOMETRY, LOBES, MODEL, RECORDING, kind_of
+from .file_kinds import CHATTER, CUTTING, FRF, GEOMETRY, LOBES, MODEL, POLES, RECORDING, kind_of
 from .gate import (
     check_frf,
     check_model,
@@ -27,6 +27,7 @@ from .gate import (
 )
 from .gate.signals import level_table, look
 from .point_words import points_in_words
+from .poles_table import poles_in_words
 from .progress import Watch, silent
 from .provenance import read_provenance
 from .reciprocity_tables import pair_table, vector_table
@@ -76,6 +77,7 @@ def inspect_file(path: str | os.PathLike[str], watch: Watch = silent) -> Finding
         CUTTING: _cutting,
         GEOMETRY: _geometry,
         CHATTER: _chatter,
+        POLES: _poles,
     }
     return readers[kind](path)
 
@@ -206,6 +208,11 @@ def _cutting(path: str | os.PathLike[str]) -> Findings:
         f"Ktc {process.ktc / 1e6:g} MPa, immersion {immersion[0]:g} to {immersion[1]:g} deg"
     )
     return Findings(CUTTING, summary, concerns=tuple(doubts))
+
+
+def _poles(path: str | os.PathLike[str]) -> Findings:
+    summary, tables = poles_in_words(path)
+    return Findings(POLES, summary, tables)
 
 
 def _geometry(path: str | os.PathLike[str]) -> Findings:

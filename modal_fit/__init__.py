@@ -17,6 +17,7 @@ from .pole_picking import (
     candidate_groups,
     fit_picked_poles,
     read_picked_poles,
+    read_pole_groups,
     write_pole_candidates,
 )
 from .polyreference import ModalFit, fit_polyreference
@@ -65,6 +66,7 @@ __all__ = [
     "read_modal_model",
     "read_modes_uff",
     "read_picked_poles",
+    "read_pole_groups",
     "reciprocity_residual",
     "synthesis",
     "write_modal_model",

@@ -2,12 +2,13 @@
 
 from .candidate_groups import CandidateGroup, candidate_groups
 from .picked_fit import fit_picked_poles
-from .poles_file import read_picked_poles, write_pole_candidates
+from .poles_file import read_picked_poles, read_pole_groups, write_pole_candidates
 
 __all__ = [
     "CandidateGroup",
     "candidate_groups",
     "fit_picked_poles",
     "read_picked_poles",
+    "read_pole_groups",
     "write_pole_candidates",
 ]

@@ -44,6 +44,14 @@ class OfferedGroup(BaseModel):
     group: Annotated[int, Field(ge=1)]
     frequency_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)]
     damping_ratio: Annotated[float, Field(gt=0, lt=1, allow_inf_nan=False)]
+    n_orders: Annotated[int, Field(ge=0)] = 0
+    taken: bool = False
+    reason: str = ""
+
+    @property
+    def pole(self) -> complex:
+        """rad/s."""
+        return _pole(self.frequency_hz, self.damping_ratio)
 
 
 class PolesFile(BaseModel):
@@ -87,8 +95,24 @@ def read_picked_poles(path: str | os.PathLike[str]) -> NDArray[np.complex128]:
             f, zeta = offered.frequency_hz, offered.damping_ratio
         assert f is not None
         assert zeta is not None
-        poles.append(2 * np.pi * f * (-zeta + 1j * np.sqrt(1 - zeta**2)))
+        poles.append(_pole(f, zeta))
     return np.array(poles, dtype=complex)
+
+
+def read_pole_groups(path: str | os.PathLike[str]) -> tuple[CandidateGroup, ...]:
+    """Groups that a file offers; none where it is a choice only.
+
+    Raises
+    ------
+    InputError, FileFormatError
+        As :func:`read_picked_poles`.
+    """
+    groups = _read(Path(path)).groups
+    return tuple(CandidateGroup(one.group, one.pole, one.n_orders, one.taken, one.reason) for one in groups)
+
+
+def _pole(f: float, zeta: float) -> complex:
+    return complex(2 * np.pi * f * (-zeta + 1j * np.sqrt(1 - zeta**2)))
 
 
 def _no_group(number: int, groups: Mapping[int, OfferedGroup]) -> str:

@@ -122,8 +122,12 @@ def test_poles_are_picked_from_candidates_and_the_report_says_so(
     taken = [one["group"] for one in offered["poles"]]
     assert [round(groups[number]["frequency_hz"], 1) for number in taken] == [22.0, 48.0, 48.4, 71.0, 104.0]
     assert len(offered["stabilisation"]["orders"]) == len(offered["stabilisation"]["poles_rad_per_s"])
+    assert run(["inspect", paths["candidates.json"]]) == 0
+    assert f"5 picked poles of candidates.json, {len(groups)} groups to pick from" in capsys.readouterr().out
     rows = "".join(f"[[poles]]\ngroup = {number}\n" for number in taken if number != taken[2])
     (tmp_path / "poles.toml").write_text(f'candidates = "candidates.json"\n{rows}')
+    assert run(["inspect", paths["poles.toml"]]) == 0
+    assert "4 picked poles of poles.toml" in capsys.readouterr().out
     assert run(["fit", frf, *band, "--poles", paths["poles.toml"], "--refine", "--out", paths["b.json"]]) == 0
     assert "4 poles picked in poles.toml, refined from there" in capsys.readouterr().out
     assert run(["report", frf, paths["b.json"], "--out", paths["r.html"]]) == 0
