@@ -9,10 +9,14 @@ from cutting import MillingProcess, directional_matrix
 from foundation import InputError
 from modal_fit import ModalModel
 
+from .beyond_band import lost_inside, with_residual_flexibility
 from .tool_receptance import tool_directions
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+
+LOST = 0.1
+"""Share of the FRF at the resonances that may be left out without a word; a limit moves by about as much."""
 
 
 @dataclass(frozen=True)
@@ -68,8 +72,9 @@ class DelaySystem:
 def delay_system(model: ModalModel, process: MillingProcess, *, node: str | None = None) -> DelaySystem:
     """Bring a modal model to the tool's X, Y, Z and join it with a process.
 
-    Residual terms at fixed poles become modes (a residue of full rank becomes up to three); a residual flexibility is
-    kept; a residual inertia is left out with a warning: it stands for a body that would drift away.
+    A residual flexibility is kept; a residual inertia is left out with a warning: it stands for a body that would
+    drift away. The out-of-band terms of a fit, whose poles lie outside its band, count as one residual flexibility
+    (:func:`with_residual_flexibility`), with a warning where they shape the FRF inside the band.
 
     Parameters
     ----------
@@ -99,17 +104,16 @@ def delay_system(model: ModalModel, process: MillingProcess, *, node: str | None
     poles, right, left = model.poles, model.right, model.left
     upper = np.zeros((len(model.responses), len(model.excitations)))
     warnings: tuple[str, ...] = ()
-    residuals = model.residuals
+    residuals = with_residual_flexibility(model).residuals
     if residuals is not None:
         upper = residuals.upper
         if residuals.lower.any():
             warnings = ("the residual inertia of modes below the band is left out of the time-periodic solution",)
-        if residuals.poles is not None and residuals.residues is not None:
-            u, gain, v = np.linalg.svd(residuals.residues, full_matrices=False)
-            count = gain.shape[1]
-            poles = np.concatenate([poles, np.repeat(residuals.poles, count)])
-            right = np.concatenate([right, (u * gain[:, None, :]).swapaxes(1, 2).reshape(-1, right.shape[1])])
-            left = np.concatenate([left, v.reshape(-1, left.shape[1])])
+        if (share := lost_inside(model)) > LOST:
+            warnings += (
+                f"modes just outside the fitted band make {100 * share:.0f} % of the FRF at the resonances inside it, "
+                "and limits leave that out; fit a wider band",
+            )
     if poles.real.max() >= 0:
         worst = poles[poles.real.argmax()]
         raise InputError(f"the structure itself is unstable: pole {worst:.4g} rad/s does not decay; fit again")

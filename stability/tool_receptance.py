@@ -11,6 +11,8 @@ from estimation import Frf, to_receptance
 from foundation import DegreeOfFreedom, InputError
 from modal_fit import ModalModel
 
+from .beyond_band import with_residual_flexibility
+
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
@@ -62,7 +64,7 @@ def tool_receptance(structure: Frf | ModalModel, *, node: str | None = None) -> 
         structure = to_receptance(structure)
     placed = tool_directions(structure, node).place
     if isinstance(structure, ModalModel):
-        return _from_model(structure, placed)
+        return _from_model(with_residual_flexibility(structure), placed)
     return _from_frf(structure, placed)
 
 

@@ -1,13 +1,12 @@
 """This project's fit as an engine."""
 
 import warnings
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf, FrfCovariance
-from modal_fit import fit_polyreference
+from modal_fit import ModalFit, fit_polyreference
 
 from .problem import UNITS, Answer, FoundMode, Problem
 
@@ -32,13 +31,12 @@ def find_modes(problem: Problem) -> Answer:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         fit = fit_polyreference(frf, problem.band)
-    status = getattr(fit, "status", None)
     said = [*fit.warnings, *(f"{one.category.__name__}: {one.message}" for one in caught)]
-    said += [f"status: {status}"] if status is not None else []
+    said += [f"status: {fit.status}"]
     return Answer(_modes(fit), said=tuple(said))
 
 
-def _modes(fit: Any) -> tuple[FoundMode, ...]:
+def _modes(fit: ModalFit) -> tuple[FoundMode, ...]:
     model = fit.model
     bars = _standard_errors(fit)
     found = []
@@ -50,12 +48,11 @@ def _modes(fit: Any) -> tuple[FoundMode, ...]:
     return tuple(found)
 
 
-def _standard_errors(fit: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
-    """Of frequency (Hz) and damping ratio: those that the fit states, else those of noise from its covariance."""
-    stated = getattr(fit, "errors", None)
-    if stated is not None:
-        return np.asarray(stated.frequency), np.asarray(stated.damping)
+def _standard_errors(fit: ModalFit) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Of frequency (Hz) and damping ratio: the total that the fit states, else the noise's part of its covariance."""
     model = fit.model
+    if model.errors is not None:
+        return model.errors.frequency, model.errors.damping
     if model.covariance is None:
         return None
     n, size = len(model.poles), np.abs(model.poles)

@@ -18,6 +18,7 @@ from .entry_noise import entry_noise
 from .held_out_lines import holds_on_held_out_lines
 from .hidden_modes import hidden_candidates
 from .measured_lines import MeasuredLines, correlated_lines, measured_lines
+from .outside_terms import with_terms_that_hold
 from .refinement import refine
 from .selection import Reweigh, Selection, select_modes
 from .spread import mode_errors, unknowns_covariance
@@ -95,6 +96,8 @@ def _fitted(
             f"no pole is stable over orders 1 to {max_order} between {band[0]:g} and {band[1]:g} Hz "
             "and lowers the misfit by more than noise would; widen the band, raise --max-order or average more"
         )
+    if lines.stated:
+        selection = replace(selection, lines=with_terms_that_hold(selection.modes, selection.lines))
     return _finished(frf, chart, selection)
 
 

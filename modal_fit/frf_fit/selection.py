@@ -167,8 +167,8 @@ def _without_needless(state: Selection, *, thorough: bool) -> Selection:
         others = np.arange(len(state.modes.poles)) != number
         last = state.modes.chosen(others).joined(state.modes.chosen(~others))
         reason = judge_again(candidate, last, eliminate(last, state.lines), state.lines, thorough=thorough)
-        if reason or _far(candidate, complex(last.poles[-1])):
-            reason = reason or f"refinement drives it to {abs(last.poles[-1]) / (2 * np.pi):.4g} Hz"
+        reason = reason or _strayed(candidate, complex(last.poles[-1]), state.lines)
+        if reason:
             taken = tuple(one for one in state.taken if one is not candidate)
             rest = state.modes.chosen(others)
             if thorough:
@@ -177,7 +177,11 @@ def _without_needless(state: Selection, *, thorough: bool) -> Selection:
     return state
 
 
-def _far(start: Candidate, pole: complex) -> bool:
-    """Whether a mode moved by several bandwidths since it was a candidate."""
-    damping = max(start.damping_ratio, -pole.real / abs(pole), 0.0025)
-    return abs(pole - start.pole) > min(4 * damping, 0.3) * abs(start.pole)
+def _strayed(start: Candidate, pole: complex, lines: MeasuredLines) -> str:
+    """Whether a mode left the band or moved by several bandwidths since it was a candidate; empty where it did not."""
+    frequency, size = abs(pole) / (2 * np.pi), abs(pole)
+    low, high = lines.band
+    damping = max(start.damping_ratio, -pole.real / size, 0.0025)
+    if low < frequency < high and abs(pole - start.pole) <= min(4 * damping, 0.3) * abs(start.pole):
+        return ""
+    return f"refinement drives it to {frequency:.4g} Hz"

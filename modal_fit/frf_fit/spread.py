@@ -1,19 +1,20 @@
 """Error bars of frequencies and dampings: noise, and what changes with points, band and out-of-band terms."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 
 import numpy as np
 
 from ..mode_errors import ModeErrors
-from ..out_of_band import basis_with_poles, fixed_poles
 from .elimination import Elimination, Modes, Real
 from .measured_lines import MeasuredLines
 from .neighbourhood import half_power_lines
+from .outside_terms import with_fixed_poles
 from .refinement import normal_equations, refine, weighted_matrix, without_response
 
 _EDGE = 0.05  # of the band
 _OTHER_POLES = (((0.5,), (1.6, 4.0)), ((0.85,), (1.15, 2.0)))  # of the band's lower and upper end
+_TO_FEWER = (((0.7,), (1.3, 3.0)), ((), (2.0,)))  # where the fit has fewer than three fixed poles
+_ALL_POLES = 3
 _STEPS, _TOLERANCE = 8, 1e-5
 _FEWEST_RESPONSES = 4
 _SMOOTH = 4  # lines to each side over which the squared error is averaged
@@ -84,10 +85,9 @@ def _narrowed(modes: Modes, lines: MeasuredLines) -> Iterator[MeasuredLines]:
 
 
 def _other_terms(lines: MeasuredLines) -> Iterator[MeasuredLines]:
-    """The lines with the fixed poles outside the band at other places."""
-    for below, above in _OTHER_POLES:
-        poles = fixed_poles(lines.band, below, above)[-len(lines.outside_poles) :]
-        yield replace(lines, outside_poles=tuple(poles), basis=basis_with_poles(lines.s, lines.band, poles))
+    """The lines with the fixed poles outside the band at other places, or with more and with fewer of them."""
+    for below, above in _OTHER_POLES if len(lines.outside_poles) == _ALL_POLES else _TO_FEWER:
+        yield with_fixed_poles(lines, below, above)
 
 
 def _scatter(modes: Modes, variants: Iterable[MeasuredLines]) -> Real:
