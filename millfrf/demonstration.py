@@ -56,10 +56,11 @@ IMMERSIONS = {"central": (0.38, 0.61), "down": (0.77, 1.0), "up": (0.0, 0.23)}
 
 SWEEP_RPM, SWEEP_SECONDS, SWEEP_DEPTH = (450.0, 690.0), 60.0, 2e-3
 KEPT_BAND = (5.0, 60.0)
-FIT_BAND = (15.2, 22.5)
-"""Inside the 15 to 23 Hz of the teeth, where the FRF is known."""
+FIT_BAND = (15.2, 59.0)
+"""From the slowest passing of the teeth to where the sixth harmonic of it still shakes. Limits rest on harmonics of the
+tooth passing: a fit of the 15 to 23 Hz of the two close modes alone makes limits at 1200 rpm 12 to 16 % too low."""
 
-SUBSPACE_BAND = (13.0, 25.0)
+SUBSPACE_BAND = (13.0, 60.0)
 """Records need no force on every line."""
 
 COMPARED_RPM = (800, 900, 1200, 1600, 2000)

@@ -10,9 +10,9 @@ from foundation import MillfrfError
 
 from .likelihood_model import LikelihoodModel, Setting
 from .linear_start import linear_start
-from .maximum_likelihood import LikelihoodFit, Noise, maximise_likelihood
+from .maximum_likelihood import LikelihoodFit, maximise_likelihood
 from .modal_model import ModalModel
-from .out_of_band import out_of_band_basis, residuals_from
+from .out_of_band import ABOVE, out_of_band_basis, residuals_from
 from .record_spectra import RecordSpectra
 
 
@@ -21,11 +21,9 @@ def best_fit(
     spectra: RecordSpectra,
     band: tuple[float, float],
     *,
-    noise: Noise | None,
     n_smooth: int,
-    curvatures: tuple[bool, ...] = (False, True),
 ) -> LikelihoodFit:
-    """Fit without and with a fixed pole above the band, as ``curvatures`` says; keep the better by Schwarz's criterion.
+    """Fit without, with one and with two fixed poles above the band; keep the best by Schwarz's criterion.
 
     Raises
     ------
@@ -35,11 +33,11 @@ def best_fit(
     fits = []
     x = 2 * (spectra.s.imag / (2 * np.pi) - band[0]) / (band[1] - band[0]) - 1
     powers = np.array([x**k for k in range(n_smooth)]).reshape(n_smooth, len(x))
-    for curvature in curvatures:
-        setting = Setting(spectra, out_of_band_basis(spectra.s, band, curvature=curvature), powers)
+    for above in ABOVE:
+        setting = Setting(spectra, out_of_band_basis(spectra.s, band, above), powers)
         try:
             start = linear_start(poles, setting, transients=n_smooth > 0)
-            fit = maximise_likelihood(start, setting, noise)
+            fit = maximise_likelihood(start, setting)
         except np.linalg.LinAlgError:
             continue
         if np.isfinite(fit.log_likelihood):

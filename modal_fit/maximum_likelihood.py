@@ -13,12 +13,11 @@ from .likelihood_model import (
     prediction,
     transfer,
 )
-from .noise_levels import LineNoise, NoiseLevels, flat_noise, noise_levels
+from .noise_levels import NoiseLevels, flat_noise, noise_levels
 from .record_spectra import RecordSpectra
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
-Noise = NoiseLevels | LineNoise
 _NOISE_ROUNDS = 3
 _STEPS = 25
 _ENOUGH = 0.02  # gain of the cost, in units where one standard error is worth 1
@@ -46,21 +45,19 @@ class LikelihoodFit:
 
     model: LikelihoodModel
     covariance: Real
-    noise: NoiseLevels | LineNoise
+    noise: NoiseLevels
     reduced_chi_square: float
     log_likelihood: float
     converged: bool
 
 
-def maximise_likelihood(
-    start: LikelihoodModel, setting: Setting, noise: NoiseLevels | LineNoise | None = None
-) -> LikelihoodFit:
+def maximise_likelihood(start: LikelihoodModel, setting: Setting) -> LikelihoodFit:
     """Fit all unknowns to the lines of all tests at once, with noise on forces and responses.
 
     The cost is ``sum_k e^H V^-1 e`` with ``e = X - prediction`` and ``V = diag(response noise) + H diag(force
     noise) H^H``; its gradient is taken at the force freed of its estimated error, ``F + W H^H V^-1 e``, which removes
     the bias that noise on nearly dependent forces brings into H1 (Pintelon & Schoukens, System Identification,
-    2nd ed., section 9.11). Where ``noise`` is None, its variances and the unknowns are found in turn.
+    2nd ed., section 9.11). Variances of the noise and the unknowns are found in turn.
 
     Parameters
     ----------
@@ -68,23 +65,17 @@ def maximise_likelihood(
         Starting values near the optimum, from :func:`linear_start`.
     setting
         Lines and out-of-band basis.
-    noise
-        Known noise, such as an FRF's covariance; None: estimated from the misfit.
     """
     spectra = setting.spectra
     n_unknowns = start.pack().size - 2 * len(start.poles)
     model, converged = start, False
     frf = transfer(model, setting)
     error = spectra.response - prediction(model, setting, frf)
-    given = noise
-    if given is not None:
-        model, frf, error, converged = _gauss_newton(model, setting, given)
-    for number in range(0 if given is not None else _NOISE_ROUNDS):
-        noise = noise_levels(error, frf, spectra.test, spectra.n_tests, n_unknowns)
-        if number == 0:  # far from the optimum, misfit would pass for force noise
-            noise = flat_noise(error, spectra.test, spectra.excitation.shape[1])
+    noise = flat_noise(error, spectra.test, spectra.excitation.shape[1])  # far off, misfit would pass for force noise
+    for number in range(_NOISE_ROUNDS):
+        if number:
+            noise = noise_levels(error, frf, spectra.test, spectra.n_tests, n_unknowns)
         model, frf, error, converged = _gauss_newton(model, setting, noise)
-    assert noise is not None
     whitener, log_determinant = _whitener(noise.covariance(frf, spectra.test))
     cost = float(np.sum(np.abs(whitener @ error[..., None]) ** 2))
     information = _information(model, setting, noise, frf, error)
@@ -95,7 +86,7 @@ def maximise_likelihood(
 
 
 def _gauss_newton(
-    model: LikelihoodModel, setting: Setting, noise: Noise
+    model: LikelihoodModel, setting: Setting, noise: NoiseLevels
 ) -> tuple[LikelihoodModel, Complex, Complex, bool]:
     """Levenberg-Marquardt steps with noise variances held."""
     damping = 1e-4
@@ -122,7 +113,7 @@ def _gauss_newton(
     return model, frf, error, False
 
 
-def _evaluate(model: LikelihoodModel, setting: Setting, noise: Noise) -> tuple[Complex, Complex, float]:
+def _evaluate(model: LikelihoodModel, setting: Setting, noise: NoiseLevels) -> tuple[Complex, Complex, float]:
     frf = transfer(model, setting)
     error = setting.spectra.response - prediction(model, setting, frf)
     whitener, _ = _whitener(noise.covariance(frf, setting.spectra.test))
@@ -136,7 +127,7 @@ def _whitener(covariance: Complex) -> tuple[Complex, float]:
     return np.asarray(np.linalg.inv(factor), dtype=np.complex128), log_determinant
 
 
-def _corrected_force(noise: Noise, spectra: RecordSpectra, frf: Complex, error: Complex) -> Complex:
+def _corrected_force(noise: NoiseLevels, spectra: RecordSpectra, frf: Complex, error: Complex) -> Complex:
     """Force freed of its estimated noise, F + W H^H V^-1 e."""
     if not noise.excitation.any():
         return spectra.excitation
@@ -146,7 +137,7 @@ def _corrected_force(noise: Noise, spectra: RecordSpectra, frf: Complex, error: 
 
 
 def _normal_equations(
-    model: LikelihoodModel, setting: Setting, noise: Noise, frf: Complex, error: Complex
+    model: LikelihoodModel, setting: Setting, noise: NoiseLevels, frf: Complex, error: Complex
 ) -> tuple[Real, Real]:
     force = _corrected_force(noise, setting.spectra, frf, error)
     derivative = jacobian(model, setting, force)
@@ -158,7 +149,7 @@ def _normal_equations(
     return np.asarray(matrix), np.asarray(real.T @ target.real + imaginary.T @ target.imag)
 
 
-def _information(model: LikelihoodModel, setting: Setting, noise: Noise, frf: Complex, error: Complex) -> Real:
+def _information(model: LikelihoodModel, setting: Setting, noise: NoiseLevels, frf: Complex, error: Complex) -> Real:
     """Fisher information of the packed unknowns: twice the whitened Jacobian's product (complex noise)."""
     weighted, _ = _normal_equations(model, setting, noise, frf, error)
     return 2 * weighted

@@ -29,27 +29,6 @@ class NoiseLevels:
         return np.asarray(passed + diagonal)
 
 
-@dataclass(frozen=True)
-class LineNoise:
-    """Known covariance of the response noise on every line; forces are noiseless.
-
-    Parameters
-    ----------
-    response : (n_lines, n_responses, n_responses)
-    """
-
-    response: NDArray[np.complex128]
-
-    @property
-    def excitation(self) -> NDArray[np.float64]:
-        """No force noise, shape (0,)."""
-        return np.zeros(0)
-
-    def covariance(self, frf: NDArray[np.complex128], test: NDArray[np.int64]) -> NDArray[np.complex128]:
-        """The same on every call."""
-        return self.response
-
-
 def flat_noise(error: NDArray[np.complex128], test: NDArray[np.int64], n_excitations: int) -> NoiseLevels:
     """All of the error taken as flat noise on the responses; ``error`` (n_lines, n_responses)."""
     n_tests = int(test.max()) + 1

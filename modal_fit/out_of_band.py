@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from .modal_model import Residuals
 
 Complex = NDArray[np.complex128]
-ABOVE = 2.0
-"""The fixed pole lies at twice the band's upper end."""
+ABOVE: tuple[tuple[float, ...], ...] = ((), (2.0,), (1.3, 3.0))
+"""Fixed poles above the band, as multiples of its upper end: none, one, or one near it and one far above."""
 
 _DAMPING = 0.05
 
 
-def out_of_band_basis(s: Complex, band: tuple[float, float], *, curvature: bool, above: float = ABOVE) -> Complex:
-    """Basis on receptance: 1, (w0/s)^2 and, with ``curvature``, a fixed pole pair above the band.
+def out_of_band_basis(s: Complex, band: tuple[float, float], above: Sequence[float] = ABOVE[1]) -> Complex:
+    """Basis on receptance: 1, (w0/s)^2 and two functions of each fixed pole above the band.
 
     The two textbook terms leave an error of order (w / w_mode)^2 of a near out-of-band mode, which a fit puts
     into the damping inside the band. Real and imaginary part of a residue at a fixed pole above take it up; where
@@ -27,16 +27,14 @@ def out_of_band_basis(s: Complex, band: tuple[float, float], *, curvature: bool,
         2 pi i f.
     band
         Hz.
-    curvature
-        Whether to add the fixed pole.
     above
-        Where it lies, over the band's upper end.
+        Where the fixed poles lie, over the band's upper end.
 
     Returns
     -------
-    (2 or 4, n_lines), dimensionless
+    (2 + 2 n_poles, n_lines), dimensionless
     """
-    return basis_with_poles(s, band, [fixed_pole(band, above)] if curvature else [])
+    return basis_with_poles(s, band, [fixed_pole(band, place) for place in above])
 
 
 def basis_with_poles(s: Complex, band: tuple[float, float], poles: Sequence[complex]) -> Complex:
@@ -60,14 +58,14 @@ def fixed_poles(
     return [fixed_pole((band[0], band[0]), place) for place in below] + [fixed_pole(band, place) for place in above]
 
 
-def fixed_pole(band: tuple[float, float], above: float = ABOVE) -> complex:
+def fixed_pole(band: tuple[float, float], above: float = 2.0) -> complex:
     """The pole above the band, rad/s."""
     return complex(2 * np.pi * above * band[1] * (-_DAMPING + 1j * np.sqrt(1 - _DAMPING**2)))
 
 
 def residuals_from(outside: NDArray[np.float64], band: tuple[float, float]) -> Residuals:
-    """Read the fitted coefficients (n_terms, n_responses, n_excitations) as residual terms."""
-    return residuals_with_poles(outside, band, [fixed_pole(band)] if len(outside) > 2 else [])
+    """Read the coefficients (2 + 2 n_poles, n_responses, n_excitations) of :func:`out_of_band_basis`."""
+    return residuals_with_poles(outside, band, [fixed_pole(band, place) for place in ABOVE[len(outside) // 2 - 1]])
 
 
 def residuals_with_poles(

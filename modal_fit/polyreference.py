@@ -1,21 +1,16 @@
 """`fit_polyreference`: FRF matrix to modal model, with stabilisation, vectors, residuals and error bars."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import Frf, to_receptance
+from estimation import Frf
 from foundation import InputError, MillfrfError
 
 from .frf_fit import NOT_REFINED, REFINED, MatrixFit, default_order, fit_matrix
-from .likelihood_result import best_fit, modal_model_from
 from .matrix_fraction import matrix_fraction_poles
-from .maximum_likelihood import LikelihoodFit
 from .modal_model import ModalModel
-from .mode_selection import needed_modes
-from .noise_levels import LineNoise
 from .record_spectra import RecordSpectra
 from .stabilisation import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
 from .transfer_delay import transfer_delay
@@ -67,8 +62,9 @@ def fit_polyreference(
 
     Poles come from the poly-reference least-squares complex frequency method over all orders. Each is tried in its
     neighbourhood and stays where the data need it. Poles and the vectors of the references are then refined together;
-    all that belongs to one response is eliminated (variable projection), in the quantity that was measured. An FRF
-    with a covariance is refined by maximum likelihood on it (:func:`fit_with_covariance`).
+    all that belongs to one response is eliminated (variable projection), in the quantity that was measured and weighted
+    by its noise. Where the FRF has a covariance, that is the noise; terms for modes outside the band are then as few
+    as it allows.
 
     Parameters
     ----------
@@ -88,8 +84,6 @@ def fit_polyreference(
     MillfrfError
         No pole is stable over the orders.
     """
-    if frf.covariance is not None:
-        return fit_with_covariance(frf, band, 40 if max_order is None else max_order, n_modes)
     inside = usable_lines(frf, band, max_order)
     references = min(len(frf.responses), len(frf.excitations))
     order = default_order(int(inside.sum()), references) if max_order is None else max_order
@@ -101,109 +95,16 @@ def fit_polyreference(
     fit = fit_matrix(advanced, inside, band, order, n_modes)
     model = replace(fit.model, delay=delay)
     error = relative_error(frf, model, inside)
-    chi = float("nan")
+    chi = fit.chi_square if frf.covariance is not None else float("nan")
     warnings = (*status_warnings(fit), *fit_warnings(frf, inside, model, band, chi, error))
     return ModalFit(model, fit.chart, fit.refused, band, chi, error, warnings, fit.status)
-
-
-def fit_with_covariance(frf: Frf, band: tuple[float, float], max_order: int, n_modes: int | None) -> ModalFit:
-    """Fit an FRF whose covariance is known, as stacked milling records give it, by maximum likelihood.
-
-    Parameters
-    ----------
-    frf, band, n_modes
-        As in :func:`fit_polyreference`.
-    max_order
-        Highest order of the denominator.
-    """
-    receptance = to_receptance(frf)
-    inside = usable_lines(receptance, band, max_order)
-    delay, advanced = 0.0, receptance
-    chart, kept, dropped = _poles_over_orders(receptance, band, max_order, inside, n_modes)
-    lines, _ = frf_lines(replace(receptance, covariance=None), inside)
-    for number in range(_DELAY_ROUNDS if receptance.quantity == "transfer" else 0):
-        found, before = transfer_delay(np.array([group.pole for group in kept]), lines, band), delay
-        delay = found if number < 2 else (found + before) / 2  # poles and delay can swing about their common value
-        advanced = without_delay(receptance, delay)
-        chart, kept, dropped = _poles_over_orders(advanced, band, max_order, inside, n_modes)
-        if abs(delay - before) < 1e-3 / band[1]:
-            break
-    spectra, noise = frf_lines(advanced, inside)
-    fit, superfluous = _fit_needed(kept, spectra, band, noise)
-    dropped = (*dropped, *superfluous)
-    model = modal_model_from(fit, band, receptance.responses, receptance.excitations, receptance.unit)
-    model = replace(model, delay=delay)
-    error = _relative_error_of_receptance(receptance, model, inside)
-    chi = fit.reduced_chi_square if noise is not None else float("nan")
-    return ModalFit(model, chart, dropped, band, chi, error, fit_warnings(receptance, inside, model, band, chi, error))
-
-
-def _poles_over_orders(
-    frf: Frf, band: tuple[float, float], max_order: int, inside: NDArray[np.bool_], n_modes: int | None
-) -> tuple[StabilisationChart, tuple[PoleGroup, ...], tuple[PoleGroup, ...]]:
-    """Chart, kept groups and dropped groups of one FRF."""
-    weights = None
-    if frf.covariance is not None:
-        variance = frf.covariance.variance()[inside].sum(axis=(1, 2))
-        weights = np.zeros(len(frf.frequencies))
-        weights[inside] = 1 / np.maximum(variance, 1e-3 * np.median(variance))
-    chart = stabilisation_chart(
-        list(matrix_fraction_poles(frf, band, min(max_order, inside.sum() // 2), weights)), band
-    )
-    kept, dropped = choose_poles(chart)
-    if n_modes is not None and len(kept) > n_modes:
-        ranked = sorted(kept, key=_minus_orders)
-        spare = [replace(group, reason=f"not among the {n_modes} asked for") for group in ranked[n_modes:]]
-        kept, dropped = tuple(ranked[:n_modes]), (*dropped, *spare)
-    if not kept:
-        raise MillfrfError(
-            f"no pole is stable over orders 1 to {max_order} between {band[0]:g} and {band[1]:g} Hz; "
-            "widen the band, raise --max-order or average more"
-        )
-    return chart, kept, dropped
-
-
-def _fit_needed(
-    kept: Sequence[PoleGroup], spectra: RecordSpectra, band: tuple[float, float], noise: LineNoise | None
-) -> tuple[LikelihoodFit, list[PoleGroup]]:
-    """Refine the modes that are needed, and leave out those that the refinement shows to be none."""
-    groups = sorted(kept, key=_minus_orders)
-    poles = np.array([group.pole for group in groups])
-    superfluous: list[PoleGroup] = []
-    while True:
-        needed = needed_modes(poles, spectra, band, noise)
-        spare = dict.fromkeys(needed.superfluous, "the fit is as good without it")
-        staying = [number for number in range(len(poles)) if number not in spare]
-        superfluous += [replace(groups[number], reason=reason) for number, reason in spare.items()]
-        groups, poles = [groups[number] for number in staying], poles[staying]
-        fit = best_fit(poles, spectra, band, noise=noise, n_smooth=0, curvatures=(needed.curvature,))
-        strayed = _strayed(fit.model.poles, poles, band)
-        if strayed and len(strayed) < len(poles):
-            superfluous += [replace(groups[n], reason="refinement drove it out of the band") for n in strayed]
-            staying = [number for number in range(len(poles)) if number not in strayed]
-            groups, poles = [groups[number] for number in staying], poles[staying]
-            continue
-        if not needed_modes(fit.model.poles, spectra, band, noise).superfluous:
-            return fit, superfluous
-        poles = fit.model.poles
-
-
-def _strayed(found: Complex, start: Complex, band: tuple[float, float]) -> list[int]:
-    """Modes that left the band or are no vibration any more, or that moved further than a neighbour is away."""
-    frequency, zeta = np.abs(found) / (2 * np.pi), -found.real / np.abs(found)
-    moved = np.abs(found - start) > 0.1 * np.abs(start)
-    return [
-        number
-        for number in range(len(found))
-        if not band[0] < frequency[number] < band[1] or zeta[number] > _NO_VIBRATION or moved[number]
-    ]
 
 
 def _delay(frf: Frf, band: tuple[float, float], order: int, inside: NDArray[np.bool_], n_modes: int | None) -> float:
     """Delay of a transfer, found in turn with its poles."""
     delay = 0.0
     poles = _first_poles(frf, band, order, n_modes)
-    lines, _ = frf_lines(replace(frf, covariance=None), inside)
+    lines = flat_lines(frf, inside)
     for number in range(_DELAY_ROUNDS):
         found, before = transfer_delay(poles, lines, band), delay
         delay = found if number < 2 else (found + before) / 2  # poles and delay can swing about their common value
@@ -261,52 +162,18 @@ def usable_lines(frf: Frf, band: tuple[float, float], max_order: int | None) -> 
     return np.asarray(inside)
 
 
-def frf_lines(frf: Frf, inside: NDArray[np.bool_]) -> tuple[RecordSpectra, LineNoise | None]:
-    """The FRF as excitation and response lines whose noise is independent between lines.
-
-    With covariance ``R (x) Q`` on a line, the columns of ``H C`` with ``C^T Q conj(C) = I`` have covariance R each and
-    none with one another.
-    """
-    s = 2j * np.pi * frf.frequencies[inside]
+def flat_lines(frf: Frf, inside: NDArray[np.bool_]) -> RecordSpectra:
+    """The FRF as responses to unit excitations, one column of it after the other."""
     values = frf.values[inside]
     n_lines, n_responses, n_excitations = values.shape
-    drive = np.broadcast_to(np.eye(n_excitations, dtype=complex), (n_lines, n_excitations, n_excitations))
-    noise = None
-    if frf.covariance is not None:
-        factor = np.linalg.cholesky(frf.covariance.excitation[inside].conj())
-        drive = np.linalg.inv(factor).conj().transpose(0, 2, 1)
-        noise = LineNoise(np.repeat(_regular(frf.covariance.response[inside]), n_excitations, axis=0))
-    response = (values @ drive).transpose(0, 2, 1).reshape(-1, n_responses)
-    excitation = drive.transpose(0, 2, 1).reshape(-1, n_excitations)
-    lines = RecordSpectra(
-        np.repeat(s, n_excitations),
+    excitation = np.tile(np.eye(n_excitations, dtype=complex), (n_lines, 1))
+    return RecordSpectra(
+        np.repeat(2j * np.pi * frf.frequencies[inside], n_excitations),
         np.zeros(n_lines * n_excitations, dtype=np.int64),
-        np.ascontiguousarray(excitation),
-        np.ascontiguousarray(response),
+        excitation,
+        np.ascontiguousarray(values.transpose(0, 2, 1).reshape(-1, n_responses)),
         np.zeros(n_responses, dtype=np.int64),
     )
-    return lines, noise
-
-
-def _regular(covariance: Complex) -> Complex:
-    """Keep a covariance of few averages invertible: smoothed over neighbouring lines, plus a small diagonal."""
-    kernel = np.ones(9) / 9
-    flat = covariance.reshape(len(covariance), -1)
-    padded = np.concatenate([flat[:4][::-1], flat, flat[-4:][::-1]]) if len(flat) > 8 else flat
-    smooth = flat
-    if len(flat) > 8:
-        smooth = np.stack([np.convolve(column, kernel, "valid") for column in padded.T], axis=1)
-    matrices = smooth.reshape(covariance.shape)
-    power = np.maximum(np.real(np.einsum("kpp->kp", matrices)), 1e-300)
-    floor = 1e-6 * np.median(power, axis=0) + 1e-3 * power
-    return np.asarray(matrices + np.einsum("kp,pu->kpu", floor, np.eye(power.shape[1])))
-
-
-def _relative_error_of_receptance(frf: Frf, model: ModalModel, inside: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Root mean square misfit over root mean square FRF, (n_responses, n_excitations)."""
-    misfit = frf.values[inside] - model.receptance(frf.frequencies[inside])
-    size = np.sqrt(np.mean(np.abs(frf.values[inside]) ** 2, axis=0))
-    return np.asarray(np.sqrt(np.mean(np.abs(misfit) ** 2, axis=0)) / np.where(size > 0, size, 1.0))
 
 
 def relative_error(frf: Frf, model: ModalModel, inside: NDArray[np.bool_]) -> NDArray[np.float64]:

@@ -107,8 +107,7 @@ def fit_subspace(
             f"no pole is stable over orders 2 to {max_order} between {band[0]:g} and {band[1]:g} Hz; "
             "widen the band or record longer"
         )
-    fit = best_fit(np.array([group.pole for group in kept]), spectra, band, noise=None, n_smooth=_SMOOTH)
-    assert isinstance(fit.noise, NoiseLevels)
+    fit = best_fit(np.array([group.pole for group in kept]), spectra, band, n_smooth=_SMOOTH)
     responses = [channel.degree_of_freedom for channel in records[0].responses]
     excitations = [channel.degree_of_freedom for channel in records[0].excitations]
     unit = "m/N" if records[0].excitations[0].unit == "N" else f"m/{records[0].excitations[0].unit}"

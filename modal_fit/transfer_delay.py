@@ -29,7 +29,7 @@ def transfer_delay(poles: Complex, spectra: RecordSpectra, band: tuple[float, fl
     band
         Hz.
     """
-    setting = Setting(spectra, out_of_band_basis(spectra.s, band, curvature=True), np.zeros((0, len(spectra.s))))
+    setting = Setting(spectra, out_of_band_basis(spectra.s, band), np.zeros((0, len(spectra.s))))
     design = regressors(poles, setting, 0, 0)
     design = np.concatenate([design.real, design.imag])
     orthogonal, _ = np.linalg.qr(design / np.linalg.norm(design, axis=0))

@@ -18,7 +18,9 @@ from .entry_noise import entry_noise
 from .held_out_lines import holds_on_held_out_lines
 from .hidden_modes import hidden_candidates
 from .measured_lines import MeasuredLines, correlated_lines, measured_lines
-from .outside_terms import with_terms_that_hold
+from .outer_modes import inside as inside_band
+from .outer_modes import with_outer_as_residuals
+from .outside_terms import with_fewest_terms
 from .refinement import refine
 from .selection import Reweigh, Selection, select_modes
 from .spread import mode_errors, unknowns_covariance
@@ -91,13 +93,13 @@ def _fitted(
         return (*candidates(left, band, max_order, None)[1], *hidden_candidates(modes, fitted, elimination))
 
     selection = select_modes(found, lines, reweigh, look_again, n_modes=n_modes)
-    if not selection.taken:
+    if not inside_band(selection.modes, band).any():
         raise MillfrfError(
             f"no pole is stable over orders 1 to {max_order} between {band[0]:g} and {band[1]:g} Hz "
             "and lowers the misfit by more than noise would; widen the band, raise --max-order or average more"
         )
     if lines.stated:
-        selection = replace(selection, lines=with_terms_that_hold(selection.modes, selection.lines))
+        selection = replace(selection, lines=with_fewest_terms(selection.modes, selection.lines))
     return _finished(frf, chart, selection)
 
 
@@ -118,7 +120,7 @@ def _finished(frf: Frf, chart: StabilisationChart, selection: Selection) -> Matr
     errors = mode_errors(modes, lines, found, unknowns)
     last = {one.pole: (one, reason) for one, reason in selection.refused}
     refused = tuple(one.dropped(reason) for one, reason in last.values())
-    model = modal_model(frf, modes, found, lines, unknowns, scale, errors)
+    model = with_outer_as_residuals(modal_model(frf, modes, found, lines, unknowns, scale, errors))
     return MatrixFit(model, chart, refused, chi_square, status, refined.converged)
 
 

@@ -23,7 +23,9 @@ _NEEDED = 0.2  # misfit over the modes' own size that a missing mode leaves, whe
 _PLAIN = 0.6  # the same, where a candidate is taken although few orders have it
 _STEADY = 0.5  # share of the orders that a candidate needs where more than noise is left
 _GAIN = 1.5  # factor by which the misfit around the pole must fall there
-_PLAINLY = 100.0  # the same, from which errors of the other modes cannot be what the candidate explains
+_PLAINLY = 300.0  # the same, from which errors of the other modes cannot be what the candidate explains
+_MOST_OF_ALL = 2.0  # factor by which a mode that is left out may raise the misfit of the whole band
+_OVERLAPPING = 1.0  # sums of half bandwidths
 _ALIKE = 0.6  # product of both vectors' modal assurance from which two near modes are one
 _NEAR = 3.0  # sums of half bandwidths within which two modes may be one
 _ROUNDING = 1e-14  # share of the power below which a misfit is rounding
@@ -94,7 +96,8 @@ def judge_again(candidate: Candidate, modes: Modes, found: Elimination, lines: M
     """Weigh the last of the modes against the fit without it; the reason why it is not needed, or empty.
 
     With poles held, leaving a mode out raises the misfit at least as much as with the others refined. That is enough
-    for a mode that stands alone; else the others are refined with and without it.
+    for a mode that stands alone; else the others are refined with and without it. A mode that overlaps no other stays,
+    too, where the misfit of the whole band doubles without it.
 
     Parameters
     ----------
@@ -112,11 +115,15 @@ def judge_again(candidate: Candidate, modes: Modes, found: Elimination, lines: M
     local, near, far_power = _neighbourhood(replace(candidate, pole=pole), others, found, lines)
     start = others.chosen(near).joined(modes.chosen(np.array([len(modes.poles) - 1])))
     held = _Trial(local, eliminate(others.chosen(near), local), eliminate(start, local), start, far_power)
-    if not _unneeded(candidate, held) and (not thorough or _alone(start)):
+    if not _unneeded(candidate, held) and (not thorough or _alone(start, 2 * _NEAR)):
         return ""
     before = refine(others.chosen(near), local, steps=_TRIAL_STEPS, tolerance=_TRIAL_TOLERANCE)
     after = refine(start, local, steps=_TRIAL_STEPS, tolerance=_TRIAL_TOLERANCE)
-    return _unneeded(candidate, _Trial(local, before.elimination, after.elimination, after.modes, far_power))
+    reason = _unneeded(candidate, _Trial(local, before.elimination, after.elimination, after.modes, far_power))
+    if not reason or not _alone(start, _OVERLAPPING):
+        return reason
+    without = others.chosen(~near).joined(before.modes)
+    return reason if eliminate(without, lines).cost < _MOST_OF_ALL * found.cost else ""
 
 
 def _neighbourhood(
@@ -131,11 +138,11 @@ def _neighbourhood(
     return local, near, mode_power(far, right, lines).sum(axis=1)[chosen]
 
 
-def _alone(modes: Modes) -> bool:
-    """Whether no other mode stands near the last one."""
+def _alone(modes: Modes, reach: float) -> bool:
+    """Whether no other mode stands within ``reach`` sums of half bandwidths of the last one."""
     width = modes.frequencies * modes.damping_ratios
     apart = np.abs(modes.frequencies - modes.frequencies[-1])[:-1]
-    return bool(np.all(apart > 2 * _NEAR * (width[:-1] + width[-1])))
+    return bool(np.all(apart > reach * (width[:-1] + width[-1])))
 
 
 def _hopeless(candidate: Candidate, modes: Modes, found: Elimination, lines: MeasuredLines, far_power: Real) -> str:

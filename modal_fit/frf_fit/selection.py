@@ -11,6 +11,7 @@ from .elimination import Elimination, Modes, eliminate
 from .judging import judge, judge_again
 from .measured_lines import MeasuredLines
 from .neighbourhood import participations
+from .outer_modes import inside, just_outside
 from .refinement import refine
 
 _ROUNDS = 4
@@ -80,7 +81,7 @@ def select_modes(
     state, pending = _added(state, pending, reweigh, n_modes)
     for _ in range(_LOOKS):
         before = len(state.modes.poles)
-        if n_modes is not None and before >= n_modes:
+        if n_modes is not None and _n_inside(state) >= n_modes:
             break
         left = look_again(state.modes, state.lines, eliminate(state.modes, state.lines))
         state, pending = _added(state, (*left, *pending), reweigh, n_modes)
@@ -99,6 +100,10 @@ def _added(
             break
         state = _refined(state, reweigh)
     return state, pending
+
+
+def _n_inside(state: Selection) -> int:
+    return int(inside(state.modes, state.lines.band).sum())
 
 
 def _refined(state: Selection, reweigh: Reweigh) -> Selection:
@@ -133,7 +138,7 @@ def _one_round(
     added = False
     elimination = eliminate(state.modes, state.lines)
     for candidate in pending:
-        if n_modes is not None and len(state.modes.poles) >= n_modes:
+        if n_modes is not None and _n_inside(state) >= n_modes:
             refused.append((candidate, f"not among the {n_modes} asked for"))
             continue
         if _known(candidate, state.modes):
@@ -178,10 +183,15 @@ def _without_needless(state: Selection, *, thorough: bool) -> Selection:
 
 
 def _strayed(start: Candidate, pole: complex, lines: MeasuredLines) -> str:
-    """Whether a mode left the band or moved by several bandwidths since it was a candidate; empty where it did not."""
+    """Whether a mode moved by several bandwidths since it was a candidate, or far out of the band; empty where not.
+
+    One that moved just outside stands for a mode there, and stays as an out-of-band term.
+    """
     frequency, size = abs(pole) / (2 * np.pi), abs(pole)
     low, high = lines.band
     damping = max(start.damping_ratio, -pole.real / size, 0.0025)
+    if just_outside(pole, lines.band):
+        return ""
     if low < frequency < high and abs(pole - start.pole) <= min(4 * damping, 0.3) * abs(start.pole):
         return ""
     return f"refinement drives it to {frequency:.4g} Hz"

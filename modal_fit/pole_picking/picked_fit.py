@@ -14,7 +14,7 @@ from ..frf_fit.picked import fit_picked
 from ..polyreference import (
     ModalFit,
     fit_warnings,
-    frf_lines,
+    flat_lines,
     relative_error,
     status_warnings,
     usable_lines,
@@ -120,5 +120,4 @@ def _moved(picked: Complex, found: Complex) -> tuple[str, ...]:
 
 def _delay(frf: Frf, band: Band, poles: Complex, inside: NDArray[np.bool_]) -> float:
     """Delay of a transfer beside given poles, s."""
-    lines, _ = frf_lines(replace(frf, covariance=None), inside)
-    return transfer_delay(poles, lines, band)
+    return transfer_delay(poles, flat_lines(frf, inside), band)

@@ -31,22 +31,22 @@ def demo(tmp_path_factory: pytest.TempPathFactory) -> DemoResult:
     return run_demo(DemoOptions(tmp_path_factory.mktemp("demo")))
 
 
-def test_both_close_modes_are_found(demo: DemoResult) -> None:
+def test_the_three_modes_of_the_band_are_found(demo: DemoResult) -> None:
     pairs = nearest_modes(demo)
-    assert len(pairs) == 2
-    assert len({found for _, found in pairs}) == 2
+    assert len(pairs) == len(demo.identified.poles) == 3
+    assert len({found for _, found in pairs}) == 3
     for true, found in pairs:
         assert demo.identified.natural_frequencies[found] == pytest.approx(
-            demo.true.natural_frequencies[true], rel=0.005
+            demo.true.natural_frequencies[true], rel=0.001
         )
-        assert demo.identified.damping_ratios[found] == pytest.approx(demo.true.damping_ratios[true], rel=0.15)
+        assert demo.identified.damping_ratios[found] == pytest.approx(demo.true.damping_ratios[true], rel=0.02)
 
 
-def test_depth_limits_of_the_measured_dynamics_are_within_a_tenth(demo: DemoResult) -> None:
+def test_depth_limits_of_the_measured_dynamics_are_within_three_hundredths(demo: DemoResult) -> None:
     true = demo.lobes["true"].depth_limits
-    np.testing.assert_allclose(demo.lobes["identified"].depth_limits[:4], true[:4], rtol=0.10)
+    np.testing.assert_allclose(demo.lobes["identified"].depth_limits[:4], true[:4], rtol=0.03)
     np.testing.assert_allclose(demo.lobes["hammer"].depth_limits, true, rtol=0.10)
-    # at 2000 rpm 52 Hz decides, which lies outside the band that was measured in the cut
+    # at 2000 rpm the teeth pass at 67 Hz, outside the band that was measured in the cut
     assert demo.lobes["identified"].depth_limits[4] < true[4]
 
 
@@ -75,7 +75,7 @@ def test_true_model_is_the_structure_that_was_milled(demo: DemoResult) -> None:
 
 
 def test_its_own_model_explains_its_own_recordings(demo: DemoResult, tmp_path: Path) -> None:
-    """The structure has a mode at 52 Hz, and the sensors a high-pass: neither is missing from 13 to 25 Hz."""
+    """The structure has modes at 83 and 127 Hz, and the sensors a high-pass: neither is missing from 13 to 60 Hz."""
     folder = demo.report.parent
     sweeps = sorted((folder / "recordings").glob("sweep_*.h5"))
     found = diagnose_files(folder / "model_housing.json", sweeps, tmp_path / "out")
@@ -84,13 +84,13 @@ def test_its_own_model_explains_its_own_recordings(demo: DemoResult, tmp_path: P
     assert found.diagnosis.band is not None
     assert found.diagnosis.band.edges == SUBSPACE_BAND
     assert found.diagnosis.improvement.before < 1.1 * found.diagnosis.improvement.noise_floor
-    assert any("13 to 25 Hz" in line for line in found.summary)
-    assert "13 to 25 Hz" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert any("13 to 60 Hz" in line for line in found.summary)
+    assert "13 to 60 Hz" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 
 def test_tables_and_files_are_there(demo: DemoResult) -> None:
     modes, depths, trap = comparison_tables(demo)
-    assert (len(modes.rows), len(depths.rows), len(trap.rows)) == (2, 5, 5)
+    assert (len(modes.rows), len(depths.rows), len(trap.rows)) == (3, 5, 5)
     folder = demo.report.parent
     assert read_frf(folder / "frf_in_process.h5").quantity == "accelerance"
     page = demo.report.read_text(encoding="utf-8")

@@ -69,9 +69,7 @@ def test_its_frf_and_its_error_bars(fitted: SubspaceFit) -> None:
 def test_derivatives_equal_differences_and_the_scaling_changes_nothing() -> None:
     spectra = record_spectra(sweeps(0.05, 2, 12.0), (13.0, 25.0))
     x = np.linspace(-1, 1, len(spectra.s))
-    setting = Setting(
-        spectra, out_of_band_basis(spectra.s, (13.0, 25.0), curvature=True), np.array([np.ones_like(x), x])
-    )
+    setting = Setting(spectra, out_of_band_basis(spectra.s, (13.0, 25.0)), np.array([np.ones_like(x), x]))
     model = linear_start(default_structure().poles[:2] * 1.01, setting)
     packed = model.pack()
     derivative = jacobian(model, setting, spectra.excitation)
