@@ -110,7 +110,10 @@ def _of_other_forms(fitted: Fit, lines: list[WindowedLines]) -> Real:
         for place, values in cause.physics.other_forms(cause.values, cause.place):
             causes = list(fitted.explanation.causes)
             causes[number] = replace(cause, place=place, values=values)
-            again = fit(lines, replace(fitted.explanation, causes=tuple(causes)), fitted.noises, iterations=WIDER)
+            try:
+                again = fit(lines, replace(fitted.explanation, causes=tuple(causes)), fitted.noises, iterations=WIDER)
+            except np.linalg.LinAlgError:
+                continue
             moved = again.explanation.causes[number].coordinates() - cause.coordinates()
             extra[own] += min(1.0, np.exp(-(again.score - fitted.score) / 2)) * moved**2
     return extra

@@ -5,7 +5,7 @@ from .beam_element import beam_mass, beam_stiffness
 from .causes import Cause, PostureFrequencies, equivalent_causes, explain_frequencies
 from .cell_structure import cell_structure_at
 from .change import Change, Companion, Numbered
-from .changes import changed_robot, possible_changes
+from .changes import changed_robot, possible_changes, unnamed_changes
 from .constrained_statics import constrained_system, tip_compliance, tip_stiffness
 from .drilling_deviation import (
     DeviationMap,
@@ -202,6 +202,7 @@ __all__ = [
     "turned_place",
     "typed_values",
     "unit_doubts",
+    "unnamed_changes",
     "with_damping_factor",
     "with_gravity",
     "with_joint_factor",

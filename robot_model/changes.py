@@ -1,6 +1,7 @@
 """What may be wrong with a robot's model: every single change with one number that is weighed against data."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -23,6 +24,7 @@ from .variations import (
 Real = NDArray[np.float64]
 
 _FACTORS = (0.05, 20.0)
+_MASSES = (0.2, 5.0)
 _FACTOR_STARTS = tuple(float(value) for value in np.geomspace(0.2, 5.0, 16))
 _LINK_STARTS = (*(float(value) for value in np.geomspace(0.05, 5.0, 12)), 100.0)
 _PAYLOADS = tuple(float(value) for value in np.geomspace(0.5, 100.0, 14))
@@ -74,6 +76,25 @@ def possible_changes(
         damped = partial(_with_damping, nothing)
         changes.append(Change("damping", "damping", "", True, _FACTOR_STARTS, _FACTORS, 1.0, damped))
     return tuple(changes)
+
+
+def unnamed_changes(robot: SpatialRobot) -> tuple[Change, ...]:
+    """Factors on the masses of bodies, which no diagnosis names: what numbers that are named owe to such errors."""
+    nothing = np.zeros(len(robot.mechanism.moving))
+    return tuple(
+        Change(
+            f"mass of the body on node {body.node}",
+            "mass",
+            "",
+            True,
+            _FACTOR_STARTS,
+            _MASSES,
+            1.0,
+            partial(_with_mass, place, nothing),
+        )
+        for place, body in enumerate(robot.bodies)
+        if body.mass > 0
+    )
 
 
 def _payload(robot: SpatialRobot, payload_at: Real | None) -> Change:
@@ -155,3 +176,9 @@ def _with_weight(offset: Real, robot: SpatialRobot, gravity: float) -> Changed:
 
 def _with_damping(offset: Real, robot: SpatialRobot, factor: float) -> Changed:
     return with_damping_factor(robot, factor), offset
+
+
+def _with_mass(place: int, offset: Real, robot: SpatialRobot, factor: float) -> Changed:
+    bodies = list(robot.bodies)
+    bodies[place] = replace(bodies[place], mass=factor * bodies[place].mass, inertia=factor * bodies[place].inertia)
+    return replace(robot, bodies=tuple(bodies)), offset

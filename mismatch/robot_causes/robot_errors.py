@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_model import Change
+from robot_model import Change, unnamed_changes
 
 from .robot_fit import RobotFit
 from .robot_held_out import Tested
@@ -28,7 +28,8 @@ class NumberErrors:
         Between fits that leave one recording out: ``sqrt((n - 1) / n sum (theta_i - mean)^2)``, the jackknife (Efron &
         Tibshirani, An Introduction to the Bootstrap, chapter 11).
     form
-        Largest shift when one further change is free, weighed by ``1 - exp(-gain / 2)`` of what it gains in cost.
+        Largest shift when one further change is free, weighed by ``1 - exp(-gain / 2)`` of what it gains in cost; the
+        masses of bodies are freed too, though none is ever named.
     """
 
     fitted: Real
@@ -63,7 +64,7 @@ def number_errors(
     numbers = np.array([number for _, number in final.changes])
     form = np.zeros(len(numbers))
     there = {one.name for one, _ in final.changes}
-    for change in changes:
+    for change in (*changes, *unnamed_changes(setting.robot)):
         if change.name in there:
             continue
         fitted = fit_from(setting, (*final.changes, *numbered(change, change.neutral)), free)
