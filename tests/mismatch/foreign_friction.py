@@ -14,8 +14,8 @@ twelve sliders in parallel whose yields spread over a decade (Iwan). All saturat
 
 SLIDERS = 12
 FINE = {"root": 16, "arctangent": 16, "lugre": 64, "iwan": 16}
-"""Steps a sample. LuGre's bristles relax at the rate ``|v| / scale``: with 16 steps Runge-Kutta ran away where the joint
-moved fastest, in 2 of 20 draws."""
+"""Steps a sample. LuGre's bristles relax at the rate ``|v| / scale``: with 16 steps Runge-Kutta ran away where the
+joint moved fastest, in 2 of 20 draws."""
 
 
 def response_with_friction(
