@@ -1,5 +1,6 @@
 """Stability lobes from modal models and measured FRFs: knows nothing of acquisition hardware."""
 
+from .beyond_band import with_residual_flexibility
 from .boundary import StabilityBoundary, StabilityGrid, stability_grid, trace_boundary
 from .certified import certified_lobes
 from .chatter import (
@@ -78,6 +79,7 @@ __all__ = [
     "tool_receptance",
     "trace_boundary",
     "unstable_poles",
+    "with_residual_flexibility",
     "write_lobes",
     "zero_order",
 ]

@@ -154,11 +154,11 @@ def _hopeless(candidate: Candidate, modes: Modes, found: Elimination, lines: Mea
     if left[here].sum() < _CLEAN * lines.noise[here].sum():
         return ""
     size = mode_power(modes, found.right, lines).sum(axis=1) + outside_power(found, lines) + far_power
-    worst = max(
-        float(np.sqrt(left[where].sum() / max(size[where].sum(), 1e-300)))
-        for where in [half_power_lines(pole, lines) for pole in (candidate.pole, *modes.poles)]
-        if where.any()
-    )
+    places = [half_power_lines(pole, lines) for pole in (candidate.pole, *modes.poles)]
+    shares = [np.sqrt(left[here].sum() / max(size[here].sum(), 1e-300)) for here in places if here.any()]
+    if not shares:  # all stand outside the lines
+        return ""
+    worst = float(max(shares))
     if worst < _NEEDED:
         return f"only {100 * worst:.0f} % are left around it, as errors of the other modes would leave"
     return ""

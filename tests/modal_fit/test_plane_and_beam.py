@@ -72,6 +72,23 @@ def test_twenty_subsets_of_the_plane(shared_data: Path) -> None:
         assert len(found) - matched(found, PLANE) <= 1, seed
 
 
+@pytest.mark.slow
+@pytest.mark.shared_data
+def test_other_edges_of_the_band_give_the_same_modes(shared_data: Path) -> None:
+    """Each edge moved by 5 %: the same thirteen, 95 % of frequencies and dampings within their 95 % bars."""
+    frf = plane(shared_data, np.arange(74))
+    base = fit_polyreference(frf, BAND).model
+    assert base.errors is not None
+    low, high = BAND
+    held = []
+    for band in ((0.95 * low, high), (1.05 * low, high), (low, 0.95 * high), (low, 1.05 * high)):
+        other = fit_polyreference(frf, band).model
+        assert (len(other.poles), matched(other.natural_frequencies, PLANE)) == (13, 13), band
+        held += list(np.abs(other.natural_frequencies - base.natural_frequencies) < 1.96 * base.errors.frequency)
+        held += list(np.abs(other.damping_ratios - base.damping_ratios) < 1.96 * base.errors.damping)
+    assert np.mean(held) >= 0.95
+
+
 @pytest.mark.shared_data
 def test_the_beam(shared_data: Path) -> None:
     columns = []
