@@ -92,6 +92,28 @@ def judge(candidate: Candidate, modes: Modes, found: Elimination, lines: Measure
     return Verdict(_strayed(candidate, trial) or _unneeded(candidate, trial), after.modes, near)
 
 
+def judge_early(candidate: Candidate, modes: Modes, found: Elimination, lines: MeasuredLines) -> str:
+    """Weigh the last of the modes that start together; the reason why it is not needed, or empty.
+
+    For lines whose noise is known. Other modes may be missing yet, so that a misfit beyond the noise says nothing
+    against this one: it stays unless the fit is as good without it, or unless it overlaps a mode that it is a copy of
+    where more than noise is left.
+    """
+    pole = complex(modes.poles[-1])
+    others = modes.chosen(np.arange(len(modes.poles) - 1))
+    local, near, far_power = _neighbourhood(replace(candidate, pole=pole), others, found, lines)
+    start = others.chosen(near).joined(modes.chosen(np.array([len(modes.poles) - 1])))
+    trial = _Trial(local, eliminate(others.chosen(near), local), eliminate(start, local), start, far_power)
+    if not _as_good_without(trial) and _alone(start, _OVERLAPPING):
+        return ""
+    before = refine(others.chosen(near), local, steps=_TRIAL_STEPS, tolerance=_TRIAL_TOLERANCE)
+    after = refine(start, local, steps=_TRIAL_STEPS, tolerance=_TRIAL_TOLERANCE)
+    trial = _Trial(local, before.elimination, after.elimination, after.modes, far_power)
+    if reason := _as_good_without(trial):
+        return reason
+    return "" if _alone(start, _OVERLAPPING) or _most_missed(trial)[2] else _copy(trial)
+
+
 def judge_again(candidate: Candidate, modes: Modes, found: Elimination, lines: MeasuredLines, *, thorough: bool) -> str:
     """Weigh the last of the modes against the fit without it; the reason why it is not needed, or empty.
 
@@ -181,16 +203,8 @@ def _strayed(candidate: Candidate, trial: _Trial) -> str:
 
 def _unneeded(candidate: Candidate, trial: _Trial) -> str:
     """Why the data do not need the candidate; empty where they do."""
-    n_unknowns = 2 * (trial.lines.values.shape[2] + trial.lines.drive.shape[2])
-    lines = trial.lines
-    exact = _ROUNDING * float(np.mean(np.abs(lines.values) ** 2))
-    variance = max(trial.after.cost / lines.n_values, _variance_at_mode(trial), exact)
-    if lines.stated:
-        variance = max(variance, float(lines.noise.sum()) / lines.n_values)
-    memory = max(trial.after.colour(lines, np.ones(len(lines.s), dtype=bool)), 0.0)  # fewer independent values
-    penalty = n_unknowns * float(np.log(lines.n_values)) * (1 + 2 * memory)
-    if trial.before.cost - trial.after.cost < penalty * variance:
-        return "the fit is as good without it"
+    if reason := _as_good_without(trial):
+        return reason
     share, gain, clean = _most_missed(trial)
     if clean or gain > _PLAINLY:
         return ""
@@ -200,6 +214,24 @@ def _unneeded(candidate: Candidate, trial: _Trial) -> str:
         return f"found in only {100 * candidate.share:.0f} % of the orders, and the misfit is more than noise"
     if gain < _GAIN:
         return f"the misfit around it falls by a factor of {gain:.1f} only, and stays more than noise"
+    return _copy(trial)
+
+
+def _as_good_without(trial: _Trial) -> str:
+    """Schwarz's criterion on the neighbourhood; a reason where the gain is within the penalty, else empty."""
+    n_unknowns = 2 * (trial.lines.values.shape[2] + trial.lines.drive.shape[2])
+    lines = trial.lines
+    exact = _ROUNDING * float(np.mean(np.abs(lines.values) ** 2))
+    variance = max(trial.after.cost / lines.n_values, _variance_at_mode(trial), exact)
+    if lines.stated:
+        variance = max(variance, float(lines.noise.sum()) / lines.n_values)
+    memory = max(trial.after.colour(lines, np.ones(len(lines.s), dtype=bool)), 0.0)  # fewer independent values
+    penalty = n_unknowns * float(np.log(lines.n_values)) * (1 + 2 * memory)
+    return "the fit is as good without it" if trial.before.cost - trial.after.cost < penalty * variance else ""
+
+
+def _copy(trial: _Trial) -> str:
+    """A reason where the last mode has the vectors of a near one, else empty."""
     alike, other = likeness(trial.modes, trial.after.right, len(trial.modes.poles) - 1)
     if alike > _ALIKE:
         return f"a copy of the mode at {other:.4g} Hz (assurance {alike:.2f}), and the misfit is more than noise"

@@ -8,7 +8,7 @@ import numpy as np
 from ..shape_measures import modal_assurance
 from .candidates import Candidate
 from .elimination import Elimination, Modes, eliminate
-from .judging import judge, judge_again
+from .judging import judge, judge_again, judge_early
 from .measured_lines import MeasuredLines
 from .neighbourhood import participations
 from .outer_modes import inside, just_outside
@@ -171,7 +171,11 @@ def _without_needless(state: Selection, *, thorough: bool) -> Selection:
         number = next(n for n, one in enumerate(state.taken) if one is candidate)
         others = np.arange(len(state.modes.poles)) != number
         last = state.modes.chosen(others).joined(state.modes.chosen(~others))
-        reason = judge_again(candidate, last, eliminate(last, state.lines), state.lines, thorough=thorough)
+        found = eliminate(last, state.lines)
+        if state.lines.stated and not thorough:
+            reason = judge_early(candidate, last, found, state.lines)
+        else:
+            reason = judge_again(candidate, last, found, state.lines, thorough=thorough)
         reason = reason or _strayed(candidate, complex(last.poles[-1]), state.lines)
         if reason:
             taken = tuple(one for one in state.taken if one is not candidate)
