@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from estimation import Frf, FrfCovariance
 from modal_fit import ModalFit, fit_polyreference
+from modal_fit.frf_fit import REFINED
 
 from .problem import UNITS, Answer, FoundMode, Problem
 
@@ -32,7 +33,7 @@ def find_modes(problem: Problem) -> Answer:
         warnings.simplefilter("always")
         fit = fit_polyreference(frf, problem.band)
     said = [*fit.warnings, *(f"{one.category.__name__}: {one.message}" for one in caught)]
-    said += [f"status: {fit.status}"]
+    said += [f"status: {fit.status}"] if fit.status != REFINED else []
     return Answer(_modes(fit), said=tuple(said))
 
 

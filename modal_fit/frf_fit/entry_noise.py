@@ -5,6 +5,8 @@ from numpy.typing import NDArray
 
 from estimation import Frf
 
+from .measured_lines import noise_correlation
+
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 _LINES = 15  # over which a variance of few averages is smoothed
@@ -18,13 +20,20 @@ def entry_noise(frf: Frf, chosen: NDArray[np.bool_]) -> Real:
     neighbouring lines; entries without it get :func:`neighbour_noise`.
     """
     values = frf.values[chosen]
-    flat = np.broadcast_to(neighbour_noise(values), values.shape)
+    flat = np.broadcast_to(neighbour_noise(values) / _seen_by_curve(frf), values.shape)
     stated = frf.entry_variance()
     if stated is None:
         return np.asarray(flat)
     stated = stated[chosen]
     known = np.isfinite(stated).all(axis=0) & (stated.max(axis=0) > 0)
     return np.where(known, np.maximum(_smoothed(stated), 1e-3 * np.median(stated, axis=0)), flat)
+
+
+def _seen_by_curve(frf: Frf) -> float:
+    """Share of the noise that the cubic through five lines leaves where an exponential window correlates them."""
+    between = noise_correlation(frf, len(_CURVE) - 1)
+    apart = np.subtract.outer(np.arange(len(_CURVE)), np.arange(len(_CURVE)))
+    return float(_CURVE @ between[apart + len(_CURVE) - 1] @ _CURVE / np.sum(_CURVE**2))
 
 
 def neighbour_noise(values: Complex) -> Real:

@@ -115,7 +115,7 @@ def _finished(frf: Frf, chart: StabilisationChart, selection: Selection) -> Matr
     expected = float(lines.noise.sum())
     chi_square = found.cost * lines.n_values / max(freedom, 1) / expected
     scale = max(1.0, chi_square) if frf.covariance is not None else chi_square
-    scale *= 2 * expected / lines.n_values
+    scale *= 2 * expected / lines.n_values * lines.correlation
     unknowns = unknowns_covariance(modes, lines, found, scale)
     errors = mode_errors(modes, lines, found, unknowns)
     last = {one.pole: (one, reason) for one, reason in selection.refused}

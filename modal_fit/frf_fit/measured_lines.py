@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import Frf
+from estimation import Frf, window_correlation
 
 from ..out_of_band import basis_with_poles, fixed_pole, fixed_poles
 
@@ -49,6 +49,8 @@ class MeasuredLines:
         Hz.
     noise : (n_lines,)
         Noise power expected on each line, summed over columns and responses, in the units of ``values``.
+    correlation
+        Lines per independent value of the noise; above 1 under an exponential window.
     stated
         Whether the FRF came with a covariance; else the noise is that of neighbouring lines or of the coherence.
     """
@@ -63,6 +65,7 @@ class MeasuredLines:
     basis: Complex
     band: tuple[float, float]
     noise: Real
+    correlation: float = 1.0
     stated: bool = False
 
     @property
@@ -148,6 +151,20 @@ def correlated_lines(frf: Frf, chosen: NDArray[np.bool_], band: tuple[float, flo
     return replace(_assembled(frf, chosen, band, drive.conj(), whitening, weights, noise), stated=True)
 
 
+def noise_correlation(frf: Frf, reach: int) -> Real:
+    """Real part of the correlation of the noise on two lines by their distance, (2 reach + 1,), the middle one 1.
+
+    An exponential window correlates white noise (:func:`estimation.window_correlation`); without one, lines are
+    independent. Summed, it is the largest factor by which variances of functions of many lines grow.
+    """
+    apart = np.arange(-reach, reach + 1).astype(np.float64)
+    if frf.exponential_time_constant is None:
+        return np.asarray((apart == 0).astype(float))
+    spacing = float(np.median(np.diff(frf.frequencies)))
+    between = window_correlation(np.asarray(apart * spacing, dtype=np.float64), frf.exponential_time_constant)
+    return np.asarray(between.real)
+
+
 def _smoothed(level: Real) -> Real:
     """Mean over nine neighbouring lines: a covariance of few averages scatters."""
     if len(level) < 9:
@@ -179,4 +196,5 @@ def _assembled(
         basis=basis_with_poles(s, band, poles),
         band=band,
         noise=np.asarray(noise),
+        correlation=float(noise_correlation(frf, len(frf.frequencies)).sum()),
     )

@@ -74,7 +74,7 @@ def as_good_without(trial: Trial) -> str:
     if lines.stated:
         variance = max(variance, float(lines.noise.sum()) / lines.n_values)
     memory = max(trial.after.colour(lines, np.ones(len(lines.s), dtype=bool)), 0.0)  # fewer independent values
-    penalty = n_unknowns * float(np.log(lines.n_values)) * (1 + 2 * memory)
+    penalty = n_unknowns * float(np.log(lines.n_values)) * max(1 + 2 * memory, lines.correlation)
     return "the fit is as good without it" if trial.before.cost - trial.after.cost < penalty * variance else ""
 
 

@@ -79,7 +79,7 @@ def _refined(frf: Frf, chart: StabilisationChart, refined: Refined, lines: Measu
     n_left = 2 * found.n_modes * (1 + lines.drive.shape[2])
     chi_square = _chi_square(found, lines, n_left + found.solution.size)
     scale = max(1.0, chi_square) if frf.covariance is not None else chi_square
-    scale *= 2 * float(lines.noise.sum()) / lines.n_values
+    scale *= 2 * float(lines.noise.sum()) / lines.n_values * lines.correlation
     unknowns = unknowns_covariance(modes, lines, found, scale)
     errors = mode_errors(modes, lines, found, unknowns)
     model = modal_model(frf, modes, found, lines, unknowns, scale, errors)
