@@ -99,4 +99,7 @@ def test_frequencies_fall_by_more_than_their_error_bars(chain: Path) -> None:
     low, high = (read_modal_model(chain / f"model{level}.json") for level in (100, 200))
     pairs = compare_modes(low, high)
     assert len(pairs) >= 12
-    assert sum(pair.moved and pair.frequency_change < 0 for pair in pairs) >= 10
+    # bars hold the edges of the band and the out-of-band terms too: up to nine times those of the noise alone
+    assert sum(pair.moved and pair.frequency_change < 0 for pair in pairs) >= 9
+    assert sum(pair.frequency_change < 0 for pair in pairs) >= 12
+    assert not any(pair.moved and pair.frequency_change > 0 for pair in pairs)
