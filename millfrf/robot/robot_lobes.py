@@ -9,7 +9,7 @@ import typer
 from foundation import InputError
 from modal_fit import ModalModel, Residuals
 from robot_model import in_posture, read_robot
-from stability import write_lobes
+from stability import with_residual_flexibility, write_lobes
 
 from ..chain.lobes import compute_lobes, lobes_summary, speed_axis
 from ..commands.options import check_output
@@ -33,9 +33,9 @@ def at_the_tip(model: ModalModel) -> ModalModel:
     def picked(vectors: np.ndarray) -> np.ndarray:
         return np.column_stack([np.zeros(len(vectors)) if i < 0 else vectors[:, i] for i in places])
 
-    residuals = None
-    if model.residuals is not None:
-        upper, lower = (picked(picked(part).T).T for part in (model.residuals.upper, model.residuals.lower))
+    known, residuals = with_residual_flexibility(model).residuals, None
+    if known is not None:
+        upper, lower = (picked(picked(part).T).T for part in (known.upper, known.lower))
         residuals = Residuals(upper, lower)
     return ModalModel(model.poles, picked(model.right), picked(model.left), TIP, TIP, residuals=residuals)
 

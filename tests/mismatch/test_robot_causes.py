@@ -77,22 +77,14 @@ def heavy_elbow() -> SpatialRobot:
     return replace(ROBOT, bodies=tuple(bodies))
 
 
-def assert_named(found: RobotDiagnosis, name: str, number: float, neutral: float = np.inf) -> None:
-    """One cause with its number; each posture is predicted from the others to noise, but for that number's error.
-
-    The allowance is a twentieth of what was wrong, or the error that the other postures leave to the number where that
-    is more: with each mode's damping believed to 15 %, the five modes of one posture tell a factor of 1.6 to 0.11, a
-    sixth of the change.
-    """
+def assert_named(found: RobotDiagnosis, name: str, number: float) -> None:
     assert found.verdict == "explained"
     assert [cause.name for cause in found.causes] == [name]
     assert found.equivalents == ()
-    [cause] = found.causes
-    assert cause.number == pytest.approx(number, abs=3.5 * cause.standard_error)
-    count = len(found.held_out)
-    others = cause.standard_error * np.sqrt(count / max(count - 1, 1))
+    assert found.causes[0].number == pytest.approx(number, abs=3.5 * found.causes[0].standard_error)
     for one in found.held_out:
-        assert one.after < np.hypot(one.free, max(0.05, others / abs(number - neutral)) * one.before)
+        # noise is all that is left, but for a twentieth of what was wrong: the number comes from the other postures
+        assert one.after < np.hypot(one.free, 0.05 * one.before)
 
 
 def test_a_softer_joint_is_named_with_its_stiffness_from_one_posture() -> None:
@@ -240,19 +232,17 @@ def test_a_right_robot_is_left_alone(count: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [2, 3])
 @pytest.mark.parametrize(
-    ("name", "number", "neutral", "truth"),
+    ("name", "number", "truth"),
     [
-        ("joint 3 stiffness", 0.7, 1.0, with_joint_factor(ROBOT, "3", 0.7)),
-        ("joint 5 stiffness", 1.8, 1.0, with_joint_factor(ROBOT, "5", 1.8)),
-        ("payload", 12.0, 0.0, with_payload(ROBOT, 12.0)),
-        ("damping", 1.6, 1.0, with_damping_factor(ROBOT, 1.6)),
+        ("joint 3 stiffness", 0.7, with_joint_factor(ROBOT, "3", 0.7)),
+        ("joint 5 stiffness", 1.8, with_joint_factor(ROBOT, "5", 1.8)),
+        ("payload", 12.0, with_payload(ROBOT, 12.0)),
+        ("damping", 1.6, with_damping_factor(ROBOT, 1.6)),
     ],
     ids=["joint 3", "joint 5", "payload", "damping"],
 )
-def test_one_change_is_named_from_several_postures(
-    name: str, number: float, neutral: float, truth: SpatialRobot, count: int
-) -> None:
-    assert_named(diagnose_robot(ROBOT, in_postures(truth, count)), name, number, neutral)
+def test_one_change_is_named_from_several_postures(name: str, number: float, truth: SpatialRobot, count: int) -> None:
+    assert_named(diagnose_robot(ROBOT, in_postures(truth, count)), name, number)
 
 
 @pytest.mark.slow
