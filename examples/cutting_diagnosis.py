@@ -19,7 +19,7 @@ from millfrf.__main__ import run
 from millfrf.figures.cut_diagnosis_figure import cut_orders_figure, cut_turn_figure
 from millfrf.figures.embed import save_figure
 from millfrf.figures.style import house_style
-from mismatch.cutting_causes import diagnose_cut, read_cut_recording
+from mismatch.adapters.cut import diagnose_cut, read_cut_recording
 from replay_data import MillingCell, default_structure, dynamometer, tip_accelerometers
 
 STATED = MillingProcess(2, 12.7e-3, math.pi / 2, 119e6, 0.17, 0.33, math.pi / 2, math.pi, 0.15e-3)

@@ -13,8 +13,8 @@ from millfrf.concealment import ConcealOptions, run_concealed
 from millfrf.figures.diagnosis_law import law_figure
 from millfrf.figures.diagnosis_spectra import spectra_figure
 from mismatch import diagnose, read_trials
-from mismatch.free_form_law import free_form_laws
-from mismatch.held_out_spectra import held_out_spectra
+from mismatch.location.free_form_law import free_form_laws
+from mismatch.location.held_out_spectra import held_out_spectra
 from modal_fit import read_modal_model
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"

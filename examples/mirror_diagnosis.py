@@ -27,8 +27,8 @@ from mismatch import (
     predict_lines,
     windowed_lines,
 )
-from mismatch.joint_screening import screen_joints
 from mismatch.physics import JointPhysics, library
+from mismatch.screening.joint_screening import screen_joints
 from modal_fit import ModalModel, read_modal_model
 
 Real = NDArray[np.float64]

@@ -28,8 +28,8 @@ from scipy.signal import butter, filtfilt, resample_poly
 from cutting.compiled import compiled
 from millfrf.figures.style import COLOURS, house_style, new_figure
 from mismatch import Diagnosis, Trial, diagnose
-from mismatch.physics_terms import improved_model
-from mismatch.prediction import predict
+from mismatch.models.model_terms import improved_model
+from mismatch.models.prediction import predict
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]

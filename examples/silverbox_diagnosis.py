@@ -21,8 +21,8 @@ from scipy.signal import csd, welch
 
 from millfrf.figures.style import COLOURS, house_style, new_figure
 from mismatch import Diagnosis, Trial, diagnose, linear_floor, seen_motion
-from mismatch.physics_terms import improved_model
-from mismatch.prediction import predict
+from mismatch.models.model_terms import improved_model
+from mismatch.models.prediction import predict
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]

@@ -1,15 +1,15 @@
 """Where a model and recordings disagree: locate it, name the physics, model it, show the fit improve."""
 
-from .diagnose import Settings, diagnose
-from .diagnosis import AcceptedCause, Candidate, Diagnosis, Improvement
-from .explanation import Cause, Explanation, predict_lines
-from .fitting import Fit, fit, residual
-from .joint_direction import JointSighting, SeenMotion, find_direction, seen_motion
-from .joint_law import JointLaw, JointMotion
-from .linear_floor import Floor, linear_floor
-from .shape_of_model import LabError, ModelShape
-from .trial import Trial, band_of, read_trial, read_trials
-from .windowed_lines import WindowedLines, windowed_lines
+from .adapters.structure.diagnose import Settings, diagnose
+from .inference.diagnosis import AcceptedCause, Candidate, Diagnosis, Improvement
+from .joints.joint_law import JointLaw, JointMotion
+from .models.fitting import Fit, fit, residual
+from .models.hypothesis import Cause, Explanation, predict_lines
+from .models.model_shape import LabError, ModelShape
+from .records.trial import Trial, band_of, read_trial, read_trials
+from .records.windowed_lines import WindowedLines, windowed_lines
+from .screening.joint_direction import JointSighting, SeenMotion, find_direction, seen_motion
+from .screening.linear_floor import Floor, linear_floor
 
 __all__ = [
     "AcceptedCause",

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from cutting import MillingProcess
 from mismatch import Diagnosis, Settings, diagnose, read_trials
-from mismatch.diagnosis_file import improved_model_of, write_diagnosis
-from mismatch.spindle_orders import SpindleSpeed, spindle_speed
-from mismatch.trial import measured_part
+from mismatch.inference.diagnosis_file import improved_model_of, write_diagnosis
+from mismatch.location.spindle_orders import SpindleSpeed, spindle_speed
+from mismatch.records.trial import measured_part
 from modal_fit import read_modal_model, write_modal_model
 
 from ..gate import check_model_and_recordings

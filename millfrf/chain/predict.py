@@ -4,8 +4,8 @@ import os
 from pathlib import Path
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
-from mismatch.prediction import predict
-from mismatch.trial import read_trial
+from mismatch.models.prediction import predict
+from mismatch.records.trial import read_trial
 from modal_fit import read_modal_model
 
 from ..gate import check_model_and_recordings, check_scales

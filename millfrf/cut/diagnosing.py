@@ -8,7 +8,7 @@ from pathlib import Path
 from acquisition import Recording
 from cutting import MillingProcess
 from foundation import InputError
-from mismatch.cutting_causes import (
+from mismatch.adapters.cut import (
     diagnose_cut,
     read_cut_recording,
     write_cut_diagnosis,

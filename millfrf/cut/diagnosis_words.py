@@ -3,7 +3,7 @@
 import math
 
 from mismatch import AcceptedCause
-from mismatch.cutting_causes import COEFFICIENTS, NOISE_LIKE, CutDiagnosis
+from mismatch.adapters.cut import COEFFICIENTS, NOISE_LIKE, CutDiagnosis
 
 from ..tables import with_error
 

@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.fft import irfft
 
-from mismatch.cutting_causes import CutDiagnosis
-from mismatch.cutting_causes.cut_fit import CutFit
+from mismatch.adapters.cut import CutDiagnosis
+from mismatch.adapters.cut.cut_fit import CutFit
 
 from .style import COLOURS, legend_above, new_figure
 

@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter, ScalarFormatter
 from numpy.typing import NDArray
 
-from mismatch.residual_maps import ResidualMap, band_edges
-from mismatch.residual_view import ResidualView
-from mismatch.time_maps import BlockResidual
+from mismatch.location.residual_maps import ResidualMap, band_edges
+from mismatch.location.residual_view import ResidualView
+from mismatch.location.time_maps import BlockResidual
 
 from .style import WIDTH_MM, house_style, new_figure
 

@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mismatch.robot_causes import RobotDiagnosis
-from mismatch.robot_causes.robot_receptance import predicted_lines
+from mismatch.adapters.robot import RobotDiagnosis
+from mismatch.adapters.robot.robot_receptance import predicted_lines
 
 from .style import COLOURS, legend_above, new_figure
 

@@ -9,8 +9,8 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from foundation import writing_whole_file
-from mismatch.cutting_causes import SIGNIFICANT, CutDiagnosis
-from mismatch.cutting_causes.force_coefficients import NAMES
+from mismatch.adapters.cut import SIGNIFICANT, CutDiagnosis
+from mismatch.adapters.cut.force.force_coefficients import NAMES
 
 from ..figures.cut_diagnosis_figure import cut_orders_figure, cut_turn_figure
 from ..figures.embed import as_data_uri

@@ -5,8 +5,8 @@ import numpy as np
 from cutting import MillingProcess
 from foundation import InputError
 from mismatch import Diagnosis, Explanation
-from mismatch.equivalent_receptance import equivalent_receptance
-from mismatch.pruning import zero_of
+from mismatch.adapters.structure.pruning import zero_of
+from mismatch.models.equivalent_receptance import equivalent_receptance
 from stability import StabilityLobes, zero_order
 
 from ..figures.embed import as_data_uri

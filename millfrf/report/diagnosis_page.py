@@ -13,10 +13,10 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from cutting import MillingProcess
 from foundation import writing_whole_file
 from mismatch import Diagnosis, Trial
-from mismatch.locate import located
-from mismatch.residual_view import ResidualView, residual_view
-from mismatch.side_by_side import side_by_side
-from mismatch.spindle_orders import SpindleSpeed
+from mismatch.inference.process_pool import side_by_side
+from mismatch.location.locate import located
+from mismatch.location.residual_view import ResidualView, residual_view
+from mismatch.location.spindle_orders import SpindleSpeed
 
 from ..provenance import versions
 from .diagnosis_answers import answers, verdict_sentence, warnings

@@ -7,11 +7,11 @@ from matplotlib.figure import Figure
 
 from foundation import InputError
 from mismatch import Candidate, Diagnosis
-from mismatch.free_form_law import free_form_laws
-from mismatch.held_out_spectra import held_out_spectra
-from mismatch.locate import significant_cells
-from mismatch.recording_errors import recording_errors
-from mismatch.residual_view import ResidualView
+from mismatch.location.free_form_law import free_form_laws
+from mismatch.location.held_out_spectra import held_out_spectra
+from mismatch.location.locate import significant_cells
+from mismatch.location.recording_errors import recording_errors
+from mismatch.location.residual_view import ResidualView
 
 from ..figures.diagnosis_growth import growth_figure
 from ..figures.diagnosis_law import law_figure

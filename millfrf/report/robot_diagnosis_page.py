@@ -10,7 +10,7 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from foundation import writing_whole_file
-from mismatch.robot_causes import NOISE_LIKE, RobotCause, RobotDiagnosis
+from mismatch.adapters.robot import NOISE_LIKE, RobotCause, RobotDiagnosis
 
 from ..figures.embed import as_data_uri
 from ..figures.robot_diagnosis_figure import robot_evidence_figure, robot_spectra_figure

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 from mismatch import LabError
-from mismatch.robot_causes import (
+from mismatch.adapters.robot import (
     PosedRecording,
     diagnose_robot,
     posed_channels,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mismatch.robot_causes import EXPLAINED, NOISE_LIKE, SIGNIFICANT, Beside, RobotCause, RobotDiagnosis
+from mismatch.adapters.robot import EXPLAINED, NOISE_LIKE, SIGNIFICANT, Beside, RobotCause, RobotDiagnosis
 
 from ..tables import with_error
 

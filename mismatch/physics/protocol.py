@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from foundation import DegreeOfFreedom
 from modal_fit import ModalModel
 
-from ..joint_law import JointLaw, JointMotion
+from ..joints.joint_law import JointLaw, JointMotion
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joint_law import JointLaw, JointMotion, saturated
+from ..joints.joint_law import JointLaw, JointMotion, saturated
 from .protocol import Parameter
 
 Real = NDArray[np.float64]

@@ -10,7 +10,7 @@ from scipy.fft import irfft, rfft
 from acquisition import Channel, RecordingWriter, StreamDescription
 from millfrf.__main__ import run
 from millfrf.report.next_tests import next_test
-from mismatch.diagnosis import VERDICTS
+from mismatch.inference.diagnosis import VERDICTS
 from mismatch.physics import answer_name, library
 from modal_fit import ModalModel, write_modal_model
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from mismatch import Diagnosis, Explanation, LabError, ModelShape, Trial, band_of, predict_lines, windowed_lines
-from mismatch.diagnosis import Improvement
-from mismatch.fitting import Fit
-from mismatch.noise_model import KNOTS, NoiseModel
+from mismatch.inference.diagnosis import Improvement
+from mismatch.models.fitting import Fit
+from mismatch.noise.noise_model import KNOTS, NoiseModel
 from modal_fit import ModalModel
 
 

@@ -10,12 +10,12 @@ import pytest
 from acquisition import Channel, RecordingWriter, StreamDescription
 from foundation import InputError
 from mismatch import Explanation, LabError, ModelShape, Trial, band_of, windowed_lines
-from mismatch.equivalent_receptance import equivalent_receptance
-from mismatch.explanation import Cause
-from mismatch.joint_law import JointLaw, JointMotion
-from mismatch.linear_part import with_linear_part
+from mismatch.joints.joint_law import JointLaw, JointMotion
+from mismatch.models.equivalent_receptance import equivalent_receptance
+from mismatch.models.hypothesis import Cause
+from mismatch.models.linear_part import with_linear_part
 from mismatch.physics import JointPhysics, Parameter, library
-from mismatch.trial import measured_part
+from mismatch.records.trial import measured_part
 from modal_fit import ModalModel
 
 DIRECTION = np.array([0.6, 0.8])

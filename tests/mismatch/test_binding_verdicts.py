@@ -9,15 +9,15 @@ from concealed_recordings import RATE, Concealed, forces, linear_acceleration, t
 
 from millfrf.report.diagnosis_answers import named, verdict_sentence
 from mismatch import Diagnosis, Explanation, LabError, ModelShape, Trial, band_of, diagnose, windowed_lines
-from mismatch.acceptance import LEAST_EVIDENCE
-from mismatch.confirmed import helps
-from mismatch.diagnosis import AcceptedCause, Improvement
-from mismatch.fitting import Fit, fit
-from mismatch.held_out import block_powers
-from mismatch.leftover import leftover
+from mismatch.adapters.structure.acceptance import LEAST_EVIDENCE
+from mismatch.adapters.structure.confirmed import helps
+from mismatch.adapters.structure.held_out import block_powers
+from mismatch.inference.diagnosis import AcceptedCause, Improvement
+from mismatch.inference.verdict import MOST_LEFT, MOST_OF_RESPONSE, leaves_too_much, share_left, verdict_of
+from mismatch.location.recording_errors import recording_errors
+from mismatch.models.fitting import Fit, fit
 from mismatch.physics import library
-from mismatch.recording_errors import recording_errors
-from mismatch.verdict import MOST_LEFT, MOST_OF_RESPONSE, leaves_too_much, share_left, verdict_of
+from mismatch.remainder.leftover import leftover
 from modal_fit import ModalModel
 
 TONE = 11.37

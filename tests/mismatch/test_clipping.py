@@ -5,9 +5,9 @@ import pytest
 from concealed_recordings import Concealed, forces, linear_acceleration, structure, trial
 
 from mismatch import Explanation, LabError, ModelShape, band_of
-from mismatch.clipping import find_clipping, mended
-from mismatch.fitting import Fit, fit
-from mismatch.windowed_lines import WindowedLines, windowed_lines
+from mismatch.faults.clipping import find_clipping, mended
+from mismatch.models.fitting import Fit, fit
+from mismatch.records.windowed_lines import WindowedLines, windowed_lines
 from modal_fit import ModalModel
 
 OFF = np.array([1.01, 0.99])

@@ -8,9 +8,9 @@ import pytest
 from concealed_recordings import RATE, Concealed, forces, late, trial
 
 from mismatch import Diagnosis, Explanation, Trial, diagnose
-from mismatch.acceptance import LEAST_EVIDENCE, Option, worth_it
-from mismatch.fitting import Fit
-from mismatch.tones import find_tone
+from mismatch.adapters.structure.acceptance import LEAST_EVIDENCE, Option, worth_it
+from mismatch.faults.tones import find_tone
+from mismatch.models.fitting import Fit
 from modal_fit import ModalModel
 
 

@@ -12,8 +12,8 @@ from scipy.signal import bilinear, lfilter
 from acquisition import Channel, RecordingWriter, StreamDescription
 from foundation import InputError
 from mismatch import LabError, ModelShape, Trial, diagnose, read_trial
-from mismatch.compared_band import compared_band
-from mismatch.diagnosis_file import write_diagnosis
+from mismatch.inference.diagnosis_file import write_diagnosis
+from mismatch.records.compared_band import compared_band
 from modal_fit import ModalModel, Residuals
 
 BAND = (5.0, 24.0)

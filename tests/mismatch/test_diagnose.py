@@ -9,9 +9,9 @@ import pytest
 from concealed_recordings import RATE, Concealed, Law, forces, late, linear_acceleration, trial
 
 from mismatch import Diagnosis, Settings, Trial, diagnose
-from mismatch.diagnosis_file import improved_model_of, write_diagnosis
+from mismatch.inference.diagnosis_file import improved_model_of, write_diagnosis
+from mismatch.models.prediction import predict
 from mismatch.physics import library
-from mismatch.prediction import predict
 from modal_fit import ModalModel, read_modal_model, write_modal_model
 
 DIRECTION = np.array([0.8, -0.6])

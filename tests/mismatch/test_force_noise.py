@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from scipy.signal import firwin, lfilter
 
 from mismatch import Explanation, LabError, ModelShape, Trial, band_of, diagnose, predict_lines, windowed_lines
-from mismatch.acceptance import NOISE_LIKE
-from mismatch.leftover import leftover
-from mismatch.true_forces import without_force_noise
-from mismatch.windowed_lines import WindowedLines
+from mismatch.adapters.structure.acceptance import NOISE_LIKE
+from mismatch.records.true_forces import without_force_noise
+from mismatch.records.windowed_lines import WindowedLines
+from mismatch.remainder.leftover import leftover
 from modal_fit import ModalModel
 
 RATE, SILENT = 128.0, 26.0

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from mismatch.acceptance import LEAST_EVIDENCE, Option, plainest
-from mismatch.explanation import Explanation
-from mismatch.fitting import Fit
-from mismatch.joint_law import JointMotion
+from mismatch.adapters.structure.acceptance import LEAST_EVIDENCE, Option, plainest
+from mismatch.joints.joint_law import JointMotion
+from mismatch.models.fitting import Fit
+from mismatch.models.hypothesis import Explanation
+from mismatch.models.model_shape import LabError, ModelShape
 from mismatch.physics import JointPhysics, answer_name, library
-from mismatch.shape_of_model import LabError, ModelShape
 from modal_fit import ModalModel
 
 MOTION = JointMotion(reach=1e-3, speed=0.1, deflection=2e-4, velocity=0.02, stiffness=1e6)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from mismatch.cell_regression import moving_power
+from mismatch.remainder.cell_regression import moving_power
 
 
 def _plain(rest: np.ndarray, shown: np.ndarray, bins: int) -> float:

@@ -9,9 +9,9 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from mismatch import Diagnosis, Trial
-from mismatch.family_wise import holm
-from mismatch.locate import locate
-from mismatch.spindle_orders import SpindleSpeed
+from mismatch.location.family_wise import holm
+from mismatch.location.locate import locate
+from mismatch.location.spindle_orders import SpindleSpeed
 from modal_fit import ModalModel
 
 RATE, NOISE = 128.0, 0.02

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mismatch.joint_law import JointMotion
+from mismatch.joints.joint_law import JointMotion
 from mismatch.physics import JointPhysics, LimitedPhysics, library
 from mismatch.physics.protocol import DRY
 

@@ -5,9 +5,9 @@ import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 
 from mismatch import Explanation, LabError, ModelShape, WindowedLines, band_of, windowed_lines
-from mismatch.explanation import Cause
-from mismatch.fitting import Fit, fit
-from mismatch.form_spread import with_form_spread
+from mismatch.adapters.structure.form_spread import with_form_spread
+from mismatch.models.fitting import Fit, fit
+from mismatch.models.hypothesis import Cause
 from mismatch.physics import library
 from mismatch.physics.ac_coupling import TWO_STAGES
 

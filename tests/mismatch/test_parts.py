@@ -8,13 +8,13 @@ import pytest
 
 from mismatch import Explanation, JointLaw, LabError, ModelShape, Trial, band_of, windowed_lines
 from mismatch import physics as physics_folder
-from mismatch.explanation import Cause
-from mismatch.fitting import Fit
-from mismatch.joint_law import POINTS
-from mismatch.joint_simulation import driven_force, joint_response
-from mismatch.noise_model import fit_noise, whitening
-from mismatch.reporting_numbers import accepted_cause
-from mismatch.windowed_lines import WindowedLines, receptance_at
+from mismatch.adapters.structure.reporting_numbers import accepted_cause
+from mismatch.joints.joint_law import POINTS
+from mismatch.joints.joint_simulation import driven_force, joint_response
+from mismatch.models.fitting import Fit
+from mismatch.models.hypothesis import Cause
+from mismatch.noise.noise_model import fit_noise, whitening
+from mismatch.records.windowed_lines import WindowedLines, receptance_at
 from modal_fit import ModalModel, Residuals
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from mismatch import diagnose, read_trial, read_trials
-from mismatch.diagnosis_file import improved_model_of
-from mismatch.prediction import predict
+from mismatch.inference.diagnosis_file import improved_model_of
+from mismatch.models.prediction import predict
 from modal_fit import read_modal_model
 
 

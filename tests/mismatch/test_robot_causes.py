@@ -12,9 +12,9 @@ from acquisition import Channel, RecordingWriter, StreamDescription
 from foundation import InputError
 from millfrf.__main__ import BAD_INPUT, DONE, run
 from mismatch import Trial
-from mismatch.robot_causes import PosedRecording, RobotDiagnosis, diagnose_robot, posed
-from mismatch.robot_causes.robot_receptance import RobotModes, predicted_lines, robot_modes
-from mismatch.shape_of_model import LabError
+from mismatch.adapters.robot import PosedRecording, RobotDiagnosis, diagnose_robot, posed
+from mismatch.adapters.robot.robot_receptance import RobotModes, predicted_lines, robot_modes
+from mismatch.models.model_shape import LabError
 from modal_fit import read_modal_model
 from robot_model import (
     SpatialRobot,

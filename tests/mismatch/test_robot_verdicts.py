@@ -10,8 +10,8 @@ from payload_information import Recorded, mass_errors
 
 from millfrf.robot.diagnosis_words import describe, summary
 from mismatch import Trial
-from mismatch.robot_causes import PosedRecording, RobotCause, RobotDiagnosis, diagnose_robot, posed
-from mismatch.robot_causes.robot_held_out import chance
+from mismatch.adapters.robot import PosedRecording, RobotCause, RobotDiagnosis, diagnose_robot, posed
+from mismatch.adapters.robot.robot_held_out import chance
 from robot_model import (
     LumpedBody,
     SpatialRobot,

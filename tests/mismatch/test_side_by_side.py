@@ -6,7 +6,7 @@ from functools import partial
 
 import pytest
 
-from mismatch.side_by_side import side_by_side
+from mismatch.inference.process_pool import side_by_side
 
 
 def test_results_come_in_the_order_of_the_tasks() -> None:

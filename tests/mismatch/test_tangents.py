@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from mismatch import Explanation, LabError, ModelShape, Trial, band_of, predict_lines, windowed_lines
-from mismatch.explanation import Cause
-from mismatch.jacobian import jacobian
-from mismatch.joint_law import JointMotion
-from mismatch.joint_simulation import driven_force
-from mismatch.line_loops import whiten_lines
+from mismatch.joints.joint_law import JointMotion
+from mismatch.joints.joint_simulation import driven_force
+from mismatch.models.hypothesis import Cause
+from mismatch.models.jacobian import jacobian
+from mismatch.noise.line_loops import whiten_lines
 from mismatch.physics import JointPhysics, library
-from mismatch.windowed_lines import WindowedLines, displacement_at
+from mismatch.records.windowed_lines import WindowedLines, displacement_at
 from modal_fit import ModalModel
 
 DIRECTION = np.array([0.8, 0.6])

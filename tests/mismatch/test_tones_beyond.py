@@ -6,10 +6,10 @@ from concealed_recordings import RATE, forces, linear_acceleration, structure, t
 from numpy.typing import NDArray
 
 from mismatch import Explanation, LabError, ModelShape
-from mismatch.tones import NEAR, TONE_CONTRAST, Tone, above_neighbours
-from mismatch.tones_beyond import tones_beyond
-from mismatch.trial import Trial, band_of
-from mismatch.windowed_lines import WindowedLines, windowed_lines
+from mismatch.faults.tones import NEAR, TONE_CONTRAST, Tone, above_neighbours
+from mismatch.faults.tones_beyond import tones_beyond
+from mismatch.records.trial import Trial, band_of
+from mismatch.records.windowed_lines import WindowedLines, windowed_lines
 
 TONE = 83.217
 LEVELS = (20.0, 40.0, 80.0)

@@ -11,8 +11,7 @@ from scipy.io import savemat
 
 from estimation import Frf, FrfMapping, ImportedFrf, import_frf
 from foundation import FileFormatError, InputError
-
-from .conftest import accelerance
+from tests.estimation.importing.conftest import accelerance
 
 AXES = ("frequency", "response", "excitation")
 LABELS = {"responses": ["1..6:+Z"], "excitations": ["1:+Z", "2:+Z"], "unit": "m/s^2/N"}

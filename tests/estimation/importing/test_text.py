@@ -8,8 +8,7 @@ import pytest
 
 from estimation import Frf, FrfMapping, ImportedFrf, import_frf
 from foundation import FileFormatError, InputError
-
-from .conftest import accelerance
+from tests.estimation.importing.conftest import accelerance
 
 SIGNALCALC = (
     "Units: Ratio\nRef Chan:Resp Chan\t0-Z:0-Z\nChannel Name\t : \n\n"

@@ -11,8 +11,7 @@ import pyuff
 from estimation import Frf, read_frf_uff, write_frf_uff
 from estimation.importing import UffChoice, import_uff, import_uffs
 from foundation import FileFormatError, InputError
-
-from .conftest import accelerance, coherence_of, function, write_sets
+from tests.estimation.importing.conftest import accelerance, coherence_of, function, write_sets
 
 LABELS = {"ordinate_axis_units_lab": "NONE", "orddenom_axis_units_lab": "NONE"}
 

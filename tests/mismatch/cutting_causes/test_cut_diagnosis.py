@@ -9,8 +9,7 @@ from independent_cut import Mill, simulated
 
 from cutting import MillingProcess
 from foundation import InputError
-from mismatch import AcceptedCause
-from mismatch.cutting_causes import CutDiagnosis, CutRecording, SpindleLaw, cut_recording, diagnose_cut
+from mismatch import AcceptedCause, CutDiagnosis, CutRecording, SpindleLaw, cut_recording, diagnose_cut
 from modal_fit import ModalModel
 from replay_data import (
     LinearSweep,

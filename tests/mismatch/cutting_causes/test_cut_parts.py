@@ -11,13 +11,13 @@ from scipy.optimize import lsq_linear
 from cutting import MillingProcess, damping_matrices, edge_matrices, read_cutting_process, write_cutting_process
 from cutting.tooth_force import rigid_force
 from foundation import InputError
-from mismatch.cutting_causes import CutRecording, SpindleLaw
-from mismatch.cutting_causes import physics as physics_folder
-from mismatch.cutting_causes.bounded_steps import least_squares_within
-from mismatch.cutting_causes.computed_force import computed_force
-from mismatch.cutting_causes.cut_view import view_of
-from mismatch.cutting_causes.spindle_law import found_law
-from mismatch.cutting_causes.tip_motion import TipMotion, integrated
+from mismatch.adapters.cut import CutRecording, SpindleLaw
+from mismatch.adapters.cut import physics as physics_folder
+from mismatch.adapters.cut.force.computed_force import computed_force
+from mismatch.adapters.cut.force.cut_view import view_of
+from mismatch.adapters.cut.recordings.spindle_law import found_law
+from mismatch.adapters.cut.recordings.tip_motion import TipMotion, integrated
+from mismatch.inference.bounded_steps import least_squares_within
 
 CUTTER = MillingProcess(
     3, 0.012, math.radians(70), 6e8, 0.3, 0.1, 0.3, 2.6, 1e-4, kte=2e4, kre=1e4, kae=3e3, runout=8e-6

@@ -9,8 +9,8 @@ from independent_cut import Mill, simulated
 
 from cutting import MillingProcess
 from millfrf.cut.diagnosis_words import summary
-from mismatch.cutting_causes import CutDiagnosis, CutRecording, SpindleLaw, cut_recording, diagnose_cut
-from mismatch.cutting_causes.cut_chatter import chatter_of
+from mismatch.adapters.cut import CutDiagnosis, CutRecording, SpindleLaw, cut_recording, diagnose_cut
+from mismatch.adapters.cut.recordings.cut_chatter import chatter_of
 
 CUT = MillingProcess(2, 12.7e-3, math.pi / 2, 119e6, 0.17, 0.33, math.pi / 2, math.pi, 0.15e-3)
 HELIX = math.radians(30)

@@ -1,0 +1,1 @@
+"""Recordings of cuts: forces, the tip's motion, the spindle's angle."""

@@ -1,0 +1,188 @@
+"""Receptance of a robot in a posture with each mode a little off, and what that predicts for a recording."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from robot_model import SpatialRobot, housing_node, modes_at
+from robot_model.spatial_modes import modal_damping
+
+from ...models.model_shape import LabError
+from ...records.windowed_lines import WindowedLines
+from .posed_recording import HOUSING, TIP, PosedRecording
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+MARGIN = 2
+"""Modes beyond those that may deviate which take part when modes are paired."""
+
+PAIRED = 0.1
+"""Difference of ln frequency that counts as much against a pair as a quarter of the shape."""
+
+
+@dataclass(frozen=True)
+class RobotModes:
+    """Modes of a robot at the degrees of freedom of one recording.
+
+    Parameters
+    ----------
+    natural : (n_modes,), rad/s
+    damping : (n_modes,), 1
+        Damping ratios; above 1 where a mode is overdamped.
+    shapes : (n_modes, n_places)
+        Mass-normalised, over ``TIP`` or ``TIP + HOUSING``.
+    rows, columns
+        Places of the recording's responses and excitations among them.
+    count
+        Modes, from the lowest, that may be off.
+    """
+
+    natural: Real
+    damping: Real
+    shapes: Real
+    rows: tuple[int, ...]
+    columns: tuple[int, ...]
+    count: int
+
+    @property
+    def per_mode(self) -> int:
+        """Deviations of one mode: ln frequency, ln damping ratio, each entry of the shape."""
+        return 2 + int(self.shapes.shape[1])
+
+    @property
+    def size(self) -> int:
+        """Deviations altogether."""
+        return self.count * self.per_mode
+
+    def moved(self, u: Real, error: LabError) -> "RobotModes":
+        """The modes at deviations u (size,), in units of ``error``."""
+        table = u.reshape(self.count, self.per_mode)
+        natural, damping, shapes = self.natural.copy(), self.damping.copy(), self.shapes.copy()
+        natural[: self.count] *= np.exp(error.frequency * table[:, 0])
+        damping[: self.count] *= np.exp(np.clip(error.damping * table[:, 1], -5, 5))
+        shapes[: self.count] += self._unit(error)[:, None] * table[:, 2:]
+        return RobotModes(natural, damping, shapes, self.rows, self.columns, self.count)
+
+    def aligned(self, reference: "RobotModes") -> "RobotModes":
+        """The same modes in the order and on the side of those of a reference.
+
+        Modes may cross when the robot changes, and an eigenvector's sign means nothing: modes are paired so that
+        frequencies and shapes (modal assurance criterion, Allemang & Brown 1982) agree best.
+        """
+        near = min(self.count + MARGIN, len(self.natural), len(reference.natural))
+        mine, theirs = self.shapes[:near], reference.shapes[:near]
+        overlap = theirs @ mine.T
+        sizes = np.outer(np.sum(theirs**2, axis=1), np.sum(mine**2, axis=1))
+        apart = np.log(reference.natural[:near, None] / self.natural[:near]) / PAIRED
+        order = linear_sum_assignment(apart**2 + 4 * (1 - overlap**2 / np.maximum(sizes, 1e-300)))[1]
+        whole = np.concatenate([order, np.arange(near, len(self.natural))])
+        signs = np.ones(len(whole))
+        signs[:near] = np.where(overlap[np.arange(near), order] < 0, -1.0, 1.0)
+        shapes = signs[:, None] * self.shapes[whole]
+        return RobotModes(self.natural[whole], self.damping[whole], shapes, self.rows, self.columns, self.count)
+
+    def deviations(self, seen: "RobotModes", error: LabError) -> Real:
+        """u (size,) that moves these modes onto those seen, mode by mode."""
+        table = np.zeros((self.count, self.per_mode))
+        seen = seen.aligned(self)
+        first = slice(0, self.count)
+        table[:, 0] = np.log(seen.natural[first] / self.natural[first]) / error.frequency
+        table[:, 1] = np.log(seen.damping[first] / self.damping[first]) / error.damping
+        table[:, 2:] = (seen.shapes[first] - self.shapes[first]) / self._unit(error)[:, None]
+        return table.ravel()
+
+    def _unit(self, error: LabError) -> Real:
+        return np.asarray(error.shape * np.sqrt(np.mean(self.shapes[: self.count] ** 2, axis=1)))
+
+    def receptance(self, frequencies: Real) -> Complex:
+        """``sum phi phi^T / (w_r^2 - w^2 + 2 i zeta_r w_r w)``, overdamped modes exactly, (n, n_rows, n_columns)."""
+        gain = self._gain(frequencies)
+        rows, columns = self.shapes[:, list(self.rows)], self.shapes[:, list(self.columns)]
+        pairs = (rows[:, :, None] * columns[:, None, :]).reshape(len(self.natural), -1)
+        return np.asarray((gain @ pairs).reshape(len(frequencies), len(self.rows), len(self.columns)))
+
+    def _gain(self, frequencies: Real) -> Complex:
+        omega = 2 * np.pi * frequencies[:, None]
+        return np.asarray(1 / (self.natural**2 - omega**2 + 2j * self.damping * self.natural * omega))
+
+    def slopes(self, base: "RobotModes", frequencies: Real, force: Complex, error: LabError) -> Complex:
+        """Derivative of displacement lines by u at force lines, (n_lines, n_rows, size); ``base``: modes at u = 0."""
+        omega = 2 * np.pi * frequencies[:, None]
+        gain = self._gain(frequencies)[:, : self.count]
+        natural, damping = self.natural[: self.count], self.damping[: self.count]
+        rows, columns = self.shapes[: self.count, list(self.rows)], self.shapes[: self.count, list(self.columns)]
+        pushed = force @ columns.T
+        result = np.zeros((len(frequencies), len(self.rows), self.count, self.per_mode), dtype=complex)
+        by_frequency = -(gain**2) * (2 * natural**2 + 2j * damping * natural * omega) * error.frequency
+        by_damping = -(gain**2) * 2j * damping * natural * omega * error.damping
+        result[:, :, :, 0] = (by_frequency * pushed)[:, None, :] * rows.T
+        result[:, :, :, 1] = (by_damping * pushed)[:, None, :] * rows.T
+        unit = base._unit(error)
+        for entry in range(self.shapes.shape[1]):
+            for position, row in enumerate(self.rows):
+                if row == entry:
+                    result[:, position, :, 2 + entry] += unit * gain * pushed
+            for position, column in enumerate(self.columns):
+                if column == entry:
+                    turned = unit * gain * force[:, position, None]
+                    result[:, :, :, 2 + entry] += turned[:, None, :] * rows.T
+        return result.reshape(len(frequencies), len(self.rows), self.size)
+
+
+def robot_modes(robot: SpatialRobot, recording: PosedRecording, offset: Real, sensor: Real, count: int) -> RobotModes:
+    """Modes of a robot in a recording's posture.
+
+    Parameters
+    ----------
+    robot
+    recording
+        Its posture, axes and degrees of freedom.
+    offset : (n_moving,), rad
+        By how much the joints stand elsewhere than stated.
+    sensor : (3,), m
+        Housing sensor from the tip, in the recording's axes: it moves by ``t + theta x r`` with the node before the
+        tool's spring.
+    count
+        Modes that may be off.
+    """
+    modes = modes_at(robot, recording.q + offset)
+    tip = modes.shapes[:, modes.structure.tip]
+    shapes = tip[:, :3] @ recording.axes
+    places: tuple[str, ...] = TIP
+    if any(label in HOUSING for label in recording.responses):
+        moved = modes.shapes[:, housing_node(robot)]
+        held = moved[:, :3] @ recording.axes + np.cross(moved[:, 3:] @ recording.axes, sensor)
+        shapes = np.hstack([shapes, held])
+        places = (*TIP, *HOUSING)
+    natural = np.sqrt(modes.squares)
+    return RobotModes(
+        natural,
+        modal_damping(robot, modes.squares) / (2 * natural),
+        shapes,
+        tuple(places.index(label) for label in recording.responses),
+        tuple(places.index(label) for label in recording.excitations),
+        count,
+    )
+
+
+def predicted_lines(modes: RobotModes, lines: WindowedLines) -> Complex:
+    """Windowed response lines (n_lines, n_responses) that the modes give for the recorded forces.
+
+    Lines above 1.5 times the band are left out: they reach into it by leakage alone.
+    """
+    frequencies = lines.padded_frequencies
+    needed = frequencies <= 1.5 * float(lines.frequencies[-1])
+    response = np.zeros((len(frequencies), len(modes.rows)), dtype=complex)
+    near = frequencies[needed]
+    moved = np.einsum("kpq,kq->kp", modes.receptance(near), lines.force_lines[needed])
+    response[needed] = moved * lines.padded_kinematic[needed]
+    return lines.cut(lines.signal(response))
+
+
+def quick_lines(modes: RobotModes, lines: WindowedLines) -> Complex:
+    """The same from the windowed forces, line by line: for searches and derivatives, no leakage."""
+    moved = np.einsum("kpq,kq->kp", modes.receptance(lines.frequencies), lines.force_here)
+    return np.asarray(moved * lines.kinematic)

@@ -1,0 +1,1 @@
+"""The comparison of a modal model with recordings of forces and responses."""

@@ -1,0 +1,177 @@
+"""What numbers owe to the form of the law: how far parts of the recordings disagree on them beyond noise."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft
+from scipy.stats import chi2
+from scipy.stats import t as student
+
+from ...models.fitting import Fit, fit
+from ...models.hypothesis import held_values, predict_lines
+from ...models.jacobian import jacobian
+from ...models.misfit import through_structure
+from ...noise.noise_model import NoiseModel, whitening
+from ...physics import FormedPhysics, JointPhysics
+from ...records.windowed_lines import WindowedLines
+from .held_out import block_slices
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+WIDER, WORSE = 15, 20.0
+"""Steps at most of a fit of a wider form, and score by which it may be worse: else it did not end."""
+
+PARTS = 3
+"""Of each recording, by how hard the structure moves: weak, middle, strong."""
+
+DISAGREE = 0.05
+"""Chance below which parts are taken to disagree."""
+
+NORMAL = 1.959964
+"""Standard errors to a side of a 95 % interval."""
+
+
+def with_form_spread(fitted: Fit, lines: Sequence[WindowedLines]) -> Fit:
+    """A fit whose covariance holds, beside the noise, what its numbers owe to the form of their laws.
+
+    A law that has a wider form, one shape number more, is fitted in that form too: what its numbers then differ, and
+    how much less surely they are known, counts. And a law of another form is matched best by other numbers where the
+    motion is small than where it is large. Each recording is cut into blocks of time, and these are put into a weak, a
+    middle and a strong part; each part g has its own answer ``theta_g = theta + N_g^-1 J_g^T V^-1 r_g`` for every
+    number, to first order and with the modes held. Where the parts disagree beyond their noise (Cochran's Q), the
+    variance between them (DerSimonian & Laird 1986, Controlled Clinical Trials 7) is added, widened by Student's t for
+    the few parts: it is not divided by their number, as a wrong form does not average out.
+
+    Parameters
+    ----------
+    fitted
+        The final fit.
+    lines
+        Its recordings.
+    """
+    shape = fitted.explanation.shape
+    believed = shape.per_mode * (len(shape.nominal.poles) - shape.added)
+    told = np.arange(believed, fitted.explanation.size)
+    told = told[(told < shape.modal_size) | (told >= shape.size)]
+    modal = np.concatenate([np.arange(first, first + 2) for first in range(0, believed, shape.per_mode)])
+    extra = np.zeros(fitted.explanation.size)
+    extra += _of_wider_forms(fitted, list(lines)) + _of_other_forms(fitted, list(lines))
+    extra[modal] += _between(fitted, lines, modal)
+    if len(told):
+        extra[told] += _between(fitted, lines, told)
+    return replace(fitted, covariance=fitted.covariance + np.diag(extra))
+
+
+def _of_wider_forms(fitted: Fit, lines: list[WindowedLines]) -> Real:
+    """Variance that each number gains when its law may take a wider form, (size,).
+
+    The wider law is fitted like the named one; what its number differs, squared, and how much less surely it is known
+    are what the named number owes to the form.
+    """
+    extra = np.zeros(fitted.explanation.size)
+    at = fitted.explanation.shape.size
+    for place, cause in enumerate(fitted.explanation.causes):
+        own, at = slice(at, at + len(cause.values)), at + cause.size
+        make: Callable[[], tuple[JointPhysics, float]] | None = getattr(cause.physics, "wider", None)
+        if make is None:
+            continue
+        physics, shape_number = make()
+        wider = replace(cause, physics=physics, values=np.append(held_values(cause), shape_number))
+        causes = list(fitted.explanation.causes)
+        causes[place] = wider
+        try:
+            again = fit(lines, replace(fitted.explanation, causes=tuple(causes)), fitted.noises, iterations=WIDER)
+        except np.linalg.LinAlgError:
+            continue
+        if again.score > fitted.score + WORSE:
+            continue
+        there = again.explanation.causes[place].coordinates()[: len(cause.values)]
+        moved = there - cause.coordinates()[: len(cause.values)]
+        gained = np.diag(again.covariance)[own] - np.diag(fitted.covariance)[own]
+        extra[own] = moved**2 + np.maximum(gained, 0.0)
+    return extra
+
+
+def _of_other_forms(fitted: Fit, lines: list[WindowedLines]) -> Real:
+    """Variance that numbers owe to another form of their law, by how likely that form is beside the named one, (size,).
+
+    The squared difference counts by the likelihood of the other form over that of the named one (Bayes' information
+    criterion), and whole where both are as likely: the interval shall hold either.
+    """
+    extra = np.zeros(fitted.explanation.size)
+    at = fitted.explanation.shape.size
+    for number, cause in enumerate(fitted.explanation.causes):
+        own, at = slice(at, at + len(cause.values)), at + cause.size
+        if not isinstance(cause.physics, FormedPhysics):
+            continue
+        for place, values in cause.physics.other_forms(cause.values, cause.place):
+            causes = list(fitted.explanation.causes)
+            causes[number] = replace(cause, place=place, values=values)
+            try:
+                again = fit(lines, replace(fitted.explanation, causes=tuple(causes)), fitted.noises, iterations=WIDER)
+            except np.linalg.LinAlgError:
+                continue
+            moved = again.explanation.causes[number].coordinates() - cause.coordinates()
+            extra[own] += min(1.0, np.exp(-(again.score - fitted.score) / 2)) * moved**2
+    return extra
+
+
+def _between(fitted: Fit, lines: Sequence[WindowedLines], which: NDArray[np.int64]) -> Real:
+    """Variance between parts of the recordings for the coordinates ``which``."""
+    parts = [
+        part for one, noise in zip(lines, fitted.noises, strict=True) for part in _parts(fitted, one, noise, which)
+    ]
+    found = [_answer(matrix, gradient) for matrix, gradient in parts]
+    steps, variances = np.array([step for step, _ in found]), np.array([variance for _, variance in found])
+    return np.array([_variance(steps[:, k], variances[:, k]) for k in range(len(which))])
+
+
+def _parts(fitted: Fit, lines: WindowedLines, noise: NoiseModel, which: NDArray[np.int64]) -> list[tuple[Real, Real]]:
+    """Normal equations of the weak, the middle and the strong part of a recording."""
+    explanation = fitted.explanation
+    predicted = predict_lines(explanation, lines)
+    white = whitening(noise.covariance(lines.frequencies, through_structure(explanation, lines)))
+    slopes = np.einsum("kij,kjc->kic", white, jacobian(explanation, lines, predicted)[:, :, which])
+    rest = np.einsum("kij,kj->ki", white, lines.measured - predicted.response)
+    n = len(lines.window)
+    slope, left, moved = (_signal(lines, part) for part in (slopes, rest, predicted.response))
+    blocks = block_slices(lines)
+    size = np.mean(moved**2, axis=0)
+    strength = np.array([np.mean(moved[block] ** 2 / size) for block in blocks])
+    found = []
+    for group in np.array_split(np.argsort(strength), min(PARTS, len(blocks))):
+        matrix, gradient = np.zeros((len(which), len(which))), np.zeros(len(which))
+        for number in group:
+            own = slope[blocks[number]].reshape(-1, len(which))
+            matrix += n * own.T @ own
+            gradient += n * own.T @ left[blocks[number]].ravel()
+        found.append((matrix, gradient))
+    return found
+
+
+def _signal(lines: WindowedLines, part: Complex) -> Real:
+    """Windowed signals in time of lines (n_lines, ...)."""
+    spectrum = np.zeros((len(lines.window) // 2 + 1, *part.shape[1:]), dtype=complex)
+    spectrum[lines.band] = part
+    return np.asarray(irfft(spectrum, n=len(lines.window), axis=0))
+
+
+def _answer(matrix: Real, gradient: Real) -> tuple[Real, Real]:
+    """Step to a part's own answer, and its variance by the noise; infinite where the part says nothing."""
+    inverse = np.linalg.pinv(matrix + 1e-6 * np.eye(len(matrix)), hermitian=True)
+    return inverse @ gradient, np.diag(inverse)
+
+
+def _variance(steps: Real, variances: Real) -> float:
+    """Between parts, for a 95 % interval of 1.96 standard errors; 0 where they agree."""
+    weights = 1 / np.maximum(variances, 1e-300)
+    freedom = len(steps) - 1
+    mean = np.sum(weights * steps) / np.sum(weights)
+    q = float(np.sum(weights * (steps - mean) ** 2))
+    if freedom < 1 or q < chi2.isf(DISAGREE, freedom):
+        return 0.0
+    between = (q - freedom) / float(np.sum(weights) - np.sum(weights**2) / np.sum(weights))
+    return max(between, 0.0) * float(student.ppf(0.975, freedom) / NORMAL) ** 2

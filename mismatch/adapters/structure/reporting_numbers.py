@@ -1,0 +1,117 @@
+"""Fitted coordinates as parameters with standard errors, in the units of files."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...faults.shown_faults import FAULTS
+from ...inference.diagnosis import AcceptedCause
+from ...models.fitting import Fit
+from ...models.hypothesis import Cause, direction_of, held_values
+from ...physics import answer_name
+
+Real = NDArray[np.float64]
+
+
+def accepted_cause(fitted: Fit, location: dict[str, object], evidence: float, place: int = -1) -> AcceptedCause:
+    """One cause of a fit, the last if not told, with its numbers and their standard errors (to first order)."""
+    causes = fitted.explanation.causes
+    cause, place = causes[place], place % len(causes)
+    first = fitted.explanation.size - sum(one.size for one in causes[place:])
+    covariance = fitted.covariance[first : first + cause.size, first : first + cause.size]
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    parameters, errors = {}, {}
+    # beyond a limit that the motion sets a number changes nothing, and its error says so
+    for parameter, value, error in zip(cause.physics.parameters, held_values(cause), spread, strict=False):
+        parameters[parameter.name] = float(value)
+        errors[parameter.name] = float(error * parameter.unit_step * (abs(value) if parameter.logarithmic else 1.0))
+    derived, their_errors = _derived(cause, covariance)
+    parameters, errors = parameters | derived, errors | their_errors
+    return AcceptedCause(answer_name(cause.physics), dict(location), parameters, errors, evidence)
+
+
+def with_final_numbers(fitted: Fit, accepted: list[AcceptedCause]) -> list[AcceptedCause]:
+    """Accepted causes with the numbers, errors and directions of the final fit, which is that of the improved model.
+
+    Parameters
+    ----------
+    fitted
+        With all accepted causes.
+    accepted
+        In the order found, as they were when they were found; plain faults are left as they are.
+    """
+    told, place = [], 0
+    for one in accepted:
+        if one.name in FAULTS:
+            told.append(one)
+        elif one.name == "missing_mode":
+            told.append(accepted_mode(fitted, one.evidence))
+        else:
+            direction = fitted.explanation.causes[place].direction
+            location = one.location if direction is None else direction_of(fitted.explanation.causes[place])
+            told.append(accepted_cause(fitted, location, one.evidence, place))
+            place += 1
+    return told
+
+
+def _derived(cause: Cause, covariance: Real) -> tuple[dict[str, float], dict[str, float]]:
+    """Numbers that a laboratory knows better than those of the equation, if the physics has a ``derived``."""
+    numbers: Callable[[Real], dict[str, float]] | None = getattr(cause.physics, "derived", None)
+    if numbers is None:
+        return {}, {}
+    here, at = numbers(cause.values), cause.coordinates()
+    count = len(cause.values)
+    slopes: dict[str, Real] = {name: np.zeros(count) for name in here}
+    for k in range(count):
+        step = 1e-4 * max(1.0, abs(float(at[k])))
+        aside = [numbers(cause.moved(at + sign * step * np.eye(len(at))[k]).values) for sign in (1, -1)]
+        for name in here:
+            slopes[name][k] = (aside[0].get(name, here[name]) - aside[1].get(name, here[name])) / (2 * step)
+    own = covariance[:count, :count]
+    return here, {name: float(np.sqrt(np.maximum(slope @ own @ slope, 0.0))) for name, slope in slopes.items()}
+
+
+def accepted_mode(fitted: Fit, evidence: float) -> AcceptedCause:
+    """The added mode of a fit: frequency, damping ratio and shape at the responses."""
+    shape, model = fitted.explanation.shape, fitted.explanation.model
+    first = shape.per_mode * (len(model.poles) - 1)
+    spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[first : first + 2], 0.0))
+    frequency, damping = float(model.natural_frequencies[-1]), float(model.damping_ratios[-1])
+    right = np.abs(model.right[-1]) / np.abs(model.right[-1]).max()
+    place = {"shape": dict(zip(model.responses, [round(float(x), 4) for x in right], strict=True))}
+    return AcceptedCause(
+        "missing_mode",
+        place,
+        {"frequency_hz": frequency, "damping_ratio": damping},
+        {
+            "frequency_hz": float(spread[0]) * shape.lab.frequency * frequency,
+            "damping_ratio": float(spread[1]) * shape.lab.damping * damping,
+        },
+        evidence,
+    )
+
+
+def modal_deviation(fitted: Fit) -> AcceptedCause | None:
+    """``modal_parameters`` where the refit lies farther from the nominal model than a lab's own error.
+
+    |u|^2 of believed parameters has the mean n for errors of that size (n without the two free numbers of each mode's
+    scale); it is odd four standard deviations above.
+    """
+    shape = fitted.explanation.shape
+    count = len(shape.nominal.poles) - shape.added
+    rows = shape.modal_rows(fitted.explanation.u)[:count]
+    n = count * (shape.per_mode - 2)
+    size = float(np.sum(rows**2))
+    if size < n + 4 * np.sqrt(2 * n):
+        return None
+    spread = np.sqrt(shape.modal_rows(np.diag(fitted.covariance)))[:count]
+    model, nominal = fitted.explanation.model, shape.nominal
+    modes = [k for k in range(count) if np.sum(rows[k] ** 2) > shape.per_mode + 3 * np.sqrt(2 * shape.per_mode)]
+    parameters, errors = {}, {}
+    for k in range(count):
+        parameters[f"frequency_{k + 1}_hz"] = float(model.natural_frequencies[k])
+        errors[f"frequency_{k + 1}_hz"] = float(spread[k, 0] * shape.lab.frequency * nominal.natural_frequencies[k])
+        parameters[f"damping_ratio_{k + 1}"] = float(model.damping_ratios[k])
+        errors[f"damping_ratio_{k + 1}"] = float(spread[k, 1] * shape.lab.damping * nominal.damping_ratios[k])
+    return AcceptedCause("modal_parameters", {"modes": [k + 1 for k in modes]}, parameters, errors, size - n)

@@ -1,0 +1,61 @@
+"""Where a fit comes to rest: evidence counts from there."""
+
+from dataclasses import replace
+
+from ...models.fitting import Fit, fit
+from ...models.hypothesis import Cause, Explanation
+from ...physics import ChainPhysics
+from ...records.windowed_lines import WindowedLines
+from .reporting_numbers import modal_deviation
+
+ITERATIONS, FROM_BELIEF = 60, 20
+
+
+def settled(lines: list[WindowedLines], fitted: Fit) -> Fit:
+    """Fit until it rests; if the lab's model then looks odd, once more from that model, and the better of both.
+
+    A cause of changed stiffness and the modes it changes run along one long valley: a search that began beside it may
+    stop where modes carry what the cause should. A next cause must not live on what this one left undone.
+
+    Parameters
+    ----------
+    lines
+        Recordings.
+    fitted
+        From a few steps.
+    """
+    rested = fit(lines, fitted.explanation, fitted.noises, iterations=ITERATIONS)
+    if modal_deviation(rested) is None or not rested.explanation.causes:
+        return rested
+    again = fit(lines, believed(rested.explanation), rested.noises, iterations=ITERATIONS)
+    return min(rested, again, key=lambda one: one.score)
+
+
+def with_chain(lines: list[WindowedLines], current: Fit, cause: Cause) -> Fit:
+    """Fit a linear cause together with the modes: from where they are and, if they look odd, from the lab's model.
+
+    Modes that have taken up all that a cause does leave it nothing to begin with.
+
+    Parameters
+    ----------
+    lines
+        Recordings.
+    current
+        Without the cause.
+    cause
+        With numbers to begin with.
+    """
+    explanation = current.explanation
+    fitted = fit(lines, explanation.with_cause(cause), current.noises)
+    if modal_deviation(current) is None or not isinstance(cause.physics, ChainPhysics):
+        return fitted
+    absent = replace(cause, values=cause.physics.start(explanation.shape.nominal))
+    fresh = believed(explanation).with_cause(absent)
+    return min(fitted, fit(lines, fresh, iterations=FROM_BELIEF), key=lambda one: one.score)
+
+
+def believed(explanation: Explanation) -> Explanation:
+    """The same causes and added modes on the lab's own model."""
+    shape, u = explanation.shape, explanation.u.copy()
+    u[: shape.per_mode * (len(shape.nominal.poles) - shape.added)] = 0.0
+    return replace(explanation, u=u)

@@ -1,0 +1,1 @@
+"""Faults of a recording itself: tones from elsewhere and channels that saturate."""

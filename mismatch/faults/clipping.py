@@ -1,0 +1,187 @@
+"""A response that follows its prediction up to a limit and no farther: found, and mended."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..models.fitting import Fit, fit
+from ..records.windowed_lines import WindowedLines
+from .saturation import Saturation, rounded, saturated
+from .tones import shown_signal
+
+Real = NDArray[np.float64]
+
+LIMITS = np.linspace(0.25, 1.0, 76)
+"""Limits that are tried, as shares of the largest value measured."""
+
+BEYOND = 1.15
+"""Of a limit: predicted there, a response must show the limit."""
+
+LEAST_BEYOND = 30
+"""Samples."""
+
+FOLLOWS = 0.1
+"""Slope of what is shown on what was due beyond a limit, above which it is no limit: an amplitude that friction or a
+stiffening joint keeps small still rises with its prediction."""
+
+LEAST_GAIN = 60.0
+"""Of twice the log likelihood."""
+
+ROUNDS = 12
+"""Of mending and refitting."""
+
+SETTLED = 1e-3
+"""Relative change of the error beside the limit at which mending stops."""
+
+MEMORY = 4
+"""Rounds from which the next is extrapolated."""
+
+
+@dataclass(frozen=True)
+class Clipping:
+    """A response that cannot show more than a limit.
+
+    Parameters
+    ----------
+    response
+        Its number.
+    saturation
+        Its characteristic.
+    gain
+        Twice the log likelihood gained.
+    """
+
+    response: int
+    saturation: Saturation
+    gain: float
+
+    def of(self, signal: Real) -> Real:
+        """What the channel shows of a signal (n,)."""
+        return saturated(signal, self.saturation.limit, self.saturation.sharpness)
+
+
+def find_clipping(fitted: Fit, lines: list[WindowedLines]) -> Clipping | None:
+    """The response, if any, that follows its prediction only up to a limit.
+
+    Parameters
+    ----------
+    fitted
+        What predicts.
+    lines
+        Recordings, responses as measured.
+    """
+    return _found([shown_signal(fitted, one) for one in lines], lines)
+
+
+def _found(predicted: list[Real], lines: list[WindowedLines]) -> Clipping | None:
+    """The clearest limit of any response, its prediction in time known."""
+    best: Clipping | None = None
+    for p in range(lines[0].measured.shape[1]):
+        measured, shown = _channel(predicted, lines, p)
+        plain = float(np.sum((measured - shown) ** 2))
+        for limit in float(np.abs(measured).max()) * LIMITS:
+            pile = _held(measured, shown, limit)
+            if pile is None:
+                continue
+            clipped = float(np.sum((measured - np.clip(shown, -limit, limit)) ** 2))
+            gain = len(measured) * float(np.log(plain / clipped))
+            if gain > LEAST_GAIN and (best is None or gain > best.gain):
+                best = Clipping(p, Saturation(*pile), gain)
+    return best
+
+
+def _held(measured: Real, shown: Real, limit: float) -> tuple[float, float] | None:
+    """Place and standard error of a limit: what was due beyond shows it, however much was due, and nothing passes."""
+    beyond = np.abs(shown) > BEYOND * limit
+    if beyond.sum() < LEAST_BEYOND or np.quantile(np.abs(measured), 0.9995) > 1.2 * limit:
+        return None
+    due, pile = np.abs(shown[beyond]), measured[beyond] * np.sign(shown[beyond])
+    if np.quantile(pile, 0.25) < 0.9 * limit or np.quantile(pile, 0.98) > 1.15 * limit:
+        return None
+    spread = due - due.mean()
+    slope = float(np.sum(spread * pile) / np.sum(spread**2))
+    if abs(slope) > FOLLOWS:
+        return None
+    return float(np.median(pile)), float(np.sqrt(np.pi / 2 / len(pile)) * pile.std())
+
+
+def mended(fitted: Fit, lines: list[WindowedLines], clipping: Clipping) -> tuple[Fit, list[WindowedLines], Clipping]:
+    """Put back what the limit cut off, and refit, until both agree.
+
+    Each round takes the cut part from the prediction of the last; as that was fitted to too little, rounds approach
+    their end slowly, the slower the more was cut, and the next start is extrapolated from the last few (Anderson,
+    J. ACM 12, 1965).
+
+    Parameters
+    ----------
+    fitted
+        Without knowledge of the limit.
+    lines
+        Recordings as measured.
+    clipping
+        What was found.
+
+    Returns
+    -------
+    fitted, lines, clipping
+        Settled.
+    """
+    start, shown = fitted, [shown_signal(fitted, one) for one in lines]
+    tried, reached, error = list[Real](), list[Real](), np.inf
+    for _ in range(ROUNDS):
+        tried.append(start.explanation.u)
+        fitted = fit(_repaired(shown, lines, clipping), start.explanation, start.noises, iterations=4)
+        reached.append(fitted.explanation.u)
+        start, shown = fitted, [shown_signal(fitted, one) for one in lines]
+        clipping = _again(shown, lines, clipping)
+        before, error = error, _error(shown, lines, clipping)
+        if abs(before - error) < SETTLED * error:
+            break
+        ahead = replace(fitted, explanation=replace(fitted.explanation, u=_extrapolated(tried, reached)))
+        farther = [shown_signal(ahead, one) for one in lines]
+        if _error(farther, lines, clipping) < error:
+            start, shown = ahead, farther
+    repaired = _repaired(shown, lines, clipping)
+    return fit(repaired, start.explanation, start.noises, iterations=4), repaired, clipping
+
+
+def _extrapolated(tried: list[Real], reached: list[Real]) -> Real:
+    """Where rounds that led from ``tried`` to ``reached`` lead to, by the combination that changes least."""
+    starts, ends = np.array(tried[-MEMORY:]), np.array(reached[-MEMORY:])
+    if len(ends) < 2:
+        return np.asarray(ends[-1])
+    change = ends - starts
+    weights = np.linalg.lstsq((change[:-1] - change[-1]).T, -change[-1], rcond=1e-8)[0]
+    return np.asarray(ends[-1] + weights @ (ends[:-1] - ends[-1]))
+
+
+def _error(predicted: list[Real], lines: list[WindowedLines], clipping: Clipping) -> float:
+    """Power of what the clipped prediction leaves of the response as measured."""
+    measured, shown = _channel(predicted, lines, clipping.response)
+    return float(np.sum((measured - clipping.of(shown)) ** 2))
+
+
+def _repaired(predicted: list[Real], lines: list[WindowedLines], clipping: Clipping) -> list[WindowedLines]:
+    """Recordings with what the limit cut off taken from the prediction."""
+    p = clipping.response
+    whole = []
+    for one, signal in zip(lines, predicted, strict=True):
+        response = one.trial.response.copy()
+        response[:, p] += signal[:, p] - clipping.of(signal[:, p])
+        whole.append(replace(one, trial=replace(one.trial, response=response), measured=one.cut(response)))
+    return whole
+
+
+def _again(predicted: list[Real], lines: list[WindowedLines], clipping: Clipping) -> Clipping:
+    """The same channel's limit as the better prediction shows it."""
+    again = _found(predicted, lines)
+    found = again if again is not None and again.response == clipping.response else clipping
+    sharp = replace(found.saturation, sharpness=np.inf)
+    return replace(found, saturation=rounded(*_channel(predicted, lines, found.response), sharp))
+
+
+def _channel(predicted: list[Real], lines: list[WindowedLines], p: int) -> tuple[Real, Real]:
+    """One response as measured and as predicted, all recordings, run-in left out."""
+    measured = np.concatenate([one.trial.response[one.start :, p] for one in lines])
+    return measured, np.concatenate([signal[one.start :, p] for one, signal in zip(lines, predicted, strict=True)])

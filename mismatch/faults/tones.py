@@ -1,0 +1,258 @@
+"""Tones from elsewhere: seen in the residual itself, they go before any cause is looked for."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft
+from scipy.ndimage import maximum_filter, median_filter
+from scipy.stats import t as student
+
+from ..models.fitting import Fit
+from ..models.hypothesis import predict_lines
+from ..models.misfit import levels, through_structure
+from ..noise.noise_model import NoiseModel, whitening
+from ..records.windowed_lines import WindowedLines
+
+Real = NDArray[np.float64]
+
+TONE_CONTRAST, SEEN_AGAIN = 60.0, 5.0
+"""Of a residual line against its neighbourhood, summed over recordings, and what two of them must show at least; noise
+alone passes 15 in one recording once in 3 million lines."""
+
+FORCED = 12.0
+"""Contrast of a force from which a line is the cut's own."""
+
+NEAR = np.ones(41, dtype=bool)
+"""Lines of a neighbourhood."""
+
+BESIDE = np.array([abs(k) > 3 for k in range(-10, 11)])
+"""Lines beside a line, without those that a tone reaches: a narrow resonance is as high there."""
+
+MOST_LINES = 8
+"""That may stand out, tones and their harmonics; more are a comb."""
+
+REACH = 10
+"""Lines on each side that a tone reaches through the window."""
+
+
+@dataclass(frozen=True)
+class Tone:
+    """A steady tone that the forces do not know.
+
+    Parameters
+    ----------
+    frequency
+        Hz.
+    amplitudes : (n_responses,)
+        Of each response, mean over recordings.
+    gain
+        Twice the log likelihood gained.
+    spread : (n_responses,)
+        Standard error of the amplitudes: how far recordings differ, for a mean over few of them.
+    """
+
+    frequency: float
+    amplitudes: Real
+    gain: float
+    spread: Real
+
+
+def mean_and_error(sizes: list[Real]) -> tuple[Real, Real]:
+    """Mean over recordings of amplitudes (n_responses,) each, and its standard error: 1.96 of it make 95 %.
+
+    The spread is widened by Student's t and not divided by the number of recordings, as a tone that changes from one
+    to the next has no one amplitude; of a single recording no error is known (not a number).
+
+    Examples
+    --------
+    >>> mean, error = mean_and_error([np.array([1.0]), np.array([1.2]), np.array([1.1])])
+    >>> float(mean[0].round(3)), float(error[0].round(3))
+    (1.1, 0.22)
+    """
+    mean = np.asarray(np.mean(sizes, axis=0))
+    if len(sizes) < 2:
+        return mean, np.full(len(mean), np.nan)
+    return mean, np.asarray(np.std(sizes, axis=0, ddof=1) * student.ppf(0.975, len(sizes) - 1) / 1.96)
+
+
+def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
+    """The strongest residual line that stands out of the recordings at one frequency, and of no force.
+
+    A tone from elsewhere is the weaker beside the noise the harder is cut, as noise grows with the signal: it must be
+    seen in two recordings (in the only one, where there is one).
+    """
+    if len(lines) == 0:
+        return None
+    powers = [_whitened_power(fitted, one, noise) for one, noise in zip(lines, fitted.noises, strict=True)]
+    together = seen_together([sharp_contrast(power) for power in powers], lines, FORCED)
+    axis = lines[0].frequencies
+    if is_comb(together):
+        return None
+    for k in np.argsort(-together)[:20]:
+        if together[k] < TONE_CONTRAST:
+            return None
+        frequency = float(axis[k])
+        if _too_few_left(lines, frequency):
+            continue
+        exact = sharp_frequency(_rests(fitted, lines), [one.trial.rate for one in lines], frequency)
+        # the lines beside it seemed to stand out as much; how strong it is does not depend on how far it leaks
+        shown = [_at(above_neighbours(power, NEAR), one, exact) for one, power in zip(lines, powers, strict=True)]
+        sizes, spread = mean_and_error(_amplitudes(fitted, lines, exact))
+        return Tone(exact, sizes, 2 * float(np.sum(shown)), spread)
+    return None
+
+
+def seen_together(contrasts: list[Real], lines: list[WindowedLines], forced: float) -> Real:
+    """Contrast of each line of the first recording (n_lines,), summed over recordings; 0 where it is no tone's.
+
+    A line of another recording counts with those beside it. Two recordings must show it (the only one, where there is
+    one), and no force with a contrast above ``forced``.
+
+    Parameters
+    ----------
+    contrasts : each (n_lines,)
+        Of the recordings.
+    lines
+        They themselves.
+    forced
+        Contrast of a force.
+    """
+    axis = lines[0].frequencies
+    each = [
+        np.max([np.interp(axis + shift * _step(one), one.frequencies, c) for shift in (-1, 0, 1)], axis=0)
+        for one, c in zip(lines, contrasts, strict=True)
+    ]
+    again = np.sort(each, axis=0)[-min(2, len(lines))]
+    pushed = [np.interp(axis, one.frequencies, force_contrast(one)) > forced for one in lines]
+    return np.where((again > SEEN_AGAIN) & ~np.any(pushed, axis=0), np.sum(each, axis=0), 0.0)
+
+
+def is_comb(contrast: Real) -> bool:
+    """Whether more lines stand out than a machine nearby makes.
+
+    Forces that repeat within the record put all that they cause, errors of the model included, on a comb of lines.
+
+    Parameters
+    ----------
+    contrast : (n_lines,)
+        Summed over recordings.
+    """
+    lines = np.flatnonzero(contrast > TONE_CONTRAST / 3)
+    return int(np.sum(np.diff(lines, prepend=-REACH) > 2)) > MOST_LINES
+
+
+def stands_out(fitted: Fit, lines: list[WindowedLines], frequency: float) -> bool:
+    """Whether a line (Hz) of recordings that still hold it is a tone beside what a fit leaves."""
+    total = 0.0
+    for one, noise in zip(lines, fitted.noises, strict=True):
+        power = _whitened_power(fitted, one, noise)
+        total += _at(sharp_contrast(power), one, frequency)
+    return total > TONE_CONTRAST
+
+
+def _at(contrast: Real, lines: WindowedLines, frequency: float) -> float:
+    """The largest of the lines (n_lines,) about a frequency, Hz."""
+    return float(contrast[np.abs(lines.frequencies - frequency) < 1.5 * _step(lines)].max(initial=0.0))
+
+
+def _rests(fitted: Fit, lines: list[WindowedLines]) -> list[Real]:
+    """Windowed residuals in time, (n_kept, n_responses) each."""
+    rests = [one.trial.response - shown_signal(fitted, one) for one in lines]
+    return [
+        rest[one.start : one.start + len(one.window)] * one.window[:, None]
+        for rest, one in zip(rests, lines, strict=True)
+    ]
+
+
+def sharp_frequency(windowed: list[Real], rates: list[float], near: float) -> float:
+    """Peak (Hz) of windowed signals' spectra about a line, forty points a line, all recordings together.
+
+    Parameters
+    ----------
+    windowed : each (n_kept, n_channels)
+    rates
+        Of each, Hz.
+    near
+        The line, Hz.
+    """
+    step = max(rate / len(kept) for kept, rate in zip(windowed, rates, strict=True))
+    tries = near + step * np.linspace(-2, 2, 161)
+    power = np.zeros(len(tries))
+    for kept, rate in zip(windowed, rates, strict=True):
+        waves = np.exp(-2j * np.pi * tries[:, None] * np.arange(len(kept)) / rate)
+        power += np.sum(np.abs(waves @ kept) ** 2, axis=1)
+    return float(tries[np.argmax(power)])
+
+
+def without_tone(fitted: Fit, lines: WindowedLines, tone: Tone) -> WindowedLines:
+    """The same recording without the tone, and without the lines about it.
+
+    The sinusoid that fits the residual best is subtracted, or a strong tone's leakage through the window would stand
+    out far from it; what is left of one that wavers is left out.
+    """
+    rest = lines.trial.response - shown_signal(fitted, lines)
+    turn = 2 * np.pi * tone.frequency * np.arange(len(rest)) / lines.trial.rate
+    waves = np.column_stack([np.cos(turn), np.sin(turn)])
+    response = lines.trial.response - waves @ np.linalg.lstsq(waves, rest, rcond=None)[0]
+    kept = np.abs(lines.frequencies - tone.frequency) > REACH * _step(lines)
+    return replace(
+        lines,
+        trial=replace(lines.trial, response=response),
+        band=lines.band[kept],
+        frequencies=lines.frequencies[kept],
+        force_here=lines.force_here[kept],
+        measured=lines.cut(response)[kept],
+        trust=lines.trust[kept],
+    )
+
+
+def shown_signal(fitted: Fit, lines: WindowedLines) -> Real:
+    """Predicted responses in time, (n_samples, n_responses)."""
+    spectrum = predict_lines(fitted.explanation, lines).spectrum
+    return np.asarray(irfft(spectrum, n=lines.padded, axis=0)[: len(lines.trial.force)])
+
+
+def _step(lines: WindowedLines) -> float:
+    return lines.trial.rate / len(lines.window)
+
+
+def _whitened_power(fitted: Fit, lines: WindowedLines, noise: NoiseModel) -> Real:
+    """Power of each residual line in units of its noise, mean over channels."""
+    rest = lines.measured - predict_lines(fitted.explanation, lines).response
+    own = noise.covariance(lines.frequencies, through_structure(fitted.explanation, lines))
+    return np.asarray(np.sum(np.abs(np.einsum("kij,kj->ki", whitening(own), rest)) ** 2, axis=1) / rest.shape[1])
+
+
+def sharp_contrast(power: Real) -> Real:
+    """Each line of a power (n_lines,) over its neighbourhood and over the lines just beside it, the smaller of both."""
+    return np.minimum(above_neighbours(power, NEAR), above_neighbours(power, BESIDE))
+
+
+def above_neighbours(power: Real, footprint: NDArray[np.bool_]) -> Real:
+    """Each line of a power (n_lines,) over the median of the lines about it that the footprint holds."""
+    # mirrored at its ends: a weak last line repeated would make its neighbours stand out
+    around = median_filter(power, footprint=footprint, mode="mirror")
+    return np.asarray(power / np.maximum(around, 1e-3 * power.mean() + 1e-300))
+
+
+def _too_few_left(lines: list[WindowedLines], frequency: float) -> bool:
+    """Whether taking the tone out would leave less than three quarters of any recording's lines."""
+    reach = [np.abs(one.frequencies - frequency) <= REACH * _step(one) for one in lines]
+    return any(near.sum() > 0.25 * len(near) for near in reach)
+
+
+def force_contrast(lines: WindowedLines) -> Real:
+    """Power of the forces at each line or beside it against the median of its neighbourhood, (n_lines,)."""
+    power = np.sum(np.abs(lines.force_here / levels(lines)[1]) ** 2, axis=1)
+    return np.asarray(maximum_filter(above_neighbours(power, NEAR), 3))
+
+
+def _amplitudes(fitted: Fit, lines: list[WindowedLines], frequency: float) -> list[Real]:
+    found = []
+    for one in lines:
+        rest = one.measured - predict_lines(fitted.explanation, one).response
+        k = int(np.argmin(np.abs(one.frequencies - frequency)))
+        power = np.sum(np.abs(rest[max(0, k - 2) : k + 3]) ** 2, axis=0)
+        found.append(2 * np.sqrt(power / len(one.window)))
+    return found

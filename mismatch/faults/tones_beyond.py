@@ -1,0 +1,84 @@
+"""Steady tones above the band in which model and recording are compared."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..models.hypothesis import Explanation, predict_lines
+from ..records.windowed_lines import WindowedLines, windowed_lines
+from .tones import (
+    NEAR,
+    REACH,
+    TONE_CONTRAST,
+    Tone,
+    is_comb,
+    mean_and_error,
+    seen_together,
+    sharp_contrast,
+    sharp_frequency,
+)
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+HIGHEST = 0.45
+"""Highest frequency looked at, as a share of the sample rate."""
+
+QUIET_FORCE = 5.0
+"""Contrast that no force may show there: above the modes a force's line needs no resonance to be seen in a response."""
+
+
+def tones_beyond(explanation: Explanation, lines: list[WindowedLines], decay: float, most: int) -> list[Tone]:
+    """Lines above the compared band that stand out of the residual in two recordings, and in no force.
+
+    No noise was fitted there, so each response is its own measure: a line's power against the median of its neighbours.
+    The explanation is the final one: a hardening joint answers periodic forces with lines that they do not have.
+
+    Parameters
+    ----------
+    explanation
+        With all causes.
+    lines
+        Recordings.
+    decay
+        Of the slowest mode, 1/s.
+    most
+        How many tones are looked for.
+
+    Returns
+    -------
+    list of Tone
+        Strongest first.
+    """
+    above = [_above(one, decay) for one in lines]
+    if not above or min(len(one.frequencies) for one in above) < 4 * len(NEAR):
+        return []
+    rests = [one.measured - predict_lines(explanation, one).response for one in above]
+    contrasts = [np.mean([sharp_contrast(column) for column in (np.abs(rest) ** 2).T], axis=0) for rest in rests]
+    together = seen_together(contrasts, above, QUIET_FORCE)
+    axis, found = above[0].frequencies, list[Tone]()
+    if is_comb(together):
+        return found
+    while len(found) < most and together.max() > TONE_CONTRAST:
+        k = int(np.argmax(together))
+        found.append(_tone(above, rests, float(axis[k]), float(together[k])))
+        together[max(0, k - REACH) : k + REACH + 1] = 0.0
+    return found
+
+
+def _above(lines: WindowedLines, decay: float) -> WindowedLines:
+    rate = lines.trial.rate
+    return windowed_lines(
+        lines.trial, (float(lines.frequencies[-1]) + REACH / lines.trial.duration, HIGHEST * rate), decay
+    )
+
+
+def _tone(above: list[WindowedLines], rests: list[Complex], near: float, contrast: float) -> Tone:
+    kept = [one.trial.response[one.start : one.start + len(one.window)] * one.window[:, None] for one in above]
+    frequency = sharp_frequency(kept, [one.trial.rate for one in above], near)
+    sizes = []
+    for one, rest in zip(above, rests, strict=True):
+        k = int(np.argmin(np.abs(one.frequencies - frequency)))
+        power = np.sum(np.abs(rest[max(0, k - 2) : k + 3]) ** 2, axis=0)
+        sizes.append(2 * np.sqrt(power / len(one.window)))
+    mean, spread = mean_and_error(sizes)
+    return Tone(frequency, mean, 2 * contrast, spread)

@@ -1,0 +1,144 @@
+"""Free simulation of a joint's law on a modal model, recording by recording."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, rfft
+
+from foundation import DegreeOfFreedom, InputError
+from modal_fit import ModalModel
+
+from ..records.windowed_lines import WindowedLines, displacement_at
+from .joint_law import JointLaw
+from .joint_loop import driven_run, free_run
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+INSTANTS_PER_PERIOD = 20.0
+"""Of the highest mode."""
+
+
+@dataclass(frozen=True)
+class JointResponse:
+    """A joint in a simulation.
+
+    Parameters
+    ----------
+    force : (n_padded_lines,), N
+        Padded spectrum.
+    deflection, velocity : (k n_padded,), m and m/s
+        At the recording's samples, or k times as often (:func:`substeps`).
+    """
+
+    force: Complex
+    deflection: Real
+    velocity: Real
+
+
+def common_axes(model: ModalModel) -> tuple[list[int], list[int]]:
+    """Responses and excitations that share an axis: where a joint's deflection and its force are both seen.
+
+    Raises
+    ------
+    InputError
+        There are none.
+    """
+    axes = {DegreeOfFreedom.parse(label).axis: place for place, label in reversed(list(enumerate(model.responses)))}
+    pairs = [
+        (axes[axis], place)
+        for place, axis in enumerate(DegreeOfFreedom.parse(label).axis for label in model.excitations)
+        if axis in axes
+    ]
+    if not pairs:
+        raise InputError(f"responses {', '.join(model.responses)} share no axis with {', '.join(model.excitations)}")
+    return [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+
+
+def fineness(model: ModalModel, rate: float) -> int:
+    """Instants of the simulation a sample."""
+    return max(4, int(np.ceil(INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate)))
+
+
+def substeps(model: ModalModel, rate: float, fine: int) -> int:
+    """Instants a sample at which a motion is kept: a divisor of ``fine`` that follows the highest mode."""
+    wanted = INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate
+    return next((k for k in range(1, fine) if fine % k == 0 and k >= wanted), fine)
+
+
+def joint_response(
+    model: ModalModel, lines: WindowedLines, force: Complex, direction: Real, law: JointLaw
+) -> JointResponse:
+    """Force and motion of a joint, the structure simulated freely under the outer force and the joint's.
+
+    Parameters
+    ----------
+    model
+        Linear structure.
+    lines
+        Of the recording.
+    force : (n_padded_lines, n_excitations)
+        Spectrum of the outer force.
+    direction : (n_axes,)
+        Of the joint over the common axes, of unit length.
+    law
+        Of the joint.
+    """
+    rows, _ = common_axes(model)
+    frequencies = lines.padded_frequencies
+    displacement = displacement_at(model, frequencies, force)[:, rows] @ direction
+    fine = fineness(model, lines.trial.rate)
+    n = fine * lines.padded
+    deflection = fine * irfft(displacement, n=n)
+    velocity = fine * irfft(2j * np.pi * frequencies * displacement, n=n)
+    step = 1.0 / (fine * lines.trial.rate)
+    written = (np.empty(n), np.empty(n), np.empty(n))
+    free_run(
+        deflection,
+        velocity,
+        joint_dynamics(model, direction, step),
+        law.tables(),
+        (law.reach, law.speed),
+        stiffness_ramp(law, n, step, lines.trial.duration),
+        (law.springs, law.yields),
+        written,
+    )
+    force_lines = np.asarray(rfft(written[0])[: len(frequencies)] / fine)
+    every = fine // substeps(model, lines.trial.rate, fine)
+    return JointResponse(force_lines, written[1][::every].copy(), written[2][::every].copy())
+
+
+def driven_force(lines: WindowedLines, deflection: Real, velocity: Real, law: JointLaw, *, often: int = 1) -> Real:
+    """The joint's force (n,), N, for a motion sampled at the trial's rate, or ``often`` times it."""
+    result = np.empty(len(deflection))
+    ramp = stiffness_ramp(law, len(deflection), 1 / (often * lines.trial.rate), lines.trial.duration)
+    driven_run(deflection, velocity, law.tables(), (law.reach, law.speed), ramp, (law.springs, law.yields), result)
+    return result
+
+
+def stiffness_ramp(law: JointLaw, n: int, step: float, duration: float) -> Real:
+    """Change of stiffness (n,), N/m, at instants ``step`` s apart."""
+    tau = np.minimum(np.arange(n) * step / duration, 1.0) - 0.5
+    return np.asarray(law.ramp * tau + law.bend * (4 * tau**2 - 1))
+
+
+def joint_dynamics(
+    model: ModalModel, direction: Real, step: float
+) -> tuple[Complex, Complex, Complex, Complex, Complex]:
+    """Exact step of ``q' = p q + left.d g`` for g straight between instants.
+
+    Returns
+    -------
+    turn, early, late, to_x, to_v : (n_modes,)
+        As :func:`mismatch.joints.joint_loop.free_run` takes them.
+    """
+    rows, columns = common_axes(model)
+    poles = model.poles
+    z = poles * step
+    turn = np.exp(z)
+    whole = (turn - 1) / poles
+    late = (turn - 1 - z) / (poles * z)
+    push = model.left[:, columns] @ direction
+    to_x = model.right[:, rows] @ direction
+    return turn, (whole - late) * push, late * push, to_x, to_x * poles

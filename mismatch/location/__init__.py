@@ -1,0 +1,1 @@
+"""Where a mismatch sits: frequency bands, channels, times, levels, spindle orders."""

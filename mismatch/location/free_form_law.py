@@ -1,0 +1,172 @@
+"""The restoring force of a joint as it was measured, no law assumed: means in bins of deflection and of velocity."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, rfft
+
+from ..inference.diagnosis import Diagnosis
+from ..joints.joint_simulation import driven_force
+from ..models.fitting import Fit
+from ..models.hypothesis import Cause, Explanation, predict_lines
+from ..models.misfit import through_structure
+from ..noise.noise_model import whitening
+from ..physics import answer_name
+from ..records.windowed_lines import WindowedLines
+from ..screening.joint_direction import SeenMotion, seen_motion
+from ..screening.linear_floor import FloorRecord
+
+Real = NDArray[np.float64]
+
+BINS = 21
+LEAST_SAMPLES = 80
+BLOCK = 1.0
+"""Length of a piece of the record that counts as one independent sample of the scatter, s."""
+
+
+@dataclass(frozen=True)
+class BinnedForce:
+    """Mean force in bins.
+
+    Parameters
+    ----------
+    at : (n,)
+        Mean of each bin: m, or m/s.
+    force, error : (n,), N
+        Mean and its standard error from the scatter between pieces of the records.
+    law : (n,), N
+        The accepted law's force, driven by the same motion, filtered and averaged alike.
+    """
+
+    at: Real
+    force: Real
+    error: Real
+    law: Real
+
+
+@dataclass(frozen=True)
+class FreeFormLaw:
+    """Measured force of one accepted joint.
+
+    Parameters
+    ----------
+    name
+        Of the accepted cause.
+    direction : (n_axes,)
+        Along which it acts.
+    forward, backward
+        Against deflection, moving up and moving down: apart where the joint rubs or remembers.
+    damping
+        Against velocity, what depends on deflection taken off.
+    explained
+        Share of the measured force's power that the law gives.
+    """
+
+    name: str
+    direction: Real
+    forward: BinnedForce
+    backward: BinnedForce
+    damping: BinnedForce
+    explained: float
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """Samples of all recordings, band-limited alike: deflection, velocity, force, the law's force, number of piece."""
+
+    x: Real
+    v: Real
+    force: Real
+    law: Real
+    piece: NDArray[np.int64]
+
+
+def free_form_laws(diagnosis: Diagnosis) -> tuple[FreeFormLaw, ...]:
+    """Measured force of each accepted joint cause, all other causes in place."""
+    return tuple(
+        _measured(diagnosis, cause) for cause in diagnosis.final.explanation.causes if cause.direction is not None
+    )
+
+
+def _measured(diagnosis: Diagnosis, cause: Cause) -> FreeFormLaw:
+    final = diagnosis.final.explanation
+    assert cause.direction is not None
+    bare = replace(final, causes=tuple(one for one in final.causes if one is not cause))
+    samples = _joined([_seen(diagnosis.final, bare, cause, k, one) for k, one in enumerate(diagnosis.lines)])
+    up = samples.v > 0
+    ends = _edges(samples.x)
+    elastic = _mean_at(samples.x, samples.force, ends), _mean_at(samples.x, samples.law, ends)
+    rest = replace(samples, force=samples.force - elastic[0], law=samples.law - elastic[1])
+    share = 1 - float(np.mean((samples.force - samples.law) ** 2) / np.mean(samples.force**2))
+    return FreeFormLaw(
+        answer_name(cause.physics),
+        cause.direction,
+        _binned(samples, samples.x, ends, up),
+        _binned(samples, samples.x, ends, ~up),
+        _binned(rest, samples.v, _edges(samples.v), np.ones(len(up), dtype=bool)),
+        share,
+    )
+
+
+def _seen(final: Fit, bare: Explanation, cause: Cause, number: int, lines: WindowedLines) -> _Sample:
+    """Motion and force along the joint in one recording, and the law's force for that motion."""
+    assert cause.direction is not None
+    through = through_structure(bare, lines)
+    covariance = final.noises[number].covariance(lines.frequencies, through)
+    rest = lines.measured - predict_lines(bare, lines).response
+    record = FloorRecord(lines, rest, through, whitening(covariance), np.zeros((0, 0)), np.zeros(0))
+    seen: SeenMotion = seen_motion(record, bare, cause.direction)
+    law = driven_force(lines, seen.deflection, seen.velocity, cause.law())
+    kept = slice(lines.start, len(law) - max(int(lines.trial.rate), 1))
+    force, given = _in_band(seen.force, lines)[kept], _in_band(law, lines)[kept]
+    piece = np.arange(len(force)) // max(int(BLOCK * lines.trial.rate), 1)
+    return _Sample(seen.deflection[kept], seen.velocity[kept], force, given, piece)
+
+
+def _in_band(signal: Real, lines: WindowedLines) -> Real:
+    axis = np.arange(len(signal) // 2 + 1) * lines.trial.rate / len(signal)
+    inside = (axis >= lines.frequencies[0]) & (axis <= lines.frequencies[-1])
+    return np.asarray(irfft(rfft(signal) * inside, n=len(signal)))
+
+
+def _joined(parts: list[_Sample]) -> _Sample:
+    pieces, count = [], 0
+    for part in parts:
+        pieces.append(part.piece + count)
+        count += int(part.piece[-1]) + 1
+    x, v, force, law = (np.concatenate([getattr(part, name) for part in parts]) for name in ("x", "v", "force", "law"))
+    return _Sample(x, v, force, law, np.concatenate(pieces))
+
+
+def _edges(values: Real) -> Real:
+    """Edges of the bins where all but one in 500 samples lie: halfway between evenly wide and evenly filled."""
+    shares = np.linspace(0.001, 0.999, BINS + 1)
+    filled = np.quantile(values, shares)
+    return np.asarray(0.5 * (filled + np.linspace(filled[0], filled[-1], BINS + 1)))
+
+
+def _mean_at(values: Real, force: Real, edges: Real) -> Real:
+    """Mean force of a sample's bin, straight between the middles."""
+    place = np.digitize(values, edges[1:-1])
+    held = np.maximum(np.bincount(place, minlength=BINS), 1)
+    means = np.bincount(place, force, BINS) / held
+    return np.asarray(np.interp(values, 0.5 * (edges[1:] + edges[:-1]), means))
+
+
+def _binned(samples: _Sample, values: Real, edges: Real, chosen: NDArray[np.bool_]) -> BinnedForce:
+    """Means, and their errors by leaving out one piece of the records at a time (jackknife)."""
+    inside = chosen & (values >= edges[0]) & (values <= edges[-1])
+    place = np.digitize(values[inside], edges[1:-1])
+    piece = samples.piece[inside]
+    count = int(samples.piece[-1]) + 1
+    cell = piece * BINS + place
+    held = np.bincount(cell, minlength=count * BINS).reshape(count, BINS).astype(float)
+    sums = np.bincount(cell, samples.force[inside], count * BINS).reshape(count, BINS)
+    total, all_sums = held.sum(axis=0), sums.sum(axis=0)
+    good = total >= LEAST_SAMPLES
+    left = (all_sums - sums) / np.maximum(total - held, 1)
+    error = np.sqrt((count - 1) / count * np.sum((left - left.mean(axis=0)) ** 2, axis=0))
+    law = np.bincount(place, samples.law[inside], BINS) / np.maximum(total, 1)
+    at = np.bincount(place, values[inside], BINS) / np.maximum(total, 1)
+    return BinnedForce(at[good], (all_sums / np.maximum(total, 1))[good], error[good], law[good])

@@ -1,0 +1,108 @@
+"""How a residual grows with the level of excitation: what kind of omission it is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..models.fitting import Fit
+from ..models.hypothesis import Explanation
+from ..records.windowed_lines import WindowedLines
+from .residual_maps import normalised, overlap
+
+Real = NDArray[np.float64]
+
+SEEN = 2.0
+"""Standard errors above noise from which a recording's residual is used."""
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Residual above noise against force, recording by recording.
+
+    Parameters
+    ----------
+    force : (n_recordings,), N
+        Root mean square, all directions together.
+    amplitude, error : (n_recordings,)
+        Root mean square residual with the noise's power taken off, every channel in units of its own response averaged
+        over the recordings; its standard error. Zero where nothing stands above the noise.
+    noise : (n_recordings,)
+        Of the noise, in the same unit.
+    exponent, exponent_error
+        Of ``amplitude ~ force^exponent``; nan where fewer than two levels show it.
+    """
+
+    force: Real
+    amplitude: Real
+    error: Real
+    noise: Real
+    exponent: float
+    exponent_error: float
+
+
+def growth(
+    explanation: Explanation,
+    reference: Fit,
+    lines: Sequence[WindowedLines],
+    bands: Sequence[tuple[float, float]],
+    spread: float,
+) -> Growth:
+    """Growth of an explanation's residual inside bands (Hz; none: everywhere).
+
+    A linear omission grows as the force, a cubic as its third power, dry friction not at all.
+
+    Parameters
+    ----------
+    explanation
+        Whose residual.
+    reference
+        Fit whose noise is taken off.
+    lines
+        Recordings.
+    bands
+        Where the residual was found.
+    spread
+        Relative standard deviation of the noise's variance, beyond chance.
+    """
+    unit = np.sqrt(np.mean([np.mean(np.abs(one.measured) ** 2, axis=0) for one in lines], axis=0))
+    rows = []
+    for number, one in enumerate(lines):
+        single, _, variance = normalised(explanation, reference, number, one)
+        inside = _inside(one.frequencies, bands)
+        floor = variance[inside] / unit**2
+        power = np.abs(single[inside]) ** 2 * floor
+        excess = float(power.sum() - floor.sum())
+        chance = 0.5 * float(np.sum(power**2)) * overlap(one.window)
+        error = float(np.sqrt(chance + (spread * float(floor.sum())) ** 2))
+        rows.append((one.trial.level, excess / power.size, error / power.size, float(floor.mean())))
+    force, excess_, error_, noise = np.array(rows).T
+    amplitude = np.sqrt(np.maximum(excess_, 0.0))
+    spreads = error_ / (2 * np.maximum(amplitude, np.sqrt(error_)))
+    seen = excess_ > SEEN * error_
+    exponent, exponent_error = _slope(force[seen], amplitude[seen], spreads[seen] / amplitude[seen])
+    return Growth(force, amplitude, spreads, np.sqrt(noise), exponent, exponent_error)
+
+
+def _inside(frequencies: Real, bands: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
+    inside = np.zeros(len(frequencies), dtype=bool)
+    for low, high in bands or [(0.0, np.inf)]:
+        inside |= (frequencies >= low) & (frequencies <= high)
+    return inside
+
+
+def _slope(force: Real, amplitude: Real, relative: Real) -> tuple[float, float]:
+    """Weighted slope of the logarithms and its standard error, enlarged where the points do not lie on a line."""
+    if len(force) < 2 or np.ptp(np.log(force)) < 0.1:
+        return float("nan"), float("nan")
+    weight = 1 / np.maximum(relative, 1e-3) ** 2
+    x, y = np.log(force), np.log(amplitude)
+    x0, y0 = np.average(x, weights=weight), np.average(y, weights=weight)
+    size = float(np.sum(weight * (x - x0) ** 2))
+    slope = float(np.sum(weight * (x - x0) * (y - y0)) / size)
+    error = 1 / np.sqrt(size)
+    if len(force) > 2:
+        misfit = np.sum(weight * (y - y0 - slope * (x - x0)) ** 2) / (len(force) - 2)
+        error *= np.sqrt(max(1.0, float(misfit)))
+    return slope, float(error)

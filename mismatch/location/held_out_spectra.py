@@ -1,0 +1,79 @@
+"""Spectra of the recording that was held out: measured, what each model leaves of it, noise."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..adapters.structure.held_out import residual_lines
+from ..faults.shown_faults import FAULTS
+from ..inference.diagnosis import Diagnosis
+from ..models.misfit import through_structure
+from ..records.windowed_lines import WindowedLines
+from .residual_maps import band_edges
+
+Real = NDArray[np.float64]
+
+BANDS_PER_OCTAVE = 24
+
+
+@dataclass(frozen=True)
+class HeldOutSpectra:
+    """Amplitude spectral densities in narrow bands, unit of the response per root Hz.
+
+    Parameters
+    ----------
+    recording
+        Its name.
+    frequencies : (n_bands,), Hz
+    channels
+        Names of the responses.
+    powers : (n_responses,)
+        0 displacement, 1 velocity, 2 acceleration.
+    measured, predicted, before, after, noise : (n_bands, n_responses)
+        The response, the improved model's prediction, residuals of the refitted nominal and of the improved model,
+        both fitted to the other recordings, and the noise.
+    """
+
+    recording: str
+    frequencies: Real
+    channels: tuple[str, ...]
+    powers: NDArray[np.int64]
+    measured: Real
+    predicted: Real
+    before: Real
+    after: Real
+    noise: Real
+
+
+def held_out_spectra(diagnosis: Diagnosis) -> HeldOutSpectra:
+    """Spectra of the recording named by the diagnosis' improvement, both models fitted to the others only."""
+    lines = list(diagnosis.measured or diagnosis.lines)
+    names = [one.trial.name for one in lines]
+    kept = names.index(diagnosis.improvement.held_out)
+    here, final = lines[kept], diagnosis.final
+    before, after = diagnosis.elsewhere
+    faults = [cause for cause in diagnosis.physics if cause.name in FAULTS]
+    rests = residual_lines(before, here), residual_lines(after, here, faults)
+    covariance = final.noises[kept].covariance(here.frequencies, through_structure(final.explanation, here))
+    edges = band_edges([here], BANDS_PER_OCTAVE, 3)
+    power = [
+        np.abs(here.measured) ** 2,
+        np.abs(here.measured - rests[1]) ** 2,
+        np.abs(rests[0]) ** 2,
+        np.abs(rests[1]) ** 2,
+        np.real(np.einsum("kii->ki", covariance)),
+    ]
+    densities = [_density(one, here, edges) for one in power]
+    channels = here.trial.channels[-here.measured.shape[1] :]
+    middle = np.sqrt(edges[1:] * edges[:-1])
+    return HeldOutSpectra(here.trial.name, middle, channels, here.trial.powers, *densities)
+
+
+def _density(power: Real, lines: WindowedLines, edges: Real) -> Real:
+    """Root of the mean one-sided density in bands; nan where a band holds no line."""
+    place = np.digitize(lines.frequencies, edges[1:-1])
+    held = np.bincount(place, minlength=len(edges) - 1)
+    sums = np.array([np.bincount(place, power[:, p], len(held)) for p in range(power.shape[1])]).T
+    mean = np.where(held[:, None] > 0, sums / np.maximum(held, 1)[:, None], np.nan)
+    return np.asarray(np.sqrt(2 * mean / lines.trial.rate))

@@ -1,0 +1,216 @@
+"""Where a mismatch sits: frequency bands, channels, times, excitation levels, spindle orders, and how it grows."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as fisher
+
+from ..inference.diagnosis import Diagnosis
+from ..records.trial import Trial
+from .family_wise import FAMILY_WISE, holm
+from .growth import Growth, growth
+from .residual_view import ResidualView, linear_part, residual_view
+from .spindle_orders import SpindleSpeed, order_powers
+from .time_maps import BlockResidual
+
+Real = NDArray[np.float64]
+Tables = tuple[tuple[Real, Real], tuple[Real, Real]]
+"""Ratio of residual to noise power and independent lines, before and after."""
+
+NO_SPEED = "no recording states the spindle's speed in events or set-up"
+NO_ORDER = "no order of the spindle stands out of the residual beside it"
+
+
+def locate(
+    diagnosis: Diagnosis,
+    trials: Sequence[Trial] | None = None,
+    speeds: Mapping[str, SpindleSpeed] | None = None,
+) -> dict[str, Any]:
+    """Locate the mismatch of a diagnosis; plain content for its file.
+
+    Parameters
+    ----------
+    diagnosis
+        With its fits and recordings.
+    trials
+        The recordings as read, before tones and clipping were mended; None: what the diagnosis holds.
+    speeds
+        Spindle speed by recording's name.
+    """
+    return located(residual_view(diagnosis, trials), speeds or {})
+
+
+def located(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> dict[str, Any]:
+    """The same from maps that are already made.
+
+    Every cell of every map is tested for more residual power than noise has; p-values are adjusted together (Holm), so
+    that in a diagnosis of noise alone any place at all is named with probability ``family_wise_level``.
+    """
+    before, after = view.before, view.after
+    tables = {
+        "band": (before.pooled_joint(0), after.pooled_joint(0)),
+        "channel": (before.pooled((0, 1)), after.pooled((0, 1))),
+        "level": (before.pooled_joint(1), after.pooled_joint(1)),
+    }
+    blocks = [_block_table(one) for one in view.blocks_before]
+    chances = [view.noise.chance(*entry[0]) for entry in tables.values()]
+    chances.append(view.noise.chance(before.ratio, before.count[:, :, None]))
+    chances += [view.noise.chance(*block) for block in blocks]
+    orders = _orders(view, speeds)
+    chances.append(np.array([order["p_value"] for order in orders]))
+    adjusted = _split(holm(np.concatenate([c.ravel() for c in chances])), chances)
+    bands = _bands(before.edges, tables["band"], adjusted[0])
+    found_orders = [
+        order | {"p_value": float(p)} for order, p in zip(orders, adjusted[-1], strict=True) if p < FAMILY_WISE
+    ]
+    return {
+        "tests": int(sum(c.size for c in chances)),
+        "family_wise_level": FAMILY_WISE,
+        "noise_level_spread": _plain(view.noise.spread),
+        "frequency_bands": bands,
+        "channels": _named("channel", before.channels, tables["channel"], adjusted[1]),
+        "levels": _levels(view, tables["level"], adjusted[2]),
+        "cells": _cells(view, adjusted[3]),
+        "times": _times(view, blocks, adjusted[4:-1]),
+        "growth": _growth(view, bands),
+        "spindle_orders": found_orders,
+        "spindle_orders_note": NO_SPEED if not speeds else "" if found_orders else NO_ORDER,
+    }
+
+
+def significant_cells(content: Mapping[str, Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Mask (n_recordings, n_bands, n_responses) of the cells that :func:`located` named."""
+    mask = np.zeros(shape, dtype=bool)
+    for cell in content["cells"]:
+        mask[tuple(cell)] = True
+    return mask
+
+
+def _split(flat: Real, like: Sequence[Real]) -> list[Real]:
+    ends = np.cumsum([one.size for one in like])[:-1]
+    return [part.reshape(one.shape) for part, one in zip(np.split(flat, ends), like, strict=True)]
+
+
+def _block_table(blocks: BlockResidual) -> tuple[Real, Real]:
+    mean = blocks.power.mean(axis=1)
+    return mean, np.full(len(mean), blocks.power.shape[1] * blocks.channels / blocks.overlap)
+
+
+def _plain(value: float) -> float | None:
+    """Rounded to four digits; None for what is no number."""
+    return float(f"{value:.4g}") if np.isfinite(value) else None
+
+
+def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Beginning and end of each unbroken stretch."""
+    steps = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
+    return [(int(a), int(b)) for a, b in zip(steps[::2], steps[1::2], strict=True)]
+
+
+def _bands(edges: Real, tables: Tables, p_value: Real) -> list[dict[str, Any]]:
+    """Neighbouring significant bands together, most excess first."""
+    before, after = tables
+    excess = np.maximum(before[0] - 1, 0) * before[1]
+    found = []
+    for start, stop in _runs(p_value < FAMILY_WISE):
+        part = slice(start, stop)
+        peak = start + int(np.argmax(excess[part]))
+        weights = np.maximum(before[1][part], 1e-9), np.maximum(after[1][part], 1e-9)
+        found.append(
+            {
+                "low_hz": _plain(edges[start]),
+                "high_hz": _plain(edges[stop]),
+                "peak_hz": _plain(float(np.sqrt(edges[peak] * edges[peak + 1]))),
+                "before": _plain(float(np.average(before[0][part], weights=weights[0]))),
+                "after": _plain(float(np.average(after[0][part], weights=weights[1]))),
+                "share": _plain(float(excess[part].sum() / max(excess.sum(), 1e-300))),
+                "p_value": float(p_value[part].min()),
+            }
+        )
+    return sorted(found, key=lambda one: -(one["share"] or 0.0))
+
+
+def _named(key: str, names: Sequence[str], tables: Tables, p_value: Real) -> list[dict[str, Any]]:
+    (before, count), (after, _) = tables
+    excess = np.maximum(before - 1, 0) * count
+    return [
+        {
+            key: name,
+            "before": _plain(before[k]),
+            "after": _plain(after[k]),
+            "share": _plain(excess[k] / max(float(excess.sum()), 1e-300)),
+            "p_value": float(p_value[k]),
+            "significant": bool(p_value[k] < FAMILY_WISE),
+        }
+        for k, name in enumerate(names)
+    ]
+
+
+def _levels(view: ResidualView, tables: Tables, p_value: Real) -> list[dict[str, Any]]:
+    rows = _named("recording", view.before.recordings, tables, p_value)
+    return [row | {"force_rms_n": _plain(one.trial.level)} for row, one in zip(rows, view.measured, strict=True)]
+
+
+def _cells(view: ResidualView, p_value: Real) -> list[list[int]]:
+    """Significant cells as indices [recording, band, channel]; bands are about sixth octaves."""
+    return [[int(k) for k in cell] for cell in np.argwhere(p_value < FAMILY_WISE)]
+
+
+def _times(view: ResidualView, tables: Sequence[tuple[Real, Real]], p_values: Sequence[Real]) -> list[dict[str, Any]]:
+    """Stretches of time whose blocks are significant."""
+    found = []
+    for blocks, (ratio, _), p_value in zip(view.blocks_before, tables, p_values, strict=True):
+        for start, stop in _runs(p_value < FAMILY_WISE):
+            found.append(
+                {
+                    "recording": blocks.recording,
+                    "start_s": _plain(blocks.times[start]),
+                    "end_s": _plain(blocks.times[stop]),
+                    "before": _plain(float(ratio[start:stop].mean())),
+                    "p_value": float(p_value[start:stop].min()),
+                }
+            )
+    return found
+
+
+def _growth(view: ResidualView, bands: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Of the residual after the refit, and of what the final model leaves without its joints' laws."""
+    ranges = [(band["low_hz"], band["high_hz"]) for band in bands]
+    if not ranges:
+        return {"note": "nothing stands above the noise, so nothing grows"}
+    diagnosis = view.diagnosis
+    refitted = growth(diagnosis.base.explanation, view.reference, view.measured, ranges, view.noise.spread)
+    content = {"residual": _growth_content(refitted)}
+    bare = linear_part(diagnosis)
+    if bare is not None:
+        content["effect"] = _growth_content(growth(bare, view.reference, diagnosis.lines, ranges, view.noise.spread))
+    return content
+
+
+def _growth_content(found: Growth) -> dict[str, Any]:
+    return {
+        "force_rms_n": [_plain(x) for x in found.force],
+        "amplitude": [_plain(x) for x in found.amplitude],
+        "standard_error": [_plain(x) for x in found.error],
+        "noise": [_plain(x) for x in found.noise],
+        "exponent": _plain(found.exponent),
+        "exponent_standard_error": _plain(found.exponent_error),
+    }
+
+
+def _orders(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> list[dict[str, Any]]:
+    """All orders of all recordings that state a speed, with the chance that an order stands out as it does."""
+    rows = []
+    for blocks in view.blocks_before:
+        if blocks.recording not in speeds:
+            continue
+        on, off, count = order_powers(blocks, speeds[blocks.recording])
+        for k in np.flatnonzero(count > 0):
+            ratio = float(on[k] / max(off[k], 1e-12))
+            chance = float(fisher.sf(ratio / view.noise.level, 2 * count[k], 2 / view.noise.spread**2))
+            rows.append(
+                {"recording": blocks.recording, "order": int(k + 1), "contrast": _plain(ratio), "p_value": chance}
+            )
+    return rows

@@ -1,0 +1,58 @@
+"""Errors of each recording as it was measured, by the models fitted without the one held out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..adapters.structure.held_out import residual_lines
+from ..adapters.structure.pruning import zero_of
+from ..faults.shown_faults import FAULTS
+from ..inference.diagnosis import Diagnosis
+from ..models.misfit import through_structure
+
+
+@dataclass(frozen=True)
+class RecordingError:
+    """Errors as shares of one recording's response.
+
+    Parameters
+    ----------
+    recording
+        Its name.
+    held_out
+        Whether the models were fitted without it.
+    force
+        Root mean square, N.
+    nominal, refitted, final
+        Of the nominal model, of modal parameters alone, of the final model.
+    noise
+        Root mean square noise.
+    """
+
+    recording: str
+    held_out: bool
+    force: float
+    nominal: float
+    refitted: float
+    final: float
+    noise: float
+
+
+def recording_errors(diagnosis: Diagnosis) -> tuple[RecordingError, ...]:
+    """Of all recordings; of the one held out they are those of the diagnosis' :class:`Improvement`."""
+    linear, improved = diagnosis.elsewhere
+    faults = [cause for cause in diagnosis.physics if cause.name in FAULTS]
+    found = []
+    for one, noise in zip(diagnosis.measured or diagnosis.lines, diagnosis.final.noises, strict=True):
+        rests = (
+            residual_lines(zero_of(improved.shape), one),
+            residual_lines(linear, one),
+            residual_lines(improved, one, faults),
+        )
+        power = float(np.sum(np.abs(one.measured) ** 2))
+        covariance = noise.covariance(one.frequencies, through_structure(improved, one))
+        nominal, refitted, final = (float(np.sqrt(np.sum(np.abs(rest) ** 2) / power)) for rest in rests)
+        floor = float(np.sqrt(np.sum(np.trace(covariance, axis1=1, axis2=2).real) / power))
+        held = one.trial.name == diagnosis.improvement.held_out and len(diagnosis.lines) > 1
+        found.append(RecordingError(one.trial.name, held, one.trial.level, nominal, refitted, final, floor))
+    return tuple(found)

@@ -1,0 +1,133 @@
+"""Maps of residual power over noise power: frequency band x channel x recording."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..models.fitting import Fit
+from ..models.hypothesis import Explanation, predict_lines
+from ..models.misfit import through_structure
+from ..noise.noise_model import whitening
+from ..records.windowed_lines import WindowedLines
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+BANDS_PER_OCTAVE = 6
+LEAST_LINES = 12
+"""Of a band, in every recording."""
+
+
+@dataclass(frozen=True)
+class ResidualMap:
+    """Mean of |residual|² over noise variance in cells; 1 where only noise is left.
+
+    Parameters
+    ----------
+    edges : (n_bands + 1,), Hz
+    channels
+        Names of the responses.
+    recordings
+        Names, weakest force first.
+    ratio : (n_recordings, n_bands, n_responses)
+        Each channel against its own noise.
+    joint : (n_recordings, n_bands)
+        All channels together, whitened.
+    count : (n_recordings, n_bands)
+        Independent complex lines of a cell of one channel.
+    """
+
+    edges: Real
+    channels: tuple[str, ...]
+    recordings: tuple[str, ...]
+    ratio: Real
+    joint: Real
+    count: Real
+
+    def pooled(self, axis: tuple[int, ...]) -> tuple[Real, Real]:
+        """Ratio and count over ``axis`` of ``ratio``, cells weighted by their lines."""
+        weight = np.broadcast_to(self.count[:, :, None], self.ratio.shape)
+        total = weight.sum(axis=axis)
+        return np.asarray((self.ratio * weight).sum(axis=axis) / np.maximum(total, 1e-9)), np.asarray(total)
+
+    def pooled_joint(self, axis: int) -> tuple[Real, Real]:
+        """The same of ``joint``; every channel brings its lines."""
+        total = self.count.sum(axis=axis)
+        ratio = (self.joint * self.count).sum(axis=axis) / np.maximum(total, 1e-9)
+        return np.asarray(ratio), np.asarray(total * len(self.channels))
+
+
+def overlap(window: Real) -> float:
+    """How many neighbouring lines of a windowed spectrum count as one, ``N sum w^4 / (sum w^2)^2``."""
+    return float(len(window) * np.sum(window**4) / np.sum(window**2) ** 2)
+
+
+def band_edges(lines: Sequence[WindowedLines], per_octave: int = BANDS_PER_OCTAVE, least: int = LEAST_LINES) -> Real:
+    """Edges (Hz) of bands evenly wide on a logarithmic axis, each with ``least`` lines in every recording."""
+    low = max(float(one.frequencies[0]) for one in lines)
+    high = min(float(one.frequencies[-1]) for one in lines)
+    fine = np.geomspace(low, high, max(2, round(per_octave * np.log2(high / low)) + 1))
+    step = max(one.trial.rate / len(one.window) for one in lines)
+    edges = [fine[0]]
+    for edge in fine[1:]:
+        if edge - edges[-1] >= least * step:
+            edges.append(edge)
+    if len(edges) < 2:
+        return np.array([low, high])
+    edges[-1] = fine[-1]
+    return np.array(edges)
+
+
+def normalised(
+    explanation: Explanation, reference: Fit, number: int, lines: WindowedLines
+) -> tuple[Complex, Complex, Real]:
+    """Residual lines in units of the noise.
+
+    Parameters
+    ----------
+    explanation
+        Whose residual.
+    reference
+        Fit whose noise is the unit.
+    number
+        Of the recording in that fit.
+    lines
+        The recording.
+
+    Returns
+    -------
+    single, white : (n_lines, n_responses)
+        Each channel by its own noise; all channels whitened together.
+    variance : (n_lines, n_responses)
+        Of the noise.
+    """
+    rest = lines.measured - predict_lines(explanation, lines).response
+    through = through_structure(reference.explanation, lines)
+    covariance = reference.noises[number].covariance(lines.frequencies, through)
+    variance = np.real(np.einsum("kii->ki", covariance))
+    return rest / np.sqrt(variance), np.einsum("kij,kj->ki", whitening(covariance), rest), variance
+
+
+def residual_map(explanation: Explanation, reference: Fit, lines: Sequence[WindowedLines], edges: Real) -> ResidualMap:
+    """Map of one explanation's residual over all recordings, noise from ``reference``."""
+    ratio, joint, count = [], [], []
+    for number, one in enumerate(lines):
+        single, white, _ = normalised(explanation, reference, number, one)
+        place = np.digitize(one.frequencies, edges[1:-1])
+        held = np.bincount(place, minlength=len(edges) - 1).astype(float)
+        ratio.append(_means(np.abs(single) ** 2, place, held))
+        joint.append(_means(np.abs(white) ** 2, place, held).mean(axis=1))
+        count.append(held / overlap(one.window))
+    first = lines[0]
+    names = first.trial.channels[-first.measured.shape[1] :]
+    return ResidualMap(
+        edges, names, tuple(one.trial.name for one in lines), np.array(ratio), np.array(joint), np.array(count)
+    )
+
+
+def _means(power: Real, place: NDArray[np.int64], held: Real) -> Real:
+    """Mean of power (n_lines, n) in each band, (n_bands, n); 1 where a band holds no line."""
+    sums = np.array([np.bincount(place, power[:, p], len(held)) for p in range(power.shape[1])]).T
+    return np.asarray(np.where(held[:, None] > 0, sums / np.maximum(held, 1)[:, None], 1.0))

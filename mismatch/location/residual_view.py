@@ -1,0 +1,108 @@
+"""The residual of a diagnosis before and after its causes, in all maps that are located and drawn."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..inference.diagnosis import Diagnosis
+from ..models.fitting import Fit
+from ..models.hypothesis import Explanation, predict_lines
+from ..noise.noise_model import NoiseModel
+from ..records.trial import Trial
+from ..records.windowed_lines import WindowedLines, windowed_lines
+from .family_wise import NoiseSpread, noise_spread
+from .residual_maps import ResidualMap, band_edges, residual_map
+from .time_maps import BlockResidual, block_residual
+
+QUIET = NoiseSpread(1.25, 0.5)
+"""Of a noise level read from the quietest bands: they lie below the mean by chance, and its colour is not known."""
+
+
+@dataclass(frozen=True)
+class ResidualView:
+    """Maps of what the refitted nominal model leaves (before) and what the final one leaves (after).
+
+    Parameters
+    ----------
+    diagnosis
+        Whose.
+    measured
+        Recordings as they were measured: tones and clipping not mended.
+    before, after
+        Frequency band x channel x recording.
+    blocks_before, blocks_after
+        Blocks of time of each recording.
+    reference
+        The final fit with the noise that is the unit of the maps: as fitted, or, where something stayed unexplained and
+        may have been taken for noise, the level of the quietest fifth of narrow bands.
+    noise
+        How well that noise is known.
+    """
+
+    diagnosis: Diagnosis
+    measured: tuple[WindowedLines, ...]
+    before: ResidualMap
+    after: ResidualMap
+    blocks_before: tuple[BlockResidual, ...]
+    blocks_after: tuple[BlockResidual, ...]
+    reference: Fit
+    noise: NoiseSpread
+
+
+def residual_view(diagnosis: Diagnosis, trials: Sequence[Trial] | None = None) -> ResidualView:
+    """Maps of a diagnosis.
+
+    Parameters
+    ----------
+    diagnosis
+        With its fits and recordings.
+    trials
+        The recordings as read, so that mended tones and clipping are located too; None: what the diagnosis holds.
+    """
+    mended = diagnosis.lines
+    measured = tuple(_as_measured(one, trials or ()) for one in mended)
+    edges = band_edges(measured)
+    base, final = diagnosis.base.explanation, diagnosis.final
+    unexplained = diagnosis.verdict == "unexplained"
+    if unexplained:
+        final = replace(final, noises=tuple(_quiet(final, k, one) for k, one in enumerate(mended)))
+    after = residual_map(final.explanation, final, mended, edges)
+    return ResidualView(
+        diagnosis,
+        measured,
+        residual_map(base, final, measured, edges),
+        after,
+        tuple(block_residual(base, final, k, one) for k, one in enumerate(measured)),
+        tuple(block_residual(final.explanation, final, k, one) for k, one in enumerate(mended)),
+        final,
+        QUIET
+        if unexplained
+        else noise_spread(after.ratio, np.broadcast_to(after.count[:, :, None], after.ratio.shape)),
+    )
+
+
+def _quiet(final: Fit, number: int, lines: WindowedLines) -> NoiseModel:
+    """Noise at the level that a fifth of all narrow bands stays below, no part of it from forces."""
+    rest = lines.measured - predict_lines(final.explanation, lines).response
+    bands = np.array_split(np.abs(rest) ** 2, min(150, max(4, len(rest) // 12)))
+    level = np.log(np.quantile([band.mean(axis=0) for band in bands], 0.2, axis=0))
+    fitted = final.noises[number]
+    return replace(fitted, responses=0 * fitted.responses + level[:, None], forces=0 * fitted.forces - 200.0)
+
+
+def linear_part(diagnosis: Diagnosis) -> Explanation | None:
+    """The final model with the causes of its joints taken away; None where it has none."""
+    final = diagnosis.final.explanation
+    kept = tuple(cause for cause in final.causes if cause.direction is None)
+    return replace(final, causes=kept) if len(kept) < len(final.causes) else None
+
+
+def _as_measured(lines: WindowedLines, trials: Sequence[Trial]) -> WindowedLines:
+    """The recording before anything was mended; the run-in is that of the diagnosis."""
+    for trial in trials:
+        if trial.name == lines.trial.name and trial.response.shape == lines.trial.response.shape:
+            decay = 7.0 * trial.rate / max(lines.start, 1)
+            band = (float(lines.frequencies[0]), float(lines.frequencies[-1]))
+            return windowed_lines(trial, band, decay)
+    return lines

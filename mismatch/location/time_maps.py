@@ -1,0 +1,120 @@
+"""Maps of residual power over noise power in blocks of time, and along the spindle's orders."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, rfft
+from scipy.signal.windows import hann
+
+from ..models.fitting import Fit
+from ..models.hypothesis import Explanation, predict_lines
+from ..models.misfit import through_structure
+from ..noise.noise_model import whitening
+from ..records.windowed_lines import WindowedLines
+from .residual_maps import overlap
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+BLOCKS = 24
+"""Of a recording."""
+
+LEAST_PERIODS = 6.0
+"""Of the lowest frequency in a block."""
+
+
+@dataclass(frozen=True)
+class BlockResidual:
+    """Short spectra of one recording's residual, whitened by the noise.
+
+    Parameters
+    ----------
+    recording
+        Name.
+    times : (n_blocks + 1,), s
+        Edges of the blocks, from the beginning of the recording.
+    frequencies : (n_lines,), Hz
+    power : (n_blocks, n_lines)
+        Mean over the responses, 1 where only noise is left.
+    channels
+        Number of responses.
+    overlap
+        Neighbouring lines that count as one.
+    """
+
+    recording: str
+    times: Real
+    frequencies: Real
+    power: Real
+    channels: int
+    overlap: float
+
+    def banded(self, edges: Real) -> tuple[Real, Real]:
+        """Mean power (n_blocks, n_bands) and independent lines (n_bands,) in bands; nan where a band holds none."""
+        place = np.digitize(self.frequencies, edges[1:-1])
+        held = np.bincount(place, minlength=len(edges) - 1).astype(float)
+        sums = np.array([np.bincount(place, row, len(held)) for row in self.power])
+        means = np.where(held > 0, sums / np.maximum(held, 1), np.nan)
+        return np.asarray(means), np.asarray(held * self.channels / self.overlap)
+
+
+def block_residual(explanation: Explanation, reference: Fit, number: int, lines: WindowedLines) -> BlockResidual:
+    """Residual of an explanation block by block; lines that a mended tone took out are left out here too.
+
+    Parameters
+    ----------
+    explanation
+        Whose residual.
+    reference
+        Fit whose noise is the unit.
+    number
+        Of the recording in that fit.
+    lines
+        The recording.
+    """
+    rate, n = lines.trial.rate, len(lines.trial.force)
+    rest = _kept(lines, lines.trial.response - lines.signal(predict_lines(explanation, lines).spectrum))
+    rest = rest[lines.start : n - max(int(rate) // 2, 1)]
+    length = int(rate * max(len(rest) / rate / BLOCKS, LEAST_PERIODS / lines.frequencies[0]))
+    length = max(16, min(length, len(rest)))
+    count = len(rest) // length
+    window = hann(length, sym=False)
+    window /= np.sqrt(np.sum(window**2))
+    axis = np.arange(length // 2 + 1) * rate / length
+    inside = (axis >= lines.frequencies[0]) & (axis <= lines.frequencies[-1])
+    blocks = rest[: count * length].reshape(count, length, -1)
+    spectra = rfft(blocks * window[:, None], axis=1)[:, inside]
+    white = _whitening_at(reference, number, lines, axis[inside])
+    small = np.einsum("kij,bkj->bki", white, spectra)
+    times = (lines.start + length * np.arange(count + 1)) / rate
+    power = np.mean(np.abs(small) ** 2, axis=2)
+    return BlockResidual(lines.trial.name, times, axis[inside], power, rest.shape[1], overlap(window))
+
+
+def _kept(lines: WindowedLines, rest: Real) -> Real:
+    """Residual without the frequencies between the lines that are compared."""
+    step = lines.trial.rate / len(lines.window)
+    if not (np.diff(lines.frequencies) > 1.5 * step).any():
+        return rest
+    axis = np.arange(len(rest) // 2 + 1) * lines.trial.rate / len(rest)
+    right = np.clip(np.searchsorted(lines.frequencies, axis), 1, len(lines.frequencies) - 1)
+    gap = lines.frequencies[right] - lines.frequencies[right - 1]
+    between = (gap > 1.5 * step) & (axis > lines.frequencies[right - 1]) & (axis < lines.frequencies[right])
+    return np.asarray(irfft(rfft(rest, axis=0) * ~between[:, None], n=len(rest), axis=0))
+
+
+def _whitening_at(reference: Fit, number: int, lines: WindowedLines, axis: Real) -> Complex:
+    """Whitening at other frequencies: the structure's part interpolated as a mean over the coarser lines."""
+    through = through_structure(reference.explanation, lines)
+    covariance = reference.noises[number].covariance(lines.frequencies, through)
+    nearest = np.clip(np.searchsorted(0.5 * (axis[1:] + axis[:-1]), lines.frequencies), 0, len(axis) - 1)
+    held = np.maximum(np.bincount(nearest, minlength=len(axis)), 1)
+    mean = np.zeros((len(axis), *covariance.shape[1:]), dtype=complex)
+    np.add.at(mean, nearest, covariance)
+    mean /= held[:, None, None]
+    empty = np.bincount(nearest, minlength=len(axis)) == 0
+    if empty.any():
+        fullest = np.flatnonzero(~empty)
+        mean[empty] = mean[fullest[np.argmin(np.abs(fullest[None] - np.flatnonzero(empty)[:, None]), axis=1)]]
+    return whitening(mean)

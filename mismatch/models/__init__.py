@@ -1,0 +1,1 @@
+"""Hypotheses about a structure: a modal model with causes, its prediction, its misfit and its fit."""

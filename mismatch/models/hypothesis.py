@@ -1,0 +1,269 @@
+"""An `Explanation`: a modal model off its nominal one, with the causes that were added to it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import rfft
+
+from modal_fit import ModalModel
+
+from ..joints.joint_law import JointLaw, JointMotion
+from ..joints.joint_simulation import JointResponse, common_axes, driven_force, joint_response
+from ..physics import Chain, ChainPhysics, JointPhysics, LimitedPhysics, Physics
+from ..records.windowed_lines import WindowedLines, displacement_at, receptance_at
+from .model_shape import ModelShape
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+TURN_STEP = 0.02
+"""Of a direction in a fit, rad."""
+
+LONGEST_STEP = 15.0
+"""Of a cause's coordinate in one step of a fit; a number on a linear scale may also change by half of itself."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One cause at a place with its numbers.
+
+    Parameters
+    ----------
+    physics
+        From the library.
+    values : (n_parameters,)
+        In SI units, in the order of ``physics.parameters``.
+    place
+        Of a linear cause; empty for a joint.
+    direction : (n_axes,)
+        Of a joint over the axes that forces and responses share, unit length; empty for a linear cause.
+    motion
+        Of that joint.
+    seen
+        Deflection and velocity at each sample by recording's name: the law is then driven by them instead of being
+        simulated freely. For approaching a solution only; what was measured leaks into the prediction.
+    """
+
+    physics: Physics
+    values: Real
+    place: str = ""
+    direction: Real | None = None
+    motion: JointMotion | None = None
+    seen: Mapping[str, tuple[Real, Real]] | None = None
+
+    @property
+    def size(self) -> int:
+        """Numbers that are fitted: parameters, and angles of the direction."""
+        return len(self.values) + (len(self.direction) - 1 if self.direction is not None else 0)
+
+    def coordinates(self) -> Real:
+        """What the fit starts from, (size,); angles are zero."""
+        values = [p.to_fit(float(v)) for p, v in zip(self.physics.parameters, self.values, strict=True)]
+        return np.array(values + [0.0] * (self.size - len(values)))
+
+    def longest_steps(self) -> Real:
+        """How far each coordinate may move in one step of a fit, (size,)."""
+        numbers = zip(self.coordinates(), self.physics.parameters, strict=False)
+        own = [max(LONGEST_STEP, 0.0 if p.logarithmic else 0.5 * abs(float(c))) for c, p in numbers]
+        return np.array(own + [LONGEST_STEP] * (self.size - len(own)))
+
+    def moved(self, coordinates: Real) -> "Cause":
+        """The cause at other coordinates; angles turn the direction from where it was."""
+        count = len(self.values)
+        values = np.array(
+            [p.from_fit(float(c)) for p, c in zip(self.physics.parameters, coordinates[:count], strict=True)]
+        )
+        if self.direction is None:
+            return replace(self, values=values)
+        turned = self.direction + TURN_STEP * across(self.direction) @ coordinates[count:]
+        return replace(self, values=values, direction=turned / np.linalg.norm(turned))
+
+    def law(self) -> JointLaw:
+        """Force law of a joint."""
+        assert isinstance(self.physics, JointPhysics)
+        assert self.motion is not None
+        return self.physics.law(self.values, self.motion)
+
+
+def direction_of(cause: Cause) -> dict[str, Any]:
+    """Location of a joint, as a diagnosis states it; the largest entry is positive."""
+    assert cause.direction is not None
+    direction = cause.direction * np.sign(cause.direction[np.argmax(np.abs(cause.direction))])
+    return {"direction": [round(float(x), 6) for x in direction]}
+
+
+def held_values(cause: Cause) -> Real:
+    """The numbers that a law goes by, brought within what its name means."""
+    if isinstance(cause.physics, LimitedPhysics) and cause.motion is not None:
+        return cause.physics.held(cause.values, cause.motion)
+    return cause.values
+
+
+def across(direction: Real) -> Real:
+    """Orthonormal vectors across a direction, (n, n - 1)."""
+    return np.asarray(np.linalg.svd(direction[None, :])[2][1:].T)
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """Modal parameters and causes: everything that predicts a recording.
+
+    Parameters
+    ----------
+    shape
+        Nominal model and lab error.
+    u : (shape.size,)
+        Deviation from it in lab errors.
+    causes
+        Added, in the order found.
+    """
+
+    shape: ModelShape
+    u: Real
+    causes: tuple[Cause, ...] = ()
+
+    @property
+    def model(self) -> ModalModel:
+        """The linear part."""
+        return self.shape.model(self.u)
+
+    @property
+    def size(self) -> int:
+        """Numbers that are fitted."""
+        return self.shape.size + sum(cause.size for cause in self.causes)
+
+    def with_cause(self, cause: Cause) -> "Explanation":
+        """The explanation with one more cause, the last."""
+        return replace(self, causes=(*self.causes, cause))
+
+    def with_causes(self, coordinates: Real) -> "Explanation":
+        """The explanation with all causes at other coordinates, one after the other."""
+        moved, at = [], 0
+        for cause in self.causes:
+            moved.append(cause.moved(coordinates[at : at + cause.size]))
+            at += cause.size
+        return replace(self, causes=tuple(moved))
+
+    def coordinates(self) -> Real:
+        """Coordinates of all causes."""
+        return np.concatenate([np.zeros(0), *(cause.coordinates() for cause in self.causes)])
+
+
+@dataclass(frozen=True)
+class Surround:
+    """All linear causes together at some lines: ``X = T H (B F - joint)``, measured ``C X``."""
+
+    response: Complex | None
+    force: Complex | None
+    feedback: Complex | None
+
+    def pushed(self, force: Complex) -> Complex:
+        """B F, (n_lines, n_excitations)."""
+        return force if self.force is None else np.einsum("kij,kj->ki", self.force, force)
+
+    def closed(self, receptance: Complex) -> Complex:
+        """``(I + H K)^-1 H``."""
+        if self.feedback is None:
+            return receptance
+        identity = np.eye(receptance.shape[1])
+        return np.asarray(np.linalg.solve(identity + receptance @ self.feedback, receptance))
+
+    def shown(self, displacement: Complex) -> Complex:
+        """C X for (n_lines, n_responses, ...)."""
+        return displacement if self.response is None else np.einsum("kij,kj...->ki...", self.response, displacement)
+
+
+def surround(explanation: Explanation, frequencies: Real) -> Surround:
+    """Matrices of all linear causes at frequencies (n,), Hz."""
+    s = np.asarray(2j * np.pi * frequencies, dtype=complex)
+    response, force, feedback = None, None, None
+    for cause in explanation.causes:
+        if isinstance(cause.physics, ChainPhysics):
+            chain: Chain = cause.physics.chain(s, cause.values, cause.place, explanation.shape.nominal)
+            if chain.response is not None:
+                response = chain.response if response is None else chain.response @ response
+            if chain.force is not None:
+                force = chain.force if force is None else chain.force @ force
+            if chain.feedback is not None:
+                feedback = chain.feedback if feedback is None else feedback + chain.feedback
+    return Surround(response, force, feedback)
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """What an explanation gives for one recording.
+
+    Parameters
+    ----------
+    response : (n_lines, n_responses)
+        Windowed lines.
+    spectrum : (n_padded_lines, n_responses)
+        Of the whole record, ramped and padded.
+    joint : (n_padded_lines, n_excitations)
+        Forces of the joints on the structure, without sign change.
+    joints
+        Each of them, in the order of the causes.
+    """
+
+    response: Complex
+    spectrum: Complex
+    joint: Complex
+    joints: tuple[JointResponse, ...]
+
+
+def predict_lines(explanation: Explanation, lines: WindowedLines) -> Predicted:
+    """Response of the whole explanation to a recording's forces, cut and windowed like the measurement."""
+    model, frequencies = explanation.model, lines.padded_frequencies
+    around = surround(explanation, frequencies)
+    pushed = around.pushed(lines.force_lines)
+    joint = np.zeros_like(pushed)
+    joints = []
+    for cause in explanation.causes:
+        if cause.direction is not None:
+            _, columns = common_axes(model)
+            if cause.seen is not None:
+                x, v = cause.seen[lines.trial.name]
+                answer = JointResponse(rfft(driven_force(lines, x, v, cause.law()), n=lines.padded), x, v)
+            else:
+                answer = joint_response(model, lines, pushed - joint, cause.direction, cause.law())
+            joints.append(answer)
+            g = answer.force
+            joint[:, columns] += g[:, None] * cause.direction
+    if around.feedback is None:
+        displacement = displacement_at(model, frequencies, pushed - joint)
+    else:
+        displacement = np.einsum("kpq,kq->kp", around.closed(receptance_at(model, frequencies)), pushed - joint)
+    spectrum = around.shown(displacement * lines.padded_kinematic)
+    return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint, tuple(joints))
+
+
+def line_response(explanation: Explanation, lines: WindowedLines, joint: Complex | None = None) -> Complex:
+    """Response lines (n_lines, n_responses) of the linear part to the windowed forces: for derivatives, no leakage.
+
+    Parameters
+    ----------
+    explanation
+        Its joints are not simulated.
+    lines
+        Recording.
+    joint : (n_lines, n_excitations)
+        Windowed lines of the joints' forces, or None.
+    """
+    around = surround(explanation, lines.frequencies)
+    force = around.pushed(lines.force_here)
+    if joint is not None:
+        force = force - joint
+    if around.feedback is None:
+        displacement = displacement_at(explanation.model, lines.frequencies, force)
+    else:
+        closed = around.closed(explanation.model.receptance(lines.frequencies))
+        displacement = np.einsum("kpq,kq->kp", closed, force)
+    return around.shown(displacement * lines.kinematic)
+
+
+def columns_of(model: ModalModel) -> list[int]:
+    """Excitations along which a joint's direction is counted."""
+    return common_axes(model)[1]

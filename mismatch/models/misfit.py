@@ -1,0 +1,114 @@
+"""One recording under an explanation: its residual, whitened, and the noise that fits it best."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..noise.line_loops import whitened_columns
+from ..noise.noise_model import NoiseModel, fit_noise, whitening_and_determinant
+from ..records.windowed_lines import WindowedLines
+from .hypothesis import Explanation, Predicted, predict_lines, surround
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Assessed:
+    """One recording under an explanation.
+
+    Parameters
+    ----------
+    predicted
+        Of the recording.
+    white : (n_lines, n_responses, n_responses)
+        Whitening of its residual.
+    rest : (n_lines, n_responses)
+        Residual.
+    misfit
+        ``2 sum ln det V + r^H V^-1 r``.
+    noise
+        V.
+    """
+
+    predicted: Predicted
+    white: Complex
+    rest: Complex
+    misfit: float
+    noise: NoiseModel
+
+
+def assess(lines: WindowedLines, explanation: Explanation, noise: NoiseModel) -> Assessed:
+    """Misfit under a given noise; infinite where a prediction is not finite or cannot be made."""
+    try:
+        predicted = predict_lines(explanation, lines)
+        rest = lines.measured - predicted.response
+        return misfit_of(lines, predicted, rest, through_structure(explanation, lines), noise)
+    except np.linalg.LinAlgError:
+        nothing = np.zeros((0, 0), dtype=complex)
+        return Assessed(Predicted(nothing, nothing, nothing, ()), nothing, nothing, np.inf, noise)
+
+
+def with_noise(
+    lines: WindowedLines, explanation: Explanation, noise: NoiseModel | None, seen: Assessed | None = None
+) -> Assessed:
+    """Misfit under the noise that fits the residual best.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        The explanation predicts no finite response: simulated freely, it runs away.
+    """
+    predicted = seen.predicted if seen is not None else predict_lines(explanation, lines)
+    rest = lines.measured - predicted.response
+    if not np.isfinite(rest).all():
+        raise np.linalg.LinAlgError(f"the response predicted for {lines.trial.name} is not finite")
+    through = through_structure(explanation, lines)
+    found = fit_noise(lines.frequencies, rest, through, levels(lines), noise)
+    return misfit_of(lines, predicted, rest, through, found)
+
+
+def least_misfit(explanation: Explanation, lines: WindowedLines) -> float:
+    """Misfit of an explanation to one recording under its likeliest noise; infinite where it runs away."""
+    try:
+        return with_noise(lines, explanation, None).misfit
+    except np.linalg.LinAlgError:
+        return np.inf
+
+
+def through_structure(explanation: Explanation, lines: WindowedLines) -> Complex:
+    """From forces to measured responses at the lines, (n_lines, n_responses, n_excitations)."""
+    around = surround(explanation, lines.frequencies)
+    closed = around.closed(explanation.model.receptance(lines.frequencies))
+    if around.force is not None:
+        closed = closed @ around.force
+    return np.asarray(around.shown(closed * lines.kinematic[:, :, None]) @ lines.trust)
+
+
+def levels(lines: WindowedLines) -> tuple[Real, Real]:
+    """Root mean square a line of responses and of forces."""
+    return (
+        np.sqrt(np.mean(np.abs(lines.measured) ** 2, axis=0)),
+        np.sqrt(np.mean(np.abs(lines.force_here) ** 2, axis=0)),
+    )
+
+
+def whitened(white: Complex, lines: Complex) -> Real:
+    """Whitened lines (n_lines, n, n_columns) as real columns (2 n_lines n, n_columns), real above imaginary parts."""
+    out = np.empty((2, *lines.shape))
+    whitened_columns(white, np.ascontiguousarray(lines), out)
+    return out.reshape(-1, lines.shape[2])
+
+
+def misfit_of(
+    lines: WindowedLines, predicted: Predicted, rest: Complex, through: Complex, noise: NoiseModel
+) -> Assessed:
+    """Misfit of a residual under a given noise; infinite where it is not finite."""
+    if not np.isfinite(rest).all():
+        return Assessed(predicted, rest, rest, np.inf, noise)
+    covariance = noise.covariance(lines.frequencies, through)
+    white, log_determinant = whitening_and_determinant(covariance)
+    small = whitened(white, rest[:, :, None])
+    misfit = 2 * float(log_determinant + np.vdot(small, small))
+    return Assessed(predicted, white, rest, misfit if np.isfinite(misfit) else np.inf, noise)

@@ -1,0 +1,163 @@
+"""The nominal model's numbers as deviations in units of what a lab's own fit may be off."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modal_fit import ModalModel
+
+from ..noise.line_loops import modal_slopes
+from .outside_band import OutsideBand, outside_band
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LabError:
+    """One standard deviation of what a laboratory's modal fit is usually off.
+
+    Defaults are those of round-robin comparisons of modal tests: frequencies agree to a per cent, dampings scatter by
+    some ten, shapes by a few (Ewins, Modal Testing, 2nd ed., section 1.5, on the SAMM survey). They set what
+    counts as a deviation, not how well anything is estimated.
+
+    Parameters
+    ----------
+    frequency, damping
+        Relative.
+    shape
+        Of each real and imaginary part of a vector's entries, relative to the vector's root mean square.
+    """
+
+    frequency: float = 0.01
+    damping: float = 0.12
+    shape: float = 0.03
+
+
+@dataclass(frozen=True)
+class ModelShape:
+    """Parameters u of a modal model, all zero at the nominal one, in units of :class:`LabError`.
+
+    Order, mode by mode: ln frequency, ln damping ratio, Re right, Im right, Re left, Im left. Behind them, where the
+    nominal model states its band, what modes outside it leave inside (:class:`OutsideBand`).
+
+    Parameters
+    ----------
+    nominal
+        The model that is believed.
+    lab
+        What one unit is.
+    added
+        Number of modes at the end that the believed model did not have: nothing is believed of them.
+    """
+
+    nominal: ModalModel
+    lab: LabError
+    added: int = 0
+
+    @property
+    def belief(self) -> Real:
+        """Precision of the belief that u is zero, (size,): 1, and all but nothing for added modes."""
+        precision = np.ones(self.size)
+        if self.added:
+            precision[self.modal_size - self.added * self.per_mode : self.modal_size] = 1e-4
+        return precision
+
+    @cached_property
+    def outside(self) -> OutsideBand | None:
+        """Terms for modes outside the nominal model's band; None where it states none."""
+        believed = len(self.nominal.poles) - self.added
+        bare = replace(
+            self.nominal,
+            poles=self.nominal.poles[:believed],
+            right=self.nominal.right[:believed],
+            left=self.nominal.left[:believed],
+            covariance=None,
+        )
+        return outside_band(bare, self.lab.shape)
+
+    @property
+    def modal_size(self) -> int:
+        """Parameters of the modes."""
+        return int(self.per_mode * len(self.nominal.poles))
+
+    def modal_rows(self, values: Real) -> Real:
+        """Those of ``values`` (size,) that belong to the modes, (n_modes, per_mode)."""
+        return values[: self.modal_size].reshape(-1, self.per_mode)
+
+    def with_mode(self, pole: complex, right: Complex, left: Complex) -> "ModelShape":
+        """The same with one more mode at the end."""
+        model = replace(
+            self.nominal,
+            poles=np.append(self.nominal.poles, pole),
+            right=np.vstack([self.nominal.right, right]),
+            left=np.vstack([self.nominal.left, left]),
+            covariance=None,
+        )
+        return ModelShape(model, self.lab, self.added + 1)
+
+    @property
+    def per_mode(self) -> int:
+        """Parameters a mode."""
+        return 2 + 2 * int(self.nominal.right.shape[1] + self.nominal.left.shape[1])
+
+    @property
+    def size(self) -> int:
+        """Parameters altogether."""
+        return self.modal_size + (self.outside.size if self.outside is not None else 0)
+
+    def _scales(self) -> tuple[Real, Real]:
+        """Unit of a right and of a left entry, each (n_modes,)."""
+        right, left = (np.sqrt(np.mean(np.abs(v) ** 2, axis=1)) for v in (self.nominal.right, self.nominal.left))
+        return self.lab.shape * right, self.lab.shape * left
+
+    def model(self, u: Real) -> ModalModel:
+        """The modal model at ``u``, (size,)."""
+        rows = self.modal_rows(u)
+        omega = np.abs(self.nominal.poles) * np.exp(self.lab.frequency * rows[:, 0])
+        damping = np.clip(self.nominal.damping_ratios * np.exp(self.lab.damping * rows[:, 1]), 1e-5, 0.95)
+        poles = omega * (-damping + 1j * np.sqrt(1 - damping**2))
+        n, m = self.nominal.right.shape[1], self.nominal.left.shape[1]
+        right_unit, left_unit = self._scales()
+        right = self.nominal.right + right_unit[:, None] * (rows[:, 2 : 2 + n] + 1j * rows[:, 2 + n : 2 + 2 * n])
+        rest = rows[:, 2 + 2 * n :]
+        left = self.nominal.left + left_unit[:, None] * (rest[:, :m] + 1j * rest[:, m:])
+        residuals = self.nominal.residuals
+        if self.outside is not None and u[self.modal_size :].any():
+            residuals = self.outside.added(residuals, u[self.modal_size :])
+        return replace(
+            self.nominal, poles=poles, right=right, left=left, residuals=residuals, covariance=None, errors=None
+        )
+
+    def jacobian(self, u: Real, frequencies: Real, force: Complex, factor: Complex | None = None) -> Complex:
+        """Derivative of the displacement lines by u for force lines, (n_lines, n_responses, size).
+
+        Parameters
+        ----------
+        u : (size,)
+        frequencies : (n_lines,), Hz
+        force : (n_lines, n_excitations)
+        factor : (n_lines, n_responses)
+            The displacement is multiplied by it; None: one.
+        """
+        model = self.model(u)
+        poles = model.poles
+        zeta = -poles.real / np.abs(poles)
+        along = np.abs(poles) * zeta * self.lab.damping * (-1 - 1j * zeta / np.sqrt(1 - zeta**2))
+        if factor is None:
+            factor = np.ones((len(frequencies), model.right.shape[1]), dtype=complex)
+        result = np.empty((*factor.shape, self.size), dtype=complex)
+        s = np.asarray(2j * np.pi * frequencies, dtype=complex)
+        modal_slopes(
+            s,
+            np.ascontiguousarray(force),
+            (poles, model.right, model.left),
+            (poles * self.lab.frequency, along, *self._scales()),
+            factor,
+            result,
+        )
+        if self.outside is not None:
+            result[:, :, self.modal_size :] = self.outside.slopes(s, force, factor)
+        return result

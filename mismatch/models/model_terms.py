@@ -1,0 +1,65 @@
+"""Causes as the terms of a modal model file, and back: what `improved_model.json` holds beside its modes."""
+
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+
+from foundation import FileFormatError
+from modal_fit import ModalModel
+
+from ..joints.joint_law import JointMotion
+from ..physics import Physics, library
+from .hypothesis import Cause, Explanation
+from .model_shape import LabError, ModelShape
+
+
+def improved_model(explanation: Explanation, faults: tuple[dict[str, Any], ...] = ()) -> ModalModel:
+    """The refitted modes with a term ``{name, location, parameters}`` for each cause.
+
+    Parameters
+    ----------
+    explanation
+        Fitted.
+    faults
+        Terms of causes that are no part of it: a tone, a limit.
+    """
+    terms = []
+    for cause in explanation.causes:
+        names = [parameter.name for parameter in cause.physics.parameters]
+        location: dict[str, Any] = {"place": cause.place}
+        if cause.direction is not None and cause.motion is not None:
+            location = {"direction": [float(x) for x in cause.direction], "motion": asdict(cause.motion)}
+        values = {name: float(value) for name, value in zip(names, cause.values, strict=True)}
+        terms.append({"name": cause.physics.name, "location": location, "parameters": values})
+    return replace(explanation.model, physics=(*terms, *faults))
+
+
+def explanation_of(model: ModalModel, causes: dict[str, Physics] | None = None) -> Explanation:
+    """An explanation that predicts what a model file says; terms that are no physics of the structure are left out.
+
+    Raises
+    ------
+    FileFormatError
+        A term of unknown physics, or one that lacks a number.
+    """
+    known = causes if causes is not None else library()
+    found = []
+    for term in model.physics:
+        name = term.get("name")
+        if name in ("unmeasured_excitation", "clipping", "modal_parameters", "missing_mode"):
+            continue
+        if name not in known:
+            raise FileFormatError(f"the model has a term of unknown physics {name!r}; known are {', '.join(known)}")
+        try:
+            values = np.array([float(term["parameters"][parameter.name]) for parameter in known[name].parameters])
+            location = term["location"]
+            if "direction" in location:
+                motion = JointMotion(**location["motion"])
+                found.append(Cause(known[name], values, "", np.array(location["direction"], dtype=float), motion))
+            else:
+                found.append(Cause(known[name], values, str(location["place"])))
+        except (KeyError, TypeError, ValueError) as error:
+            raise FileFormatError(f"the model's term {name} is incomplete: {error}; diagnose again") from error
+    shape = ModelShape(replace(model, physics=()), LabError())
+    return Explanation(shape, np.zeros(shape.size), tuple(found))

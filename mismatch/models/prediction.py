@@ -1,0 +1,73 @@
+"""Responses that a model, with its terms of physics, gives for the forces of a recording."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft
+
+from modal_fit import ModalModel
+
+from ..faults.shown_faults import with_faults
+from ..records.trial import Trial, band_of
+from ..records.windowed_lines import windowed_lines
+from .hypothesis import predict_lines
+from .model_terms import explanation_of
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Predicted beside measured responses.
+
+    Parameters
+    ----------
+    response : (n_samples, n_responses)
+        In the measured quantities; of frequencies up to half the sampling rate.
+    run_in
+        Samples at the beginning in which the structure's unknown first motion still rings.
+    error : (n_responses,)
+        Root mean square of measured minus predicted over that of measured, in the model's band after the run-in.
+    total_error
+        Of all responses together, each line of the band counting by its power.
+    band
+        Hz.
+    """
+
+    response: Real
+    run_in: int
+    error: Real
+    total_error: float
+    band: tuple[float, float]
+
+
+def predict(model: ModalModel, trial: Trial) -> Prediction:
+    """Simulate a recording's forces through a model and its terms of physics.
+
+    A limit (``clipping``) is applied to its channel. A steady tone (``unmeasured_excitation``) has no known phase in
+    another recording; its amplitude and phase are read from the recording at that one frequency.
+
+    Raises
+    ------
+    FileFormatError
+        Terms that cannot be read.
+    InputError
+        A recording that the model cannot be compared with.
+    """
+    explanation = explanation_of(model)
+    band = band_of(model, trial.rate)
+    decay = float((-model.poles.real).min())
+    lines = windowed_lines(trial, band, decay)
+    n = len(trial.force)
+    response = np.asarray(irfft(predict_lines(explanation, lines).spectrum, n=lines.padded, axis=0)[:n])
+    response = with_faults(response, trial, lines.start, model.physics)
+    measured, shown = (lines.cut(signal) for signal in (trial.response, response))
+    rest, power = np.abs(measured - shown) ** 2, np.abs(measured) ** 2
+    return Prediction(
+        np.asarray(response),
+        lines.start,
+        np.sqrt(rest.sum(axis=0) / power.sum(axis=0)),
+        float(np.sqrt(rest.sum() / power.sum())),
+        band,
+    )

@@ -1,0 +1,1 @@
+"""What a hypothesis leaves of the recordings, and whether that is noise."""

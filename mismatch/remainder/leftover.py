@@ -1,0 +1,112 @@
+"""Is what remains noise? Noise stays when the signal goes; an omission comes and goes with it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft
+from scipy.signal import ShortTimeFFT
+from scipy.signal.windows import hann
+
+from ..models.hypothesis import Explanation, predict_lines
+from ..records.windowed_lines import WindowedLines
+from .cell_regression import moving_power
+from .repeated_part import repeated_share
+
+Real = NDArray[np.float64]
+
+SEGMENT = 2.0
+"""Length of a segment, s, at least twenty periods of nothing in particular: half a hertz apart."""
+
+BINS = 12
+"""Neighbouring bins that share one noise level."""
+
+SHIFTS, CHANCE = 14, 0.8
+"""Times that the prediction is shifted against the residual, and the quantile of what it then carries: the noise of a
+force rings in lightly damped modes, and so few independent swells are easily matched by chance."""
+
+
+@dataclass(frozen=True)
+class Leftover:
+    """What of a residual moves with the signal.
+
+    Parameters
+    ----------
+    share
+        Of the residual's power, 0 (noise) to 1, beyond what chance may well make of noise.
+    power
+        As a share of the response's, mean over channels and recordings, beyond what chance makes on average.
+    """
+
+    share: float
+    power: float
+
+
+def leftover(explanation: Explanation, lines: list[WindowedLines]) -> Leftover:
+    """How much of the residual moves with the predicted response.
+
+    In cells of time and frequency the residual's power is regressed, with non-negative factors, on a constant (noise of
+    that band), on the predicted power in the same cell and on the predicted power of all frequencies at the same time
+    (what a nonlinearity spreads). The share is what the last two carry, less what they carry by chance, when the
+    prediction is shifted in time against the residual. Where forces were replaced by what they say of the true ones,
+    the forces as measured are tried too, and what moves with both counts: the replaced ones lack force where it swells
+    from little, the measured ones bring their noise. Of forces that repeat, what the residual repeats with them moves
+    with the signal too (:func:`repeated_share`): a steady test has no times of more and of less signal.
+
+    Parameters
+    ----------
+    explanation
+        After all that was found.
+    lines
+        Recordings.
+    """
+    found = []
+    for one in lines:
+        moving = _moving(explanation, one)
+        measured = one.with_measured_forces()
+        if not np.array_equal(measured.force_here, one.force_here):
+            moving = np.minimum(moving, _moving(explanation, measured))
+        found.append(np.maximum(moving, _repeating(explanation, one)))
+    share, power = np.concatenate(found).mean(axis=0)
+    return Leftover(float(share), float(power))
+
+
+def _moving(explanation: Explanation, one: WindowedLines) -> Real:
+    """Share of the residual's power and of the response's that moves with the signal, (n_responses, 2)."""
+    predicted = predict_lines(explanation, one)
+    n = len(one.trial.force)
+    shown = irfft(predicted.spectrum, n=one.padded, axis=0)[:n]
+    rest = (one.trial.response - shown)[one.start : n - int(one.trial.rate) // 2]
+    shown = shown[one.start : n - int(one.trial.rate) // 2]
+    found = []
+    for p in range(rest.shape[1]):
+        r, s = _powers(rest[:, p], one), _powers(shown[:, p], one)
+        own = moving_power(r, s, BINS)
+        shifted = [moving_power(r, np.roll(s, shift, axis=1), BINS) for shift in _shifts(s.shape[1])]
+        whole, size = float(np.sum(r)), float(np.sum(s))
+        share = np.clip(own - np.quantile(shifted, CHANCE), 0.0, whole) / whole
+        found.append([share, np.clip(own - np.median(shifted), 0.0, whole) / size])
+    return np.array(found)
+
+
+def _repeating(explanation: Explanation, one: WindowedLines) -> Real:
+    """Share of the residual's power and of the response's that repeats with the forces, (n_responses, 2)."""
+    share = repeated_share(explanation, one)
+    if not share.any():
+        return np.zeros((len(share), 2))
+    rest = np.sum(np.abs(one.measured - predict_lines(explanation, one).response) ** 2, axis=0)
+    return np.column_stack([share, share * rest / np.sum(np.abs(one.measured) ** 2, axis=0)])
+
+
+def _shifts(count: int) -> list[int]:
+    """Segments by which a prediction is turned in time."""
+    return sorted({max(1, round(count * share)) for share in np.linspace(0.12, 0.88, SHIFTS)})
+
+
+def _powers(signal: Real, lines: WindowedLines) -> Real:
+    """Power in cells, (n_bins, n_segments), in the band that is compared."""
+    length = int(SEGMENT * lines.trial.rate)
+    transform = ShortTimeFFT(hann(length, sym=False), length // 2, lines.trial.rate)
+    power = np.abs(transform.stft(signal, p0=1, p1=len(signal) // (length // 2))) ** 2
+    inside = (transform.f >= lines.frequencies[0]) & (transform.f <= lines.frequencies[-1])
+    return np.asarray(power[inside])

@@ -1,0 +1,71 @@
+"""Forces that repeat tell noise from a missing cause: what a residual repeats with them is no noise."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
+
+from ..models.hypothesis import Explanation, predict_lines
+from ..records.windowed_lines import WindowedLines
+
+Real = NDArray[np.float64]
+
+ALIKE = 0.99
+"""Correlation of the forces with themselves a lag later from which they repeat."""
+
+RUNG_OUT = 5.0
+"""Time constants of the slowest mode after which noise that rings in it is forgotten."""
+
+MOST = 0.25
+"""Share of a residual's power that must repeat before it counts: a small error of a refit repeats too."""
+
+
+def repeated_share(explanation: Explanation, lines: WindowedLines) -> Real:
+    """Share of each response's residual power that repeats with the forces, (n_responses,); 0 below :data:`MOST`.
+
+    The residual r of the compared band is multiplied with itself one period T of the forces later:
+    ``share = <r(t) r(t + T)> / <r^2>``; noise does not repeat, and a linear or nonlinear omission does.
+
+    Parameters
+    ----------
+    explanation
+        What predicts.
+    lines
+        One recording. Of forces that do not repeat all shares are 0.
+    """
+    nothing = np.zeros(lines.measured.shape[1])
+    decay = float((-explanation.model.poles.real).min())
+    lag = repeat_of(lines.trial.force, int(RUNG_OUT / decay * lines.trial.rate), len(lines.window) // 2)
+    if lag is None:
+        return nothing
+    spectrum = np.zeros((len(lines.window) // 2 + 1, len(nothing)), dtype=complex)
+    spectrum[lines.band] = lines.measured - predict_lines(explanation, lines).response
+    rest = irfft(spectrum, n=len(lines.window), axis=0)
+    first, later = rest[:-lag], rest[lag:]
+    power = np.mean(first**2 + later**2, axis=0) / 2
+    share = np.mean(first * later, axis=0) / np.maximum(power, 1e-300)
+    return np.asarray(np.where(share > MOST, share, 0.0))
+
+
+def repeat_of(force: Real, least: int, most: int) -> int | None:
+    """Lag (samples) from ``least`` to ``most`` after which forces (n_samples, n) are the same again; None: none is.
+
+    Examples
+    --------
+    >>> saw = np.tile(np.random.default_rng(0).normal(size=(500, 1)), (6, 1))
+    >>> repeat_of(saw, 100, 1500), repeat_of(np.random.default_rng(1).normal(size=(3000, 1)), 100, 1500)
+    (500, None)
+    """
+    if least >= most:
+        return None
+    centred = force - force.mean(axis=0)
+    n = next_fast_len(2 * len(centred), real=True)
+    own = np.sum(irfft(np.abs(rfft(centred, n=n, axis=0)) ** 2, n=n, axis=0), axis=1)[: most + 1]
+    energy = np.concatenate([[0.0], np.cumsum(np.sum(centred**2, axis=1))])
+    lags = np.arange(least, most + 1)
+    overlap = np.sqrt(energy[len(centred) - lags] * (energy[-1] - energy[lags]))
+    likeness = own[least:] / np.maximum(overlap, 1e-300)
+    alike = np.flatnonzero(likeness > ALIKE)
+    if not len(alike):
+        return None
+    run = alike[: 1 + int(np.argmax(np.diff(alike, append=alike[-1] + 2) > 1))]
+    return int(lags[run[np.argmax(likeness[run])]])

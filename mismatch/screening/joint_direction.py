@@ -1,0 +1,187 @@
+"""The direction in which a joint acts, and what force it exerts, from the residual of a linear fit."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, rfft
+from scipy.optimize import minimize
+
+from ..joints.joint_law import JointMotion
+from ..joints.joint_simulation import common_axes
+from ..models.hypothesis import Explanation, columns_of, predict_lines
+from ..records.windowed_lines import receptance_at
+from .linear_floor import Floor, FloorRecord
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointSighting:
+    """Where the residual's force points.
+
+    Parameters
+    ----------
+    direction : (n_axes,)
+        Unit vector; its largest entry is positive.
+    gain
+        Twice the log likelihood that one force along it explains, its spectrum free, beyond what noise gains.
+    share
+        Of what a force in any direction would explain.
+    """
+
+    direction: Real
+    gain: float
+    share: float
+
+
+def find_direction(floor: Floor, explanation: Explanation) -> JointSighting:
+    """Most likely direction of a single force of unknown spectrum.
+
+    For each narrow band the residual ``r = G d u + noise`` has the statistic
+    ``z = mean |h^H V^-1 r|^2 / (h^H V^-1 h)``, h = G d, one under noise alone; the likelihood gained is
+    ``2 n (z - 1 - ln z)`` where z > 1. The start is the first eigenvector of the force that the residual asks for,
+    ``sum w Re(F F^H)``, ``F = G^-1 r``.
+    """
+    columns = columns_of(explanation.model)
+    bands = [_band_statistics(record, columns) for record in floor.records]
+    n = len(columns)
+
+    def gain(direction: Real) -> float:
+        return sum(_gain(parts, direction / np.linalg.norm(direction)) for parts in bands)
+
+    tries = np.random.default_rng(0).normal(size=(60 * n, n))
+    tries = np.vstack([tries, np.eye(n), *(_eigenvectors(record, columns) for record in floor.records)])
+    best = max(tries, key=gain)
+    if n > 1:
+        answer = minimize(lambda d: -gain(d), best / np.linalg.norm(best), method="Nelder-Mead")
+        best = answer.x
+    direction = best / np.linalg.norm(best)
+    direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
+    # noise alone gains half a unit a band on average where z > 1
+    chance = 0.5 * sum(len(parts.starts) for parts in bands)
+    everything = sum(_gain_of_all(parts) for parts in bands) - n * chance
+    found = gain(direction) - chance
+    return JointSighting(direction, found, found / max(everything, 1e-12))
+
+
+@dataclass(frozen=True)
+class _Bands:
+    """Per line: G^H V^-1 r and G^H V^-1 G over the joint's axes, and the bands' edges."""
+
+    pull: Complex
+    weight: Complex
+    starts: NDArray[np.int64]
+    counts: Real
+
+
+def _band_statistics(record: FloorRecord, columns: list[int]) -> _Bands:
+    reach = record.white @ record.through[:, :, columns]
+    rest = np.einsum("kij,kj->ki", record.white, record.residual)
+    pull = np.einsum("kij,ki->kj", reach.conj(), rest)
+    weight = reach.conj().swapaxes(1, 2) @ reach
+    edges = np.unique(np.linspace(0, len(rest), min(150, max(4, len(rest) // 12)) + 1).astype(int))
+    return _Bands(pull, weight, edges[:-1], np.diff(edges).astype(float))
+
+
+def _gain(bands: _Bands, direction: Real) -> float:
+    power = np.abs(bands.pull @ direction) ** 2
+    size = np.real(np.einsum("i,kij,j->k", direction, bands.weight, direction))
+    z = np.add.reduceat(power / np.maximum(size, 1e-300), bands.starts) / bands.counts
+    z = np.maximum(z, 1.0)
+    return float(2 * np.sum(bands.counts * (z - 1 - np.log(z))))
+
+
+def _gain_of_all(bands: _Bands) -> float:
+    """The same for a force in all directions, counted as that many separate ones."""
+    inverse = np.linalg.pinv(bands.weight, hermitian=True)
+    power = np.real(np.einsum("ki,kij,kj->k", bands.pull.conj(), inverse, bands.pull))
+    n = bands.pull.shape[1]
+    z = np.maximum(np.add.reduceat(power, bands.starts) / bands.counts / n, 1.0)
+    return float(2 * n * np.sum(bands.counts * (z - 1 - np.log(z))))
+
+
+def _eigenvectors(record: FloorRecord, columns: list[int]) -> Real:
+    force = np.einsum("kqp,kp->kq", np.linalg.pinv(record.through[:, :, columns]), record.residual)
+    inverse = np.linalg.inv(record.white)
+    spread = np.linalg.pinv(record.through[:, :, columns]) @ inverse
+    weight = 1 / np.maximum(np.sum(np.abs(spread) ** 2, axis=(1, 2)), 1e-300)
+    return np.asarray(np.linalg.eigh(np.real((force * weight[:, None]).T @ force.conj()))[1].T)
+
+
+@dataclass(frozen=True)
+class SeenMotion:
+    """Best estimate of a joint's motion and force in one recording.
+
+    Parameters
+    ----------
+    deflection, velocity : (n_samples,), m, m/s
+    force : (n_samples,), N
+        Most likely force along the direction given its spectrum.
+    """
+
+    deflection: Real
+    velocity: Real
+    force: Real
+
+
+def seen_motion(record: FloorRecord, explanation: Explanation, direction: Real) -> SeenMotion:
+    """Motion along a direction: the model's, corrected by the force that the residual asks for.
+
+    The force is the posterior mean ``u = lambda h^H (V + lambda h h^H)^-1 r`` with lambda from the residual's power in
+    each band (Wiener's filter), so that noise is not integrated where nothing is seen.
+    """
+    lines = record.lines
+    rows, columns = common_axes(explanation.model)
+    predicted = predict_lines(explanation, lines)
+    n = len(lines.trial.force)
+    frequencies = lines.padded_frequencies
+    whole = np.zeros((lines.padded, lines.measured.shape[1]))
+    whole[:n] = lines.trial.response - irfft(predicted.spectrum, n=lines.padded, axis=0)[:n]
+    run_in = np.ones(n)
+    run_in[: lines.start] = np.linspace(0, 1, lines.start) ** 4
+    whole[:n] *= run_in[:, None]
+    rest = rfft(whole, axis=0)
+    filtered = _wiener(record, direction, columns)
+    inside = (frequencies >= lines.frequencies[0]) & (frequencies <= lines.frequencies[-1])
+    gains = np.zeros((len(frequencies), filtered.shape[1]), dtype=complex)
+    for p in range(filtered.shape[1]):
+        gains[inside, p] = np.interp(frequencies[inside], lines.frequencies, filtered[:, p].real)
+        gains[inside, p] += 1j * np.interp(frequencies[inside], lines.frequencies, filtered[:, p].imag)
+    force = np.einsum("kp,kp->k", gains, rest)
+    receptance = receptance_at(explanation.model, frequencies)[:, rows]
+    displacement = np.einsum("kpq,kq->kp", receptance, lines.force_lines - predicted.joint) @ direction
+    displacement = displacement + np.einsum("p,kpq,q->k", direction, receptance[:, :, columns], direction) * force
+    deflection = irfft(displacement, n=lines.padded)[:n]
+    velocity = irfft(2j * np.pi * frequencies * displacement, n=lines.padded)[:n]
+    return SeenMotion(deflection, velocity, -irfft(force, n=lines.padded)[:n])
+
+
+def _wiener(record: FloorRecord, direction: Real, columns: list[int]) -> Complex:
+    """Row ``lambda h^H (V + lambda h h^H)^-1`` at the lines, (n_lines, n_responses)."""
+    bands = _band_statistics(record, columns)
+    power = np.abs(bands.pull @ direction) ** 2
+    size = np.maximum(np.real(np.einsum("i,kij,j->k", direction, bands.weight, direction)), 1e-300)
+    z = np.add.reduceat(power / size, bands.starts) / bands.counts
+    typical = np.add.reduceat(size, bands.starts) / bands.counts
+    excess = np.maximum(z - 1, 0) / typical
+    centres = bands.starts + bands.counts / 2
+    variance = np.interp(np.arange(len(size)), centres, excess)
+    reach = record.white @ (record.through[:, :, columns] @ direction)[:, :, None]
+    row = np.einsum("kij,ki->kj", record.white, reach[:, :, 0].conj())
+    return np.asarray((variance / (1 + variance * size))[:, None] * row)
+
+
+def motion_of(seen: list[SeenMotion], stiffness: float) -> JointMotion:
+    """Sizes of a joint's motion over all recordings, the means left in: play and knees are where the joint stands."""
+    deflections = np.concatenate([one.deflection for one in seen])
+    velocities = np.concatenate([one.velocity for one in seen])
+    strongest = max(seen, key=lambda one: float(np.std(one.deflection)))
+    return JointMotion(
+        float(np.std(strongest.deflection)),
+        float(np.std(strongest.velocity)),
+        2.5 * float(np.abs(deflections).max()),
+        2.5 * float(np.abs(velocities).max()),
+        stiffness,
+    )

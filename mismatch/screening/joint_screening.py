@@ -1,0 +1,83 @@
+"""Quick ranking of joint laws along a direction: each is driven by the motion that was seen and fitted linearly."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import rfft
+
+from ..joints.joint_simulation import driven_force
+from ..models.hypothesis import Cause, Explanation, columns_of
+from ..physics import JointPhysics
+from ..records.windowed_lines import receptance_at
+from .joint_direction import SeenMotion, motion_of, seen_motion
+from .linear_floor import Floor, FloorRecord
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Screened:
+    """A law's shapes along a direction, the most promising first.
+
+    Parameters
+    ----------
+    causes
+        Each with the amplitude that fits best, driven by the motion that was seen.
+    gain
+        Of the first, in misfit, linear in the amplitude and after the modal parameters have adapted.
+    """
+
+    causes: tuple[Cause, ...]
+    gain: float
+
+
+def screen_joints(floor: Floor, explanation: Explanation, direction: Real, laws: list[JointPhysics]) -> list[Screened]:
+    """Rank laws along a direction, best first; those of the wrong sign are left out.
+
+    Parameters
+    ----------
+    floor
+        Residual of the fit so far.
+    explanation
+        That fit.
+    direction : (n_axes,)
+        Unit vector.
+    laws
+        To try.
+    """
+    seen = [seen_motion(record, explanation, direction) for record in floor.records]
+    columns = columns_of(explanation.model)
+    static = explanation.model.receptance(np.array([explanation.model.natural_frequencies.min() / 20]))[0]
+    stiffness = 1 / abs(direction @ static[np.ix_(range(len(columns)), columns)] @ direction)
+    motion = motion_of(seen, float(stiffness))
+    by_name = {
+        record.lines.trial.name: (one.deflection, one.velocity) for record, one in zip(floor.records, seen, strict=True)
+    }
+    found = []
+    for law in laws:
+        causes = [Cause(law, start, "", direction, motion, by_name) for start in law.starts(motion)]
+        parts = [
+            [_column(record, explanation, one, cause) for record, one in zip(floor.records, seen, strict=True)]
+            for cause in causes
+        ]
+        gains, factors = floor.gains(parts)
+        low, high = law.parameters[0].low, law.parameters[0].high
+        fitting = (factors > low) & (factors < high) & (factors != 0)
+        order = [int(k) for k in np.argsort(-gains) if fitting[k]]
+        if order:
+            shapes = [replace(causes[k], values=np.array([factors[k], *causes[k].values[1:]])) for k in order]
+            found.append(Screened(tuple(shapes), float(gains[order[0]])))
+    return sorted(found, key=lambda one: -one.gain)
+
+
+def _column(record: FloorRecord, explanation: Explanation, seen: SeenMotion, cause: Cause) -> Real:
+    """Whitened response to the law's force for the motion that was seen."""
+    assert cause.direction is not None
+    lines = record.lines
+    force = driven_force(lines, seen.deflection, seen.velocity, cause.law())
+    spectrum = rfft(force, n=lines.padded)
+    columns = columns_of(explanation.model)
+    receptance = receptance_at(explanation.model, lines.padded_frequencies)[:, :, columns] @ cause.direction
+    response = -receptance * spectrum[:, None] * lines.padded_kinematic
+    return record.column(lines.cut(lines.signal(response)))
