@@ -15,10 +15,8 @@ from pathlib import Path
 
 from acquisition import record
 from cutting import MillingProcess, write_cutting_process
+from figures import cut_orders_figure, cut_turn_figure, house_style, save_figure
 from millfrf.__main__ import run
-from millfrf.figures.cut_diagnosis_figure import cut_orders_figure, cut_turn_figure
-from millfrf.figures.embed import save_figure
-from millfrf.figures.style import house_style
 from mismatch.adapters.cut import diagnose_cut, read_cut_recording
 from replay_data import MillingCell, default_structure, dynamometer, tip_accelerometers
 

@@ -9,9 +9,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from figures import law_figure, spectra_figure
 from millfrf.concealment import ConcealOptions, run_concealed
-from millfrf.figures.diagnosis_law import law_figure
-from millfrf.figures.diagnosis_spectra import spectra_figure
 from mismatch import diagnose, read_trials
 from mismatch.location.free_form_law import free_form_laws
 from mismatch.location.held_out_spectra import held_out_spectra

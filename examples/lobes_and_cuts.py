@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from cutting import MillingProcess
-from millfrf.figures.lobes_figure import TriedCut, lobes_figure
+from figures import TriedCut, lobes_figure
 from replay_data import MillingCell, dynamometer, table_one_model, tip_accelerometers
 from stability import classify_cut, collocation, zero_order
 

@@ -10,11 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from estimation import Frf, reciprocity_pairs
-from millfrf.figures.embed import save_figure
-from millfrf.figures.frf_gallery import GalleryEntry, gallery_page
-from millfrf.figures.indicator_figure import indicator_figure
-from millfrf.figures.reciprocity_figure import reciprocity_figure
-from millfrf.figures.shape_figure import assurance_figure, compass_figure
+from figures import (
+    GalleryEntry,
+    assurance_figure,
+    compass_figure,
+    gallery_page,
+    indicator_figure,
+    reciprocity_figure,
+    save_figure,
+)
 from modal_fit import (
     ModalModel,
     complex_mode_indicator,

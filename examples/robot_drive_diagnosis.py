@@ -26,7 +26,7 @@ from scipy.optimize import least_squares
 from scipy.signal import butter, filtfilt, resample_poly
 
 from cutting.compiled import compiled
-from millfrf.figures.style import COLOURS, house_style, new_figure
+from figures import COLOURS, house_style, new_figure
 from mismatch import Diagnosis, Trial, diagnose
 from mismatch.models.model_terms import improved_model
 from mismatch.models.prediction import predict

@@ -19,7 +19,7 @@ from scipy.io import loadmat
 from scipy.optimize import least_squares
 from scipy.signal import csd, welch
 
-from millfrf.figures.style import COLOURS, house_style, new_figure
+from figures import COLOURS, house_style, new_figure
 from mismatch import Diagnosis, Trial, diagnose, linear_floor, seen_motion
 from mismatch.models.model_terms import improved_model
 from mismatch.models.prediction import predict

@@ -11,6 +11,7 @@ import numpy as np
 from acquisition import Source, record
 from cutting import MillingProcess
 from estimation import Frf
+from figures import lobes_figure
 from foundation import InputError, writing_whole_file
 from modal_fit import ModalModel, write_modal_model
 from replay_data import (
@@ -31,7 +32,6 @@ from .chain.fit import fit_model, fit_recordings, write_fit
 from .chain.fit_options import SUBSPACE, FitOptions
 from .chain.lobes import compute_lobes, speed_axis
 from .demo_trap import Trap, report_trap, spring_trap, trap_table
-from .figures.lobes_figure import lobes_figure
 from .progress import Watch, silent
 from .report import ReportOptions, write_report
 from .tables import Table

@@ -7,8 +7,8 @@ import numpy as np
 
 from acquisition import Channel
 from estimation import Frf
+from figures import COLOURS
 
-from ..figures.style import COLOURS
 from .drawing import GREEN, GREY, RED, Drawing, framed, number, thinned
 from .monitor import Snapshot
 

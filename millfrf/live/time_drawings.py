@@ -5,8 +5,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from acquisition import Channel
+from figures import COLOURS
 
-from ..figures.style import COLOURS
 from .control import Mark
 from .drawing import GREEN, GREY, RED, Drawing, framed, number
 from .monitor import Snapshot

@@ -2,10 +2,10 @@
 
 import math
 
+from figures import ShownCut, as_data_uri, chatter_figure
+
 from ..chain.chatter import tone_table, verdict_table
 from ..chain.chatter_file import KeptCut
-from ..figures.chatter_figure import ShownCut, chatter_figure
-from ..figures.embed import as_data_uri
 from .collect import Collected
 from .section import Picture, Section
 

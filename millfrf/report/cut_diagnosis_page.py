@@ -8,13 +8,11 @@ from pathlib import Path
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from figures import as_data_uri, cut_orders_figure, cut_turn_figure, house_style
 from foundation import writing_whole_file
 from mismatch.adapters.cut import SIGNIFICANT, CutDiagnosis
 from mismatch.adapters.cut.force.force_coefficients import NAMES
 
-from ..figures.cut_diagnosis_figure import cut_orders_figure, cut_turn_figure
-from ..figures.embed import as_data_uri
-from ..figures.style import house_style
 from ..provenance import versions
 from ..tables import Table
 from .section import Picture, Section

@@ -3,14 +3,13 @@
 import numpy as np
 
 from cutting import MillingProcess
+from figures import as_data_uri, lobes_figure
 from foundation import InputError
 from mismatch import Diagnosis, Explanation
 from mismatch.adapters.structure.pruning import zero_of
 from mismatch.models.equivalent_receptance import equivalent_receptance
 from stability import StabilityLobes, zero_order
 
-from ..figures.embed import as_data_uri
-from ..figures.lobes_figure import lobes_figure
 from ..tables import Table
 from .section import Picture, Section
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from matplotlib.figure import Figure
 
+from figures import as_data_uri, channel_map_figure, growth_figure, law_figure, spectra_figure, time_map_figure
 from foundation import InputError
 from mismatch import Candidate, Diagnosis
 from mismatch.location.free_form_law import free_form_laws
@@ -13,11 +14,6 @@ from mismatch.location.locate import significant_cells
 from mismatch.location.recording_errors import recording_errors
 from mismatch.location.residual_view import ResidualView
 
-from ..figures.diagnosis_growth import growth_figure
-from ..figures.diagnosis_law import law_figure
-from ..figures.diagnosis_maps import channel_map_figure, time_map_figure
-from ..figures.diagnosis_spectra import spectra_figure
-from ..figures.embed import as_data_uri
 from ..tables import Table
 from .diagnosis_answers import number, place, words
 from .section import Picture, Section

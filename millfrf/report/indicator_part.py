@@ -3,10 +3,9 @@
 import numpy as np
 
 from estimation import Frf
+from figures import as_data_uri, indicator_figure
 from modal_fit import ComplexModeIndicator, ModalModel, complex_mode_indicator, multivariate_mode_indicator
 
-from ..figures.embed import as_data_uri
-from ..figures.indicator_figure import indicator_figure
 from .section import Picture
 
 Band = tuple[float, float]

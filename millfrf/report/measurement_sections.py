@@ -5,10 +5,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from acquisition import Recording
+from figures import as_data_uri, time_figure
 
 from ..chain.estimate_options import LOCAL
-from ..figures.embed import as_data_uri
-from ..figures.time_figure import time_figure
 from ..gate.signals import level_table, look
 from ..progress import Watch
 from ..tables import Table

@@ -1,9 +1,8 @@
 """The section on reciprocity: FRFs measured both ways, and left against right vectors."""
 
 from estimation import reciprocity_pairs
+from figures import as_data_uri, reciprocity_figure
 
-from ..figures.embed import as_data_uri
-from ..figures.reciprocity_figure import reciprocity_figure
 from ..gate import shown_pairs
 from ..reciprocity_tables import pair_table, vector_table
 from .collect import Collected

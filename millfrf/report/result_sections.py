@@ -4,14 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from figures import as_data_uri, input_figure, stabilisation_figure
 from modal_fit import ModalModel
 
 from ..chain.estimate import spectra_of_tests
 from ..chain.estimate_options import EstimateOptions
 from ..chain.fit_options import chart_from_json
-from ..figures.embed import as_data_uri
-from ..figures.input_figure import input_figure
-from ..figures.stabilisation_figure import stabilisation_figure
 from ..progress import Watch
 from ..tables import error_table, mode_table
 from .collect import Collected, SourceFile

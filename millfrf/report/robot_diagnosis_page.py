@@ -9,12 +9,10 @@ from pathlib import Path
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from figures import as_data_uri, house_style, robot_evidence_figure, robot_spectra_figure
 from foundation import writing_whole_file
 from mismatch.adapters.robot import NOISE_LIKE, RobotCause, RobotDiagnosis
 
-from ..figures.embed import as_data_uri
-from ..figures.robot_diagnosis_figure import robot_evidence_figure, robot_spectra_figure
-from ..figures.style import house_style
 from ..provenance import versions
 from ..robot.diagnosis_words import UNITS, told_number, what_is_asked
 from ..tables import Table

@@ -1,10 +1,8 @@
 """What a report shows of mode shapes: table, auto-MAC with MPC and MPD, and every vector in the complex plane."""
 
+from figures import as_data_uri, assurance_figure, compass_figure, mode_figure
 from modal_fit import ModalModel, ModeShapes
 
-from ..figures.embed import as_data_uri
-from ..figures.mode_figure import mode_figure
-from ..figures.shape_figure import assurance_figure, compass_figure
 from ..shape_table import shape_table, shapes_of
 from ..tables import Table
 from .section import Picture

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cutting import MillingProcess
+from figures import LobesBand, as_data_uri, lobes_figure
 from stability import StabilityLobes
 
-from ..figures.embed import as_data_uri
-from ..figures.lobes_figure import Band, lobes_figure
 from ..tables import Table
 from .collect import Collected
 from .lobes_check import CheckedLobes, checked_lobes, lobes_warnings
@@ -61,7 +60,7 @@ def stability_findings(collected: Collected) -> StabilityFindings:
     band = None
     if advised.band is not None:
         low, high = advised.band.low, np.minimum(advised.band.high, 1.5 * checked[0].max_depth)
-        band = Band(first.spindle_speeds_rpm, low, high)
+        band = LobesBand(first.spindle_speeds_rpm, low, high)
         drawn_speeds = advised.band.basis.count("samples")
         caption += f" Light band: 95 % interval of {first_name}"
         caption += f"; at {drawn_speeds} speeds from draws of its errors." if drawn_speeds else ", to first order."

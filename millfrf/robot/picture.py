@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from figures import COLOURS, house_style, new_figure, panel_letter
 from foundation import writing_whole_file
 from robot_model import CutPlace, DeviationMap, SpatialCase, StructureModes, close_loops, modes_at
 
-from ..figures.style import COLOURS, house_style, new_figure, panel_letter
 from .mode_page import mode_page
 
 Real = NDArray[np.float64]

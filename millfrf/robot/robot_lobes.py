@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import typer
 
+from figures import lobes_figure, save_figure
 from foundation import InputError
 from modal_fit import ModalModel, Residuals
 from robot_model import in_posture, read_robot
@@ -13,8 +14,6 @@ from stability import with_residual_flexibility, write_lobes
 
 from ..chain.lobes import compute_lobes, lobes_summary, speed_axis
 from ..commands.options import check_output
-from ..figures.embed import save_figure
-from ..figures.lobes_figure import lobes_figure
 from ..gate import check_depth, check_speed, check_speeds, lowest_frequency, read_checked_cutting
 from ..progress import bar
 from .posture_maps import depth_over_redundancy, write_posture_map

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation import Frf, to_receptance
-from millfrf.figures.embed import as_data_uri
-from millfrf.figures.frf_figure import FrfCurves, frf_figures
+from figures import FrfCurves, as_data_uri, frf_figures
 from modal_fit import ModalModel
 
 BAND = (50.0, 900.0)

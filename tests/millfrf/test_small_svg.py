@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 
-from millfrf.figures.small_svg import SmallSvg
+from figures import SmallSvg
 
 
 def drawn(x: np.ndarray, y: np.ndarray) -> tuple[list[np.ndarray], int]:

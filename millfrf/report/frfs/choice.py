@@ -1,9 +1,9 @@
 """What is drawn of an FRF: its quantity, its frequency axis, the band of its model."""
 
 from estimation import Frf, to_receptance
+from figures import coherent_lines
 from modal_fit import ModalModel
 
-from ...figures.frf_figure import coherent_lines
 from ..collect import SourceFile
 
 Band = tuple[float, float]

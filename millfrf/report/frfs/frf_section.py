@@ -3,12 +3,10 @@
 import numpy as np
 
 from estimation import Frf
+from figures import FrfCurves, as_data_uri, frf_figures, synthesis_figure
 from foundation import InputError
 from modal_fit import ModalModel, Synthesis, synthesis
 
-from ...figures.embed import as_data_uri
-from ...figures.frf_figure import FrfCurves, frf_figures
-from ...figures.synthesis_figure import synthesis_figure
 from ..collect import Collected, SourceFile
 from ..section import Fold, Picture, Section
 from .choice import Band, axis_of, band_of, knows, shown_frf

@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf
+from figures import ENTRIES_PER_PAGE, GalleryEntry, gallery_page
 from modal_fit import Synthesis
 
-from ...figures.frf_gallery import PER_PAGE, GalleryEntry, gallery_page
 from ..section import Fold, Picture
 from .choice import Band
 
@@ -33,8 +33,8 @@ def gallery_folds(
     fitted, known = (_on_axis(one, f) for one in (compared, reference))
     order = _order(frf, compared)
     folds = []
-    for first in range(0, len(order), PER_PAGE):
-        chosen = order[first : first + PER_PAGE]
+    for first in range(0, len(order), ENTRIES_PER_PAGE):
+        chosen = order[first : first + ENTRIES_PER_PAGE]
         entries = [
             GalleryEntry(
                 f"{frf.responses[p]} / {frf.excitations[q]}",

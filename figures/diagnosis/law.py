@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mismatch.location.free_form_law import BinnedForce, FreeFormLaw
 
-from .style import COLOURS, SHADE, house_style, legend_above, new_figure, panel_letter
+from ..style import COLOURS, SHADE, house_style, legend_above, new_figure, panel_letter
 
 
 def law_figure(found: FreeFormLaw) -> Figure:

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from modal_fit import ComplexModeIndicator, ModalModel, MultivariateModeIndicator
 
-from .style import COLOURS, FITTED, LINE_STYLES, house_style, legend_above, new_figure, panel_letter
+from ..style import COLOURS, FITTED, LINE_STYLES, house_style, legend_above, new_figure, panel_letter
 
 _MOST_CURVES = 3
 

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from modal_fit import ModalModel, ModeShapes
 
-from .style import WIDTH_MM, house_style, new_figure, panel_letter
+from ..style import WIDTH_MM, house_style, new_figure, panel_letter
 
 _MOST_NUMBERS = 16
 """Modes up to which the MAC stands in its cell as a number."""

@@ -9,7 +9,7 @@ from matplotlib.ticker import MaxNLocator
 
 from estimation import ReciprocityPair
 
-from .style import FITTED, WIDTH_MM, house_style, new_figure
+from ..style import FITTED, WIDTH_MM, house_style, new_figure
 
 _COLUMNS = 3
 _ROW, _TOP, _LEFT, _GAP = 58.0, 3.0, 17.0, 5.0

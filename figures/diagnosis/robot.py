@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mismatch.adapters.robot import RobotDiagnosis
 from mismatch.adapters.robot.robot_receptance import predicted_lines
 
-from .style import COLOURS, legend_above, new_figure
+from ..style import COLOURS, legend_above, new_figure
 
 Real = NDArray[np.float64]
 

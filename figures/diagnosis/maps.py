@@ -14,7 +14,7 @@ from mismatch.location.residual_maps import ResidualMap, band_edges
 from mismatch.location.residual_view import ResidualView
 from mismatch.location.time_maps import BlockResidual
 
-from .style import WIDTH_MM, house_style, new_figure
+from ..style import WIDTH_MM, house_style, new_figure
 
 Real = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition import Channel, Stream
 
-from .style import COLOURS, house_style, new_figure
+from ..style import COLOURS, house_style, new_figure
 
 BINS = 600
 MOST_CHANNELS = 9

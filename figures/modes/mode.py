@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
-from .style import COLOURS, LINE_STYLES, house_style, legend_above, new_figure
+from ..style import COLOURS, LINE_STYLES, house_style, legend_above, new_figure
 
 MOST_MODES = 4
 

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from estimation import Frf
 from modal_fit import ModalModel, StabilisationChart
 
-from .style import FITTED, house_style, legend_above, new_figure, panel_letter
+from ..style import FITTED, house_style, legend_above, new_figure, panel_letter
 
 _KINDS = (
     ("new pole", {"marker": ".", "color": "#a6a6a6", "markersize": 3}),

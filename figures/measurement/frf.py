@@ -13,7 +13,7 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .style import FITTED, MEASURED, TRUE, WIDTH_MM, house_style, new_figure
+from ..style import FITTED, MEASURED, TRUE, WIDTH_MM, house_style, new_figure
 
 PER_PAGE = 3
 """Responses, and excitations, on one page."""

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from mismatch.location.held_out_spectra import HeldOutSpectra
 
-from .style import COLOURS, WIDTH_MM, house_style, new_figure
+from ..style import COLOURS, WIDTH_MM, house_style, new_figure
 
 UNITS = ("m", "m/s", "m/s²")
 MOST_CHANNELS = 6

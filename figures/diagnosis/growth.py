@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from .style import COLOURS, house_style, legend_above, new_figure
+from ..style import COLOURS, house_style, legend_above, new_figure
 
 LABELS = {"residual": "Nominal model, refitted", "effect": "Final model without its joint law"}
 REFERENCES = ((0, "dry friction"), (1, "linear"), (3, "cubic"))

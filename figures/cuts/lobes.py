@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from stability import StabilityLobes
 
-from .style import COLOURS, SHADE, house_style, legend_above, line_style, new_figure, panel_letter
+from ..style import COLOURS, SHADE, house_style, legend_above, line_style, new_figure, panel_letter
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class TriedCut:
 
 
 @dataclass(frozen=True)
-class Band:
+class LobesBand:
     """Interval of a depth limit.
 
     Parameters
@@ -47,7 +47,7 @@ class Band:
 
 
 def lobes_figure(
-    curves: Mapping[str, StabilityLobes], cuts: Sequence[TriedCut] = (), band: Band | None = None
+    curves: Mapping[str, StabilityLobes], cuts: Sequence[TriedCut] = (), band: LobesBand | None = None
 ) -> Figure:
     """Depth limits in mm over rpm, one line for each entry; the area above the first is shaded.
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from stability import ChatterVerdict, CutSpectrum
 
-from .style import COLOURS, house_style, legend_above, new_figure, panel_letter
+from ..style import COLOURS, house_style, legend_above, new_figure, panel_letter
 
 EACH_MM = 62.0
 _DECADES = 0.5  # below the floor that are drawn

@@ -7,14 +7,14 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from .small_svg import SmallSvg
-from .style import FITTED, TRUE, WIDTH_MM
+from ..small_svg import SmallSvg
+from ..style import FITTED, TRUE, WIDTH_MM
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 COLUMNS, ROWS = 4, 6
-PER_PAGE = COLUMNS * ROWS
+ENTRIES_PER_PAGE = COLUMNS * ROWS
 """FRFs on one page."""
 
 _STYLE = (
@@ -57,7 +57,7 @@ def gallery_page(entries: Sequence[GalleryEntry], frequencies: Real) -> SmallSvg
     Parameters
     ----------
     entries
-        At most ``PER_PAGE``.
+        At most ``ENTRIES_PER_PAGE``.
     frequencies : (n_lines,), Hz
         Of all entries.
     """

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from estimation import CrossSpectra, input_coherence, input_independence, sum_tests
 
-from .style import SHADE, house_style, line_style, new_figure, panel_letter
+from ..style import SHADE, house_style, line_style, new_figure, panel_letter
 
 
 def input_figure(tests: Sequence[CrossSpectra], band: tuple[float, float]) -> Figure:

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from modal_fit import Synthesis
 
-from .style import FITTED, MEASURED, TRUE, house_style, legend_above, new_figure
+from ..style import FITTED, MEASURED, TRUE, house_style, legend_above, new_figure
 
 
 def synthesis_figure(compared: Synthesis, unit: str) -> Figure:

@@ -9,7 +9,7 @@ from scipy.fft import irfft
 from mismatch.adapters.cut import CutDiagnosis
 from mismatch.adapters.cut.cut_fit import CutFit
 
-from .style import COLOURS, legend_above, new_figure
+from ..style import COLOURS, legend_above, new_figure
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

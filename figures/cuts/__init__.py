@@ -1,0 +1,12 @@
+"""Figures of cuts: stability lobes, and spectra of cuts that were judged."""
+
+from .chatter import ShownCut, chatter_figure
+from .lobes import LobesBand, TriedCut, lobes_figure
+
+__all__ = [
+    "LobesBand",
+    "ShownCut",
+    "TriedCut",
+    "chatter_figure",
+    "lobes_figure",
+]

@@ -1,1 +1,0 @@
-"""Pictures a researcher would publish: each returns a matplotlib figure and touches no file."""
