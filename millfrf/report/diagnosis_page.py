@@ -13,7 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from cutting import MillingProcess
 from foundation import writing_whole_file
 from mismatch import Diagnosis, Trial
-from mismatch.inference.process_pool import side_by_side
+from mismatch.inference.process_pool import in_processes
 from mismatch.location.locate import located
 from mismatch.location.residual_view import ResidualView, residual_view
 from mismatch.location.spindle_orders import SpindleSpeed
@@ -88,7 +88,7 @@ def _drawn_sections(view: ResidualView, process: MillingProcess | None) -> list[
         lambda: if_possible(lambda: law_section(diagnosis), "The measured force of the joint"),
         partial(growth_section, diagnosis),
     ]
-    held_out, location, lobes, law, growth = side_by_side(makers)
+    held_out, location, lobes, law, growth = in_processes(makers)
     return [law, held_out, lobes, location, growth]
 
 

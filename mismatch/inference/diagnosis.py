@@ -1,19 +1,15 @@
 """`Diagnosis`: what was found, where, how sure, and what it does to data that it was not fitted to."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Generic, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
+from .remainder import Remainder
 
-from ..models.fitting import Fit
-from ..models.hypothesis import Explanation
-from ..records.compared_band import ComparedBand
-from ..records.windowed_lines import WindowedLines
+Details = TypeVar("Details", covariant=True)
 
-Real = NDArray[np.float64]
-
-VERDICTS = ("none", "explained", "partly explained", "unexplained")
+VERDICTS = ("none", "explained", "class", "partly explained", "unexplained")
+"""All verdicts. ``class`` says of a robot that several causes explain as well as each other."""
 
 
 @dataclass(frozen=True)
@@ -23,54 +19,93 @@ class AcceptedCause:
     Parameters
     ----------
     name
-        Of the physics, or ``modal_parameters``.
+        Name of the physics, or ``modal_parameters``.
     location
         ``{"channel": ...}``, ``{"direction": [...]}``, ``{"modes": [...]}`` or empty.
     parameters, standard_errors
-        By name, SI units.
+        Numbers and their standard errors by name, SI units.
     evidence
-        Gain in score over the explanation without it (twice a log Bayes factor).
+        Gain in score over the hypothesis without the cause (twice the logarithm of a Bayes factor).
+    error_parts
+        What a standard error is made of, by the number's name, where that is known: ``fit``, ``spread``, ``form``.
     """
 
     name: str
-    location: dict[str, Any]
-    parameters: dict[str, float]
-    standard_errors: dict[str, float]
+    location: Mapping[str, Any]
+    parameters: Mapping[str, float]
+    standard_errors: Mapping[str, float]
     evidence: float
+    error_parts: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A cause that was weighed, with its gain in score; how far it was taken (``screened`` or ``fitted``)."""
+    """A cause that was weighed.
+
+    Parameters
+    ----------
+    name
+        Name of the physics.
+    evidence
+        Gain in score, screened or fitted.
+    stage
+        How far it was taken: ``screened``, ``fitted``, or why it was not accepted.
+    location
+        Where it would sit.
+    parameters, standard_errors
+        Its numbers, where it was fitted and they are told.
+    """
 
     name: str
     evidence: float
     stage: str
-    location: dict[str, Any] = field(default_factory=dict)
+    location: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    standard_errors: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class HeldOutError:
+    """Errors on one recording that the fits did not see, relative to the root mean square response.
+
+    Parameters
+    ----------
+    name
+        Name of the recording.
+    before, after
+        Error of the nominal hypothesis and of the hypothesis with its causes.
+    floor
+        Error that noise alone leaves.
+    """
+
+    name: str
+    before: float
+    after: float
+    floor: float
 
 
 @dataclass(frozen=True)
 class Improvement:
-    """Error on a recording held out of the fits, relative to the root mean square response.
+    """Error on data held out of the fits, relative to the root mean square response.
 
     Parameters
     ----------
     held_out
-        Its name.
+        Name of what was held out.
     before, refitted, after
-        Of the nominal model, of the modal parameters refitted alone, of the improved model.
+        Errors of the nominal hypothesis, of its believed numbers refitted alone, of the hypothesis with its causes.
     noise_floor
         Root mean square noise there.
     p_value
-        That the improved model is no better than the one it is compared with (``against``), from blocks of a few
-        seconds, every channel in units of its noise.
+        Probability that the improved hypothesis is no better than the one it is compared with (``against``), from
+        blocks of a few seconds, every channel in units of its noise.
     interval
         95 % interval of ``after / before``.
     evidence
-        Gain in misfit there over the refitted model, by numbers fitted to the other recordings; 0 where there are none.
+        Gain in misfit there over the refitted hypothesis, by numbers fitted to the other data; 0 where there are none.
     against
-        ``refitted``, or ``nominal`` where nothing but modal parameters was found, or a cause that differs from a refit
-        in the lab's belief alone.
+        ``refitted``, or ``nominal`` where nothing but believed numbers was found, or a cause that differs from a refit
+        in the belief alone.
     """
 
     held_out: str
@@ -85,14 +120,16 @@ class Improvement:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
-    """Everything a report needs.
+class Diagnosis(Generic[Details]):
+    """Everything that a diagnosis says, whatever was compared.
 
     Parameters
     ----------
+    compared
+        Kind of comparison: ``structure``, ``robot`` or ``cut``.
     verdict
-        ``none``, ``explained``, ``partly explained`` (the causes help on held-out data and leave more than their
-        share) or ``unexplained``.
+        ``none``, ``explained``, ``class``, ``partly explained`` (the causes help on held-out data and leave more than
+        their share) or ``unexplained``.
     physics
         Accepted causes in the order found.
     candidates
@@ -100,34 +137,36 @@ class Diagnosis:
     equivalents
         Names that the data cannot tell from the first accepted cause.
     improvement
-        On held-out data.
-    leftover
-        Share of the final residual's power that moves with the signal instead of staying as noise does.
-    base, final
-        Fits before and after.
-    lines
-        The recordings.
-    elsewhere
-        Modal parameters alone, and the final explanation, fitted without the recording held out.
-    band
-        In which model and recordings were compared, and why; None: not stated.
+        Errors on held-out data.
+    before, after
+        What is left beyond noise, without causes and with those that are told.
+    located
+        Where the mismatch sits: bands, channels, times, levels, orders.
+    held_out
+        Errors on each recording that was held out, where several were in turn.
     doubts
         Sentences that a reader must see beside the verdict.
-    measured
-        The recordings with tones and clipping as they were measured; empty: as ``lines``.
+    content
+        What the file says of this kind of comparison alone, plain numbers and texts.
+    details
+        Fits and recordings of this kind of comparison; None of a diagnosis that was read from a file.
     """
 
+    compared: str
     verdict: str
     physics: tuple[AcceptedCause, ...]
     candidates: tuple[Candidate, ...]
     equivalents: tuple[str, ...]
     improvement: Improvement
-    leftover: float
-    base: Fit
-    final: Fit
-    lines: tuple[WindowedLines, ...]
-    elsewhere: tuple[Explanation, Explanation]
-    located: dict[str, Any] = field(default_factory=dict)
-    band: ComparedBand | None = None
+    before: Remainder
+    after: Remainder
+    located: Mapping[str, Any]
+    details: Details
+    held_out: tuple[HeldOutError, ...] = ()
     doubts: tuple[str, ...] = ()
-    measured: tuple[WindowedLines, ...] = ()
+    content: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def leftover(self) -> float:
+        """Share of the final residual that is no noise: :attr:`Remainder.share` of ``after``."""
+        return self.after.share

@@ -1,84 +1,188 @@
-"""Diagnosis files: JSON, format ``millfrf.diagnosis`` version 1."""
+"""Diagnosis files: JSON, format ``millfrf.diagnosis`` version 2; version 1 and the robots' older format are read."""
 
 import json
+import math
 import os
+from collections.abc import Mapping
 from dataclasses import asdict
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any
 
-from foundation import writing_whole_file
-from modal_fit import ModalModel
+from foundation import FileFormatError, writing_whole_file
 
-from ..models.model_terms import improved_model
-from .diagnosis import AcceptedCause, Candidate, Diagnosis, Improvement
+from .diagnosis import AcceptedCause, Candidate, Diagnosis, HeldOutError, Improvement
+from .remainder import Remainder
 
 FORMAT = "millfrf.diagnosis"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+OLD_ROBOT_FORMAT = "millfrf.robot_diagnosis"
 
 
-class Told(Protocol):
-    """What every diagnosis tells, whatever was compared; fields as of :class:`Diagnosis`."""
+def diagnosis_content(diagnosis: Diagnosis[object]) -> dict[str, Any]:
+    """What the file of a diagnosis holds; a number that is not finite stands as null.
 
-    @property
-    def verdict(self) -> str: ...
-    @property
-    def physics(self) -> tuple[AcceptedCause, ...]: ...
-    @property
-    def candidates(self) -> tuple[Candidate, ...]: ...
-    @property
-    def equivalents(self) -> tuple[str, ...]: ...
-    @property
-    def located(self) -> dict[str, Any]: ...
-    @property
-    def leftover(self) -> float: ...
-    @property
-    def improvement(self) -> Improvement: ...
-
-
-def diagnosis_content(diagnosis: Told) -> dict[str, Any]:
-    """What the file of any diagnosis holds; every number is a plain one."""
-    return {
+    Parameters
+    ----------
+    diagnosis
+        Of any kind of comparison.
+    """
+    content = {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
+        "compared": diagnosis.compared,
         "verdict": diagnosis.verdict,
         "physics": [asdict(cause) for cause in diagnosis.physics],
         "candidates": [asdict(candidate) for candidate in diagnosis.candidates],
         "equivalents": list(diagnosis.equivalents),
-        "located": diagnosis.located,
+        "located": dict(diagnosis.located),
         "leftover_share": diagnosis.leftover,
+        "remainder": {"before": asdict(diagnosis.before), "after": asdict(diagnosis.after)},
         "improvement": asdict(diagnosis.improvement),
+        "held_out": [asdict(one) for one in diagnosis.held_out],
+        "warnings": list(diagnosis.doubts),
     }
+    plain: dict[str, Any] = _plain(content | dict(diagnosis.content))
+    return plain
 
 
-def write_diagnosis(path: str | os.PathLike[str], diagnosis: Diagnosis) -> None:
+def write_diagnosis(path: str | os.PathLike[str], diagnosis: Diagnosis[object]) -> None:
     """Write a diagnosis whole.
 
-    Raises
-    ------
-    InputError
-        The folder cannot be written to.
-    """
-    band = {} if diagnosis.band is None else {"compared_band": asdict(diagnosis.band)}
-    write_content(path, diagnosis_content(diagnosis) | band | {"warnings": list(diagnosis.doubts)})
-
-
-def write_content(path: str | os.PathLike[str], content: dict[str, Any]) -> None:
-    """Write what a diagnosis' file holds whole.
+    Parameters
+    ----------
+    path
+        The file; an older one is replaced.
+    diagnosis
+        Of any kind of comparison.
 
     Raises
     ------
     InputError
         The folder cannot be written to.
     """
-    text = json.dumps(content, indent=1, allow_nan=False)
+    text = json.dumps(diagnosis_content(diagnosis), indent=1, allow_nan=False)
     with writing_whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
-def improved_model_of(diagnosis: Diagnosis) -> ModalModel:
-    """The model with everything that was accepted: refitted modes, causes, a tone, a limit."""
-    faults = tuple(
-        {"name": cause.name, "location": cause.location, "parameters": cause.parameters}
-        for cause in diagnosis.physics
-        if cause.name in ("unmeasured_excitation", "clipping")
+def read_diagnosis(path: str | os.PathLike[str]) -> Diagnosis[None]:
+    """Read a diagnosis file of any version; fits and recordings are not in it.
+
+    Parameters
+    ----------
+    path
+        A file that ``diagnose``, ``robot diagnose`` or ``cut diagnose`` wrote.
+
+    Raises
+    ------
+    FileFormatError
+        It is no diagnosis, or one of a later version.
+    """
+    name = Path(path).name
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise FileFormatError(f"{name} cannot be read as a diagnosis: {error}") from error
+    kind = content.get("format") if isinstance(content, dict) else None
+    if kind == OLD_ROBOT_FORMAT:
+        content = _of_old_robot(content)
+    elif kind != FORMAT or content.get("format_version", 0) > FORMAT_VERSION:
+        said = f"{kind!r} version {content.get('format_version')}" if isinstance(content, dict) else "no JSON object"
+        raise FileFormatError(f"{name} is {said}; wanted is {FORMAT!r} up to version {FORMAT_VERSION}")
+    try:
+        return _diagnosis(content)
+    except (KeyError, TypeError) as error:
+        raise FileFormatError(f"{name} lacks a part of a diagnosis: {error}; diagnose again") from error
+
+
+def _diagnosis(content: Mapping[str, Any]) -> Diagnosis[None]:
+    """From the content of version 1 or 2."""
+    share = _number(content["leftover_share"])
+    unknown = {"before": {"share": math.nan, "size": math.nan}, "after": {"share": share, "size": math.nan}}
+    left = content.get("remainder", unknown)
+    kind = content.get("compared", "cut" if "cut" in content else "structure")
+    known = {*Diagnosis.__dataclass_fields__, "format", "format_version", "leftover_share", "remainder", "warnings"}
+    gain = dict(content["improvement"])
+    gain["interval"] = tuple(gain["interval"])
+    return Diagnosis(
+        kind,
+        content["verdict"],
+        tuple(AcceptedCause(**cause) for cause in content["physics"]),
+        tuple(Candidate(**candidate) for candidate in content["candidates"]),
+        tuple(content["equivalents"]),
+        Improvement(**gain),
+        *(Remainder(_number(left[when]["share"]), _number(left[when]["size"])) for when in ("before", "after")),
+        content["located"],
+        None,
+        tuple(HeldOutError(**one) for one in content.get("held_out", ())),
+        tuple(content.get("warnings", ())),
+        {key: value for key, value in content.items() if key not in known},
     )
-    return improved_model(diagnosis.final.explanation, faults)
+
+
+def _of_old_robot(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Content of a robot diagnosis of the older format, in that of version 2."""
+    rows = content["held_out"]
+    before, after, floor = (
+        math.sqrt(sum(row[key] ** 2 for row in rows) / len(rows)) for key in ("before", "after", "free")
+    )
+    gain = Improvement(", ".join(row["name"] for row in rows), before, before, after, floor, content["p_value"], (0, 0))
+    excess = content["excess"]
+    return {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "compared": "robot",
+        "verdict": content["verdict"],
+        "physics": [_old_cause(cause) for cause in content["causes"]],
+        "candidates": [
+            {
+                "name": one["name"],
+                "evidence": one["evidence"],
+                "stage": one["stage"] or "fitted",
+                "location": {"kind": one["kind"], "unit": one["unit"]},
+                "parameters": {one["name"]: one["number"]},
+                "standard_errors": {one["name"]: one["standard_error"]},
+            }
+            for one in content["candidates"]
+        ],
+        "equivalents": content["equivalents"],
+        "located": {},
+        "leftover_share": excess["after"],
+        "remainder": {when: {"share": excess[when], "size": excess[when]} for when in ("before", "after")},
+        "improvement": asdict(gain) | {"interval": [math.nan, math.nan]},
+        "held_out": [{key: row["free" if key == "floor" else key] for key in ("name", "before", "after", "floor")}
+                     for row in rows],
+        "warnings": content.get("warnings", []),
+        "robot": {key: content[key] for key in ("rigid_links", "model_error", "recordings")},
+    }  # fmt: skip
+
+
+def _old_cause(cause: Mapping[str, Any]) -> dict[str, Any]:
+    """One accepted cause of the older format."""
+    numbers = [(cause["name"], cause["number"], cause["standard_error"])]
+    numbers += [(one["name"], one["number"], one["standard_error"]) for one in cause["beside"]]
+    return {
+        "name": cause["name"],
+        "location": {"kind": cause["kind"], "unit": cause["unit"]},
+        "parameters": {name: number for name, number, _ in numbers},
+        "standard_errors": {name: error for name, _, error in numbers},
+        "evidence": cause["evidence"],
+        "error_parts": {
+            cause["name"]: {"fit": cause["fitted_error"], "spread": cause["spread"], "form": cause["form"]}
+        },
+    }
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else float(value)
+
+
+def _plain(value: Any) -> Any:
+    """Mappings, sequences and numbers as JSON holds them."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 Result = TypeVar("Result")
 
 
-def side_by_side(tasks: Sequence[Callable[[], Result]]) -> list[Result]:
+def in_processes(tasks: Sequence[Callable[[], Result]]) -> list[Result]:
     """Results of all tasks, in their order.
 
     Where a process can be copied with its memory (Linux) and more than one core is free to it, the tasks run in copies

@@ -1,54 +1,91 @@
-"""From what was found to a verdict that binds: what an answer may leave, and what a held-out recording must confirm."""
+"""From what was found to a verdict that binds: what an answer may leave, and what held-out data must confirm."""
 
-from ..adapters.structure.acceptance import unexplained
-from ..models.fitting import Fit
-from ..remainder.leftover import Leftover
-from .diagnosis import AcceptedCause, Improvement
+from dataclasses import dataclass
 
-MOST_OF_RESPONSE = 0.25
-"""Error on the held-out recording, as a share of the response, above which no answer is complete: so much may be noise,
-and nothing shows that it is."""
-
-MOST_OVER_NOISE = 1.5
-"""Error on the held-out recording over the noise above which something may be missing still."""
-
-MOST_LEFT = 0.1
-"""Share of the nominal model's power above the noise that the answer may then leave."""
-
-CONFIRMED = 0.05
-"""p-value on the held-out recording above which a cause is not told."""
+from .diagnosis import Improvement
+from .remainder import Remainder
+from .settings import VerdictSettings
 
 
-def verdict_of(final: Fit, accepted: list[AcceptedCause], left: Leftover, before: Leftover, gain: Improvement) -> str:
+@dataclass(frozen=True)
+class Findings:
+    """What a verdict is made of.
+
+    Parameters
+    ----------
+    before, after
+        What is left without any cause, and with the causes.
+    named
+        Whether causes were found that the held-out data confirm.
+    excluded
+        Whether something rules out every answer: a law beyond what its name means, a recording that chatters.
+    incomplete
+        Whether the held-out data show that the answer leaves more than it may.
+    halved
+        Whether the causes remove the share of the held-out error that a partial answer needs.
+    """
+
+    before: Remainder
+    after: Remainder
+    named: bool
+    excluded: bool = False
+    incomplete: bool = False
+    halved: bool = True
+
+
+def verdict_of(found: Findings, settings: VerdictSettings) -> str:
     """``none``, ``explained``, ``partly explained`` or ``unexplained``.
 
     Parameters
     ----------
-    final
-        Of all that was accepted.
-    accepted
-        Causes.
-    left, before
-        What moves with the signal under ``final``, and without any cause.
-    gain
-        On the recording held out.
+    found
+        What is left, and what the held-out data say.
+    settings
+        Thresholds.
+
+    Examples
+    --------
+    >>> left = Remainder(0.3, 1.0), Remainder(0.01, 0.02)
+    >>> verdict_of(Findings(*left, named=True), VerdictSettings())
+    'explained'
+    >>> verdict_of(Findings(left[0], left[0], named=False), VerdictSettings())
+    'unexplained'
     """
-    if unexplained(final.explanation, left, before):
+    if found.excluded:
         return "unexplained"
-    if not accepted:
-        return "unexplained" if gain.after > MOST_OF_RESPONSE and gain.before > MOST_OF_RESPONSE else "none"
-    return "partly explained" if leaves_too_much(gain) else "explained"
+    if not found.named:
+        complete = found.before.noise_like(settings.noise_like) and not found.incomplete
+        return "none" if complete else "unexplained"
+    quiet = found.after.noise_like(settings.noise_like)
+    little = quiet or found.after.size <= (1 - settings.explained) * found.before.size
+    if little and not found.incomplete:
+        return "explained"
+    less = little or found.after.size <= (1 - settings.partly) * found.before.size
+    return "partly explained" if less and found.halved else "unexplained"
 
 
-def leaves_too_much(gain: Improvement) -> bool:
-    """Whether an answer leaves more of the held-out recording than it may."""
-    if gain.after > MOST_OF_RESPONSE:
+def leaves_too_much(gain: Improvement, settings: VerdictSettings) -> bool:
+    """Whether an answer leaves more of the held-out recording than it may.
+
+    Parameters
+    ----------
+    gain
+        Errors on the recording held out.
+    settings
+        Thresholds.
+    """
+    if gain.after > settings.most_of_response:
         return True
-    return gain.after > MOST_OVER_NOISE * gain.noise_floor and share_left(gain) > MOST_LEFT
+    return gain.after > settings.most_over_noise * gain.noise_floor and share_left(gain) > settings.most_left
 
 
 def share_left(gain: Improvement) -> float:
     """Of the nominal model's power above the noise on the held-out recording, what the answer leaves; 0 to 1 or more.
+
+    Parameters
+    ----------
+    gain
+        Errors on the recording held out.
 
     Examples
     --------

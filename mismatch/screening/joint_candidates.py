@@ -7,7 +7,7 @@ import numpy as np
 
 from ..adapters.structure.acceptance import LEAST_EVIDENCE, Option
 from ..inference.diagnosis import Candidate
-from ..inference.process_pool import side_by_side
+from ..inference.process_pool import in_processes
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import direction_of
 from ..physics import JointPhysics, answer_name
@@ -85,7 +85,7 @@ def joint_options(
         Score that the best linear cause gains.
     """
     promising = [one for one in sighted.screened if one.gain > max(LEAST_GAIN, least, PROMISING * sighted.gain)]
-    driven = side_by_side([partial(_driven, lines, current, one) for one in promising[:MOST_LAWS]])
+    driven = in_processes([partial(_driven, lines, current, one) for one in promising[:MOST_LAWS]])
     driven.sort(key=lambda one: one.score)
     gains = [current.score - one.score for one in driven]
     enough = max([LEAST_EVIDENCE / 2, RIVAL * gained, *(NEARLY * gain for gain in gains[:1])])
@@ -95,7 +95,7 @@ def joint_options(
         for place, (one, gain) in enumerate(zip(driven, gains, strict=True))
         if gain >= enough and (place < MOST_SIMULATED or gain > gains[0] - LEAST_EVIDENCE)
     ]
-    simulated = side_by_side([partial(_simulated, lines, one) for one in near])
+    simulated = in_processes([partial(_simulated, lines, one) for one in near])
     return [option for option in simulated if option is not None]
 
 

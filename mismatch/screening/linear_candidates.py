@@ -8,7 +8,7 @@ import numpy as np
 
 from ..adapters.structure.acceptance import Option
 from ..adapters.structure.settling import with_chain
-from ..inference.process_pool import side_by_side
+from ..inference.process_pool import in_processes
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import Cause, Explanation
 from ..physics import FormedPhysics, answer_name
@@ -53,7 +53,7 @@ def linear_options(
     numbers = current.explanation.shape.per_mode - 2
     if not current.explanation.causes and mode.gain > max(least, numbers * cost, PROMISING * largest):
         tasks.append(partial(_mode_option, lines, current, mode))
-    return [option for option in side_by_side(tasks) if option is not None]
+    return [option for option in in_processes(tasks) if option is not None]
 
 
 def _chain_option(lines: list[WindowedLines], current: Fit, cause: Cause) -> Option:

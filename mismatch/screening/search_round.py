@@ -6,7 +6,7 @@ from typing import Any
 
 from ..adapters.structure.acceptance import NOISE_LIKE, SMALL, Option, evidence_needed, gains, impossible, unexplained
 from ..inference.diagnosis import Candidate
-from ..inference.process_pool import side_by_side
+from ..inference.process_pool import in_processes
 from ..models.fitting import Fit
 from ..physics import ChainPhysics, JointPhysics, Physics, answer_name
 from ..records.windowed_lines import WindowedLines
@@ -92,7 +92,7 @@ def _screened(
         lambda: find_mode(own_noise, explanation),
         lambda: screen_chains(own_noise, explanation, physics),
     ]
-    sighted, mode, chains = side_by_side(makers)
+    sighted, mode, chains = in_processes(makers)
     taken = {(cause.physics.name, cause.place) for cause in explanation.causes}
     return [one for one in chains if (one.cause.physics.name, one.cause.place) not in taken], mode, sighted
 

@@ -6,7 +6,7 @@ from functools import partial
 
 import pytest
 
-from mismatch.inference.process_pool import side_by_side
+from mismatch.inference.process_pool import in_processes
 
 
 def test_results_come_in_the_order_of_the_tasks() -> None:
@@ -16,13 +16,13 @@ def test_results_come_in_the_order_of_the_tasks() -> None:
         time.sleep(0.05 * (3 - k))
         return k, os.getpid()
 
-    found = side_by_side([partial(slow, k) for k in range(3)])
+    found = in_processes([partial(slow, k) for k in range(3)])
     assert [k for k, _ in found] == [0, 1, 2]
 
 
 def test_tasks_may_be_closures_over_what_cannot_be_pickled() -> None:
     held = (value for value in range(3))
-    assert side_by_side([lambda: type(held).__name__, lambda: "other"]) == ["generator", "other"]
+    assert in_processes([lambda: type(held).__name__, lambda: "other"]) == ["generator", "other"]
 
 
 def test_a_fault_in_a_task_is_raised_here() -> None:
@@ -30,7 +30,7 @@ def test_a_fault_in_a_task_is_raised_here() -> None:
         raise ValueError("the second task fails")
 
     with pytest.raises(ValueError, match="the second task fails"):
-        side_by_side([lambda: 1, fails])
+        in_processes([lambda: 1, fails])
 
 
 def test_a_copy_that_dies_costs_no_result() -> None:
@@ -42,11 +42,11 @@ def test_a_copy_that_dies_costs_no_result() -> None:
             os._exit(1)
         return "done here"
 
-    assert side_by_side([dies_in_a_copy, lambda: "other"]) == ["done here", "other"]
+    assert in_processes([dies_in_a_copy, lambda: "other"]) == ["done here", "other"]
 
 
 def test_a_result_that_cannot_be_handed_back_is_made_here() -> None:
-    made = side_by_side([lambda: (k for k in range(2)), lambda: (k for k in range(3))])
+    made = in_processes([lambda: (k for k in range(2)), lambda: (k for k in range(3))])
     assert [list(one) for one in made] == [[0, 1], [0, 1, 2]]
 
 
@@ -54,7 +54,7 @@ def test_tasks_inside_a_task_run_there() -> None:
     """No copies of copies."""
 
     def inner() -> list[int]:
-        return side_by_side([os.getpid, os.getpid])
+        return in_processes([os.getpid, os.getpid])
 
-    for pids in side_by_side([inner, inner]):
+    for pids in in_processes([inner, inner]):
         assert len(set(pids)) == 1

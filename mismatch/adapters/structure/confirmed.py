@@ -3,7 +3,7 @@
 from functools import partial
 
 from ...inference.diagnosis import AcceptedCause, Candidate, Improvement
-from ...inference.process_pool import side_by_side
+from ...inference.process_pool import in_processes
 from ...inference.verdict import CONFIRMED
 from ...models.fitting import Fit, fit
 from ...models.misfit import least_misfit, through_structure
@@ -91,7 +91,7 @@ def _idle(
         for k in range(first, len(accepted))
     ]
     whole = fit(others, held_out.improved, iterations=0)
-    for k, less in zip(range(first, len(accepted)), side_by_side(tasks), strict=True):
+    for k, less in zip(range(first, len(accepted)), in_processes(tasks), strict=True):
         if not _missed(recordings, (whole, less), last, held_out):
             if k == len(accepted) - 1:
                 return k, steps[-2]

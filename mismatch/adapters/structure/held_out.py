@@ -12,7 +12,7 @@ from scipy.stats import wilcoxon
 
 from ...faults.shown_faults import FAULTS, with_faults
 from ...inference.diagnosis import AcceptedCause, Improvement
-from ...inference.process_pool import side_by_side
+from ...inference.process_pool import in_processes
 from ...models.fitting import Fit, fit
 from ...models.hypothesis import Explanation, predict_lines
 from ...models.misfit import least_misfit, through_structure
@@ -99,7 +99,7 @@ def held_out_improvement(
     tasks = [partial(fit, measured, nominal, iterations=ITERATIONS)]
     if final.causes or final.shape.added or any(a is not b for a, b in zip(mended, measured, strict=True)):
         tasks.append(partial(fit, mended, final, iterations=ITERATIONS))
-    fitted: list[Fit] = side_by_side(tasks)
+    fitted: list[Fit] = in_processes(tasks)
     return scored(recordings, (fitted[0].explanation, fitted[-1].explanation), noises, causes)
 
 

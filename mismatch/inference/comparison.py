@@ -1,0 +1,162 @@
+"""What an adapter gives to the search: fits, candidates of a round, and what one is worth."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Generic, Protocol, TypeVar
+
+from .diagnosis import Candidate
+from .settings import Settings
+
+
+class Fitted(Protocol):
+    """What the inference reads of a fitted hypothesis."""
+
+    @property
+    def score(self) -> float:
+        """``misfit + deviation + price``: Bayes' information criterion with the belief as prior; less is better."""
+        ...
+
+
+Fit = TypeVar("Fit", bound=Fitted)
+
+
+@dataclass(frozen=True)
+class Proposal(Generic[Fit]):
+    """A hypothesis with one more cause, fitted.
+
+    Parameters
+    ----------
+    name
+        Name of the cause, as it is told.
+    location
+        Where it sits, as a diagnosis states it.
+    fitted
+        The whole hypothesis with the cause.
+    evidence
+        Gain in score over the hypothesis without it.
+    """
+
+    name: str
+    location: Mapping[str, Any]
+    fitted: Fit
+    evidence: float
+
+
+@dataclass(frozen=True)
+class Round(Generic[Fit]):
+    """One round of the search.
+
+    Parameters
+    ----------
+    proposals
+        Causes that were fitted beside those accepted before.
+    chosen
+        The one that is accepted; None ends the search.
+    candidates
+        All causes that were weighed, screened or fitted, as a diagnosis tells them.
+    equivalents
+        Names of causes that the data cannot tell from the chosen one.
+    """
+
+    proposals: tuple[Proposal[Fit], ...]
+    chosen: Proposal[Fit] | None
+    candidates: tuple[Candidate, ...]
+    equivalents: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Search(Generic[Fit]):
+    """Where a search stands, or ends.
+
+    Parameters
+    ----------
+    steps
+        Fits without any cause, with the first, and so on.
+    accepted
+        The proposals that lead from one step to the next.
+    rounds
+        What was weighed in each round.
+    rejected
+        Causes that were accepted once and let go again.
+    """
+
+    steps: tuple[Fit, ...]
+    accepted: tuple[Proposal[Fit], ...] = ()
+    rounds: tuple[Round[Fit], ...] = ()
+    rejected: tuple[Candidate, ...] = field(default_factory=tuple)
+
+    @property
+    def base(self) -> Fit:
+        """The fit without any cause."""
+        return self.steps[0]
+
+    @property
+    def current(self) -> Fit:
+        """The fit with all accepted causes."""
+        return self.steps[-1]
+
+    @property
+    def equivalents(self) -> tuple[str, ...]:
+        """Names that the data cannot tell from the first accepted cause; none where that one was let go."""
+        if not self.accepted:
+            return ()
+        first = [one.equivalents for one in self.rounds if one.chosen is not None and one.equivalents]
+        return first[0] if first else ()
+
+    @property
+    def candidates(self) -> tuple[Candidate, ...]:
+        """All causes that were weighed in any round, and those let go again; most evidence first."""
+        weighed = [candidate for one in self.rounds for candidate in one.candidates]
+        return tuple(sorted([*weighed, *self.rejected], key=lambda one: -one.evidence))
+
+
+class Comparison(Protocol[Fit]):
+    """One kind of comparison of a model with recordings."""
+
+    @property
+    def settings(self) -> Settings:
+        """Thresholds of this comparison."""
+        ...
+
+    def finished(self, search: Search[Fit]) -> bool:
+        """Whether what is left needs no further cause."""
+        ...
+
+    def round(self, search: Search[Fit]) -> Round[Fit]:
+        """Screen and fit the causes that may be added to the last step, and choose the one that is worth it."""
+        ...
+
+    def without(self, search: Search[Fit], place: int) -> Fit:
+        """The last step fitted without one of its accepted causes, ``search.accepted[place]``."""
+        ...
+
+    def needed(self, current: Fit, base: Fit) -> float:
+        """Evidence that a further cause needs beside the causes of ``current``."""
+        ...
+
+
+def best_first(proposals: Sequence[Proposal[Fit]]) -> tuple[Proposal[Fit], ...]:
+    """Proposals in the order of their evidence, most first.
+
+    Parameters
+    ----------
+    proposals
+        Fitted causes of one round.
+    """
+    return tuple(sorted(proposals, key=lambda one: -one.evidence))
+
+
+def equivalents_of(proposals: Sequence[Proposal[Fit]], chosen: Proposal[Fit], as_good: float) -> tuple[str, ...]:
+    """Names of causes that explain as well as the chosen one, each once.
+
+    Parameters
+    ----------
+    proposals
+        Fitted causes of the round.
+    chosen
+        The accepted one.
+    as_good
+        Evidence by which another may be worse.
+    """
+    near = [one.name for one in proposals if one.name != chosen.name and one.evidence > chosen.evidence - as_good]
+    return tuple(dict.fromkeys(near))

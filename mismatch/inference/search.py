@@ -1,0 +1,84 @@
+"""The search for causes: one after the other while each is worth it, then without those made needless."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from .comparison import Comparison, Fit, Search
+from .diagnosis import Candidate
+
+Progress = Callable[[str], None]
+
+
+def search(comparison: Comparison[Fit], base: Fit, progress: Progress) -> Search[Fit]:
+    """Add causes to a hypothesis as long as one is worth it (forward selection), then prune.
+
+    Parameters
+    ----------
+    comparison
+        How causes are proposed, fitted and judged.
+    base
+        The fit without any cause.
+    progress
+        Called with a short text when a new stage begins.
+    """
+    found = Search((base,))
+    while len(found.accepted) < comparison.settings.search.most_causes and not comparison.finished(found):
+        progress(f"causes, round {len(found.steps)}")
+        one = comparison.round(found)
+        found = replace(found, rounds=(*found.rounds, one))
+        if one.chosen is None:
+            break
+        found = replace(found, steps=(*found.steps, one.chosen.fitted), accepted=(*found.accepted, one.chosen))
+    progress("causes made needless")
+    return pruned(comparison, found)
+
+
+def pruned(comparison: Comparison[Fit], found: Search[Fit]) -> Search[Fit]:
+    """Let go of causes that later ones have made needless (backward elimination).
+
+    What one cause leaves may look like another: a mode that imitates a joint is found before the joint is. Each cause
+    before the last is taken away; if the fit without it loses less than the evidence a cause needs, it stays away.
+
+    Parameters
+    ----------
+    comparison
+        How the fit without a cause is made.
+    found
+        Where the search ended.
+    """
+    for place in range(len(found.accepted) - 2, -1, -1):
+        if len(found.accepted) < 2:
+            break
+        less = comparison.without(found, place)
+        loss = less.score - found.current.score
+        if loss < comparison.needed(less, found.base):
+            found = released(found, place, less, "rejected", loss)
+    return found
+
+
+def released(found: Search[Fit], place: int, less: Fit, stage: str, evidence: float) -> Search[Fit]:
+    """A search without one of its accepted causes.
+
+    Parameters
+    ----------
+    found
+        With the cause.
+    place
+        Which of the accepted causes goes.
+    less
+        The last step without it.
+    stage
+        Why it goes, as its candidate says.
+    evidence
+        Score that the last step loses.
+    """
+    gone = found.accepted[place]
+    steps = found.steps[:-1] if place == len(found.accepted) - 1 else (
+        *found.steps[: place + 1], *found.steps[place + 2 : -1], less
+    )  # fmt: skip
+    return replace(
+        found,
+        steps=steps,
+        accepted=(*found.accepted[:place], *found.accepted[place + 1 :]),
+        rejected=(*found.rejected, Candidate(gone.name, evidence, stage, dict(gone.location))),
+    )

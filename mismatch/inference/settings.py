@@ -1,0 +1,199 @@
+"""`Settings`: every threshold of a decision, with its meaning; adapters state which of them differ for their kind."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from numpy import float64
+from numpy.typing import NDArray
+
+from .paired_tests import signed_ranks
+
+Real = NDArray[float64]
+
+
+@dataclass(frozen=True)
+class LabError:
+    """One standard deviation of what a laboratory's modal fit is usually off.
+
+    Defaults are those of round-robin comparisons of modal tests: frequencies agree to a per cent, dampings scatter by
+    some ten, shapes by a few (Ewins, Modal Testing, 2nd ed., section 1.5, on the SAMM survey). They set what
+    counts as a deviation, not how well anything is estimated.
+
+    Parameters
+    ----------
+    frequency, damping
+        Relative error of a mode's natural frequency and of its damping ratio.
+    shape
+        Error of each real and imaginary part of a vector's entries, relative to the vector's root mean square.
+    """
+
+    frequency: float = 0.01
+    damping: float = 0.12
+    shape: float = 0.03
+
+
+@dataclass(frozen=True)
+class EvidenceSettings:
+    """When a cause gains enough where it is fitted. Gains are in score: twice the logarithm of a Bayes factor.
+
+    Parameters
+    ----------
+    least
+        Gain below which nothing is accepted: 20 are odds of some twenty thousand to one (Kass & Raftery, Bayes
+        Factors, J. Am. Stat. Assoc. 90, 1995, call 10 very strong).
+    as_good
+        Gain by which another cause may be worse and is still told as equivalent: 6 is a likelihood ratio of 20.
+    clear
+        Standard errors by which a number of a cause must differ from its value without the cause.
+    unclear
+        Factor on the evidence that a cause needs whose number does not stand out of its error.
+    small
+        Share of the evidence found so far below which a further cause may only mend the form of the first.
+    small_after_law
+        The same share once a joint's law is accepted, whose form is never quite the true one.
+    mends_belief
+        Share of the odd deviation from the laboratory's model that a cause must remove when it gains no misfit.
+    """
+
+    least: float = 20.0
+    as_good: float = 10.0
+    clear: float = 4.0
+    unclear: float = 5.0
+    small: float = 0.01
+    small_after_law: float = 0.1
+    mends_belief: float = 0.6
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """How far the search for causes goes.
+
+    Parameters
+    ----------
+    most_causes
+        Causes accepted at most.
+    most_tested
+        Candidates of a round with enough evidence, best first, that are tested on data held out.
+    within_reach
+        Screened gain, as a share of the evidence that is needed, from which a candidate is fitted.
+    laws_first
+        Factor of a joint law's screened gain over any linear cause's from which laws are fitted first.
+    laws_again
+        Share of what moved with the signal when joint laws failed, below which they are tried again.
+    """
+
+    most_causes: int = 3
+    most_tested: int = 4
+    within_reach: float = 0.5
+    laws_first: float = 100.0
+    laws_again: float = 0.7
+
+
+@dataclass(frozen=True)
+class ScreeningSettings:
+    """Which screened candidates are fitted.
+
+    Parameters
+    ----------
+    promising_law, promising_linear
+        Screened gain, as a share of the best law's and of the best linear cause's, from which one is fitted.
+    least_law
+        Screened gain below which no law is fitted.
+    most_laws, most_simulated, most_linear
+        Laws fitted to the motion seen; the best of them that are simulated freely; linear causes fitted.
+    nearly, rival
+        Gain of a law on the motion seen, as a share of the best law's and of the best linear cause's, from which it
+        is simulated.
+    direction
+        Gain for each recording from which a direction is believed.
+    resolved
+        Least half-power bandwidth of an added mode, in spacings of lines.
+    """
+
+    promising_law: float = 0.15
+    promising_linear: float = 0.03
+    least_law: float = 60.0
+    most_laws: int = 4
+    most_simulated: int = 2
+    most_linear: int = 3
+    nearly: float = 0.6
+    rival: float = 0.3
+    direction: float = 50.0
+    resolved: float = 2.0
+
+
+@dataclass(frozen=True)
+class ProofSettings:
+    """What data that no fit has seen must confirm.
+
+    Parameters
+    ----------
+    gain
+        Gain in misfit on the data held out below which a cause is let go.
+    significance
+        p-value on the data held out above which a cause is not told.
+    belief_alone
+        Share of a cause's evidence below which its misfit says nothing, as the belief alone tells it from a refit.
+    beaten
+        Share of another cause's error held out, at or below which a cause takes its place.
+    test
+        Paired test over blocks of time: p-value that the second powers are not below the first.
+    """
+
+    gain: float = 10.0
+    significance: float = 0.05
+    belief_alone: float = 0.05
+    beaten: float = 0.25
+    test: Callable[[Real, Real], float] = signed_ranks
+
+
+@dataclass(frozen=True)
+class VerdictSettings:
+    """What an answer may leave.
+
+    Parameters
+    ----------
+    noise_like
+        Measure of what is left (see :class:`~mismatch.inference.Remainder`) up to which it passes for noise.
+    explained
+        Share of what the hypothesis without causes leaves that causes must remove, if the rest is not noise-like.
+    partly
+        Share that they must remove to be told at all; 1 tells nothing.
+    most_of_response
+        Error held out, as a share of the response, above which no answer is complete.
+    most_over_noise
+        Error held out over the noise above which something may still be missing.
+    most_left
+        Share of the nominal model's power above the noise that an answer may then leave.
+    """
+
+    noise_like: float = 0.05
+    explained: float = 0.95
+    partly: float = 1.0
+    most_of_response: float = 0.25
+    most_over_noise: float = 1.5
+    most_left: float = 0.1
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a diagnosis is made.
+
+    Parameters
+    ----------
+    lab
+        What the believed model is usually off.
+    causes
+        Causes that are weighed, by name; None: the whole library of the kind of comparison.
+    evidence, search, screening, proof, verdict
+        Thresholds of each step.
+    """
+
+    lab: LabError = field(default_factory=LabError)
+    causes: Mapping[str, Any] | None = None
+    evidence: EvidenceSettings = field(default_factory=EvidenceSettings)
+    search: SearchSettings = field(default_factory=SearchSettings)
+    screening: ScreeningSettings = field(default_factory=ScreeningSettings)
+    proof: ProofSettings = field(default_factory=ProofSettings)
+    verdict: VerdictSettings = field(default_factory=VerdictSettings)
