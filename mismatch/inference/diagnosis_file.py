@@ -111,7 +111,8 @@ def _diagnosis(content: Mapping[str, Any]) -> Diagnosis[None]:
         tuple(Candidate(**candidate) for candidate in content["candidates"]),
         tuple(content["equivalents"]),
         Improvement(**gain),
-        *(Remainder(_number(left[when]["share"]), _number(left[when]["size"])) for when in ("before", "after")),
+        _remainder(left["before"]),
+        _remainder(left["after"]),
         content["located"],
         None,
         tuple(HeldOutError(**one) for one in content.get("held_out", ())),
@@ -171,6 +172,10 @@ def _old_cause(cause: Mapping[str, Any]) -> dict[str, Any]:
             cause["name"]: {"fit": cause["fitted_error"], "spread": cause["spread"], "form": cause["form"]}
         },
     }
+
+
+def _remainder(content: Mapping[str, Any]) -> Remainder:
+    return Remainder(_number(content["share"]), _number(content["size"]))
 
 
 def _number(value: float | None) -> float:
