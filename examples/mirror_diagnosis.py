@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from mismatch import (
-    Explanation,
+    Hypothesis,
     LabError,
     ModelShape,
     Trial,
@@ -95,9 +95,9 @@ def trial(folder: Path, level: int, delay: float) -> Trial:
     return Trial(f"{level} mV", RATE, late, y, np.zeros(3, dtype=np.int64), ("ux", "uy", "uz", "yx", "yy", "yz"))
 
 
-def error(explanation: Explanation, lines: WindowedLines) -> float:
+def error(hypothesis: Hypothesis, lines: WindowedLines) -> float:
     """Of all responses together, relative."""
-    rest = lines.measured - predict_lines(explanation, lines).response
+    rest = lines.measured - predict_lines(hypothesis, lines).response
     return float(np.linalg.norm(rest) / np.linalg.norm(lines.measured))
 
 
@@ -107,24 +107,24 @@ def ask_library(folder: Path, fitted: ModalModel) -> None:
     decay = float((-model.poles.real).min())
     lines = [windowed_lines(trial(folder, level, fitted.delay), MODEL_BAND, decay) for level in LEVELS]
     shape = ModelShape(model, LabError())
-    nominal = Explanation(shape, np.zeros(shape.size))
-    own = [fit([each], nominal, iterations=5).explanation for each in lines]
+    nominal = Hypothesis(shape, np.zeros(shape.size))
+    own = [fit([each], nominal, iterations=5).hypothesis for each in lines]
     print("refit for each level: " + ", ".join(f"{error(*pair):.3f}" for pair in zip(own, lines, strict=True)))
     second, third, exponent = growth([one.model.natural_frequencies for one in own])
     print(f"modes fall by {100 * second:.2f} % to 200 mV and {100 * third:.2f} % to 300 mV: level^{exponent:.2f}")
     base = fit(lines, nominal, iterations=5)
-    for name, one in (("100 mV's model", nominal), ("one refit for all", base.explanation)):
+    for name, one in (("100 mV's model", nominal), ("one refit for all", base.hypothesis)):
         print(f"{name}: " + ", ".join(f"{error(one, each):.3f} at {each.trial.name}" for each in lines))
     floor = linear_floor(base, lines)
-    seen = find_direction(floor, base.explanation)
+    seen = find_direction(floor, base.hypothesis)
     print(f"one direction {np.round(seen.direction, 2)} holds {seen.share:.2f} of what any force would explain")
     laws = [physics for physics in library().values() if isinstance(physics, JointPhysics)]
-    for screened in screen_joints(floor, base.explanation, seen.direction, laws)[:3]:
-        start = replace(base.explanation, causes=(screened.causes[0],))
+    for screened in screen_joints(floor, base.hypothesis, seen.direction, laws)[:3]:
+        start = replace(base.hypothesis, causes=(screened.causes[0],))
         near = fit(lines, start, base.noises, iterations=3)
-        last = replace(near.explanation.causes[-1], seen=None)
-        free = fit(lines, replace(near.explanation, causes=(last,)), near.noises, iterations=5)
-        errors = ", ".join(f"{error(free.explanation, each):.3f}" for each in lines)
+        last = replace(near.hypothesis.causes[-1], seen=None)
+        free = fit(lines, replace(near.hypothesis, causes=(last,)), near.noises, iterations=5)
+        errors = ", ".join(f"{error(free.hypothesis, each):.3f}" for each in lines)
         print(f"{last.physics.name}: screened {screened.gain:.0f}, simulated {base.score - free.score:.0f}; {errors}")
 
 

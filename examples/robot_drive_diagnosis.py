@@ -143,7 +143,7 @@ def halves(trial: Trial) -> list[Trial]:
 
 def named_friction(found: Diagnosis) -> tuple[float, float]:
     """Size (N) and smoothing velocity (m/s) of the friction that was found; nothing if none was."""
-    for cause in found.final.explanation.causes:
+    for cause in found.final.hypothesis.causes:
         if cause.physics.name == "coulomb_friction":
             return float(cause.values[0]), float(cause.values[1])
     return 0.0, 1e-3
@@ -258,7 +258,7 @@ def study(folder: Path) -> tuple[Diagnosis, dict[str, Drive], dict[str, float]]:
         "published": Drive(*PUBLISHED),
     }
     trial = as_trial("test", test, loop)
-    models = {"rigid mass": nominal, "named cause": improved_model(found.final.explanation)}
+    models = {"rigid mass": nominal, "named cause": improved_model(found.final.hypothesis)}
     return found, drives, {name: predict(model, trial).total_error for name, model in models.items()}
 
 

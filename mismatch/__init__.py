@@ -4,7 +4,7 @@ from .adapters.structure.diagnose import Settings, diagnose
 from .inference.diagnosis import AcceptedCause, Candidate, Diagnosis, Improvement
 from .joints.joint_law import JointLaw, JointMotion
 from .models.fitting import Fit, fit, residual
-from .models.hypothesis import Cause, Explanation, predict_lines
+from .models.hypothesis import Cause, Hypothesis, predict_lines
 from .models.model_shape import LabError, ModelShape
 from .records.trial import Trial, band_of, read_trial, read_trials
 from .records.windowed_lines import WindowedLines, windowed_lines
@@ -16,7 +16,7 @@ __all__ = [
     "Candidate",
     "Cause",
     "Diagnosis",
-    "Explanation",
+    "Hypothesis",
     "Fit",
     "Floor",
     "Improvement",

@@ -127,7 +127,7 @@ def place(diagnosis: Diagnosis, cause: AcceptedCause) -> str:
     """Location of a cause in words."""
     location = cause.location
     if "direction" in location:
-        model = diagnosis.final.explanation.model
+        model = diagnosis.final.hypothesis.model
         parts = [DegreeOfFreedom.parse(label) for label in model.excitations][: len(location["direction"])]
         axes = ", ".join(f"{value:+.3f} {part.axis}" for value, part in zip(location["direction"], parts, strict=False))
         return f"in a joint that acts along {axes} at {parts[0].node}"

@@ -5,7 +5,7 @@ import numpy as np
 from cutting import MillingProcess
 from figures import as_data_uri, lobes_figure
 from foundation import InputError
-from mismatch import Diagnosis, Explanation
+from mismatch import Diagnosis, Hypothesis
 from mismatch.adapters.structure.pruning import zero_of
 from mismatch.models.equivalent_receptance import equivalent_receptance
 from stability import StabilityLobes, zero_order
@@ -66,15 +66,15 @@ def diagnosis_lobes_section(diagnosis: Diagnosis, process: MillingProcess | None
 
 
 def _curves(diagnosis: Diagnosis, cut: MillingProcess) -> dict[str, StabilityLobes]:
-    final, lines = diagnosis.final.explanation, diagnosis.lines
+    final, lines = diagnosis.final.hypothesis, diagnosis.lines
     nominal = zero_of(final.shape)
     natural = nominal.model.natural_frequencies
     frequencies = np.linspace(natural.min() / 3, 3 * natural.max(), LINES)
     tooth = 2 * np.pi / cut.teeth
     speeds = np.geomspace(natural.min() * tooth / 2, 3 * natural.max() * tooth, SPEEDS)
 
-    def limits(explanation: Explanation, place: int) -> StabilityLobes:
-        return zero_order(equivalent_receptance(explanation, lines[place], frequencies), cut, speeds, DEEPEST)
+    def limits(hypothesis: Hypothesis, place: int) -> StabilityLobes:
+        return zero_order(equivalent_receptance(hypothesis, lines[place], frequencies), cut, speeds, DEEPEST)
 
     curves = {"nominal": limits(nominal, 0)}
     if any(cause.direction is not None for cause in final.causes) and len(lines) > 1:

@@ -130,20 +130,20 @@ def mended(fitted: Fit, lines: list[WindowedLines], clipping: Clipping) -> tuple
     start, shown = fitted, [shown_signal(fitted, one) for one in lines]
     tried, reached, error = list[Real](), list[Real](), np.inf
     for _ in range(ROUNDS):
-        tried.append(start.explanation.u)
-        fitted = fit(_repaired(shown, lines, clipping), start.explanation, start.noises, iterations=4)
-        reached.append(fitted.explanation.u)
+        tried.append(start.hypothesis.u)
+        fitted = fit(_repaired(shown, lines, clipping), start.hypothesis, start.noises, iterations=4)
+        reached.append(fitted.hypothesis.u)
         start, shown = fitted, [shown_signal(fitted, one) for one in lines]
         clipping = _again(shown, lines, clipping)
         before, error = error, _error(shown, lines, clipping)
         if abs(before - error) < SETTLED * error:
             break
-        ahead = replace(fitted, explanation=replace(fitted.explanation, u=_extrapolated(tried, reached)))
+        ahead = replace(fitted, hypothesis=replace(fitted.hypothesis, u=_extrapolated(tried, reached)))
         farther = [shown_signal(ahead, one) for one in lines]
         if _error(farther, lines, clipping) < error:
             start, shown = ahead, farther
     repaired = _repaired(shown, lines, clipping)
-    return fit(repaired, start.explanation, start.noises, iterations=4), repaired, clipping
+    return fit(repaired, start.hypothesis, start.noises, iterations=4), repaired, clipping
 
 
 def _extrapolated(tried: list[Real], reached: list[Real]) -> Real:

@@ -21,7 +21,7 @@ def repair_plain_faults(lines: list[WindowedLines], base: Fit) -> tuple[list[Win
         if tone is None or tone.gain < LEAST_EVIDENCE:
             break
         lines = [without_tone(base, one, tone) for one in lines]
-        base = fit(lines, base.explanation, iterations=4)
+        base = fit(lines, base.hypothesis, iterations=4)
         found.append(_tone_cause(tone, lines[0]))
     clipping = find_clipping(base, lines)
     if clipping is not None:
@@ -48,7 +48,7 @@ def with_tones_settled(
     """
     tones = [cause for cause in accepted if cause.name == "unmeasured_excitation"]
     gone = [one for one in tones if not stands_out(fitted, lines, one.parameters["frequency_hz"])]
-    beyond = tones_beyond(fitted.explanation, lines, decay, MOST_TONES - len(tones) + len(gone))
+    beyond = tones_beyond(fitted.hypothesis, lines, decay, MOST_TONES - len(tones) + len(gone))
     return [cause for cause in accepted if cause not in gone] + [_tone_cause(tone, lines[0]) for tone in beyond]
 
 

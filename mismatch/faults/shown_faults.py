@@ -14,7 +14,7 @@ Real = NDArray[np.float64]
 Term = Mapping[str, Any]
 
 FAULTS = ("unmeasured_excitation", "clipping")
-"""Names of causes that are no part of an explanation."""
+"""Names of causes that are no part of a hypothesis."""
 
 
 def with_faults(response: Real, trial: Trial, start: int, terms: Sequence[Term]) -> Real:

@@ -209,7 +209,7 @@ def without_tone(fitted: Fit, lines: WindowedLines, tone: Tone) -> WindowedLines
 
 def shown_signal(fitted: Fit, lines: WindowedLines) -> Real:
     """Predicted responses in time, (n_samples, n_responses)."""
-    spectrum = predict_lines(fitted.explanation, lines).spectrum
+    spectrum = predict_lines(fitted.hypothesis, lines).spectrum
     return np.asarray(irfft(spectrum, n=lines.padded, axis=0)[: len(lines.trial.force)])
 
 
@@ -219,8 +219,8 @@ def _step(lines: WindowedLines) -> float:
 
 def _whitened_power(fitted: Fit, lines: WindowedLines, noise: NoiseModel) -> Real:
     """Power of each residual line in units of its noise, mean over channels."""
-    rest = lines.measured - predict_lines(fitted.explanation, lines).response
-    own = noise.covariance(lines.frequencies, through_structure(fitted.explanation, lines))
+    rest = lines.measured - predict_lines(fitted.hypothesis, lines).response
+    own = noise.covariance(lines.frequencies, through_structure(fitted.hypothesis, lines))
     return np.asarray(np.sum(np.abs(np.einsum("kij,kj->ki", whitening(own), rest)) ** 2, axis=1) / rest.shape[1])
 
 
@@ -251,7 +251,7 @@ def force_contrast(lines: WindowedLines) -> Real:
 def _amplitudes(fitted: Fit, lines: list[WindowedLines], frequency: float) -> list[Real]:
     found = []
     for one in lines:
-        rest = one.measured - predict_lines(fitted.explanation, one).response
+        rest = one.measured - predict_lines(fitted.hypothesis, one).response
         k = int(np.argmin(np.abs(one.frequencies - frequency)))
         power = np.sum(np.abs(rest[max(0, k - 2) : k + 3]) ** 2, axis=0)
         found.append(2 * np.sqrt(power / len(one.window)))

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.hypothesis import Explanation, predict_lines
+from ..models.hypothesis import Hypothesis, predict_lines
 from ..records.windowed_lines import WindowedLines, windowed_lines
 from .tones import (
     NEAR,
@@ -27,15 +27,15 @@ QUIET_FORCE = 5.0
 """Contrast that no force may show there: above the modes a force's line needs no resonance to be seen in a response."""
 
 
-def tones_beyond(explanation: Explanation, lines: list[WindowedLines], decay: float, most: int) -> list[Tone]:
+def tones_beyond(hypothesis: Hypothesis, lines: list[WindowedLines], decay: float, most: int) -> list[Tone]:
     """Lines above the compared band that stand out of the residual in two recordings, and in no force.
 
     No noise was fitted there, so each response is its own measure: a line's power against the median of its neighbours.
-    The explanation is the final one: a hardening joint answers periodic forces with lines that they do not have.
+    The hypothesis is the final one: a hardening joint answers periodic forces with lines that they do not have.
 
     Parameters
     ----------
-    explanation
+    hypothesis
         With all causes.
     lines
         Recordings.
@@ -52,7 +52,7 @@ def tones_beyond(explanation: Explanation, lines: list[WindowedLines], decay: fl
     above = [_above(one, decay) for one in lines]
     if not above or min(len(one.frequencies) for one in above) < 4 * len(NEAR):
         return []
-    rests = [one.measured - predict_lines(explanation, one).response for one in above]
+    rests = [one.measured - predict_lines(hypothesis, one).response for one in above]
     contrasts = [np.mean([sharp_contrast(column) for column in (np.abs(rest) ** 2).T], axis=0) for rest in rests]
     together = seen_together(contrasts, above, QUIET_FORCE)
     axis, found = above[0].frequencies, list[Tone]()

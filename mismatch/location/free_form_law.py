@@ -9,7 +9,7 @@ from scipy.fft import irfft, rfft
 from ..inference.diagnosis import Diagnosis
 from ..joints.joint_simulation import driven_force
 from ..models.fitting import Fit
-from ..models.hypothesis import Cause, Explanation, predict_lines
+from ..models.hypothesis import Cause, Hypothesis, predict_lines
 from ..models.misfit import through_structure
 from ..noise.noise_model import whitening
 from ..physics import answer_name
@@ -85,12 +85,12 @@ class _Sample:
 def free_form_laws(diagnosis: Diagnosis) -> tuple[FreeFormLaw, ...]:
     """Measured force of each accepted joint cause, all other causes in place."""
     return tuple(
-        _measured(diagnosis, cause) for cause in diagnosis.final.explanation.causes if cause.direction is not None
+        _measured(diagnosis, cause) for cause in diagnosis.final.hypothesis.causes if cause.direction is not None
     )
 
 
 def _measured(diagnosis: Diagnosis, cause: Cause) -> FreeFormLaw:
-    final = diagnosis.final.explanation
+    final = diagnosis.final.hypothesis
     assert cause.direction is not None
     bare = replace(final, causes=tuple(one for one in final.causes if one is not cause))
     samples = _joined([_seen(diagnosis.final, bare, cause, k, one) for k, one in enumerate(diagnosis.lines)])
@@ -109,7 +109,7 @@ def _measured(diagnosis: Diagnosis, cause: Cause) -> FreeFormLaw:
     )
 
 
-def _seen(final: Fit, bare: Explanation, cause: Cause, number: int, lines: WindowedLines) -> _Sample:
+def _seen(final: Fit, bare: Hypothesis, cause: Cause, number: int, lines: WindowedLines) -> _Sample:
     """Motion and force along the joint in one recording, and the law's force for that motion."""
     assert cause.direction is not None
     through = through_structure(bare, lines)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..models.fitting import Fit
-from ..models.hypothesis import Explanation
+from ..models.hypothesis import Hypothesis
 from ..records.windowed_lines import WindowedLines
 from .residual_maps import normalised, overlap
 
@@ -43,19 +43,19 @@ class Growth:
 
 
 def growth(
-    explanation: Explanation,
+    hypothesis: Hypothesis,
     reference: Fit,
     lines: Sequence[WindowedLines],
     bands: Sequence[tuple[float, float]],
     spread: float,
 ) -> Growth:
-    """Growth of an explanation's residual inside bands (Hz; none: everywhere).
+    """Growth of a hypothesis's residual inside bands (Hz; none: everywhere).
 
     A linear omission grows as the force, a cubic as its third power, dry friction not at all.
 
     Parameters
     ----------
-    explanation
+    hypothesis
         Whose residual.
     reference
         Fit whose noise is taken off.
@@ -69,7 +69,7 @@ def growth(
     unit = np.sqrt(np.mean([np.mean(np.abs(one.measured) ** 2, axis=0) for one in lines], axis=0))
     rows = []
     for number, one in enumerate(lines):
-        single, _, variance = normalised(explanation, reference, number, one)
+        single, _, variance = normalised(hypothesis, reference, number, one)
         inside = _inside(one.frequencies, bands)
         floor = variance[inside] / unit**2
         power = np.abs(single[inside]) ** 2 * floor

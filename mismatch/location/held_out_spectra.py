@@ -55,7 +55,7 @@ def held_out_spectra(diagnosis: Diagnosis) -> HeldOutSpectra:
     before, after = diagnosis.elsewhere
     faults = [cause for cause in diagnosis.physics if cause.name in FAULTS]
     rests = residual_lines(before, here), residual_lines(after, here, faults)
-    covariance = final.noises[kept].covariance(here.frequencies, through_structure(final.explanation, here))
+    covariance = final.noises[kept].covariance(here.frequencies, through_structure(final.hypothesis, here))
     edges = band_edges([here], BANDS_PER_OCTAVE, 3)
     power = [
         np.abs(here.measured) ** 2,

@@ -181,7 +181,7 @@ def _growth(view: ResidualView, bands: Sequence[Mapping[str, Any]]) -> dict[str,
     if not ranges:
         return {"note": "nothing stands above the noise, so nothing grows"}
     diagnosis = view.diagnosis
-    refitted = growth(diagnosis.base.explanation, view.reference, view.measured, ranges, view.noise.spread)
+    refitted = growth(diagnosis.base.hypothesis, view.reference, view.measured, ranges, view.noise.spread)
     content = {"residual": _growth_content(refitted)}
     bare = linear_part(diagnosis)
     if bare is not None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..models.fitting import Fit
-from ..models.hypothesis import Explanation, predict_lines
+from ..models.hypothesis import Hypothesis, predict_lines
 from ..models.misfit import through_structure
 from ..noise.noise_model import whitening
 from ..records.windowed_lines import WindowedLines
@@ -81,13 +81,13 @@ def band_edges(lines: Sequence[WindowedLines], per_octave: int = BANDS_PER_OCTAV
 
 
 def normalised(
-    explanation: Explanation, reference: Fit, number: int, lines: WindowedLines
+    hypothesis: Hypothesis, reference: Fit, number: int, lines: WindowedLines
 ) -> tuple[Complex, Complex, Real]:
     """Residual lines in units of the noise.
 
     Parameters
     ----------
-    explanation
+    hypothesis
         Whose residual.
     reference
         Fit whose noise is the unit.
@@ -103,18 +103,18 @@ def normalised(
     variance : (n_lines, n_responses)
         Of the noise.
     """
-    rest = lines.measured - predict_lines(explanation, lines).response
-    through = through_structure(reference.explanation, lines)
+    rest = lines.measured - predict_lines(hypothesis, lines).response
+    through = through_structure(reference.hypothesis, lines)
     covariance = reference.noises[number].covariance(lines.frequencies, through)
     variance = np.real(np.einsum("kii->ki", covariance))
     return rest / np.sqrt(variance), np.einsum("kij,kj->ki", whitening(covariance), rest), variance
 
 
-def residual_map(explanation: Explanation, reference: Fit, lines: Sequence[WindowedLines], edges: Real) -> ResidualMap:
-    """Map of one explanation's residual over all recordings, noise from ``reference``."""
+def residual_map(hypothesis: Hypothesis, reference: Fit, lines: Sequence[WindowedLines], edges: Real) -> ResidualMap:
+    """Map of one hypothesis's residual over all recordings, noise from ``reference``."""
     ratio, joint, count = [], [], []
     for number, one in enumerate(lines):
-        single, white, _ = normalised(explanation, reference, number, one)
+        single, white, _ = normalised(hypothesis, reference, number, one)
         place = np.digitize(one.frequencies, edges[1:-1])
         held = np.bincount(place, minlength=len(edges) - 1).astype(float)
         ratio.append(_means(np.abs(single) ** 2, place, held))

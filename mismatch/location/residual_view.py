@@ -7,7 +7,7 @@ import numpy as np
 
 from ..inference.diagnosis import Diagnosis
 from ..models.fitting import Fit
-from ..models.hypothesis import Explanation, predict_lines
+from ..models.hypothesis import Hypothesis, predict_lines
 from ..noise.noise_model import NoiseModel
 from ..records.trial import Trial
 from ..records.windowed_lines import WindowedLines, windowed_lines
@@ -63,18 +63,18 @@ def residual_view(diagnosis: Diagnosis, trials: Sequence[Trial] | None = None) -
     mended = diagnosis.lines
     measured = tuple(_as_measured(one, trials or ()) for one in mended)
     edges = band_edges(measured)
-    base, final = diagnosis.base.explanation, diagnosis.final
+    base, final = diagnosis.base.hypothesis, diagnosis.final
     unexplained = diagnosis.verdict == "unexplained"
     if unexplained:
         final = replace(final, noises=tuple(_quiet(final, k, one) for k, one in enumerate(mended)))
-    after = residual_map(final.explanation, final, mended, edges)
+    after = residual_map(final.hypothesis, final, mended, edges)
     return ResidualView(
         diagnosis,
         measured,
         residual_map(base, final, measured, edges),
         after,
         tuple(block_residual(base, final, k, one) for k, one in enumerate(measured)),
-        tuple(block_residual(final.explanation, final, k, one) for k, one in enumerate(mended)),
+        tuple(block_residual(final.hypothesis, final, k, one) for k, one in enumerate(mended)),
         final,
         QUIET
         if unexplained
@@ -84,16 +84,16 @@ def residual_view(diagnosis: Diagnosis, trials: Sequence[Trial] | None = None) -
 
 def _quiet(final: Fit, number: int, lines: WindowedLines) -> NoiseModel:
     """Noise at the level that a fifth of all narrow bands stays below, no part of it from forces."""
-    rest = lines.measured - predict_lines(final.explanation, lines).response
+    rest = lines.measured - predict_lines(final.hypothesis, lines).response
     bands = np.array_split(np.abs(rest) ** 2, min(150, max(4, len(rest) // 12)))
     level = np.log(np.quantile([band.mean(axis=0) for band in bands], 0.2, axis=0))
     fitted = final.noises[number]
     return replace(fitted, responses=0 * fitted.responses + level[:, None], forces=0 * fitted.forces - 200.0)
 
 
-def linear_part(diagnosis: Diagnosis) -> Explanation | None:
+def linear_part(diagnosis: Diagnosis) -> Hypothesis | None:
     """The final model with the causes of its joints taken away; None where it has none."""
-    final = diagnosis.final.explanation
+    final = diagnosis.final.hypothesis
     kept = tuple(cause for cause in final.causes if cause.direction is None)
     return replace(final, causes=kept) if len(kept) < len(final.causes) else None
 

@@ -8,7 +8,7 @@ from scipy.fft import irfft, rfft
 from scipy.signal.windows import hann
 
 from ..models.fitting import Fit
-from ..models.hypothesis import Explanation, predict_lines
+from ..models.hypothesis import Hypothesis, predict_lines
 from ..models.misfit import through_structure
 from ..noise.noise_model import whitening
 from ..records.windowed_lines import WindowedLines
@@ -59,12 +59,12 @@ class BlockResidual:
         return np.asarray(means), np.asarray(held * self.channels / self.overlap)
 
 
-def block_residual(explanation: Explanation, reference: Fit, number: int, lines: WindowedLines) -> BlockResidual:
-    """Residual of an explanation block by block; lines that a mended tone took out are left out here too.
+def block_residual(hypothesis: Hypothesis, reference: Fit, number: int, lines: WindowedLines) -> BlockResidual:
+    """Residual of a hypothesis block by block; lines that a mended tone took out are left out here too.
 
     Parameters
     ----------
-    explanation
+    hypothesis
         Whose residual.
     reference
         Fit whose noise is the unit.
@@ -74,7 +74,7 @@ def block_residual(explanation: Explanation, reference: Fit, number: int, lines:
         The recording.
     """
     rate, n = lines.trial.rate, len(lines.trial.force)
-    rest = _kept(lines, lines.trial.response - lines.signal(predict_lines(explanation, lines).spectrum))
+    rest = _kept(lines, lines.trial.response - lines.signal(predict_lines(hypothesis, lines).spectrum))
     rest = rest[lines.start : n - max(int(rate) // 2, 1)]
     length = int(rate * max(len(rest) / rate / BLOCKS, LEAST_PERIODS / lines.frequencies[0]))
     length = max(16, min(length, len(rest)))
@@ -106,7 +106,7 @@ def _kept(lines: WindowedLines, rest: Real) -> Real:
 
 def _whitening_at(reference: Fit, number: int, lines: WindowedLines, axis: Real) -> Complex:
     """Whitening at other frequencies: the structure's part interpolated as a mean over the coarser lines."""
-    through = through_structure(reference.explanation, lines)
+    through = through_structure(reference.hypothesis, lines)
     covariance = reference.noises[number].covariance(lines.frequencies, through)
     nearest = np.clip(np.searchsorted(0.5 * (axis[1:] + axis[:-1]), lines.frequencies), 0, len(axis) - 1)
     held = np.maximum(np.bincount(nearest, minlength=len(axis)), 1)

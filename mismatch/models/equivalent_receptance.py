@@ -1,4 +1,4 @@
-"""The structure that a cut sees once everything found is counted: receptances of an explanation at one level."""
+"""The structure that a cut sees once everything found is counted: receptances of a hypothesis at one level."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,12 +7,12 @@ from estimation import Frf
 
 from ..joints.joint_simulation import common_axes, driven_force
 from ..records.windowed_lines import WindowedLines
-from .hypothesis import Explanation, predict_lines, surround
+from .hypothesis import Hypothesis, predict_lines, surround
 
 Real = NDArray[np.float64]
 
 
-def equivalent_receptance(explanation: Explanation, lines: WindowedLines, frequencies: Real) -> Frf:
+def equivalent_receptance(hypothesis: Hypothesis, lines: WindowedLines, frequencies: Real) -> Frf:
     """Receptance with the causes that belong to the structure, joints linearised for the motion of one recording.
 
     A joint's law counts as the spring and damper that come closest to its force, ``k = <g x> / <x^2>`` and
@@ -21,7 +21,7 @@ def equivalent_receptance(explanation: Explanation, lines: WindowedLines, freque
 
     Parameters
     ----------
-    explanation
+    hypothesis
         As fitted.
     lines
         Recording whose motion counts.
@@ -32,15 +32,15 @@ def equivalent_receptance(explanation: Explanation, lines: WindowedLines, freque
     Frf
         Receptances, m/N.
     """
-    model = explanation.model
+    model = hypothesis.model
     added = np.zeros((len(frequencies), len(model.excitations), len(model.responses)), dtype=complex)
-    feedback = surround(explanation, frequencies).feedback
+    feedback = surround(hypothesis, frequencies).feedback
     if feedback is not None:
         added += feedback
     rows, columns = common_axes(model)
     s = 2j * np.pi * frequencies
-    answers = iter(predict_lines(explanation, lines).joints)
-    for cause in explanation.causes:
+    answers = iter(predict_lines(hypothesis, lines).joints)
+    for cause in hypothesis.causes:
         if cause.direction is None:
             continue
         answer = next(answers)

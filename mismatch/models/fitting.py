@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from ..noise.noise_model import NoiseModel
 from ..records.windowed_lines import WindowedLines
-from .hypothesis import Explanation, predict_lines
+from .hypothesis import Hypothesis, predict_lines
 from .jacobian import jacobian
-from .misfit import Assessed, assess, whitened, with_noise
+from .misfit import Misfit, misfit_under, whitened, with_noise
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -26,11 +26,11 @@ MORE_THAN_EXPECTED, LONGER = 1.5, 3.0
 
 @dataclass(frozen=True)
 class Fit:
-    """An explanation fitted to recordings.
+    """A hypothesis fitted to recordings.
 
     Parameters
     ----------
-    explanation
+    hypothesis
         At its best.
     noises
         One a recording.
@@ -44,7 +44,7 @@ class Fit:
         Of u and the causes' coordinates.
     """
 
-    explanation: Explanation
+    hypothesis: Hypothesis
     noises: tuple[NoiseModel, ...]
     misfit: float
     deviation: float
@@ -54,13 +54,13 @@ class Fit:
 
 def fit(
     lines: list[WindowedLines],
-    start: Explanation,
+    start: Hypothesis,
     noises: tuple[NoiseModel, ...] | None = None,
     *,
     iterations: int = 8,
     tolerance: float = 3.0,
 ) -> Fit:
-    """Fit an explanation to recordings.
+    """Fit a hypothesis to recordings.
 
     Minimises ``misfit + |u|^2`` by Gauss-Newton with step halving (Levenberg's damping where halving fails); noise is
     estimated anew at each step, so causes compete on what they leave, not on a noise that one of them assumed. Of long
@@ -79,25 +79,25 @@ def fit(
     tolerance
         Of the misfit: two gains below it end the fit, or a tenth of it expected.
     """
-    explanation, known = start, noises
+    hypothesis, known = start, noises
     with ThreadPoolExecutor(THREADS) as pool:
         rough = [one.thinned(ENOUGH) for one in lines]
         if any(few is not one for few, one in zip(rough, lines, strict=True)):
-            explanation, seen, _ = _descended(pool, rough, explanation, known, (iterations, tolerance))
+            hypothesis, seen, _ = _descended(pool, rough, hypothesis, known, (iterations, tolerance))
             known = tuple(one.noise for one in seen)
             iterations = max(0, iterations - LEFT_OUT)
-        explanation, seen, matrix = _descended(pool, lines, explanation, known, (iterations, tolerance))
-        cold = list(pool.map(with_noise, lines, [explanation] * len(lines), [None] * len(lines), seen))
+        hypothesis, seen, matrix = _descended(pool, lines, hypothesis, known, (iterations, tolerance))
+        cold = list(pool.map(with_noise, lines, [hypothesis] * len(lines), [None] * len(lines), seen))
     # a noise that crept along from a bad beginning may have stopped short: of two searches the better counts
     seen = [min(pair, key=lambda one: one.misfit) for pair in zip(seen, cold, strict=True)]
     misfit = sum(one.misfit for one in seen)
-    deviation = _deviation(explanation)
+    deviation = _deviation(hypothesis)
     count = 2 * sum(one.measured.size for one in lines)
-    numbers = sum(cause.size for cause in explanation.causes)
+    numbers = sum(cause.size for cause in hypothesis.causes)
     # a mode's length may be shared between its vectors at will: two numbers of each are no freedom
-    numbers += explanation.shape.added * (explanation.shape.per_mode - 2)
+    numbers += hypothesis.shape.added * (hypothesis.shape.per_mode - 2)
     return Fit(
-        explanation,
+        hypothesis,
         tuple(one.noise for one in seen),
         misfit,
         deviation,
@@ -109,43 +109,43 @@ def fit(
 def _descended(
     pool: ThreadPoolExecutor,
     lines: list[WindowedLines],
-    start: Explanation,
+    start: Hypothesis,
     noises: tuple[NoiseModel, ...] | None,
     limits: tuple[int, float],
-) -> tuple[Explanation, list[Assessed], Real]:
+) -> tuple[Hypothesis, list[Misfit], Real]:
     """Where Gauss-Newton's steps end, the recordings there, and the normal matrix; limits as for :func:`fit`."""
     iterations, tolerance = limits
-    explanation = start
+    hypothesis = start
     current = list(noises) if noises is not None else [None] * len(lines)
-    seen = list(pool.map(with_noise, lines, [explanation] * len(lines), current))
-    matrix, gradient = _normal_equations(pool, lines, explanation, seen)
+    seen = list(pool.map(with_noise, lines, [hypothesis] * len(lines), current))
+    matrix, gradient = _normal_equations(pool, lines, hypothesis, seen)
     damping, idle = 0.0, 0
     for _ in range(iterations):
-        cost = _cost(seen, explanation)
+        cost = _cost(seen, hypothesis)
         step = _solved(matrix + damping * np.diag(np.diag(matrix)), gradient)
         # where a law is stiffer than its derivatives can follow there is no step either
         if not step @ gradient >= 0.1 * tolerance or not np.isfinite(step).all():
             break
-        trial, again, trial_cost = _downhill(pool, lines, explanation, (step, float(step @ gradient)), seen)
+        trial, again, trial_cost = _downhill(pool, lines, hypothesis, (step, float(step @ gradient)), seen)
         if not trial_cost < cost:
             if damping > 1:
                 break
             damping = max(10 * damping, 0.1)
             continue
         damping /= 10
-        explanation = trial
+        hypothesis = trial
         seen = list(pool.map(with_noise, lines, [trial] * len(lines), [one.noise for one in again], again))
         # the noise may still be settling when a step gains nothing
-        idle = idle + 1 if cost - _cost(seen, explanation) < tolerance else 0
+        idle = idle + 1 if cost - _cost(seen, hypothesis) < tolerance else 0
         if idle == 2:
             break
-        matrix, gradient = _normal_equations(pool, lines, explanation, seen)
-    return explanation, seen, matrix
+        matrix, gradient = _normal_equations(pool, lines, hypothesis, seen)
+    return hypothesis, seen, matrix
 
 
 def residual(fitted: Fit, lines: list[WindowedLines]) -> list[Complex]:
     """What a fit leaves of each recording, (n_lines, n_responses)."""
-    return [one.measured - predict_lines(fitted.explanation, one).response for one in lines]
+    return [one.measured - predict_lines(fitted.hypothesis, one).response for one in lines]
 
 
 def _solved(matrix: Real, gradient: Real) -> Real:
@@ -155,33 +155,33 @@ def _solved(matrix: Real, gradient: Real) -> Real:
         return np.asarray(np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0], dtype=float)
 
 
-def _normal_of(lines: WindowedLines, explanation: Explanation, seen: Assessed) -> tuple[Real, Real]:
-    slope = whitened(seen.white, jacobian(explanation, lines, seen.predicted))
+def _normal_of(lines: WindowedLines, hypothesis: Hypothesis, seen: Misfit) -> tuple[Real, Real]:
+    slope = whitened(seen.white, jacobian(hypothesis, lines, seen.predicted))
     small = whitened(seen.white, seen.rest[:, :, None])[:, 0]
     return 2 * (slope.T @ slope), 2 * (slope.T @ small)
 
 
 def _normal_equations(
-    pool: ThreadPoolExecutor, lines: list[WindowedLines], explanation: Explanation, seen: list[Assessed]
+    pool: ThreadPoolExecutor, lines: list[WindowedLines], hypothesis: Hypothesis, seen: list[Misfit]
 ) -> tuple[Real, Real]:
     """Normal equations with the lab's belief about u, and a belief so weak that it only keeps them solvable."""
-    size, count = explanation.shape.size, explanation.size
-    parts = list(pool.map(_normal_of, lines, [explanation] * len(lines), seen))
+    size, count = hypothesis.shape.size, hypothesis.size
+    parts = list(pool.map(_normal_of, lines, [hypothesis] * len(lines), seen))
     belief = np.full(count, 1e-6)
-    belief[:size] = explanation.shape.belief
+    belief[:size] = hypothesis.shape.belief
     matrix = sum((part[0] for part in parts), np.diag(belief))
     gradient = sum((part[1] for part in parts), np.zeros(count))
-    gradient[:size] -= explanation.shape.belief * explanation.u
+    gradient[:size] -= hypothesis.shape.belief * hypothesis.u
     return matrix, gradient
 
 
 def _downhill(
     pool: ThreadPoolExecutor,
     lines: list[WindowedLines],
-    here: Explanation,
+    here: Hypothesis,
     step: tuple[Real, float],
-    seen: list[Assessed],
-) -> tuple[Explanation, list[Assessed], float]:
+    seen: list[Misfit],
+) -> tuple[Hypothesis, list[Misfit], float]:
     """Where a step (and the gain expected of it) leads, shortened until it gains, lengthened while that gains more."""
     way, expected = step
     cost = _cost(seen, here)
@@ -202,25 +202,25 @@ def _downhill(
 
 
 def _try(
-    pool: ThreadPoolExecutor, lines: list[WindowedLines], here: Explanation, step: Real, seen: list[Assessed]
-) -> tuple[Explanation, list[Assessed]]:
-    """The explanation a step away, under the noise so far."""
+    pool: ThreadPoolExecutor, lines: list[WindowedLines], here: Hypothesis, step: Real, seen: list[Misfit]
+) -> tuple[Hypothesis, list[Misfit]]:
+    """The hypothesis a step away, under the noise so far."""
     trial = _moved(here, step)
-    return trial, list(pool.map(assess, lines, [trial] * len(lines), [one.noise for one in seen]))
+    return trial, list(pool.map(misfit_under, lines, [trial] * len(lines), [one.noise for one in seen]))
 
 
-def _moved(explanation: Explanation, step: Real) -> Explanation:
-    size = explanation.shape.size
-    moved = replace(explanation, u=explanation.u + step[:size])
-    if not explanation.causes:
+def _moved(hypothesis: Hypothesis, step: Real) -> Hypothesis:
+    size = hypothesis.shape.size
+    moved = replace(hypothesis, u=hypothesis.u + step[:size])
+    if not hypothesis.causes:
         return moved
-    longest = np.concatenate([cause.longest_steps() for cause in explanation.causes])
-    return moved.with_causes(explanation.coordinates() + np.clip(step[size:], -longest, longest))
+    longest = np.concatenate([cause.longest_steps() for cause in hypothesis.causes])
+    return moved.with_causes(hypothesis.coordinates() + np.clip(step[size:], -longest, longest))
 
 
-def _cost(seen: list[Assessed], explanation: Explanation) -> float:
-    return sum(one.misfit for one in seen) + _deviation(explanation)
+def _cost(seen: list[Misfit], hypothesis: Hypothesis) -> float:
+    return sum(one.misfit for one in seen) + _deviation(hypothesis)
 
 
-def _deviation(explanation: Explanation) -> float:
-    return float(explanation.shape.belief @ explanation.u**2)
+def _deviation(hypothesis: Hypothesis) -> float:
+    return float(hypothesis.shape.belief @ hypothesis.u**2)

@@ -1,4 +1,4 @@
-"""An `Explanation`: a modal model off its nominal one, with the causes that were added to it."""
+"""A `Hypothesis`: a modal model off its nominal one, with the causes that were added to it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -108,7 +108,7 @@ def across(direction: Real) -> Real:
 
 
 @dataclass(frozen=True)
-class Explanation:
+class Hypothesis:
     """Modal parameters and causes: everything that predicts a recording.
 
     Parameters
@@ -135,12 +135,12 @@ class Explanation:
         """Numbers that are fitted."""
         return self.shape.size + sum(cause.size for cause in self.causes)
 
-    def with_cause(self, cause: Cause) -> "Explanation":
-        """The explanation with one more cause, the last."""
+    def with_cause(self, cause: Cause) -> "Hypothesis":
+        """The hypothesis with one more cause, the last."""
         return replace(self, causes=(*self.causes, cause))
 
-    def with_causes(self, coordinates: Real) -> "Explanation":
-        """The explanation with all causes at other coordinates, one after the other."""
+    def with_causes(self, coordinates: Real) -> "Hypothesis":
+        """The hypothesis with all causes at other coordinates, one after the other."""
         moved, at = [], 0
         for cause in self.causes:
             moved.append(cause.moved(coordinates[at : at + cause.size]))
@@ -176,13 +176,13 @@ class Surround:
         return displacement if self.response is None else np.einsum("kij,kj...->ki...", self.response, displacement)
 
 
-def surround(explanation: Explanation, frequencies: Real) -> Surround:
+def surround(hypothesis: Hypothesis, frequencies: Real) -> Surround:
     """Matrices of all linear causes at frequencies (n,), Hz."""
     s = np.asarray(2j * np.pi * frequencies, dtype=complex)
     response, force, feedback = None, None, None
-    for cause in explanation.causes:
+    for cause in hypothesis.causes:
         if isinstance(cause.physics, ChainPhysics):
-            chain: Chain = cause.physics.chain(s, cause.values, cause.place, explanation.shape.nominal)
+            chain: Chain = cause.physics.chain(s, cause.values, cause.place, hypothesis.shape.nominal)
             if chain.response is not None:
                 response = chain.response if response is None else chain.response @ response
             if chain.force is not None:
@@ -194,7 +194,7 @@ def surround(explanation: Explanation, frequencies: Real) -> Surround:
 
 @dataclass(frozen=True)
 class Predicted:
-    """What an explanation gives for one recording.
+    """What a hypothesis gives for one recording.
 
     Parameters
     ----------
@@ -214,14 +214,14 @@ class Predicted:
     joints: tuple[JointResponse, ...]
 
 
-def predict_lines(explanation: Explanation, lines: WindowedLines) -> Predicted:
-    """Response of the whole explanation to a recording's forces, cut and windowed like the measurement."""
-    model, frequencies = explanation.model, lines.padded_frequencies
-    around = surround(explanation, frequencies)
+def predict_lines(hypothesis: Hypothesis, lines: WindowedLines) -> Predicted:
+    """Response of the whole hypothesis to a recording's forces, cut and windowed like the measurement."""
+    model, frequencies = hypothesis.model, lines.padded_frequencies
+    around = surround(hypothesis, frequencies)
     pushed = around.pushed(lines.force_lines)
     joint = np.zeros_like(pushed)
     joints = []
-    for cause in explanation.causes:
+    for cause in hypothesis.causes:
         if cause.direction is not None:
             _, columns = common_axes(model)
             if cause.seen is not None:
@@ -240,26 +240,26 @@ def predict_lines(explanation: Explanation, lines: WindowedLines) -> Predicted:
     return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint, tuple(joints))
 
 
-def line_response(explanation: Explanation, lines: WindowedLines, joint: Complex | None = None) -> Complex:
+def line_response(hypothesis: Hypothesis, lines: WindowedLines, joint: Complex | None = None) -> Complex:
     """Response lines (n_lines, n_responses) of the linear part to the windowed forces: for derivatives, no leakage.
 
     Parameters
     ----------
-    explanation
+    hypothesis
         Its joints are not simulated.
     lines
         Recording.
     joint : (n_lines, n_excitations)
         Windowed lines of the joints' forces, or None.
     """
-    around = surround(explanation, lines.frequencies)
+    around = surround(hypothesis, lines.frequencies)
     force = around.pushed(lines.force_here)
     if joint is not None:
         force = force - joint
     if around.feedback is None:
-        displacement = displacement_at(explanation.model, lines.frequencies, force)
+        displacement = displacement_at(hypothesis.model, lines.frequencies, force)
     else:
-        closed = around.closed(explanation.model.receptance(lines.frequencies))
+        closed = around.closed(hypothesis.model.receptance(lines.frequencies))
         displacement = np.einsum("kpq,kq->kp", closed, force)
     return around.shown(displacement * lines.kinematic)
 

@@ -7,7 +7,7 @@ from scipy.fft import irfft, rfft
 from ..joints.joint_simulation import JointResponse, common_axes, driven_force, joint_dynamics, stiffness_ramp
 from ..joints.tangent_loop import tangent_run
 from ..records.windowed_lines import WindowedLines, displacement_at, receptance_at
-from .hypothesis import TURN_STEP, Cause, Explanation, Predicted, across, surround
+from .hypothesis import TURN_STEP, Cause, Hypothesis, Predicted, across, surround
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -19,7 +19,7 @@ ASIDE = 0.02
 """Step of a cause's coordinates for a difference quotient at given motion."""
 
 
-def joint_changes(explanation: Explanation, lines: WindowedLines, predicted: Predicted) -> Complex:
+def joint_changes(hypothesis: Hypothesis, lines: WindowedLines, predicted: Predicted) -> Complex:
     """Derivative of the windowed lines of the joints' force on the structure, (n_lines, n_excitations, size).
 
     A change of the modal parameters, of the outer force or of an earlier joint changes a joint's driven motion; its
@@ -27,58 +27,58 @@ def joint_changes(explanation: Explanation, lines: WindowedLines, predicted: Pre
 
     Parameters
     ----------
-    explanation
+    hypothesis
         With at least one joint.
     lines
         Recording.
     predicted
-        Of that explanation for it.
+        Of that hypothesis for it.
     """
     frequencies = lines.padded_frequencies
     frequencies = frequencies[frequencies <= BEYOND * lines.frequencies[-1]]
-    outer, change = _outer_change(explanation, lines, len(frequencies))
-    result = np.zeros((len(lines.frequencies), outer.shape[1], explanation.size), dtype=complex)
+    outer, change = _outer_change(hypothesis, lines, len(frequencies))
+    result = np.zeros((len(lines.frequencies), outer.shape[1], hypothesis.size), dtype=complex)
     answers = iter(predicted.joints)
-    at = explanation.shape.size
-    for place, cause in enumerate(explanation.causes):
+    at = hypothesis.shape.size
+    for place, cause in enumerate(hypothesis.causes):
         own = slice(at, at + cause.size)
         at += cause.size
         if cause.direction is None:
             continue
         answer = next(answers)
-        _, columns = common_axes(explanation.model)
+        _, columns = common_axes(hypothesis.model)
         outer[:, columns] -= answer.force[: len(frequencies), None] * cause.direction
-        dg = _force_change(explanation, lines, (cause, own, answer), outer, change)
+        dg = _force_change(hypothesis, lines, (cause, own, answer), outer, change)
         angles = slice(own.start + len(cause.values), own.stop)
         turn = TURN_STEP * across(cause.direction)
         result[:, columns] -= lines.cut(np.asarray(dg))[:, None, :] * cause.direction[:, None]
         result[:, columns, angles] -= lines.cut(irfft(answer.force, n=lines.padded)[:, None])[:, :, None] * turn
-        if any(later.direction is not None for later in explanation.causes[place + 1 :]):
+        if any(later.direction is not None for later in hypothesis.causes[place + 1 :]):
             change[:, columns] -= rfft(dg, n=lines.padded, axis=0)[: len(frequencies), None] * cause.direction[:, None]
             change[:, columns, angles] -= answer.force[: len(frequencies), None, None] * turn
     return result
 
 
-def _outer_change(explanation: Explanation, lines: WindowedLines, count: int) -> tuple[Complex, Complex]:
+def _outer_change(hypothesis: Hypothesis, lines: WindowedLines, count: int) -> tuple[Complex, Complex]:
     """Outer force at padded lines, and its derivative by the numbers of linear causes."""
     frequencies = lines.padded_frequencies[:count]
     force = lines.force_lines[:count]
-    outer = np.array(surround(explanation, frequencies).pushed(force))
-    change = np.zeros((*outer.shape, explanation.size), dtype=complex)
-    here, first = explanation.coordinates(), explanation.shape.size
+    outer = np.array(surround(hypothesis, frequencies).pushed(force))
+    change = np.zeros((*outer.shape, hypothesis.size), dtype=complex)
+    here, first = hypothesis.coordinates(), hypothesis.shape.size
     at = 0
-    for cause in explanation.causes:
+    for cause in hypothesis.causes:
         for k in range(at, at + cause.size if cause.direction is None else at):
             aside = here.copy()
             aside[k] += ASIDE
-            moved = surround(explanation.with_causes(aside), frequencies).pushed(force)
+            moved = surround(hypothesis.with_causes(aside), frequencies).pushed(force)
             change[:, :, first + k] = (moved - outer) / ASIDE
         at += cause.size
     return outer, change
 
 
 def _force_change(
-    explanation: Explanation,
+    hypothesis: Hypothesis,
     lines: WindowedLines,
     joint: tuple[Cause, slice, JointResponse],
     force: Complex,
@@ -89,19 +89,19 @@ def _force_change(
     often = len(answer.deflection) // (len(lines.trial.force) if cause.seen is not None else lines.padded)
     n = often * len(lines.trial.force)
     # a derivative need not be known to more than six digits
-    dg = np.zeros((n, explanation.size), dtype=np.float32)
+    dg = np.zeros((n, hypothesis.size), dtype=np.float32)
     dg[:, own] = _law_change(cause, lines, answer, often)
     if cause.seen is not None:
         return dg
-    driven = _driven_change(explanation, lines, joint, force, change)
-    spectrum = np.zeros((often * lines.padded // 2 + 1, explanation.size), dtype=np.complex64)
+    driven = _driven_change(hypothesis, lines, joint, force, change)
+    spectrum = np.zeros((often * lines.padded // 2 + 1, hypothesis.size), dtype=np.complex64)
     spectrum[: len(driven)] = often * driven
     law, step = cause.law(), 1 / (often * lines.trial.rate)
     s = 2j * np.pi * np.arange(len(spectrum), dtype=np.float32)[:, None] / np.float32(lines.padded * step * often)
     assert cause.direction is not None
     tangent_run(
         (answer.deflection[:n], answer.velocity[:n]),
-        joint_dynamics(explanation.model, cause.direction, step),
+        joint_dynamics(hypothesis.model, cause.direction, step),
         law.tables(),
         (law.reach, law.speed),
         stiffness_ramp(law, n, step, lines.trial.duration),
@@ -142,7 +142,7 @@ def _law_change(cause: Cause, lines: WindowedLines, answer: JointResponse, often
 
 
 def _driven_change(
-    explanation: Explanation,
+    hypothesis: Hypothesis,
     lines: WindowedLines,
     joint: tuple[Cause, slice, JointResponse],
     force: Complex,
@@ -152,17 +152,17 @@ def _driven_change(
     cause, own, answer = joint
     assert cause.direction is not None
     frequencies = lines.padded_frequencies[: len(force)]
-    rows, columns = common_axes(explanation.model)
-    along = np.einsum("p,kpq->kq", cause.direction, receptance_at(explanation.model, frequencies)[:, rows])
-    size = explanation.shape.size
-    modes = explanation.shape.jacobian(explanation.u, frequencies, force)
-    result = np.zeros((len(frequencies), explanation.size), dtype=complex)
+    rows, columns = common_axes(hypothesis.model)
+    along = np.einsum("p,kpq->kq", cause.direction, receptance_at(hypothesis.model, frequencies)[:, rows])
+    size = hypothesis.shape.size
+    modes = hypothesis.shape.jacobian(hypothesis.u, frequencies, force)
+    result = np.zeros((len(frequencies), hypothesis.size), dtype=complex)
     for row, share in zip(rows, cause.direction, strict=True):
         result[:, :size] += share * modes[:, row]
     if change.any():
         result += np.einsum("kq,kqc->kc", along, change)
     turn = TURN_STEP * across(cause.direction)
-    displacement = displacement_at(explanation.model, frequencies, force)[:, rows]
+    displacement = displacement_at(hypothesis.model, frequencies, force)[:, rows]
     angles = displacement @ turn - (along[:, columns] @ turn) * answer.force[: len(force), None]
     result[:, own.start + len(cause.values) : own.stop] += angles
     return np.asarray(result)

@@ -1,4 +1,4 @@
-"""One recording under an explanation: its residual, whitened, and the noise that fits it best."""
+"""One recording under a hypothesis: its residual, whitened, and the noise that fits it best."""
 
 from dataclasses import dataclass
 
@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 from ..noise.line_loops import whitened_columns
 from ..noise.noise_model import NoiseModel, fit_noise, whitening_and_determinant
 from ..records.windowed_lines import WindowedLines
-from .hypothesis import Explanation, Predicted, predict_lines, surround
+from .hypothesis import Hypothesis, Predicted, predict_lines, surround
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Assessed:
-    """One recording under an explanation.
+class Misfit:
+    """One recording under a hypothesis.
 
     Parameters
     ----------
@@ -39,48 +39,48 @@ class Assessed:
     noise: NoiseModel
 
 
-def assess(lines: WindowedLines, explanation: Explanation, noise: NoiseModel) -> Assessed:
+def misfit_under(lines: WindowedLines, hypothesis: Hypothesis, noise: NoiseModel) -> Misfit:
     """Misfit under a given noise; infinite where a prediction is not finite or cannot be made."""
     try:
-        predicted = predict_lines(explanation, lines)
+        predicted = predict_lines(hypothesis, lines)
         rest = lines.measured - predicted.response
-        return misfit_of(lines, predicted, rest, through_structure(explanation, lines), noise)
+        return misfit_of(lines, predicted, rest, through_structure(hypothesis, lines), noise)
     except np.linalg.LinAlgError:
         nothing = np.zeros((0, 0), dtype=complex)
-        return Assessed(Predicted(nothing, nothing, nothing, ()), nothing, nothing, np.inf, noise)
+        return Misfit(Predicted(nothing, nothing, nothing, ()), nothing, nothing, np.inf, noise)
 
 
 def with_noise(
-    lines: WindowedLines, explanation: Explanation, noise: NoiseModel | None, seen: Assessed | None = None
-) -> Assessed:
+    lines: WindowedLines, hypothesis: Hypothesis, noise: NoiseModel | None, seen: Misfit | None = None
+) -> Misfit:
     """Misfit under the noise that fits the residual best.
 
     Raises
     ------
     numpy.linalg.LinAlgError
-        The explanation predicts no finite response: simulated freely, it runs away.
+        The hypothesis predicts no finite response: simulated freely, it runs away.
     """
-    predicted = seen.predicted if seen is not None else predict_lines(explanation, lines)
+    predicted = seen.predicted if seen is not None else predict_lines(hypothesis, lines)
     rest = lines.measured - predicted.response
     if not np.isfinite(rest).all():
         raise np.linalg.LinAlgError(f"the response predicted for {lines.trial.name} is not finite")
-    through = through_structure(explanation, lines)
+    through = through_structure(hypothesis, lines)
     found = fit_noise(lines.frequencies, rest, through, levels(lines), noise)
     return misfit_of(lines, predicted, rest, through, found)
 
 
-def least_misfit(explanation: Explanation, lines: WindowedLines) -> float:
-    """Misfit of an explanation to one recording under its likeliest noise; infinite where it runs away."""
+def least_misfit(hypothesis: Hypothesis, lines: WindowedLines) -> float:
+    """Misfit of a hypothesis to one recording under its likeliest noise; infinite where it runs away."""
     try:
-        return with_noise(lines, explanation, None).misfit
+        return with_noise(lines, hypothesis, None).misfit
     except np.linalg.LinAlgError:
         return np.inf
 
 
-def through_structure(explanation: Explanation, lines: WindowedLines) -> Complex:
+def through_structure(hypothesis: Hypothesis, lines: WindowedLines) -> Complex:
     """From forces to measured responses at the lines, (n_lines, n_responses, n_excitations)."""
-    around = surround(explanation, lines.frequencies)
-    closed = around.closed(explanation.model.receptance(lines.frequencies))
+    around = surround(hypothesis, lines.frequencies)
+    closed = around.closed(hypothesis.model.receptance(lines.frequencies))
     if around.force is not None:
         closed = closed @ around.force
     return np.asarray(around.shown(closed * lines.kinematic[:, :, None]) @ lines.trust)
@@ -103,12 +103,12 @@ def whitened(white: Complex, lines: Complex) -> Real:
 
 def misfit_of(
     lines: WindowedLines, predicted: Predicted, rest: Complex, through: Complex, noise: NoiseModel
-) -> Assessed:
+) -> Misfit:
     """Misfit of a residual under a given noise; infinite where it is not finite."""
     if not np.isfinite(rest).all():
-        return Assessed(predicted, rest, rest, np.inf, noise)
+        return Misfit(predicted, rest, rest, np.inf, noise)
     covariance = noise.covariance(lines.frequencies, through)
     white, log_determinant = whitening_and_determinant(covariance)
     small = whitened(white, rest[:, :, None])
     misfit = 2 * float(log_determinant + np.vdot(small, small))
-    return Assessed(predicted, white, rest, misfit if np.isfinite(misfit) else np.inf, noise)
+    return Misfit(predicted, white, rest, misfit if np.isfinite(misfit) else np.inf, noise)

@@ -10,33 +10,33 @@ from modal_fit import ModalModel
 
 from ..joints.joint_law import JointMotion
 from ..physics import Physics, library
-from .hypothesis import Cause, Explanation
+from .hypothesis import Cause, Hypothesis
 from .model_shape import LabError, ModelShape
 
 
-def improved_model(explanation: Explanation, faults: tuple[dict[str, Any], ...] = ()) -> ModalModel:
+def improved_model(hypothesis: Hypothesis, faults: tuple[dict[str, Any], ...] = ()) -> ModalModel:
     """The refitted modes with a term ``{name, location, parameters}`` for each cause.
 
     Parameters
     ----------
-    explanation
+    hypothesis
         Fitted.
     faults
         Terms of causes that are no part of it: a tone, a limit.
     """
     terms = []
-    for cause in explanation.causes:
+    for cause in hypothesis.causes:
         names = [parameter.name for parameter in cause.physics.parameters]
         location: dict[str, Any] = {"place": cause.place}
         if cause.direction is not None and cause.motion is not None:
             location = {"direction": [float(x) for x in cause.direction], "motion": asdict(cause.motion)}
         values = {name: float(value) for name, value in zip(names, cause.values, strict=True)}
         terms.append({"name": cause.physics.name, "location": location, "parameters": values})
-    return replace(explanation.model, physics=(*terms, *faults))
+    return replace(hypothesis.model, physics=(*terms, *faults))
 
 
-def explanation_of(model: ModalModel, causes: dict[str, Physics] | None = None) -> Explanation:
-    """An explanation that predicts what a model file says; terms that are no physics of the structure are left out.
+def hypothesis_of(model: ModalModel, causes: dict[str, Physics] | None = None) -> Hypothesis:
+    """A hypothesis that predicts what a model file says; terms that are no physics of the structure are left out.
 
     Raises
     ------
@@ -62,4 +62,4 @@ def explanation_of(model: ModalModel, causes: dict[str, Physics] | None = None) 
         except (KeyError, TypeError, ValueError) as error:
             raise FileFormatError(f"the model's term {name} is incomplete: {error}; diagnose again") from error
     shape = ModelShape(replace(model, physics=()), LabError())
-    return Explanation(shape, np.zeros(shape.size), tuple(found))
+    return Hypothesis(shape, np.zeros(shape.size), tuple(found))

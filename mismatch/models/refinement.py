@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from ...models.fitting import Fit, fit
-from ...models.hypothesis import Cause, Explanation
+from ...models.hypothesis import Cause, Hypothesis
 from ...physics import ChainPhysics
 from ...records.windowed_lines import WindowedLines
 from .reporting_numbers import modal_deviation
@@ -24,10 +24,10 @@ def settled(lines: list[WindowedLines], fitted: Fit) -> Fit:
     fitted
         From a few steps.
     """
-    rested = fit(lines, fitted.explanation, fitted.noises, iterations=ITERATIONS)
-    if modal_deviation(rested) is None or not rested.explanation.causes:
+    rested = fit(lines, fitted.hypothesis, fitted.noises, iterations=ITERATIONS)
+    if modal_deviation(rested) is None or not rested.hypothesis.causes:
         return rested
-    again = fit(lines, believed(rested.explanation), rested.noises, iterations=ITERATIONS)
+    again = fit(lines, believed(rested.hypothesis), rested.noises, iterations=ITERATIONS)
     return min(rested, again, key=lambda one: one.score)
 
 
@@ -45,17 +45,17 @@ def with_chain(lines: list[WindowedLines], current: Fit, cause: Cause) -> Fit:
     cause
         With numbers to begin with.
     """
-    explanation = current.explanation
-    fitted = fit(lines, explanation.with_cause(cause), current.noises)
+    hypothesis = current.hypothesis
+    fitted = fit(lines, hypothesis.with_cause(cause), current.noises)
     if modal_deviation(current) is None or not isinstance(cause.physics, ChainPhysics):
         return fitted
-    absent = replace(cause, values=cause.physics.start(explanation.shape.nominal))
-    fresh = believed(explanation).with_cause(absent)
+    absent = replace(cause, values=cause.physics.start(hypothesis.shape.nominal))
+    fresh = believed(hypothesis).with_cause(absent)
     return min(fitted, fit(lines, fresh, iterations=FROM_BELIEF), key=lambda one: one.score)
 
 
-def believed(explanation: Explanation) -> Explanation:
+def believed(hypothesis: Hypothesis) -> Hypothesis:
     """The same causes and added modes on the lab's own model."""
-    shape, u = explanation.shape, explanation.u.copy()
+    shape, u = hypothesis.shape, hypothesis.u.copy()
     u[: shape.per_mode * (len(shape.nominal.poles) - shape.added)] = 0.0
-    return replace(explanation, u=u)
+    return replace(hypothesis, u=u)

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.hypothesis import Explanation, predict_lines
+from ..models.hypothesis import Hypothesis, predict_lines
 from ..records.windowed_lines import WindowedLines
 
 Complex = NDArray[np.complex128]
@@ -21,7 +21,7 @@ NOT_SMALL = 1e-3
 """Least share of a channel's whole power that this must be."""
 
 
-def beyond_model(explanation: Explanation, lines: list[WindowedLines]) -> tuple[str, ...]:
+def beyond_model(hypothesis: Hypothesis, lines: list[WindowedLines]) -> tuple[str, ...]:
     """One doubt for each side of the modes where recordings show response that the model does not give.
 
     In windows of neighbouring lines the residual is regressed on the forces; what the forces explain beyond chance is
@@ -29,12 +29,12 @@ def beyond_model(explanation: Explanation, lines: list[WindowedLines]) -> tuple[
 
     Parameters
     ----------
-    explanation
+    hypothesis
         The model, refitted or not.
     lines
         Windowed lines of every recording that is compared.
     """
-    model = explanation.model
+    model = hypothesis.model
     if model.band is not None:
         return ()
     natural = model.natural_frequencies
@@ -42,17 +42,17 @@ def beyond_model(explanation: Explanation, lines: list[WindowedLines]) -> tuple[
         (0.0, float(natural.min()) / ASIDE, "below the lowest mode"),
         (float(natural.max()) * ASIDE, np.inf, "above the highest mode"),
     )
-    return tuple(said for low, high, place in sides if (said := _doubt(explanation, lines, (low, high), place)))
+    return tuple(said for low, high, place in sides if (said := _doubt(hypothesis, lines, (low, high), place)))
 
 
-def _doubt(explanation: Explanation, lines: list[WindowedLines], edges: tuple[float, float], place: str) -> str:
+def _doubt(hypothesis: Hypothesis, lines: list[WindowedLines], edges: tuple[float, float], place: str) -> str:
     """The sentence for one side; empty where nothing is missed there in half of the recordings."""
     lacking = []
     for one in lines:
         inside = (one.frequencies >= edges[0]) & (one.frequencies <= edges[1])
         if inside.sum() < 2 * WINDOW:
             return ""
-        rest = (one.measured - predict_lines(explanation, one).response)[inside]
+        rest = (one.measured - predict_lines(hypothesis, one).response)[inside]
         moved = _moved_by_forces(rest, one.force_here[inside])
         here = np.sum(np.abs(one.measured[inside]) ** 2, axis=0)
         whole = np.sum(np.abs(one.measured) ** 2, axis=0)

@@ -8,7 +8,7 @@ from scipy.fft import irfft
 from scipy.signal import ShortTimeFFT
 from scipy.signal.windows import hann
 
-from ..models.hypothesis import Explanation, predict_lines
+from ..models.hypothesis import Hypothesis, predict_lines
 from ..records.windowed_lines import WindowedLines
 from .cell_regression import moving_power
 from .repeated_part import repeated_share
@@ -42,7 +42,7 @@ class Leftover:
     power: float
 
 
-def leftover(explanation: Explanation, lines: list[WindowedLines]) -> Leftover:
+def leftover(hypothesis: Hypothesis, lines: list[WindowedLines]) -> Leftover:
     """How much of the residual moves with the predicted response.
 
     In cells of time and frequency the residual's power is regressed, with non-negative factors, on a constant (noise of
@@ -55,25 +55,25 @@ def leftover(explanation: Explanation, lines: list[WindowedLines]) -> Leftover:
 
     Parameters
     ----------
-    explanation
+    hypothesis
         After all that was found.
     lines
         Recordings.
     """
     found = []
     for one in lines:
-        moving = _moving(explanation, one)
+        moving = _moving(hypothesis, one)
         measured = one.with_measured_forces()
         if not np.array_equal(measured.force_here, one.force_here):
-            moving = np.minimum(moving, _moving(explanation, measured))
-        found.append(np.maximum(moving, _repeating(explanation, one)))
+            moving = np.minimum(moving, _moving(hypothesis, measured))
+        found.append(np.maximum(moving, _repeating(hypothesis, one)))
     share, power = np.concatenate(found).mean(axis=0)
     return Leftover(float(share), float(power))
 
 
-def _moving(explanation: Explanation, one: WindowedLines) -> Real:
+def _moving(hypothesis: Hypothesis, one: WindowedLines) -> Real:
     """Share of the residual's power and of the response's that moves with the signal, (n_responses, 2)."""
-    predicted = predict_lines(explanation, one)
+    predicted = predict_lines(hypothesis, one)
     n = len(one.trial.force)
     shown = irfft(predicted.spectrum, n=one.padded, axis=0)[:n]
     rest = (one.trial.response - shown)[one.start : n - int(one.trial.rate) // 2]
@@ -89,12 +89,12 @@ def _moving(explanation: Explanation, one: WindowedLines) -> Real:
     return np.array(found)
 
 
-def _repeating(explanation: Explanation, one: WindowedLines) -> Real:
+def _repeating(hypothesis: Hypothesis, one: WindowedLines) -> Real:
     """Share of the residual's power and of the response's that repeats with the forces, (n_responses, 2)."""
-    share = repeated_share(explanation, one)
+    share = repeated_share(hypothesis, one)
     if not share.any():
         return np.zeros((len(share), 2))
-    rest = np.sum(np.abs(one.measured - predict_lines(explanation, one).response) ** 2, axis=0)
+    rest = np.sum(np.abs(one.measured - predict_lines(hypothesis, one).response) ** 2, axis=0)
     return np.column_stack([share, share * rest / np.sum(np.abs(one.measured) ** 2, axis=0)])
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-from ..models.hypothesis import Explanation, predict_lines
+from ..models.hypothesis import Hypothesis, predict_lines
 from ..records.windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
@@ -19,7 +19,7 @@ MOST = 0.25
 """Share of a residual's power that must repeat before it counts: a small error of a refit repeats too."""
 
 
-def repeated_share(explanation: Explanation, lines: WindowedLines) -> Real:
+def repeated_share(hypothesis: Hypothesis, lines: WindowedLines) -> Real:
     """Share of each response's residual power that repeats with the forces, (n_responses,); 0 below :data:`MOST`.
 
     The residual r of the compared band is multiplied with itself one period T of the forces later:
@@ -27,18 +27,18 @@ def repeated_share(explanation: Explanation, lines: WindowedLines) -> Real:
 
     Parameters
     ----------
-    explanation
+    hypothesis
         What predicts.
     lines
         One recording. Of forces that do not repeat all shares are 0.
     """
     nothing = np.zeros(lines.measured.shape[1])
-    decay = float((-explanation.model.poles.real).min())
+    decay = float((-hypothesis.model.poles.real).min())
     lag = repeat_of(lines.trial.force, int(RUNG_OUT / decay * lines.trial.rate), len(lines.window) // 2)
     if lag is None:
         return nothing
     spectrum = np.zeros((len(lines.window) // 2 + 1, len(nothing)), dtype=complex)
-    spectrum[lines.band] = lines.measured - predict_lines(explanation, lines).response
+    spectrum[lines.band] = lines.measured - predict_lines(hypothesis, lines).response
     rest = irfft(spectrum, n=len(lines.window), axis=0)
     first, later = rest[:-lag], rest[lag:]
     power = np.mean(first**2 + later**2, axis=0) / 2

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.hypothesis import Cause, Explanation, line_response
+from ..models.hypothesis import Cause, Hypothesis, line_response
 from ..physics import ChainPhysics
 from .linear_floor import Floor
 
@@ -20,7 +20,7 @@ class ScreenedChain:
     gain: float
 
 
-def screen_chains(floor: Floor, explanation: Explanation, causes: list[ChainPhysics]) -> list[ScreenedChain]:
+def screen_chains(floor: Floor, hypothesis: Hypothesis, causes: list[ChainPhysics]) -> list[ScreenedChain]:
     """Rank linear causes at all their places, best first.
 
     The gain is ``g^T S^-1 g`` with g the gradient along the cause's numbers and S its normal matrix after modal
@@ -28,15 +28,15 @@ def screen_chains(floor: Floor, explanation: Explanation, causes: list[ChainPhys
     """
     found = []
     for physics in causes:
-        for place in physics.places(explanation.shape.nominal):
-            start = Cause(physics, physics.start(explanation.shape.nominal), place)
-            gain, step = _gain(floor, explanation, start)
+        for place in physics.places(hypothesis.shape.nominal):
+            start = Cause(physics, physics.start(hypothesis.shape.nominal), place)
+            gain, step = _gain(floor, hypothesis, start)
             found.append(ScreenedChain(start.moved(start.coordinates() + np.clip(step, -60, 60)), gain))
     return sorted(found, key=lambda one: -one.gain)
 
 
-def _gain(floor: Floor, explanation: Explanation, cause: Cause) -> tuple[float, Real]:
-    with_it = explanation.with_cause(cause)
+def _gain(floor: Floor, hypothesis: Hypothesis, cause: Cause) -> tuple[float, Real]:
+    with_it = hypothesis.with_cause(cause)
     here = with_it.coordinates()
     own = np.zeros((cause.size, cause.size))
     shared = np.zeros((len(floor.gradient), cause.size))

@@ -53,15 +53,15 @@ class SightedLaws:
 
 def sighted_laws(lines: list[WindowedLines], current: Fit, laws: list[JointPhysics]) -> SightedLaws:
     """Screen joint laws along the direction that stands out; nothing where none does."""
-    taken = {answer_name(cause.physics) for cause in current.explanation.causes}
+    taken = {answer_name(cause.physics) for cause in current.hypothesis.causes}
     laws = [law for law in laws if answer_name(law) not in taken]
     floor = linear_floor(current, lines)
-    sighting = find_direction(floor, current.explanation)
+    sighting = find_direction(floor, current.hypothesis)
     # along a single axis there is no direction to stand out, and a broad force looks like a higher floor
     if not laws or (len(sighting.direction) > 1 and sighting.gain < STANDS_OUT * len(lines)):
         return SightedLaws((), ())
     location = {"direction": [round(float(x), 6) for x in sighting.direction]}
-    screened = screen_joints(floor, current.explanation, sighting.direction, laws)
+    screened = screen_joints(floor, current.hypothesis, sighting.direction, laws)
     weighed = [Candidate(answer_name(one.causes[0].physics), one.gain, "screened", location) for one in screened]
     return SightedLaws(tuple(screened), tuple(weighed))
 
@@ -103,19 +103,19 @@ def _driven(lines: list[WindowedLines], current: Fit, screened: Screened) -> Fit
     """A law fitted to the motion seen, from the better of its two best shapes."""
     rough = [one.thinned(FEW) for one in lines]
     starts = [
-        fit(rough, current.explanation.with_cause(cause), current.noises, iterations=2) for cause in screened.causes[:2]
+        fit(rough, current.hypothesis.with_cause(cause), current.noises, iterations=2) for cause in screened.causes[:2]
     ]
     best = min(starts, key=lambda start: start.score)
-    return fit(lines, best.explanation, best.noises, iterations=4)
+    return fit(lines, best.hypothesis, best.noises, iterations=4)
 
 
 def _simulated(lines: list[WindowedLines], near: Fit) -> Option | None:
     """The law of a driven fit, now free to move as it makes the structure move; None if that runs away."""
-    last = near.explanation.causes[-1]
-    free = replace(near.explanation, causes=(*near.explanation.causes[:-1], replace(last, seen=None)))
+    last = near.hypothesis.causes[-1]
+    free = replace(near.hypothesis, causes=(*near.hypothesis.causes[:-1], replace(last, seen=None)))
     # the one that is accepted is fitted to the end
     try:
         fitted = fit(lines, free, near.noises, iterations=10, tolerance=10.0)
     except np.linalg.LinAlgError:
         return None
-    return Option(answer_name(last.physics), direction_of(fitted.explanation.causes[-1]), fitted)
+    return Option(answer_name(last.physics), direction_of(fitted.hypothesis.causes[-1]), fitted)

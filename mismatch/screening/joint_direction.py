@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 from ..joints.joint_law import JointMotion
 from ..joints.joint_simulation import common_axes
-from ..models.hypothesis import Explanation, columns_of, predict_lines
+from ..models.hypothesis import Hypothesis, columns_of, predict_lines
 from ..records.windowed_lines import receptance_at
 from .linear_floor import Floor, FloorRecord
 
@@ -36,7 +36,7 @@ class JointSighting:
     share: float
 
 
-def find_direction(floor: Floor, explanation: Explanation) -> JointSighting:
+def find_direction(floor: Floor, hypothesis: Hypothesis) -> JointSighting:
     """Most likely direction of a single force of unknown spectrum.
 
     For each narrow band the residual ``r = G d u + noise`` has the statistic
@@ -44,7 +44,7 @@ def find_direction(floor: Floor, explanation: Explanation) -> JointSighting:
     ``2 n (z - 1 - ln z)`` where z > 1. The start is the first eigenvector of the force that the residual asks for,
     ``sum w Re(F F^H)``, ``F = G^-1 r``.
     """
-    columns = columns_of(explanation.model)
+    columns = columns_of(hypothesis.model)
     bands = [_band_statistics(record, columns) for record in floor.records]
     n = len(columns)
 
@@ -126,15 +126,15 @@ class SeenMotion:
     force: Real
 
 
-def seen_motion(record: FloorRecord, explanation: Explanation, direction: Real) -> SeenMotion:
+def seen_motion(record: FloorRecord, hypothesis: Hypothesis, direction: Real) -> SeenMotion:
     """Motion along a direction: the model's, corrected by the force that the residual asks for.
 
     The force is the posterior mean ``u = lambda h^H (V + lambda h h^H)^-1 r`` with lambda from the residual's power in
     each band (Wiener's filter), so that noise is not integrated where nothing is seen.
     """
     lines = record.lines
-    rows, columns = common_axes(explanation.model)
-    predicted = predict_lines(explanation, lines)
+    rows, columns = common_axes(hypothesis.model)
+    predicted = predict_lines(hypothesis, lines)
     n = len(lines.trial.force)
     frequencies = lines.padded_frequencies
     whole = np.zeros((lines.padded, lines.measured.shape[1]))
@@ -150,7 +150,7 @@ def seen_motion(record: FloorRecord, explanation: Explanation, direction: Real) 
         gains[inside, p] = np.interp(frequencies[inside], lines.frequencies, filtered[:, p].real)
         gains[inside, p] += 1j * np.interp(frequencies[inside], lines.frequencies, filtered[:, p].imag)
     force = np.einsum("kp,kp->k", gains, rest)
-    receptance = receptance_at(explanation.model, frequencies)[:, rows]
+    receptance = receptance_at(hypothesis.model, frequencies)[:, rows]
     displacement = np.einsum("kpq,kq->kp", receptance, lines.force_lines - predicted.joint) @ direction
     displacement = displacement + np.einsum("p,kpq,q->k", direction, receptance[:, :, columns], direction) * force
     deflection = irfft(displacement, n=lines.padded)[:n]

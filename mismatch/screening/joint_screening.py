@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.fft import rfft
 
 from ..joints.joint_simulation import driven_force
-from ..models.hypothesis import Cause, Explanation, columns_of
+from ..models.hypothesis import Cause, Hypothesis, columns_of
 from ..physics import JointPhysics
 from ..records.windowed_lines import receptance_at
 from .joint_direction import SeenMotion, motion_of, seen_motion
@@ -32,23 +32,23 @@ class Screened:
     gain: float
 
 
-def screen_joints(floor: Floor, explanation: Explanation, direction: Real, laws: list[JointPhysics]) -> list[Screened]:
+def screen_joints(floor: Floor, hypothesis: Hypothesis, direction: Real, laws: list[JointPhysics]) -> list[Screened]:
     """Rank laws along a direction, best first; those of the wrong sign are left out.
 
     Parameters
     ----------
     floor
         Residual of the fit so far.
-    explanation
+    hypothesis
         That fit.
     direction : (n_axes,)
         Unit vector.
     laws
         To try.
     """
-    seen = [seen_motion(record, explanation, direction) for record in floor.records]
-    columns = columns_of(explanation.model)
-    static = explanation.model.receptance(np.array([explanation.model.natural_frequencies.min() / 20]))[0]
+    seen = [seen_motion(record, hypothesis, direction) for record in floor.records]
+    columns = columns_of(hypothesis.model)
+    static = hypothesis.model.receptance(np.array([hypothesis.model.natural_frequencies.min() / 20]))[0]
     stiffness = 1 / abs(direction @ static[np.ix_(range(len(columns)), columns)] @ direction)
     motion = motion_of(seen, float(stiffness))
     by_name = {
@@ -58,7 +58,7 @@ def screen_joints(floor: Floor, explanation: Explanation, direction: Real, laws:
     for law in laws:
         causes = [Cause(law, start, "", direction, motion, by_name) for start in law.starts(motion)]
         parts = [
-            [_column(record, explanation, one, cause) for record, one in zip(floor.records, seen, strict=True)]
+            [_column(record, hypothesis, one, cause) for record, one in zip(floor.records, seen, strict=True)]
             for cause in causes
         ]
         gains, factors = floor.gains(parts)
@@ -71,13 +71,13 @@ def screen_joints(floor: Floor, explanation: Explanation, direction: Real, laws:
     return sorted(found, key=lambda one: -one.gain)
 
 
-def _column(record: FloorRecord, explanation: Explanation, seen: SeenMotion, cause: Cause) -> Real:
+def _column(record: FloorRecord, hypothesis: Hypothesis, seen: SeenMotion, cause: Cause) -> Real:
     """Whitened response to the law's force for the motion that was seen."""
     assert cause.direction is not None
     lines = record.lines
     force = driven_force(lines, seen.deflection, seen.velocity, cause.law())
     spectrum = rfft(force, n=lines.padded)
-    columns = columns_of(explanation.model)
-    receptance = receptance_at(explanation.model, lines.padded_frequencies)[:, :, columns] @ cause.direction
+    columns = columns_of(hypothesis.model)
+    receptance = receptance_at(hypothesis.model, lines.padded_frequencies)[:, :, columns] @ cause.direction
     response = -receptance * spectrum[:, None] * lines.padded_kinematic
     return record.column(lines.cut(lines.signal(response)))

@@ -10,7 +10,7 @@ from ..adapters.structure.acceptance import Option
 from ..adapters.structure.settling import with_chain
 from ..inference.process_pool import in_processes
 from ..models.fitting import Fit, fit
-from ..models.hypothesis import Cause, Explanation
+from ..models.hypothesis import Cause, Hypothesis
 from ..physics import FormedPhysics, answer_name
 from ..records.windowed_lines import WindowedLines
 from .chain_screening import ScreenedChain
@@ -50,8 +50,8 @@ def linear_options(
     for one in chains[:MOST_CHAINS]:
         if one.gain > max(least, one.cause.size * cost, PROMISING * largest):
             tasks.append(partial(_chain_option, lines, current, one.cause))
-    numbers = current.explanation.shape.per_mode - 2
-    if not current.explanation.causes and mode.gain > max(least, numbers * cost, PROMISING * largest):
+    numbers = current.hypothesis.shape.per_mode - 2
+    if not current.hypothesis.causes and mode.gain > max(least, numbers * cost, PROMISING * largest):
         tasks.append(partial(_mode_option, lines, current, mode))
     return [option for option in in_processes(tasks) if option is not None]
 
@@ -61,17 +61,17 @@ def _chain_option(lines: list[WindowedLines], current: Fit, cause: Cause) -> Opt
 
 
 def _mode_option(lines: list[WindowedLines], current: Fit, mode: SightedMode) -> Option | None:
-    before, u = current.explanation.shape, current.explanation.u
+    before, u = current.hypothesis.shape, current.hypothesis.u
     shape = before.with_mode(mode.pole, mode.right, mode.left)
     own, outside = u[: before.modal_size], u[before.modal_size :]
-    start = Explanation(shape, np.concatenate([own, np.zeros(shape.per_mode), outside]))
+    start = Hypothesis(shape, np.concatenate([own, np.zeros(shape.per_mode), outside]))
     fitted = fit(lines, start, current.noises, iterations=12)
     return Option("missing_mode", {}, fitted) if _is_resolved(fitted, lines) else None
 
 
 def _is_resolved(fitted: Fit, lines: list[WindowedLines]) -> bool:
     """Whether the added mode is wider than the lines of a record: else it is a tone, or an accident of some lines."""
-    pole = fitted.explanation.model.poles[-1]
+    pole = fitted.hypothesis.model.poles[-1]
     width = -float(pole.real) / np.pi
     return width > RESOLVED * max(one.trial.rate / len(one.window) for one in lines)
 

@@ -125,23 +125,23 @@ def _floor(
 ) -> Floor:
     """Of many lines every few count, each for as many as it stands for."""
     records = []
-    size = fitted.explanation.size
+    size = fitted.hypothesis.size
     matrix, gradient = np.zeros((size, size)), np.zeros(size)
     belief = np.full(size, 1e-6)
-    belief[: fitted.explanation.shape.size] = fitted.explanation.shape.belief
+    belief[: fitted.hypothesis.shape.size] = fitted.hypothesis.shape.belief
     for k, whole in enumerate(lines):
         one = whole.thinned(ENOUGH)
         stands_for = len(whole.frequencies) / len(one.frequencies)
-        predicted = predict_lines(fitted.explanation, one)
+        predicted = predict_lines(fitted.hypothesis, one)
         rest = one.measured - predicted.response
-        through = through_structure(fitted.explanation, one)
+        through = through_structure(fitted.hypothesis, one)
         white = whitening(covariance(k, rest, through, one)) * np.sqrt(stands_for)
-        stacked = whitened(white, jacobian(fitted.explanation, one, predicted))
+        stacked = whitened(white, jacobian(fitted.hypothesis, one, predicted))
         record = FloorRecord(one, rest, through, white, stacked, whitened(white, rest[:, :, None])[:, 0])
         records.append(record)
         matrix += 2 * stacked.T @ stacked
         gradient += 2 * stacked.T @ record.rest
-    gradient[: fitted.explanation.shape.size] -= fitted.explanation.shape.belief * fitted.explanation.u
+    gradient[: fitted.hypothesis.shape.size] -= fitted.hypothesis.shape.belief * fitted.hypothesis.u
     return Floor(tuple(records), np.asarray(np.linalg.inv(matrix + np.diag(belief)), dtype=float), gradient)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.hypothesis import Explanation
+from ..models.hypothesis import Hypothesis
 from .linear_floor import Floor, FloorRecord
 
 Complex = NDArray[np.complex128]
@@ -27,7 +27,7 @@ class SightedMode:
     gain: float
 
 
-def find_mode(floor: Floor, explanation: Explanation) -> SightedMode:
+def find_mode(floor: Floor, hypothesis: Hypothesis) -> SightedMode:
     """The pole and residue that explain most of the residual.
 
     For poles over the band a residue of full rank is fitted by linear least squares after the modal parameters have
@@ -36,7 +36,7 @@ def find_mode(floor: Floor, explanation: Explanation) -> SightedMode:
     low = min(record.lines.frequencies[0] for record in floor.records)
     high = max(record.lines.frequencies[-1] for record in floor.records)
     best: tuple[float, complex, Real] | None = None
-    thin = _thinned(floor, explanation)
+    thin = _thinned(floor, hypothesis)
     for frequency in np.geomspace(1.3 * low, 0.95 * high, FREQUENCIES):
         for damping in DAMPINGS:
             pole = 2 * np.pi * frequency * (-damping + 1j * np.sqrt(1 - damping**2))
@@ -48,7 +48,7 @@ def find_mode(floor: Floor, explanation: Explanation) -> SightedMode:
     n, m = floor.records[0].through.shape[1:]
     parts = numbers.reshape(2, n, m)
     u, s, vh = np.linalg.svd(parts[0] + 1j * parts[1])
-    scale = np.sqrt(s[0] * np.linalg.norm(explanation.model.left) / np.linalg.norm(explanation.model.right))
+    scale = np.sqrt(s[0] * np.linalg.norm(hypothesis.model.left) / np.linalg.norm(hypothesis.model.right))
     return SightedMode(pole, u[:, 0] * s[0] / scale, vh[0] * scale, gain * s[0] ** 2 / np.sum(s**2))
 
 
@@ -61,12 +61,12 @@ class _Thin:
     gradient: Real
 
 
-def _thinned(floor: Floor, explanation: Explanation) -> _Thin:
+def _thinned(floor: Floor, hypothesis: Hypothesis) -> _Thin:
     size = len(floor.gradient)
     matrix, gradient = np.diag(np.full(size, 1e-6)), np.zeros(size)
-    shape = explanation.shape
+    shape = hypothesis.shape
     matrix[np.arange(shape.size), np.arange(shape.size)] = shape.belief
-    gradient[: shape.size] = -shape.belief * explanation.u
+    gradient[: shape.size] = -shape.belief * hypothesis.u
     records = []
     for record in floor.records:
         chosen = _chosen(record)

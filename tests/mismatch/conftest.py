@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from mismatch import Diagnosis, Explanation, LabError, ModelShape, Trial, band_of, predict_lines, windowed_lines
+from mismatch import Diagnosis, Hypothesis, LabError, ModelShape, Trial, band_of, predict_lines, windowed_lines
 from mismatch.inference.diagnosis import Improvement
 from mismatch.models.fitting import Fit
 from mismatch.noise.noise_model import KNOTS, NoiseModel
@@ -89,7 +89,7 @@ def _trial(model: ModalModel, name: str, level: float, seed: int) -> Trial:
     empty = Trial(name, RATE, force, np.zeros((n, 2)), np.array([2, 2]), channels)
     lines = windowed_lines(empty, band_of(model, RATE), 1.0)
     shape = ModelShape(model, LabError())
-    response = lines.signal(predict_lines(Explanation(shape, np.zeros(shape.size)), lines).spectrum)
+    response = lines.signal(predict_lines(Hypothesis(shape, np.zeros(shape.size)), lines).spectrum)
     return Trial(name, RATE, force, response + NOISE * rng.normal(size=(n, 2)), np.array([2, 2]), channels)
 
 
@@ -99,7 +99,7 @@ def _hand_made(model: ModalModel, trials: list[Trial]) -> Diagnosis:
     shape = ModelShape(model, LabError())
     knots = np.log(np.geomspace(lines[0].frequencies[0], lines[0].frequencies[-1], KNOTS))
     noise = NoiseModel(knots, np.full((2, KNOTS), np.log(NOISE**2)), np.full(2, -60.0))
-    explanation = Explanation(shape, np.zeros(shape.size))
-    fitted = Fit(explanation, (noise,) * len(lines), 0.0, 0.0, 0.0, 1e-6 * np.eye(shape.size))
+    hypothesis = Hypothesis(shape, np.zeros(shape.size))
+    fitted = Fit(hypothesis, (noise,) * len(lines), 0.0, 0.0, 0.0, 1e-6 * np.eye(shape.size))
     gain = Improvement(trials[len(trials) // 2].name, 0.3, 0.2, 0.1, 0.09, 0.01, (0.2, 0.4))
-    return Diagnosis("none", (), (), (), gain, 0.0, fitted, fitted, lines, (explanation, explanation))
+    return Diagnosis("none", (), (), (), gain, 0.0, fitted, fitted, lines, (hypothesis, hypothesis))

@@ -9,7 +9,7 @@ import pytest
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from foundation import InputError
-from mismatch import Explanation, LabError, ModelShape, Trial, band_of, windowed_lines
+from mismatch import Hypothesis, LabError, ModelShape, Trial, band_of, windowed_lines
 from mismatch.joints.joint_law import JointLaw, JointMotion
 from mismatch.models.equivalent_receptance import equivalent_receptance
 from mismatch.models.hypothesis import Cause
@@ -53,7 +53,7 @@ def test_a_linear_joint_is_the_structure_with_its_spring_and_damper(
     k, c = 2e4, 100.0
     cause = Cause(_Spring(), np.array([k, c]), "", DIRECTION, MOTION)
     frequencies = np.linspace(2, 30, 50)
-    found = equivalent_receptance(Explanation(shape, np.zeros(shape.size), (cause,)), lines, frequencies)
+    found = equivalent_receptance(Hypothesis(shape, np.zeros(shape.size), (cause,)), lines, frequencies)
     receptance = small_model.receptance(frequencies)
     added = (k + 2j * np.pi * frequencies * c)[:, None, None] * np.outer(DIRECTION, DIRECTION)
     expected = np.linalg.solve(np.eye(2) + receptance @ added, receptance)
@@ -70,7 +70,7 @@ def test_faults_of_the_chain_are_no_part_of_the_structure(
     cause = Cause(gain, np.array([0.5]), gain.places(small_model)[0])
     assert gain.chain(np.array([1j]), cause.values, cause.place, small_model).feedback is None
     frequencies = np.linspace(2, 30, 50)
-    found = equivalent_receptance(Explanation(shape, np.zeros(shape.size), (cause,)), lines, frequencies)
+    found = equivalent_receptance(Hypothesis(shape, np.zeros(shape.size), (cause,)), lines, frequencies)
     np.testing.assert_allclose(found.values, small_model.receptance(frequencies))
 
 

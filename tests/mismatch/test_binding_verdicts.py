@@ -8,7 +8,7 @@ import pytest
 from concealed_recordings import RATE, Concealed, forces, linear_acceleration, trial
 
 from millfrf.report.diagnosis_answers import named, verdict_sentence
-from mismatch import Diagnosis, Explanation, LabError, ModelShape, Trial, band_of, diagnose, windowed_lines
+from mismatch import Diagnosis, Hypothesis, LabError, ModelShape, Trial, band_of, diagnose, windowed_lines
 from mismatch.adapters.structure.acceptance import LEAST_EVIDENCE
 from mismatch.adapters.structure.confirmed import helps
 from mismatch.adapters.structure.held_out import block_powers
@@ -128,7 +128,7 @@ def test_a_quarter_of_the_response_left_is_not_none(
     hand_made: Callable[[ModalModel, list[Trial]], Diagnosis],
 ) -> None:
     known = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1)])
-    left = leftover(known.final.explanation, list(known.lines))
+    left = leftover(known.final.hypothesis, list(known.lines))
     good, bad = _gain(0.1, 0.1, 0.1, 0.1, 1.0, 0.0), _gain(0.5, 0.5, 0.5, 0.5, 1.0, 0.0)
     assert verdict_of(known.final, [], left, left, good) == "none"
     assert verdict_of(known.final, [], left, left, bad) == "unexplained"
@@ -186,16 +186,16 @@ def test_what_repeats_with_the_force_is_no_noise(model: ModalModel, law: bool) -
     one = _periodic(model, law)
     lines = [windowed_lines(one, band_of(model, RATE), float((-model.poles.real).min()))]
     shape = ModelShape(model, LabError())
-    base = fit(lines, Explanation(shape, np.zeros(shape.size)))
-    share = leftover(base.explanation, lines).share
+    base = fit(lines, Hypothesis(shape, np.zeros(shape.size)))
+    share = leftover(base.hypothesis, lines).share
     assert share > 0.7 if law else share < 0.05
 
 
 def test_accepted_numbers_are_those_of_the_improved_model(model: ModalModel, linear_trials: list[Trial]) -> None:
-    """A gain error found in a model that is off too: told numbers and final explanation are one."""
+    """A gain error found in a model that is off too: told numbers and final hypothesis are one."""
     wrong = [replace(one, response=one.response * np.array([1.0, 1.25])) for one in linear_trials]
     found = diagnose(model, wrong)
     causes = [cause for cause in found.physics if cause.name == "gain_error"]
     assert len(causes) == 1
-    held = [cause for cause in found.final.explanation.causes if cause.physics.name == "gain_error"]
+    held = [cause for cause in found.final.hypothesis.causes if cause.physics.name == "gain_error"]
     assert causes[0].parameters["gain_minus_one"] == pytest.approx(float(held[0].values[0]), rel=1e-9)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from concealed_recordings import Concealed, forces, linear_acceleration, structure, trial
 
-from mismatch import Explanation, LabError, ModelShape, band_of
+from mismatch import Hypothesis, LabError, ModelShape, band_of
 from mismatch.faults.clipping import find_clipping, mended
 from mismatch.models.fitting import Fit, fit
 from mismatch.records.windowed_lines import WindowedLines, windowed_lines
@@ -16,7 +16,7 @@ DECAY = 1.7
 
 def fitted_to(lines: list[WindowedLines], model: ModalModel) -> Fit:
     shape = ModelShape(model, LabError())
-    return fit(lines, Explanation(shape, np.zeros(shape.size)))
+    return fit(lines, Hypothesis(shape, np.zeros(shape.size)))
 
 
 def cuts(
@@ -56,7 +56,7 @@ def test_found_and_mended(share: float, before: bool) -> None:
     assert clipping.response == 1
     settled, repaired, clipping = mended(base, lines, clipping)
     assert clipping.saturation.limit == pytest.approx(limit, abs=max(4 * clipping.saturation.error, 1e-3 * limit))
-    found, true = settled.explanation.model, structure()
+    found, true = settled.hypothesis.model, structure()
     assert found.natural_frequencies == pytest.approx(true.natural_frequencies, rel=1e-3)
     assert found.damping_ratios == pytest.approx(true.damping_ratios, rel=0.02)
     whole = cuts(np.inf, 8)[1].trial.response[:, 1]
@@ -68,6 +68,6 @@ def test_friction_that_keeps_a_response_small_is_no_limit() -> None:
     law = Concealed(lambda x, v: 25 * float(np.tanh(v / 2e-3)), np.array([0.3, 0.95]))
     lines = cuts(np.inf, 9, law, duration=15.0)
     shape = ModelShape(structure(), LabError())
-    believed = fit(lines, Explanation(shape, np.zeros(shape.size)), iterations=1)
+    believed = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=1)
     assert find_clipping(believed, lines) is None
     assert find_clipping(fitted_to(lines, structure()), lines) is None

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, Concealed, forces, late, trial
 
-from mismatch import Diagnosis, Explanation, Trial, diagnose
+from mismatch import Diagnosis, Hypothesis, Trial, diagnose
 from mismatch.adapters.structure.acceptance import LEAST_EVIDENCE, Option, worth_it
 from mismatch.faults.tones import find_tone
 from mismatch.models.fitting import Fit
@@ -52,9 +52,9 @@ def test_a_narrow_mode_must_outdo_chance_in_all_its_places(
     known = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1), trial_of(small_model, "high", 60.0, 2)])
     base = known.base
     pole = -np.pi * half_power_bandwidth + 2j * np.pi * 20.0
-    shape = base.explanation.shape.with_mode(pole, small_model.right[0], small_model.left[0])
+    shape = base.hypothesis.shape.with_mode(pole, small_model.right[0], small_model.left[0])
     gained = LEAST_EVIDENCE + 5.0
-    fitted = Fit(Explanation(shape, np.zeros(shape.size)), base.noises, -200.0, 0.0, -gained, 1e-6 * np.eye(shape.size))
+    fitted = Fit(Hypothesis(shape, np.zeros(shape.size)), base.noises, -200.0, 0.0, -gained, 1e-6 * np.eye(shape.size))
     assert worth_it(Option("missing_mode", {}, fitted), base, base, list(known.lines)) is named
 
 

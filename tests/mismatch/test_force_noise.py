@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import firwin, lfilter
 
-from mismatch import Explanation, LabError, ModelShape, Trial, band_of, diagnose, predict_lines, windowed_lines
+from mismatch import Hypothesis, LabError, ModelShape, Trial, band_of, diagnose, predict_lines, windowed_lines
 from mismatch.adapters.structure.acceptance import NOISE_LIKE
 from mismatch.records.true_forces import without_force_noise
 from mismatch.records.windowed_lines import WindowedLines
@@ -28,7 +28,7 @@ def _trial(model: ModalModel, level: float, seed: int) -> tuple[Trial, NDArray[n
     empty = Trial("t", RATE, force, np.zeros((n, 2)), np.array([2, 2]), ("fx", "fy", "ax", "ay"))
     lines = windowed_lines(empty, band_of(model, RATE), 1.0)
     shape = ModelShape(model, LabError())
-    response = lines.signal(predict_lines(Explanation(shape, np.zeros(shape.size)), lines).spectrum)
+    response = lines.signal(predict_lines(Hypothesis(shape, np.zeros(shape.size)), lines).spectrum)
     noise = 0.06 * force.std(axis=0) * rng.normal(size=force.shape)
     measured = response + 0.06 * response.std(axis=0) * rng.normal(size=response.shape)
     return Trial(f"level {level:g}", RATE, force + noise, measured, np.array([2, 2]), empty.channels), noise
@@ -104,7 +104,7 @@ def _swelling(model: ModalModel) -> WindowedLines:
     trial = Trial("t", RATE, force, np.zeros((n, 2)), np.array([2, 2]), ("fx", "fy", "ax", "ay"))
     lines = windowed_lines(trial, band_of(model, RATE), 1.0)
     shape = ModelShape(model, LabError())
-    response = lines.signal(predict_lines(Explanation(shape, np.zeros(shape.size)), lines).spectrum)
+    response = lines.signal(predict_lines(Hypothesis(shape, np.zeros(shape.size)), lines).spectrum)
     measured = response + 0.005 * response.std(axis=0) * rng.normal(size=response.shape)
     noisy = replace(trial, force=force + rng.normal(size=force.shape), response=measured)
     return without_force_noise(windowed_lines(noisy, band_of(model, RATE), 1.0), np.ones(2))
@@ -117,7 +117,7 @@ def test_force_that_swells_from_little_leaves_nothing(small_model: ModalModel) -
     """
     lines = _swelling(small_model)
     shape = ModelShape(small_model, LabError())
-    known = Explanation(shape, np.zeros(shape.size))
+    known = Hypothesis(shape, np.zeros(shape.size))
     only = windowed_lines(replace(lines.trial, force=lines.signal(lines.force_lines)), band_of(small_model, RATE), 1.0)
     assert leftover(known, [only]).share > 10 * NOISE_LIKE
     assert leftover(known, [lines]).share < NOISE_LIKE

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 
-from mismatch import Explanation, JointMotion, LabError, ModelShape, Trial, WindowedLines, band_of, windowed_lines
+from mismatch import Hypothesis, JointMotion, LabError, ModelShape, Trial, WindowedLines, band_of, windowed_lines
 from mismatch.adapters.structure.form_spread import with_form_spread
 from mismatch.models.fitting import Fit, fit
 from mismatch.models.hypothesis import Cause
@@ -63,7 +63,7 @@ def _named(lines: list[WindowedLines], motion: JointMotion) -> Fit:
     fits = []
     for name, scale in (("coulomb_friction", motion.velocity), ("presliding_friction", motion.deflection)):
         cause = Cause(library()[name], np.array([9.0, 0.03 * scale]), "", DIRECTION, motion)
-        fits.append(fit(lines, Explanation(shape, np.zeros(shape.size), (cause,)), iterations=25))
+        fits.append(fit(lines, Hypothesis(shape, np.zeros(shape.size), (cause,)), iterations=25))
     return min(fits, key=lambda one: one.score)
 
 
@@ -71,7 +71,7 @@ def _off(seed: int, family: str) -> tuple[float, float]:
     """Found over true saturation minus one, in standard errors: of the noise alone, and with the form."""
     lines, motion, truth = _cut(seed, family)
     named = _named(lines, motion)
-    place, cause = named.explanation.shape.size, named.explanation.causes[0]
+    place, cause = named.hypothesis.shape.size, named.hypothesis.causes[0]
     errors = [np.sqrt(one.covariance[place, place]) for one in (named, with_form_spread(named, lines))]
     step = cause.physics.parameters[0].unit_step * float(cause.values[0])
     miss = float(cause.values[0]) - truth
@@ -101,6 +101,6 @@ def test_noise_alone_leaves_an_error_as_it_is(linear_trials: list[Trial]) -> Non
     lines = [windowed_lines(one, band_of(model, RATE), decay) for one in late]
     shape = ModelShape(model, LabError())
     cause = Cause(library()["gain_error"], np.array([0.15]), f"response {model.responses[0]}")
-    found = fit(lines, Explanation(shape, np.zeros(shape.size), (cause,)), iterations=20)
+    found = fit(lines, Hypothesis(shape, np.zeros(shape.size), (cause,)), iterations=20)
     before, after = found.covariance[-1, -1], with_form_spread(found, lines).covariance[-1, -1]
     assert before <= after < 1.3 * before

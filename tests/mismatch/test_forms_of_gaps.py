@@ -6,7 +6,7 @@ import pytest
 from mismatch.adapters.structure.acceptance import LEAST_EVIDENCE, Option, plainest
 from mismatch.joints.joint_law import JointMotion
 from mismatch.models.fitting import Fit
-from mismatch.models.hypothesis import Explanation
+from mismatch.models.hypothesis import Hypothesis
 from mismatch.models.model_shape import LabError, ModelShape
 from mismatch.physics import JointPhysics, answer_name, library
 from modal_fit import ModalModel
@@ -54,7 +54,7 @@ def test_of_equal_forms_the_one_with_fewer_numbers_is_told(model: ModalModel, wo
         shape = ModelShape(model, LabError())
         for _ in range(added):
             shape = shape.with_mode(model.poles[0] * 2, model.right[0], model.left[0])
-        here = Explanation(shape, np.zeros(shape.size))
+        here = Hypothesis(shape, np.zeros(shape.size))
         return Option(name, {"form": "long" if added else "plain"}, Fit(here, (), 0.0, 0.0, score, np.zeros((1, 1))))
 
     options = [option("gap", 1, -500.0), option("gap", 0, -500.0 + worse * LEAST_EVIDENCE), option("other", 0, -499.0)]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 
-from mismatch import Explanation, LabError, ModelShape, WindowedLines, band_of, windowed_lines
+from mismatch import Hypothesis, LabError, ModelShape, WindowedLines, band_of, windowed_lines
 from mismatch.adapters.structure.form_spread import with_form_spread
 from mismatch.models.fitting import Fit, fit
 from mismatch.models.hypothesis import Cause
@@ -30,12 +30,12 @@ def named(lines: list[WindowedLines], corner: float, place: str) -> Fit:
     """The high-pass fitted with one form."""
     cause = Cause(library()["ac_coupling"], np.array([corner]), place)
     shape = ModelShape(structure(), LabError(), 0)
-    return fit(lines, Explanation(shape, np.zeros(shape.size), (cause,)))
+    return fit(lines, Hypothesis(shape, np.zeros(shape.size), (cause,)))
 
 
 def corner_and_error(found: Fit) -> tuple[float, float]:
     """Hz; the coordinate is ``ln f_c`` in steps of its unit."""
-    [cause] = found.explanation.causes
+    [cause] = found.hypothesis.causes
     corner = float(cause.values[0])
     return corner, corner * cause.physics.parameters[0].unit_step * float(np.sqrt(found.covariance[-1, -1]))
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mismatch import Explanation, JointLaw, LabError, ModelShape, Trial, band_of, windowed_lines
+from mismatch import Hypothesis, JointLaw, LabError, ModelShape, Trial, band_of, windowed_lines
 from mismatch import physics as physics_folder
 from mismatch.adapters.structure.reporting_numbers import accepted_cause
 from mismatch.joints.joint_law import POINTS
@@ -141,7 +141,7 @@ def test_a_new_cause_is_one_file_and_nothing_else(tmp_path: Path, monkeypatch: p
 
 def test_explanation_without_causes_is_the_nominal_model(model: ModalModel) -> None:
     shape = ModelShape(model, LabError())
-    same = Explanation(shape, np.zeros(shape.size)).model
+    same = Hypothesis(shape, np.zeros(shape.size)).model
     np.testing.assert_allclose(same.poles, model.poles)
     np.testing.assert_allclose(same.right, replace(model).right)
 
@@ -161,10 +161,10 @@ def test_numbers_a_laboratory_knows_better_with_their_errors(model: ModalModel) 
     physics = physics_folder.library()["dynamometer_dynamics"]
     squared, damping = 4e-6, 1e-4
     cause = Cause(physics, np.array([squared, damping]), "")
-    explanation = Explanation(shape, np.zeros(shape.size), (cause,))
-    covariance = np.zeros((explanation.size, explanation.size))
+    hypothesis = Hypothesis(shape, np.zeros(shape.size), (cause,))
+    covariance = np.zeros((hypothesis.size, hypothesis.size))
     covariance[-2, -2], covariance[-1, -1] = 0.25, 4.0
-    fitted = Fit(explanation, (), 0.0, 0.0, 0.0, covariance)
+    fitted = Fit(hypothesis, (), 0.0, 0.0, 0.0, covariance)
     found = accepted_cause(fitted, {}, 1.0)
     frequency, ratio = 1 / (2 * np.pi * np.sqrt(squared)), damping / (2 * np.sqrt(squared))
     spread, other = found.standard_errors["squared_period_s2"], found.standard_errors["damping_time_s"]

@@ -35,7 +35,7 @@ def test_silverbox_is_a_hardening_spring_and_its_arrowhead_is_simulated_freely(s
     assert strongest.name == "stiffness_hardening"
     assert strongest.parameters["exponent"] == pytest.approx(3.0, abs=0.05)
     before = silverbox.free_run_errors(nominal, signals)
-    after = silverbox.free_run_errors(silverbox.improved_model(found.final.explanation), signals)
+    after = silverbox.free_run_errors(silverbox.improved_model(found.final.hypothesis), signals)
     assert all(after[part] < 0.1 * before[part] for part in before)
     assert after["arrowhead"] < 1.0  # mV; a neural state-space encoder is given as about 6
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mismatch import Explanation, LabError, ModelShape, Trial, band_of, predict_lines, windowed_lines
+from mismatch import Hypothesis, LabError, ModelShape, Trial, band_of, predict_lines, windowed_lines
 from mismatch.joints.joint_law import JointMotion
 from mismatch.joints.joint_simulation import driven_force
 from mismatch.models.hypothesis import Cause
@@ -19,7 +19,7 @@ from modal_fit import ModalModel
 DIRECTION = np.array([0.8, 0.6])
 
 
-def _explanation(model: ModalModel, lines: WindowedLines, name: str) -> Explanation:
+def _explanation(model: ModalModel, lines: WindowedLines, name: str) -> Hypothesis:
     """A joint whose force is a third of the elastic one, rms."""
     physics = library()[name]
     assert isinstance(physics, JointPhysics)
@@ -30,7 +30,7 @@ def _explanation(model: ModalModel, lines: WindowedLines, name: str) -> Explanat
     values = physics.starts(motion)[0].copy()
     values[0] *= 0.3 * stiffness * x.std() / driven_force(lines, x, v, physics.law(values, motion)).std()
     shape = ModelShape(model, LabError())
-    return Explanation(shape, np.zeros(shape.size), (Cause(physics, values, "", DIRECTION, motion),))
+    return Hypothesis(shape, np.zeros(shape.size), (Cause(physics, values, "", DIRECTION, motion),))
 
 
 @pytest.mark.parametrize(
@@ -48,20 +48,20 @@ def test_the_tangent_is_that_of_whole_simulations(
     omega = np.abs(small_model.poles)
     damped = replace(small_model, poles=omega * (-0.1 + 1j * np.sqrt(1 - 0.01)))
     lines = windowed_lines(trial_of(damped, "mid", 50.0, 4), band_of(damped, 128.0), 4.0)
-    explanation = _explanation(damped, lines, name)
-    slope = jacobian(explanation, lines, predict_lines(explanation, lines))
-    size, h = explanation.shape.size, 0.03
+    hypothesis = _explanation(damped, lines, name)
+    slope = jacobian(hypothesis, lines, predict_lines(hypothesis, lines))
+    size, h = hypothesis.shape.size, 0.03
 
     def moved(k: int, by: float) -> np.ndarray:
         if k < size:
             u = np.zeros(size)
             u[k] = by
-            return predict_lines(replace(explanation, u=u), lines).response
-        coordinates = explanation.coordinates()
+            return predict_lines(replace(hypothesis, u=u), lines).response
+        coordinates = hypothesis.coordinates()
         coordinates[k - size] += by
-        return predict_lines(explanation.with_causes(coordinates), lines).response
+        return predict_lines(hypothesis.with_causes(coordinates), lines).response
 
-    for k in [0, 1, 2, 7, 10, *range(size, explanation.size)]:
+    for k in [0, 1, 2, 7, 10, *range(size, hypothesis.size)]:
         quotient = (moved(k, h) - moved(k, -h)) / (2 * h)
         assert np.linalg.norm(slope[:, :, k] - quotient) < 0.2 * np.linalg.norm(quotient), k
 

@@ -5,7 +5,7 @@ import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 from numpy.typing import NDArray
 
-from mismatch import Explanation, LabError, ModelShape
+from mismatch import Hypothesis, LabError, ModelShape
 from mismatch.faults.tones import NEAR, TONE_CONTRAST, Tone, above_neighbours
 from mismatch.faults.tones_beyond import tones_beyond
 from mismatch.records.trial import Trial, band_of
@@ -37,7 +37,7 @@ def prepared(one: Trial) -> WindowedLines:
 
 def found_in(lines: list[WindowedLines]) -> list[Tone]:
     shape = ModelShape(structure(), LabError())
-    return tones_beyond(Explanation(shape, np.zeros(shape.size)), lines, DECAY, 4)
+    return tones_beyond(Hypothesis(shape, np.zeros(shape.size)), lines, DECAY, 4)
 
 
 def noise_of(lines: list[WindowedLines]) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...models.fitting import Fit, fit
-from ...models.hypothesis import Cause, Explanation
+from ...models.hypothesis import Cause, Hypothesis
 from ...physics import ChainPhysics, LimitedPhysics
 from ...records.windowed_lines import WindowedLines
 from ...remainder.leftover import Leftover
@@ -59,14 +59,14 @@ def gains(option: Option, current: Fit) -> bool:
 
 def impossible(option: Option) -> str:
     """Why the numbers of an option's last cause cannot be, beyond their errors; empty where they can."""
-    causes = option.fitted.explanation.causes
+    causes = option.fitted.hypothesis.causes
     if option.name == "missing_mode" or not causes:
         return ""
     cause = causes[-1]
     said: Callable[[Real, Real], str] | None = getattr(cause.physics, "impossible", None)
     if said is None:
         return ""
-    first = option.fitted.explanation.size - cause.size
+    first = option.fitted.hypothesis.size - cause.size
     spread = np.sqrt(np.maximum(np.diag(option.fitted.covariance)[first : first + len(cause.values)], 0.0))
     steps = np.array([parameter.unit_step for parameter in cause.physics.parameters])
     return said(cause.values, CLEAR * spread * steps)
@@ -79,17 +79,17 @@ def plainest(options: list[Option]) -> Option | None:
         return None
     line = best.fitted.score + LEAST_EVIDENCE / 2
     forms = [option for option in options if option.name == best.name and option.fitted.score < line]
-    return min(forms, key=lambda option: (option.fitted.explanation.size, option.fitted.score))
+    return min(forms, key=lambda option: (option.fitted.hypothesis.size, option.fitted.score))
 
 
-def unexplained(explanation: Explanation, left: Leftover, before: Leftover) -> bool:
+def unexplained(hypothesis: Hypothesis, left: Leftover, before: Leftover) -> bool:
     """Whether too much still moves with the signal for the causes found, if any.
 
     A law that had to be held within what its name means may leave nothing: it is another law.
     """
     if left.share <= NOISE_LIKE:
         return False
-    return left.power > (1 - EXPLAINED) * before.power or any(_strained(cause) for cause in explanation.causes)
+    return left.power > (1 - EXPLAINED) * before.power or any(_strained(cause) for cause in hypothesis.causes)
 
 
 def _strained(cause: Cause) -> bool:
@@ -112,7 +112,7 @@ def evidence_needed(current: Fit, base: Fit) -> float:
     base
         Without any.
     """
-    a_law = any(cause.direction is not None for cause in current.explanation.causes)
+    a_law = any(cause.direction is not None for cause in current.hypothesis.causes)
     share = AFTER_A_LAW if a_law else SMALL
     return max(LEAST_EVIDENCE, share * (base.score - current.score))
 
@@ -133,7 +133,7 @@ def worth_it(option: Option, current: Fit, base: Fit, lines: list[WindowedLines]
         return False
     if current.misfit - option.fitted.misfit > LEAST_EVIDENCE:
         return True
-    size = current.explanation.shape.size
+    size = current.hypothesis.shape.size
     odd = max(current.deviation - size, 1.0)
     if current.deviation - option.fitted.deviation <= 0.6 * odd:
         return False
@@ -142,15 +142,15 @@ def worth_it(option: Option, current: Fit, base: Fit, lines: list[WindowedLines]
 
 def _plainer_gain(current: Fit, lines: list[WindowedLines]) -> float:
     """What the score would gain if nothing were believed of the dampings, or of the frequencies."""
-    shape = current.explanation.shape
-    rows = shape.modal_rows(current.explanation.u)[: len(shape.nominal.poles) - shape.added]
+    shape = current.hypothesis.shape
+    rows = shape.modal_rows(current.hypothesis.u)[: len(shape.nominal.poles) - shape.added]
     cost = float(np.log(2 * sum(one.measured.size for one in lines)))
     return max(float(np.sum(rows[:, k] ** 2 - cost)) for k in (0, 1))
 
 
 def _places_of_a_mode(fitted: Fit, lines: list[WindowedLines]) -> float:
     """Evidence that chance finds for the mode added last among all the places where one as narrow might lie."""
-    pole = fitted.explanation.model.poles[-1]
+    pole = fitted.hypothesis.model.poles[-1]
     band = max(one.frequencies[-1] for one in lines) - min(one.frequencies[0] for one in lines)
     return 2 * float(np.log(max(band / (-float(pole.real) / np.pi), 1.0)))
 
@@ -160,26 +160,26 @@ def _is_missed(option: Option, lines: list[WindowedLines], needed: float) -> boo
 
     A delay is taken up by real modes to first order: its number has a wide error, and still it is not none.
     """
-    fitted, explanation = option.fitted, option.fitted.explanation
-    if option.name == "missing_mode" or not isinstance(explanation.causes[-1].physics, ChainPhysics):
+    fitted, hypothesis = option.fitted, option.fitted.hypothesis
+    if option.name == "missing_mode" or not isinstance(hypothesis.causes[-1].physics, ChainPhysics):
         return False
-    without = replace(explanation, causes=explanation.causes[:-1])
+    without = replace(hypothesis, causes=hypothesis.causes[:-1])
     return fit(lines, without, fitted.noises, iterations=TO_REST).score - fitted.score > needed
 
 
 def _mode_measured(fitted: Fit) -> bool:
     """Whether the damping of the mode added last stands out of its error: else no resonance was seen."""
-    shape = fitted.explanation.shape
+    shape = fitted.hypothesis.shape
     place = shape.per_mode * (len(shape.nominal.poles) - 1) + 1
     return float(np.sqrt(np.maximum(fitted.covariance[place, place], 0.0))) * shape.lab.damping < 1 / CLEAR
 
 
 def _measured(fitted: Fit) -> bool:
     """Whether any number of the last cause stands out of its own error: else the gain came from elsewhere."""
-    cause = fitted.explanation.causes[-1]
-    first = fitted.explanation.size - cause.size
+    cause = fitted.hypothesis.causes[-1]
+    first = fitted.hypothesis.size - cause.size
     spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[first : first + len(cause.values)], 0.0))
-    absent = cause.physics.start(fitted.explanation.shape.nominal) if isinstance(cause.physics, ChainPhysics) else None
+    absent = cause.physics.start(fitted.hypothesis.shape.nominal) if isinstance(cause.physics, ChainPhysics) else None
     clear = []
     for k, (parameter, error) in enumerate(zip(cause.physics.parameters, spread, strict=True)):
         if parameter.logarithmic:

@@ -42,7 +42,7 @@ def confirmed(
     """
     steps, accepted, rejected = list(steps), list(accepted), list[Candidate]()
     while True:
-        held_out = held_out_improvement(recordings, steps[-1].explanation, steps[-1].noises, accepted)
+        held_out = held_out_improvement(recordings, steps[-1].hypothesis, steps[-1].noises, accepted)
         if len(steps) == 1 or len(recordings.mended) == 1:
             return (steps, accepted), rejected, held_out
         gone = _idle(recordings, steps, accepted, held_out)
@@ -96,7 +96,7 @@ def _idle(
             if k == len(accepted) - 1:
                 return k, steps[-2]
             again = fit(
-                recordings.mended, without_cause(last.explanation, accepted[k]), last.noises, iterations=ITERATIONS
+                recordings.mended, without_cause(last.hypothesis, accepted[k]), last.noises, iterations=ITERATIONS
             )
             return k, again
     return None
@@ -108,7 +108,7 @@ def _missed(recordings: Recordings, fits: tuple[Fit, Fit], last: Fit, held_out: 
     if by_belief(less, whole):
         return less.score - whole.score > evidence_needed(less, less)
     here = recordings.mended[recordings.kept]
-    rest, without = residual_lines(held_out.improved, here), residual_lines(less.explanation, here)
-    covariance = last.noises[recordings.kept].covariance(here.frequencies, through_structure(last.explanation, here))
-    gain = least_misfit(less.explanation, here) - least_misfit(held_out.improved, here)
+    rest, without = residual_lines(held_out.improved, here), residual_lines(less.hypothesis, here)
+    covariance = last.noises[recordings.kept].covariance(here.frequencies, through_structure(last.hypothesis, here))
+    gain = least_misfit(less.hypothesis, here) - least_misfit(held_out.improved, here)
     return gain > HELD_OUT and chance_of_no_gain(here, covariance, without, rest) < CONFIRMED

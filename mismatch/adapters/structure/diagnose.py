@@ -13,7 +13,7 @@ from ...faults.fault_repair import repair_plain_faults, with_tones_settled
 from ...inference.diagnosis import AcceptedCause, Candidate, Diagnosis
 from ...inference.verdict import verdict_of
 from ...models.fitting import Fit, fit
-from ...models.hypothesis import Explanation
+from ...models.hypothesis import Hypothesis
 from ...models.linear_part import with_linear_part
 from ...models.model_shape import LabError, ModelShape
 from ...physics import ChainPhysics, JointPhysics, Physics, library
@@ -101,7 +101,7 @@ def _diagnosed(model: ModalModel, trials: Sequence[Trial], settings: Settings, t
     bands = [compared_band(model, trial.rate) for trial in trials]
     lines = [windowed_lines(trial, band.edges, decay) for trial, band in zip(trials, bands, strict=True)]
     tell("modal parameters")
-    nominal = Explanation(ModelShape(model, settings.lab), np.zeros(ModelShape(model, settings.lab).size))
+    nominal = Hypothesis(ModelShape(model, settings.lab), np.zeros(ModelShape(model, settings.lab).size))
     base = fit(lines, nominal, iterations=FIRST_FIT)
     lines, base = _with_true_forces(lines, base)
     tell("tones and clipping")
@@ -120,12 +120,12 @@ def _diagnosed(model: ModalModel, trials: Sequence[Trial], settings: Settings, t
     deviation = _deviation(lines, told)
     if deviation is not None:
         accepted.append(deviation)
-    left = leftover(current.explanation, lines)
+    left = leftover(current.hypothesis, lines)
     verdict = verdict_of(current, accepted, left, search.before, held_out.improvement)
     if verdict == "unexplained":
         candidates += [Candidate(one.name, one.evidence, "rejected", one.location) for one in accepted]
         accepted, current, left = [], base, search.before
-        held_out = held_out_improvement(Recordings(whole, whole), base.explanation, base.noises)
+        held_out = held_out_improvement(Recordings(whole, whole), base.hypothesis, base.noises)
     return Diagnosis(
         verdict,
         tuple(accepted),
@@ -138,7 +138,7 @@ def _diagnosed(model: ModalModel, trials: Sequence[Trial], settings: Settings, t
         tuple(lines),
         (held_out.linear, held_out.improved),
         band=max(bands, key=lambda band: band.high),
-        doubts=beyond_model(base.explanation, lines),
+        doubts=beyond_model(base.hypothesis, lines),
         measured=tuple(whole),
     )
 
@@ -154,7 +154,7 @@ def _with_true_forces(lines: list[WindowedLines], base: Fit) -> tuple[list[Windo
     for variances in (estimated, [np.full(len(variance), np.inf) for variance in estimated]):
         weighed = [without_force_noise(one, variance) for one, variance in zip(lines, variances, strict=True)]
         if all(_mostly_kept(one, before) for one, before in zip(weighed, lines, strict=True)):
-            found.append((weighed, fit(weighed, base.explanation, base.noises)))
+            found.append((weighed, fit(weighed, base.hypothesis, base.noises)))
     best = min(found, key=lambda pair: pair[1].score)
     return best if best[1].score < base.score - LEAST_EVIDENCE else found[0]
 
@@ -183,7 +183,7 @@ def _search(
     current, accepted, steps = base, list(faults), [base]
     candidates: list[Candidate] = []
     equivalents: tuple[str, ...] = ()
-    moving = before = leftover(base.explanation, lines)
+    moving = before = leftover(base.hypothesis, lines)
     in_vain = np.inf
     while len(steps) <= MOST_CAUSES:
         tell(f"causes, round {len(steps)}")
@@ -209,9 +209,9 @@ def _search(
         accepted.append(_describe(best, current))
         failed = one.sighted and not any(_gaining_law(option, current) for option in one.options)
         current = best.fitted
-        if failed and all(cause.direction is None for cause in current.explanation.causes):
+        if failed and all(cause.direction is None for cause in current.hypothesis.causes):
             in_vain = moving.power
-        moving = leftover(current.explanation, lines)
+        moving = leftover(current.hypothesis, lines)
         steps.append(current)
     tell("causes made needless")
     steps, accepted, rejected = pruned(lines, steps, accepted)
@@ -225,7 +225,7 @@ def _best(one: Round, current: Fit) -> Option | None:
 
 def _gaining_law(option: Option, current: Fit) -> bool:
     """Whether a joint's law gained something, though another cause may have gained more."""
-    causes = option.fitted.explanation.causes
+    causes = option.fitted.hypothesis.causes
     return bool(causes) and causes[-1].direction is not None and gains(option, current)
 
 
@@ -240,11 +240,11 @@ def _laws(causes: dict[str, Physics]) -> dict[str, Physics]:
 def _deviation(lines: list[WindowedLines], current: Fit) -> AcceptedCause | None:
     """Modal parameters that are off by more than a lab's error, and not by the linear part of a joint's law."""
     found = modal_deviation(current)
-    causes = current.explanation.causes
+    causes = current.hypothesis.causes
     if found is None or all(cause.direction is None for cause in causes):
         return found
     freed = tuple(with_linear_part(cause) if cause.direction is not None else cause for cause in causes)
-    again = fit(lines, replace(current.explanation, causes=freed), current.noises, iterations=20)
+    again = fit(lines, replace(current.hypothesis, causes=freed), current.noises, iterations=20)
     return found if modal_deviation(again) is not None else None
 
 

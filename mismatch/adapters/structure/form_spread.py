@@ -52,12 +52,12 @@ def with_form_spread(fitted: Fit, lines: Sequence[WindowedLines]) -> Fit:
     lines
         Its recordings.
     """
-    shape = fitted.explanation.shape
+    shape = fitted.hypothesis.shape
     believed = shape.per_mode * (len(shape.nominal.poles) - shape.added)
-    told = np.arange(believed, fitted.explanation.size)
+    told = np.arange(believed, fitted.hypothesis.size)
     told = told[(told < shape.modal_size) | (told >= shape.size)]
     modal = np.concatenate([np.arange(first, first + 2) for first in range(0, believed, shape.per_mode)])
-    extra = np.zeros(fitted.explanation.size)
+    extra = np.zeros(fitted.hypothesis.size)
     extra += _of_wider_forms(fitted, list(lines)) + _of_other_forms(fitted, list(lines))
     extra[modal] += _between(fitted, lines, modal)
     if len(told):
@@ -71,24 +71,24 @@ def _of_wider_forms(fitted: Fit, lines: list[WindowedLines]) -> Real:
     The wider law is fitted like the named one; what its number differs, squared, and how much less surely it is known
     are what the named number owes to the form.
     """
-    extra = np.zeros(fitted.explanation.size)
-    at = fitted.explanation.shape.size
-    for place, cause in enumerate(fitted.explanation.causes):
+    extra = np.zeros(fitted.hypothesis.size)
+    at = fitted.hypothesis.shape.size
+    for place, cause in enumerate(fitted.hypothesis.causes):
         own, at = slice(at, at + len(cause.values)), at + cause.size
         make: Callable[[], tuple[JointPhysics, float]] | None = getattr(cause.physics, "wider", None)
         if make is None:
             continue
         physics, shape_number = make()
         wider = replace(cause, physics=physics, values=np.append(held_values(cause), shape_number))
-        causes = list(fitted.explanation.causes)
+        causes = list(fitted.hypothesis.causes)
         causes[place] = wider
         try:
-            again = fit(lines, replace(fitted.explanation, causes=tuple(causes)), fitted.noises, iterations=WIDER)
+            again = fit(lines, replace(fitted.hypothesis, causes=tuple(causes)), fitted.noises, iterations=WIDER)
         except np.linalg.LinAlgError:
             continue
         if again.score > fitted.score + WORSE:
             continue
-        there = again.explanation.causes[place].coordinates()[: len(cause.values)]
+        there = again.hypothesis.causes[place].coordinates()[: len(cause.values)]
         moved = there - cause.coordinates()[: len(cause.values)]
         gained = np.diag(again.covariance)[own] - np.diag(fitted.covariance)[own]
         extra[own] = moved**2 + np.maximum(gained, 0.0)
@@ -101,20 +101,20 @@ def _of_other_forms(fitted: Fit, lines: list[WindowedLines]) -> Real:
     The squared difference counts by the likelihood of the other form over that of the named one (Bayes' information
     criterion), and whole where both are as likely: the interval shall hold either.
     """
-    extra = np.zeros(fitted.explanation.size)
-    at = fitted.explanation.shape.size
-    for number, cause in enumerate(fitted.explanation.causes):
+    extra = np.zeros(fitted.hypothesis.size)
+    at = fitted.hypothesis.shape.size
+    for number, cause in enumerate(fitted.hypothesis.causes):
         own, at = slice(at, at + len(cause.values)), at + cause.size
         if not isinstance(cause.physics, FormedPhysics):
             continue
         for place, values in cause.physics.other_forms(cause.values, cause.place):
-            causes = list(fitted.explanation.causes)
+            causes = list(fitted.hypothesis.causes)
             causes[number] = replace(cause, place=place, values=values)
             try:
-                again = fit(lines, replace(fitted.explanation, causes=tuple(causes)), fitted.noises, iterations=WIDER)
+                again = fit(lines, replace(fitted.hypothesis, causes=tuple(causes)), fitted.noises, iterations=WIDER)
             except np.linalg.LinAlgError:
                 continue
-            moved = again.explanation.causes[number].coordinates() - cause.coordinates()
+            moved = again.hypothesis.causes[number].coordinates() - cause.coordinates()
             extra[own] += min(1.0, np.exp(-(again.score - fitted.score) / 2)) * moved**2
     return extra
 
@@ -131,10 +131,10 @@ def _between(fitted: Fit, lines: Sequence[WindowedLines], which: NDArray[np.int6
 
 def _parts(fitted: Fit, lines: WindowedLines, noise: NoiseModel, which: NDArray[np.int64]) -> list[tuple[Real, Real]]:
     """Normal equations of the weak, the middle and the strong part of a recording."""
-    explanation = fitted.explanation
-    predicted = predict_lines(explanation, lines)
-    white = whitening(noise.covariance(lines.frequencies, through_structure(explanation, lines)))
-    slopes = np.einsum("kij,kjc->kic", white, jacobian(explanation, lines, predicted)[:, :, which])
+    hypothesis = fitted.hypothesis
+    predicted = predict_lines(hypothesis, lines)
+    white = whitening(noise.covariance(lines.frequencies, through_structure(hypothesis, lines)))
+    slopes = np.einsum("kij,kjc->kic", white, jacobian(hypothesis, lines, predicted)[:, :, which])
     rest = np.einsum("kij,kj->ki", white, lines.measured - predicted.response)
     n = len(lines.window)
     slope, left, moved = (_signal(lines, part) for part in (slopes, rest, predicted.response))

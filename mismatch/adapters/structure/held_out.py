@@ -1,4 +1,4 @@
-"""What an explanation is worth on a recording that it was not fitted to."""
+"""What a hypothesis is worth on a recording that it was not fitted to."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -14,7 +14,7 @@ from ...faults.shown_faults import FAULTS, with_faults
 from ...inference.diagnosis import AcceptedCause, Improvement
 from ...inference.process_pool import in_processes
 from ...models.fitting import Fit, fit
-from ...models.hypothesis import Explanation, predict_lines
+from ...models.hypothesis import Hypothesis, predict_lines
 from ...models.misfit import least_misfit, through_structure
 from ...noise.noise_model import NoiseModel, whitening
 from ...records.windowed_lines import WindowedLines
@@ -36,19 +36,19 @@ DRAWS = 1000
 
 @dataclass(frozen=True)
 class HeldOut:
-    """What an explanation is worth elsewhere.
+    """What a hypothesis is worth elsewhere.
 
     Parameters
     ----------
     improvement
         Errors on the recording held out.
     linear, improved
-        Modal parameters alone, and the whole explanation, fitted to the other recordings.
+        Modal parameters alone, and the whole hypothesis, fitted to the other recordings.
     """
 
     improvement: Improvement
-    linear: Explanation
-    improved: Explanation
+    linear: Hypothesis
+    improved: Hypothesis
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class Recordings:
 
 
 def held_out_improvement(
-    recordings: Recordings, final: Explanation, noises: tuple[NoiseModel, ...], causes: Sequence[AcceptedCause] = ()
+    recordings: Recordings, final: Hypothesis, noises: tuple[NoiseModel, ...], causes: Sequence[AcceptedCause] = ()
 ) -> HeldOut:
     """Fit on all recordings but one, compare errors on that one as it was measured.
 
@@ -100,12 +100,12 @@ def held_out_improvement(
     if final.causes or final.shape.added or any(a is not b for a, b in zip(mended, measured, strict=True)):
         tasks.append(partial(fit, mended, final, iterations=ITERATIONS))
     fitted: list[Fit] = in_processes(tasks)
-    return scored(recordings, (fitted[0].explanation, fitted[-1].explanation), noises, causes)
+    return scored(recordings, (fitted[0].hypothesis, fitted[-1].hypothesis), noises, causes)
 
 
 def scored(
     recordings: Recordings,
-    elsewhere: tuple[Explanation, Explanation],
+    elsewhere: tuple[Hypothesis, Hypothesis],
     noises: tuple[NoiseModel, ...],
     causes: Sequence[AcceptedCause],
 ) -> HeldOut:
@@ -142,9 +142,9 @@ def scored(
     return HeldOut(improvement, linear, improved)
 
 
-def residual_lines(explanation: Explanation, lines: WindowedLines, faults: Sequence[AcceptedCause] = ()) -> Complex:
-    """What an explanation, with plain faults, leaves of a recording, (n_lines, n_responses)."""
-    predicted = predict_lines(explanation, lines)
+def residual_lines(hypothesis: Hypothesis, lines: WindowedLines, faults: Sequence[AcceptedCause] = ()) -> Complex:
+    """What a hypothesis, with plain faults, leaves of a recording, (n_lines, n_responses)."""
+    predicted = predict_lines(hypothesis, lines)
     if not faults:
         return lines.measured - predicted.response
     signal = np.asarray(irfft(predicted.spectrum, n=lines.padded, axis=0)[: len(lines.trial.force)])

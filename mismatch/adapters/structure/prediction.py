@@ -12,7 +12,7 @@ from ..faults.shown_faults import with_faults
 from ..records.trial import Trial, band_of
 from ..records.windowed_lines import windowed_lines
 from .hypothesis import predict_lines
-from .model_terms import explanation_of
+from .model_terms import hypothesis_of
 
 Real = NDArray[np.float64]
 
@@ -55,12 +55,12 @@ def predict(model: ModalModel, trial: Trial) -> Prediction:
     InputError
         A recording that the model cannot be compared with.
     """
-    explanation = explanation_of(model)
+    hypothesis = hypothesis_of(model)
     band = band_of(model, trial.rate)
     decay = float((-model.poles.real).min())
     lines = windowed_lines(trial, band, decay)
     n = len(trial.force)
-    response = np.asarray(irfft(predict_lines(explanation, lines).spectrum, n=lines.padded, axis=0)[:n])
+    response = np.asarray(irfft(predict_lines(hypothesis, lines).spectrum, n=lines.padded, axis=0)[:n])
     response = with_faults(response, trial, lines.start, model.physics)
     measured, shown = (lines.cut(signal) for signal in (trial.response, response))
     rest, power = np.abs(measured - shown) ** 2, np.abs(measured) ** 2

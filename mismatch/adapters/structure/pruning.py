@@ -6,7 +6,7 @@ import numpy as np
 
 from ...inference.diagnosis import AcceptedCause, Candidate
 from ...models.fitting import Fit, fit
-from ...models.hypothesis import Explanation
+from ...models.hypothesis import Hypothesis
 from ...models.model_shape import ModelShape
 from ...physics import answer_name
 from ...records.windowed_lines import WindowedLines
@@ -18,7 +18,7 @@ ITERATIONS = 20
 def pruned(
     lines: list[WindowedLines], steps: list[Fit], accepted: list[AcceptedCause]
 ) -> tuple[list[Fit], list[AcceptedCause], list[Candidate]]:
-    """Try the last explanation without each cause that came before its last; keep what is not worth its evidence out.
+    """Try the last hypothesis without each cause that came before its last; keep what is not worth its evidence out.
 
     What one cause leaves may look like another: a mode that imitates a joint is found before the joint is.
 
@@ -43,7 +43,7 @@ def pruned(
     place = len(steps) - 3
     while place >= 0 and len(steps) > 2:
         base, last, cause = steps[0], steps[-1], accepted[faults + place]
-        less = fit(lines, without_cause(last.explanation, cause), last.noises, iterations=ITERATIONS)
+        less = fit(lines, without_cause(last.hypothesis, cause), last.noises, iterations=ITERATIONS)
         if less.score - last.score < evidence_needed(less, base):
             rejected.append(Candidate(cause.name, less.score - last.score, "rejected", cause.location))
             accepted = accepted[: faults + place] + accepted[faults + place + 1 :]
@@ -52,15 +52,15 @@ def pruned(
     return steps, accepted, rejected
 
 
-def without_cause(explanation: Explanation, cause: AcceptedCause) -> Explanation:
-    """An explanation without one of its causes."""
+def without_cause(hypothesis: Hypothesis, cause: AcceptedCause) -> Hypothesis:
+    """A hypothesis without one of its causes."""
     if cause.name == "missing_mode":
-        shape, u = without_added(explanation.shape), explanation.u
-        kept_u = np.concatenate([u[: shape.modal_size], u[explanation.shape.modal_size :]])
-        return replace(explanation, shape=shape, u=kept_u)
-    kept = list(explanation.causes)
+        shape, u = without_added(hypothesis.shape), hypothesis.u
+        kept_u = np.concatenate([u[: shape.modal_size], u[hypothesis.shape.modal_size :]])
+        return replace(hypothesis, shape=shape, u=kept_u)
+    kept = list(hypothesis.causes)
     kept.pop(next(k for k, one in enumerate(kept) if answer_name(one.physics) == cause.name))
-    return replace(explanation, causes=tuple(kept))
+    return replace(hypothesis, causes=tuple(kept))
 
 
 def without_added(shape: ModelShape) -> ModelShape:
@@ -73,7 +73,7 @@ def without_added(shape: ModelShape) -> ModelShape:
     return replace(shape, nominal=bare, added=0)
 
 
-def zero_of(shape: ModelShape) -> Explanation:
+def zero_of(shape: ModelShape) -> Hypothesis:
     """The nominal model without causes."""
     bare = without_added(shape)
-    return Explanation(bare, np.zeros(bare.size))
+    return Hypothesis(bare, np.zeros(bare.size))

@@ -16,9 +16,9 @@ Real = NDArray[np.float64]
 
 def accepted_cause(fitted: Fit, location: dict[str, object], evidence: float, place: int = -1) -> AcceptedCause:
     """One cause of a fit, the last if not told, with its numbers and their standard errors (to first order)."""
-    causes = fitted.explanation.causes
+    causes = fitted.hypothesis.causes
     cause, place = causes[place], place % len(causes)
-    first = fitted.explanation.size - sum(one.size for one in causes[place:])
+    first = fitted.hypothesis.size - sum(one.size for one in causes[place:])
     covariance = fitted.covariance[first : first + cause.size, first : first + cause.size]
     spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     parameters, errors = {}, {}
@@ -48,8 +48,8 @@ def with_final_numbers(fitted: Fit, accepted: list[AcceptedCause]) -> list[Accep
         elif one.name == "missing_mode":
             told.append(accepted_mode(fitted, one.evidence))
         else:
-            direction = fitted.explanation.causes[place].direction
-            location = one.location if direction is None else direction_of(fitted.explanation.causes[place])
+            direction = fitted.hypothesis.causes[place].direction
+            location = one.location if direction is None else direction_of(fitted.hypothesis.causes[place])
             told.append(accepted_cause(fitted, location, one.evidence, place))
             place += 1
     return told
@@ -74,7 +74,7 @@ def _derived(cause: Cause, covariance: Real) -> tuple[dict[str, float], dict[str
 
 def accepted_mode(fitted: Fit, evidence: float) -> AcceptedCause:
     """The added mode of a fit: frequency, damping ratio and shape at the responses."""
-    shape, model = fitted.explanation.shape, fitted.explanation.model
+    shape, model = fitted.hypothesis.shape, fitted.hypothesis.model
     first = shape.per_mode * (len(model.poles) - 1)
     spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[first : first + 2], 0.0))
     frequency, damping = float(model.natural_frequencies[-1]), float(model.damping_ratios[-1])
@@ -98,15 +98,15 @@ def modal_deviation(fitted: Fit) -> AcceptedCause | None:
     |u|^2 of believed parameters has the mean n for errors of that size (n without the two free numbers of each mode's
     scale); it is odd four standard deviations above.
     """
-    shape = fitted.explanation.shape
+    shape = fitted.hypothesis.shape
     count = len(shape.nominal.poles) - shape.added
-    rows = shape.modal_rows(fitted.explanation.u)[:count]
+    rows = shape.modal_rows(fitted.hypothesis.u)[:count]
     n = count * (shape.per_mode - 2)
     size = float(np.sum(rows**2))
     if size < n + 4 * np.sqrt(2 * n):
         return None
     spread = np.sqrt(shape.modal_rows(np.diag(fitted.covariance)))[:count]
-    model, nominal = fitted.explanation.model, shape.nominal
+    model, nominal = fitted.hypothesis.model, shape.nominal
     modes = [k for k in range(count) if np.sum(rows[k] ** 2) > shape.per_mode + 3 * np.sqrt(2 * shape.per_mode)]
     parameters, errors = {}, {}
     for k in range(count):

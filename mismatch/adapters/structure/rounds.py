@@ -85,15 +85,15 @@ def _screened(
     lines: list[WindowedLines], current: Fit, causes: dict[str, Physics], laws: list[JointPhysics]
 ) -> tuple[list[ScreenedChain], SightedMode, SightedLaws]:
     """What every cause promises, without a fit: linear ones not found yet, a further mode, joint laws."""
-    own_noise, explanation = noise_floor(current, lines), current.explanation
+    own_noise, hypothesis = noise_floor(current, lines), current.hypothesis
     physics = [p for p in causes.values() if isinstance(p, ChainPhysics)]
     makers: list[Callable[[], Any]] = [
         lambda: sighted_laws(lines, current, laws) if laws else SightedLaws((), ()),
-        lambda: find_mode(own_noise, explanation),
-        lambda: screen_chains(own_noise, explanation, physics),
+        lambda: find_mode(own_noise, hypothesis),
+        lambda: screen_chains(own_noise, hypothesis, physics),
     ]
     sighted, mode, chains = in_processes(makers)
-    taken = {(cause.physics.name, cause.place) for cause in explanation.causes}
+    taken = {(cause.physics.name, cause.place) for cause in hypothesis.causes}
     return [one for one in chains if (one.cause.physics.name, one.cause.place) not in taken], mode, sighted
 
 
@@ -113,17 +113,17 @@ def _explains(best: Option | None, lines: list[WindowedLines], before: Leftover)
     """Whether an option leaves too little that moves with the signal to look further."""
     if best is None:
         return False
-    return not unexplained(best.fitted.explanation, leftover(best.fitted.explanation, lines), before)
+    return not unexplained(best.fitted.hypothesis, leftover(best.fitted.hypothesis, lines), before)
 
 
 def _joints_are_due(
     best: Option | None, current: Fit, moving: tuple[Leftover, Leftover], lines: list[WindowedLines]
 ) -> bool:
     """Whether joint laws are tried beside linear causes: none was found, a mode may imitate them, or much is left."""
-    if best is None and not current.explanation.causes:
+    if best is None and not current.hypothesis.causes:
         return True
     # modes are many-sided: a joint that drifts or rubs is imitated by a few of them
     if best is not None and best.name == "missing_mode":
         return True
-    left = leftover(best.fitted.explanation, lines) if best is not None else moving[0]
+    left = leftover(best.fitted.hypothesis, lines) if best is not None else moving[0]
     return left.share > NOISE_LIKE and left.power > 3 * SMALL * moving[1].power
