@@ -1,20 +1,21 @@
-"""Fitted coordinates as parameters with standard errors, in the units of files."""
+"""Fitted coordinates told as causes: parameters with standard errors, in the units of files."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...faults.shown_faults import FAULTS
-from ...inference.diagnosis import AcceptedCause
-from ...models.fitting import Fit
+from ...inference import AcceptedCause, Proposal
+from ...models.fitting import Fit, modes_are_odd
 from ...models.hypothesis import Cause, direction_of, held_values
-from ...physics import answer_name
+from ...physics import ModePhysics, answer_name
+from ...physics.modal_parameters import PHYSICS as BELIEF
 
 Real = NDArray[np.float64]
 
 
-def accepted_cause(fitted: Fit, location: dict[str, object], evidence: float, place: int = -1) -> AcceptedCause:
+def accepted_cause(fitted: Fit, location: Mapping[str, Any], evidence: float, place: int = -1) -> AcceptedCause:
     """One cause of a fit, the last if not told, with its numbers and their standard errors (to first order)."""
     causes = fitted.hypothesis.causes
     cause, place = causes[place], place % len(causes)
@@ -31,27 +32,23 @@ def accepted_cause(fitted: Fit, location: dict[str, object], evidence: float, pl
     return AcceptedCause(answer_name(cause.physics), dict(location), parameters, errors, evidence)
 
 
-def with_final_numbers(fitted: Fit, accepted: list[AcceptedCause]) -> list[AcceptedCause]:
+def told_causes(fitted: Fit, accepted: Sequence[Proposal[Fit]]) -> list[AcceptedCause]:
     """Accepted causes with the numbers, errors and directions of the final fit, which is that of the improved model.
 
     Parameters
     ----------
     fitted
-        With all accepted causes.
+        The fit with all accepted causes.
     accepted
-        In the order found, as they were when they were found; plain faults are left as they are.
+        In the order found, which is that of the hypothesis.
     """
-    told, place = [], 0
-    for one in accepted:
-        if one.name in FAULTS:
-            told.append(one)
-        elif one.name == "missing_mode":
-            told.append(accepted_mode(fitted, one.evidence))
+    told = []
+    for place, (one, cause) in enumerate(zip(accepted, fitted.hypothesis.causes, strict=True)):
+        if isinstance(cause.physics, ModePhysics):
+            told.append(accepted_mode(fitted, cause.physics, one.evidence))
         else:
-            direction = fitted.hypothesis.causes[place].direction
-            location = one.location if direction is None else direction_of(fitted.hypothesis.causes[place])
+            location = one.location if cause.direction is None else direction_of(cause)
             told.append(accepted_cause(fitted, location, one.evidence, place))
-            place += 1
     return told
 
 
@@ -72,8 +69,18 @@ def _derived(cause: Cause, covariance: Real) -> tuple[dict[str, float], dict[str
     return here, {name: float(np.sqrt(np.maximum(slope @ own @ slope, 0.0))) for name, slope in slopes.items()}
 
 
-def accepted_mode(fitted: Fit, evidence: float) -> AcceptedCause:
-    """The added mode of a fit: frequency, damping ratio and shape at the responses."""
+def accepted_mode(fitted: Fit, physics: ModePhysics, evidence: float) -> AcceptedCause:
+    """The mode added last to a fit: frequency, damping ratio and shape at the responses.
+
+    Parameters
+    ----------
+    fitted
+        The fit with the mode.
+    physics
+        The cause that added it.
+    evidence
+        Gain in score.
+    """
     shape, model = fitted.hypothesis.shape, fitted.hypothesis.model
     first = shape.per_mode * (len(model.poles) - 1)
     spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[first : first + 2], 0.0))
@@ -81,7 +88,7 @@ def accepted_mode(fitted: Fit, evidence: float) -> AcceptedCause:
     right = np.abs(model.right[-1]) / np.abs(model.right[-1]).max()
     place = {"shape": dict(zip(model.responses, [round(float(x), 4) for x in right], strict=True))}
     return AcceptedCause(
-        "missing_mode",
+        physics.name,
         place,
         {"frequency_hz": frequency, "damping_ratio": damping},
         {
@@ -93,18 +100,18 @@ def accepted_mode(fitted: Fit, evidence: float) -> AcceptedCause:
 
 
 def modal_deviation(fitted: Fit) -> AcceptedCause | None:
-    """``modal_parameters`` where the refit lies farther from the nominal model than a lab's own error.
+    """The modal parameters as a cause, where the refit lies farther from the nominal model than a lab's own error.
 
-    |u|^2 of believed parameters has the mean n for errors of that size (n without the two free numbers of each mode's
-    scale); it is odd four standard deviations above.
+    Parameters
+    ----------
+    fitted
+        The final fit.
     """
-    shape = fitted.hypothesis.shape
-    count = len(shape.nominal.poles) - shape.added
-    rows = shape.modal_rows(fitted.hypothesis.u)[:count]
-    n = count * (shape.per_mode - 2)
-    size = float(np.sum(rows**2))
-    if size < n + 4 * np.sqrt(2 * n):
+    if not modes_are_odd(fitted):
         return None
+    shape = fitted.hypothesis.shape
+    count = shape.believed
+    rows = shape.modal_rows(fitted.hypothesis.u)[:count]
     spread = np.sqrt(shape.modal_rows(np.diag(fitted.covariance)))[:count]
     model, nominal = fitted.hypothesis.model, shape.nominal
     modes = [k for k in range(count) if np.sum(rows[k] ** 2) > shape.per_mode + 3 * np.sqrt(2 * shape.per_mode)]
@@ -114,4 +121,5 @@ def modal_deviation(fitted: Fit) -> AcceptedCause | None:
         errors[f"frequency_{k + 1}_hz"] = float(spread[k, 0] * shape.lab.frequency * nominal.natural_frequencies[k])
         parameters[f"damping_ratio_{k + 1}"] = float(model.damping_ratios[k])
         errors[f"damping_ratio_{k + 1}"] = float(spread[k, 1] * shape.lab.damping * nominal.damping_ratios[k])
-    return AcceptedCause("modal_parameters", {"modes": [k + 1 for k in modes]}, parameters, errors, size - n)
+    beyond = float(np.sum(rows**2)) - count * (shape.per_mode - 2)
+    return AcceptedCause(BELIEF.name, {"modes": [k + 1 for k in modes]}, parameters, errors, beyond)
