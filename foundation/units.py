@@ -5,7 +5,7 @@ from functools import cache
 from tokenize import TokenError
 from typing import TYPE_CHECKING
 
-from foundation.errors import InputError
+from .errors import InputError
 
 if TYPE_CHECKING:
     import pint

@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 from robot_model import Payload, PlanarCase, SpatialCase, close_loops, payload_wrench
-from robot_model.gravity import STANDARD_GRAVITY
-from robot_model.weight import tool_attitude
+from robot_model.finite_elements.gravity import STANDARD_GRAVITY
+from robot_model.spatial.weight import tool_attitude
 
 Real = NDArray[np.float64]
 

@@ -29,7 +29,7 @@ from robot_model import (
     sag_parts,
     tool_down,
 )
-from robot_model.weight import NO_MASSES
+from robot_model.spatial.weight import NO_MASSES
 
 from ..commands.options import check_output
 from ..tables import Table, show
