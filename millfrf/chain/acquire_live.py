@@ -8,9 +8,9 @@ from dataclasses import replace
 from typing import Any
 
 from acquisition import Source
-from acquisition.events import announced_events
-from acquisition.feeds import WithFeeds
 from acquisition.session import Session
+from acquisition.sources.events import announced_events
+from acquisition.sources.feeds import WithFeeds
 from foundation import MillfrfError
 
 from ..live import LiveControl, LiveMonitor, LiveServer, LiveSettings

@@ -7,8 +7,8 @@ import numpy as np
 
 from foundation import FileFormatError, InputError
 
-from .channel import Channel
-from .source import StreamDescription
+from ..channel import Channel
+from ..sources.source import StreamDescription
 
 FORMAT = "millfrf.recording"
 FORMAT_VERSION = 1

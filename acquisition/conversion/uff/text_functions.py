@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from .uff_lines import UffLines
+from .lines import UffLines
 
 _HEADER = 11
 _WIDTHS = {

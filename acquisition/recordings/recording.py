@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError, InputError
 
+from ..channel import Channel
+from ..file_safety.damage import open_for_reading, reporting_damage, require_stored, whole_rows
+from ..file_safety.durability import is_being_written
+from ..sources.source import StreamDescription
 from .alignment import Alignment
-from .channel import Channel
-from .damage import open_for_reading, reporting_damage, require_stored, whole_rows
-from .durability import is_being_written
 from .event_series import EventSeries
 from .recording_format import check_format, stream_from_attributes, text_attribute
-from .source import StreamDescription
 
 
 class Stream:

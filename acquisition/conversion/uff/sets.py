@@ -11,8 +11,8 @@ import numpy as np
 
 from foundation import FileFormatError
 
-from .uff_lines import UffLines, read_uff_lines, whole_uff
-from .uff_text_functions import text_function
+from .lines import UffLines, read_uff_lines, whole_uff
+from .text_functions import text_function
 
 _FUNCTION = 58
 _SPARE = 2

@@ -14,8 +14,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..sources.source import StreamDescription
 from .recording import Stream
-from .source import StreamDescription
 
 Real = NDArray[np.float64]
 

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
+from ..errors import DiskFull
+from ..file_safety.durability import SpareSpace, Syncer, is_being_written, is_disk_full
+from ..sources.events import SAMPLES_AXIS, TEXT_BYTES, EventAxis, Events, stored_texts
+from ..sources.source import StreamDescription
 from .appending import append_rows
-from .durability import SpareSpace, Syncer, is_being_written, is_disk_full
-from .errors import DiskFull
-from .events import SAMPLES_AXIS, TEXT_BYTES, EventAxis, Events, stored_texts
 from .recording_format import ENDING_BYTES, FORMAT, FORMAT_VERSION
-from .source import StreamDescription
 
 _CLOCK_CHUNK = 1024
 

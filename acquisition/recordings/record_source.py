@@ -5,9 +5,9 @@ import os
 from collections.abc import Callable
 from typing import Literal
 
-from .events import Events, announced_events
+from ..sources.events import Events, announced_events
+from ..sources.source import Block, Source
 from .recording_writer import RecordingWriter
-from .source import Block, Source
 
 SPARE_BYTES = 16_000_000
 """Disk space kept aside while recording, so that a full disk does not cost the file."""

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from foundation import InputError, writing_whole_file
 
-from .durability import is_being_written
-from .events import Events
+from ..file_safety.durability import is_being_written
+from ..sources.events import Events
 from .recording import Recording, Stream
 from .recording_writer import RecordingWriter
 

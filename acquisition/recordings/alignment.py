@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError, InputError
 
-from .clock import ClockFit, fit_clock
+from ..clock import ClockFit, fit_clock
+from ..sources.source import StreamDescription
 from .event_series import EventSeries
-from .source import StreamDescription
 
 
 class Alignment:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from .channel import Channel
+from ..channel import Channel
 from .events import Events
 
 
