@@ -13,9 +13,9 @@ import numpy as np
 from acquisition import read_uff_sets
 from foundation import FileFormatError, InputError
 
-from ..frf import Frf
-from .entries import FrfEntry, ImportedFrf, assembled
-from .uff_coherence import MULTIPLE, ORDINARY, Coherence, coherences_of, with_coherences, with_multiple_coherence
+from ...frf_matrix.frf import Frf
+from ..entries import FrfEntry, ImportedFrf, assembled
+from .coherences import MULTIPLE, ORDINARY, Coherence, coherences_of, with_coherences, with_multiple_coherence
 from .uff_units import StatedUnit, stated_unit
 
 _FUNCTION, _UNITS = 58, 164

@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from .coherence import multiple_coherence
-from .cross_spectra import CrossSpectra
-from .frf import Frf, FrfCovariance
-from .independence import RANK_TOLERANCE, input_independence
-from .quantities import frf_quantity
+from ..frf_matrix.frf import Frf, FrfCovariance
+from ..frf_matrix.quantities import frf_quantity
+from ..spectra.coherence import multiple_coherence
+from ..spectra.cross_spectra import CrossSpectra
+from ..spectra.independence import RANK_TOLERANCE, input_independence
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

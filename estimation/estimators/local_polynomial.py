@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from .band_records import BandRecord
-from .frf import Frf, FrfCovariance
-from .quantities import frf_quantity
+from ..band_records import BandRecord
+from ..frf_matrix.frf import Frf, FrfCovariance
+from ..frf_matrix.quantities import frf_quantity
 
 Complex = NDArray[np.complex128]
 _LINES_AT_ONCE = 2048

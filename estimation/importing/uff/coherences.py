@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError
 
-from ..frf import Frf
-from .entries import FrfEntry
+from ...frf_matrix.frf import Frf
+from ..entries import FrfEntry
 
 ORDINARY, MULTIPLE = 6, 26
 """Function types of data set 58."""

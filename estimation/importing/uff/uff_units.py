@@ -7,7 +7,7 @@ from typing import Any
 
 from foundation import InputError
 
-from .units import SI, FrfUnit, frf_unit
+from ..units import SI, FrfUnit, frf_unit
 
 _MOTION = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _FORCES = (9, 13)  # reaction and excitation force

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from .coherence import multiple_coherence
-from .cross_spectra import CrossSpectra, lines_of
-from .frf import Frf, FrfCovariance
-from .independence import independent_lines
-from .quantities import frf_quantity
-from .stacking import check_stackable, sum_tests
+from ..frf_matrix.frf import Frf, FrfCovariance
+from ..frf_matrix.quantities import frf_quantity
+from ..spectra.coherence import multiple_coherence
+from ..spectra.cross_spectra import CrossSpectra, lines_of
+from ..spectra.independence import independent_lines
+from ..spectra.stacking import check_stackable, sum_tests
 
 
 def h1(spectra: CrossSpectra) -> Frf:
