@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..shape_measures import modal_assurance
+from ...models.shape_measures import modal_assurance
+from ..variable_projection.elimination import Elimination, Modes, Real
+from ..variable_projection.measured_lines import MeasuredLines
+from ..variable_projection.neighbourhood import half_power_lines, mode_power, outside_power
 from .candidates import Candidate
-from .elimination import Elimination, Modes, Real
-from .measured_lines import MeasuredLines
-from .neighbourhood import half_power_lines, mode_power, outside_power
 
 CLEAN = 2.0  # misfit over the noise expected up to which noise alone decides
 _WHITE = 0.35  # correlation of neighbouring lines' errors up to which they are noise, whatever its level

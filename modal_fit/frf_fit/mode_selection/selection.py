@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..shape_measures import modal_assurance
+from ...models.shape_measures import modal_assurance
+from ..variable_projection.elimination import Elimination, Modes, eliminate
+from ..variable_projection.measured_lines import MeasuredLines
+from ..variable_projection.neighbourhood import participations
+from ..variable_projection.outer_modes import inside, just_outside
+from ..variable_projection.refinement import refine
 from .candidates import Candidate
-from .elimination import Elimination, Modes, eliminate
 from .judging import judge, judge_again, judge_early
-from .measured_lines import MeasuredLines
-from .neighbourhood import participations
-from .outer_modes import inside, just_outside
-from .refinement import refine
 
 _ROUNDS = 4
 _LOOKS = 3

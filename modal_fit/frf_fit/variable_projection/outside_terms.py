@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..out_of_band import basis_with_poles, fixed_poles
+from ...models.out_of_band import basis_with_poles, fixed_poles
 from .elimination import Modes
 from .measured_lines import MeasuredLines
 from .refinement import refine

@@ -5,12 +5,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..variable_projection.elimination import Elimination, Modes, Real, eliminate
+from ..variable_projection.measured_lines import MeasuredLines
+from ..variable_projection.neighbourhood import (
+    around,
+    half_power_lines,
+    mode_power,
+    outside_power,
+    participation,
+    without_modes,
+)
+from ..variable_projection.refinement import refine
 from .candidates import Candidate
-from .elimination import Elimination, Modes, Real, eliminate
-from .measured_lines import MeasuredLines
 from .needed import CLEAN, NEAR, NEEDED, Trial, as_good_without, copy_of_near_mode, most_missed, unneeded
-from .neighbourhood import around, half_power_lines, mode_power, outside_power, participation, without_modes
-from .refinement import refine
 
 _TRIAL_STEPS, _TRIAL_TOLERANCE = 12, 1e-3
 _DOUBTFUL = 0.4  # share of the orders below which a candidate is tried only where much is left

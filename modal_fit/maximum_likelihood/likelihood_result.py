@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from foundation import MillfrfError
 
+from ..models.modal_model import ModalModel
+from ..models.out_of_band import ABOVE, out_of_band_basis, residuals_from
+from .likelihood_fit import LikelihoodFit, maximise_likelihood
 from .likelihood_model import LikelihoodModel, Setting
 from .linear_start import linear_start
-from .maximum_likelihood import LikelihoodFit, maximise_likelihood
-from .modal_model import ModalModel
-from .out_of_band import ABOVE, out_of_band_basis, residuals_from
 from .record_spectra import RecordSpectra
 
 
