@@ -17,10 +17,10 @@ from acquisition import record
 from foundation import InputError, MillfrfError
 from modal_fit import ModalModel
 from replay_data import HammerCell, dynamometer, tip_accelerometers
-from replay_data.concealed_cell import FINE_RATE, LEVELS, ConcealedCell, milling_force
-from replay_data.concealed_effect import ConcealedEffect, draw_effect, draw_name, joint_scale
-from replay_data.joint_march import tip_motion
-from replay_data.posture_robot import posture_robot
+from replay_data.concealment.concealed_cell import FINE_RATE, LEVELS, ConcealedCell, milling_force
+from replay_data.concealment.concealed_effect import ConcealedEffect, draw_effect, draw_name, joint_scale
+from replay_data.concealment.posture_robot import posture_robot
+from replay_data.simulation.joint_march import tip_motion
 
 from .chain.estimate import estimate_recordings, write_estimate
 from .chain.estimate_options import EstimateOptions

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from replay_data.concealed_effect import FOREIGN, ConcealedEffect
+from replay_data.concealment.concealed_effect import FOREIGN, ConcealedEffect
 
 from .concealment import ConcealResult
 from .tables import Table

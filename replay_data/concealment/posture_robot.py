@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from modal_fit import ModalModel
 
-from .robot_structure import TOOL_TIP
+from ..robot_structure import TOOL_TIP
 
 FREQUENCIES = ((10.0, 12.0), (15.0, 18.0), (22.0, 26.0))
 """Ranges of the natural frequencies, Hz: those of heavy articulated robots (Mohammadi & Ahmadi: 17 and 18 Hz)."""

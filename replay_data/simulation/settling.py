@@ -10,10 +10,10 @@ from cutting import MillingProcess, refuse_varied
 from foundation import InputError
 from modal_fit import ModalModel
 
+from ..robot_structure import TOOL_TIP
 from .material import material_named
 from .milling_loop import Memory, empty_memory, mill, prepare_cut
 from .modal_integrator import Dynamics, discretise
-from .robot_structure import TOOL_TIP
 
 Real = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from cutting.compiled import compiled
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .robot_structure import TOOL_TIP, select
+from ..robot_structure import TOOL_TIP, select
 
 _DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
 

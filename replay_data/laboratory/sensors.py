@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from acquisition import Channel
 from foundation import SI_UNITS, DegreeOfFreedom, InputError
 
-from .robot_structure import HOUSING, TOOL_TIP
+from ..robot_structure import HOUSING, TOOL_TIP
 
 
 @dataclass(frozen=True)

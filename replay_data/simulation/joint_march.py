@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from cutting.compiled import compiled
 from modal_fit import ModalModel
 
+from ..robot_structure import TOOL_TIP, select
 from .joint_laws import JOINT_LAWS, joint_force, stretched
 from .modal_integrator import require_simulable
-from .robot_structure import TOOL_TIP, select
 
 ROUNDS = 6
 """Corrections of the joint's force at each instant."""

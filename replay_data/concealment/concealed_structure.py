@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
+from ..simulation.joint_march import LINEAR, JointLaw
 from .concealed_effect import JOINT_EFFECTS, ConcealedEffect
-from .joint_march import LINEAR, JointLaw
 from .posture_robot import real_modes
 
 

@@ -10,16 +10,16 @@ from acquisition import Block, StreamDescription
 from cutting import MillingProcess
 from modal_fit import ModalModel
 
+from ..laboratory.sensors import Sensor, dynamometer, tip_accelerometers
+from ..laboratory.setup_text import setup_text
+from ..laboratory.signal_chain import Decimator
+from ..milling_cell import MillingCell
+from ..sampled_cell import STREAM
+from ..simulation.joint_march import tip_motion
+from ..speed_profiles import LinearSweep
 from .concealed_chain import in_converter, through_chain
 from .concealed_effect import ConcealedEffect
 from .concealed_structure import concealed_law, concealed_structure, unmeasured_force
-from .joint_march import tip_motion
-from .milling_cell import MillingCell
-from .sampled_cell import STREAM
-from .sensors import Sensor, dynamometer, tip_accelerometers
-from .setup_text import setup_text
-from .signal_chain import Decimator
-from .speed_profiles import LinearSweep
 
 Real = NDArray[np.float64]
 
