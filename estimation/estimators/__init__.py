@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Estimators of the FRF: least squares, errors in variables, local polynomials."""

@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""`Frf`, the matrix of frequency response functions: its quantity, its known band and its files."""

@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Averaged spectra of recordings: windows, stacking, coherence, independence of inputs, and usable samples."""

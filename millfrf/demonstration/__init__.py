@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""The demonstration on the simulated cell: the whole chain, and the blind diagnosis of a concealed effect."""

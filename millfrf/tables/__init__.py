@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Tables of results for the terminal and for reports."""

@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Maximum-likelihood modal parameters from whole records, with noise on forces and responses."""

@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""The simulated laboratory: sensors, signal chain, and the set-up that it notes down."""

@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Parameters of a robot from measured FRFs, frequencies or deflections, with standard errors."""

@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Kinematics of any mechanism: frames, loops, joint values and inverse solutions."""

@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Planar robots: rigid links on joint springs, flexible links, and natural coordinates."""

@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Robots in space: structure at a posture, modes, weight, a compliant tool, and natural coordinates."""

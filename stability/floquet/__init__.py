@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""The tooth period as an operator, its Floquet multipliers, and the depths at which cuts grow."""

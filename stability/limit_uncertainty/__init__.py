@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Error bars of stability limits: sensitivities, drawn samples, and the interval that holds the true limit."""

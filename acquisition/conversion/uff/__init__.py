@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Data sets of Universal File Format files, read line by line or with pyuff."""

@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""FRFs of Universal File Format files, with their coherences and units."""

@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Between this project's files and those of other programs."""

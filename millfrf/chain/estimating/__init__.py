@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""From recordings to an FRF file."""

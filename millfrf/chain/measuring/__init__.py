@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Before and during a measurement: plan, check of the signals, recording."""

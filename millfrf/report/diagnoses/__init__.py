@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Report pages of the diagnoses: structure, robot, and cutting process."""

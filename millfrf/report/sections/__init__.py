@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Sections and folded parts of the modal-fitting report."""

@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""`millfrf robot diagnose`: the command, its run, and its words."""

@@ -1,1 +1,1 @@
-"""TODO(shelf)"""
+"""Variable projection on the measured lines: linear unknowns eliminated, poles and left vectors refined."""
