@@ -35,11 +35,11 @@ def tooth_force(
     Parameters
     ----------
     sine, cosine
-        Of the immersion angle phi.
+        Sine and cosine of the immersion angle phi.
     sine_edge, cosine_edge
-        Of the edge angle gamma.
-    tangential, radial, axial
-        Forces on the tooth, N.
+        Sine and cosine of the edge angle gamma.
+    tangential, radial, axial : N
+        Forces on the tooth.
 
     Returns
     -------
@@ -74,19 +74,19 @@ def wrapped_immersion(angle: float) -> float:
 
 @compiled
 def engaged_share(angle: float, step: float, start: float, leave: float) -> tuple[float, float]:
-    """Share of the angle step around ``angle`` that lies in the immersion, and the middle of that part.
+    """Give the share of the angle step around ``angle`` that lies in the immersion, and the middle of that part.
 
     A tooth enters and leaves between two instants; weighting with this share keeps the force's impulse right to the
     second order of the step, instead of quantising entry and exit.
 
     Parameters
     ----------
-    angle
-        Immersion angle at the instant, rad, wrapped.
-    step
-        Angle turned between two instants, rad.
-    start, leave
-        Immersion, rad.
+    angle : rad
+        Immersion angle at the instant, wrapped.
+    step : rad
+        Angle turned between two instants.
+    start, leave : rad
+        Angles at which the immersion begins and ends.
 
     Returns
     -------
@@ -108,7 +108,7 @@ def engaged_share(angle: float, step: float, start: float, leave: float) -> tupl
 
 
 def rigid_chip_thickness(process: MillingProcess, tooth: int, immersion: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Chip thickness of one tooth of a tool that does not vibrate, with runout.
+    """Give the chip thickness of one tooth, with runout, when the tool does not vibrate.
 
     ``h = min_k (k f sin(phi) + rho_j - rho_(j+k)) sin(gamma)``, k = 1 ... N, not below zero: the surface at an angle is
     the deepest that any earlier tooth left there (Altintas, Manufacturing Automation, 2nd ed., section 4.8).
@@ -120,7 +120,7 @@ def rigid_chip_thickness(process: MillingProcess, tooth: int, immersion: NDArray
     tooth
         Index j of the tooth, 0 ... N - 1.
     immersion : (n,), rad
-        Its angles.
+        Immersion angles of the tooth.
 
     Returns
     -------
@@ -140,7 +140,7 @@ def tooth_offsets(process: MillingProcess) -> NDArray[np.float64]:
 
 
 def rigid_force(process: MillingProcess, depth: float, spindle_angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Force on a tool that does not vibrate, the F_p of Mohammadi & Ahmadi, Eq. 1.
+    """Give the force on a tool that does not vibrate, the F_p of Mohammadi & Ahmadi, Eq. 1.
 
     Tooth j (0 ... N - 1) stands at ``phi_j = angle + 2 pi j / N``; its forces are ``Ft = Ktc a h + Kte a / sin(gamma)``
     and alike for radial and axial, zero while no chip is cut.
@@ -148,11 +148,11 @@ def rigid_force(process: MillingProcess, depth: float, spindle_angles: NDArray[n
     Parameters
     ----------
     process
-        Cutter, immersion, coefficients.
-    depth
-        Axial depth a, m.
+        Cutter, immersion and coefficients.
+    depth : m
+        Axial depth of cut a.
     spindle_angles : (n,), rad
-        Angle of tooth 0.
+        Spindle angles, counted as the angle of tooth 0.
 
     Returns
     -------

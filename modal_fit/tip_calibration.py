@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from estimation import Frf, FrfCovariance, to_receptance
 from foundation import InputError, MillfrfError, shared_band
 
-from .modal_model import ModalModel, Residuals
+from .models.modal_model import ModalModel, Residuals
+from .models.shape_measures import modal_assurance
+from .models.uncertainty import derived_covariance
 from .polyreference import ModalFit, fit_polyreference
-from .shape_measures import modal_assurance
-from .uncertainty import derived_covariance
 
 Complex = NDArray[np.complex128]
 _POOR = 0.3  # relative standard error above which a ratio is replaced

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from .likelihood_model import Setting
-from .linear_start import regressors
-from .out_of_band import out_of_band_basis
-from .record_spectra import RecordSpectra
+from .maximum_likelihood.likelihood_model import Setting
+from .maximum_likelihood.linear_start import regressors
+from .maximum_likelihood.record_spectra import RecordSpectra
+from .models.out_of_band import out_of_band_basis
 
 Complex = NDArray[np.complex128]
 _LONGEST = 4.0  # periods of the band's upper end

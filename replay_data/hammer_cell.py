@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .modal_integrator import discretise, respond
+from .laboratory.sensors import Sensor, hammer_sensors
+from .laboratory.setup_text import setup_text
 from .robot_structure import TOOL_TIP
 from .sampled_cell import March, SampledCell
-from .sensors import Sensor, hammer_sensors
-from .setup_text import setup_text
+from .simulation.modal_integrator import discretise, respond
 
 LEAD = 0.05
 """Quiet time before the first tap, s."""

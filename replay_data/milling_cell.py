@@ -11,12 +11,12 @@ from cutting.tooth_force import tooth_offsets
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .material import Material, material_named
-from .milling_loop import empty_memory, mill, prepare_cut
-from .modal_integrator import discretise
+from .laboratory.sensors import Sensor, milling_sensors
+from .laboratory.setup_text import cutting_table, setup_text
 from .sampled_cell import March, SampledCell
-from .sensors import Sensor, milling_sensors
-from .setup_text import cutting_table, setup_text
+from .simulation.material import Material, material_named
+from .simulation.milling_loop import empty_memory, mill, prepare_cut
+from .simulation.modal_integrator import discretise
 from .speed_profiles import ConstantSpeed, SpeedProfile
 
 REHEARSAL = 5.0

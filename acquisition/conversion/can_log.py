@@ -16,7 +16,7 @@ from foundation import FileFormatError, InputError, mistake_in_words, writing_wh
 
 from ..drivers.can_bus import CanSignal, DbcDecoder
 from ..errors import DriverMissing
-from ..recording import Recording
+from ..recordings.recording import Recording
 from .content import recording_content
 from .writers import require_writable, write_content
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError
 
-from ..recording import Recording
-from ..source import StreamDescription
+from ..recordings.recording import Recording
+from ..sources.source import StreamDescription
 
 Pairs = tuple[NDArray[np.float64], NDArray[np.float64]]
 

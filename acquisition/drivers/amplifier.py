@@ -9,7 +9,7 @@ from typing import Any
 from foundation import InputError
 
 from ..errors import DeviceError, DeviceTimeout
-from ..events import EventAxis, Events
+from ..sources.events import EventAxis, Events
 from .serial_line import on_line, open_line
 
 

@@ -13,9 +13,9 @@ import numpy as np
 from foundation import FileFormatError, InputError
 
 from ..errors import DeviceTimeout, Disconnected, DriverMissing
-from ..events import EventAxis, Events
-from ..receiver import Put
-from ..threaded_feed import ThreadedFeed
+from ..sources.events import EventAxis, Events
+from ..sources.receiver import Put
+from ..sources.threaded_feed import ThreadedFeed
 from .serial_line import LINE_FAILURES
 
 _POLL = 0.1

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import DeviceTimeout, Disconnected, DriverMissing
-from ..events import HOST_AXIS, Events
-from ..receiver import Put
-from ..threaded_feed import ThreadedFeed
+from ..sources.events import HOST_AXIS, Events
+from ..sources.receiver import Put
+from ..sources.threaded_feed import ThreadedFeed
 from .serial_line import BITS_A_BYTE, LINE_FAILURES
 
 _REPLY_BYTES = 7  # address, function, length, two data bytes, two of the checksum

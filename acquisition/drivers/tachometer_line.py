@@ -10,9 +10,9 @@ import numpy as np
 from foundation import InputError
 
 from ..errors import DeviceTimeout
-from ..events import HOST_AXIS, EventAxis, Events
-from ..receiver import Put
-from ..threaded_feed import ThreadedFeed
+from ..sources.events import HOST_AXIS, EventAxis, Events
+from ..sources.receiver import Put
+from ..sources.threaded_feed import ThreadedFeed
 from .serial_line import BITS_A_BYTE, on_line, open_line
 
 _NUMBER = r"([-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)"

@@ -6,8 +6,8 @@ from foundation import InputError
 
 from ..drivers.ni import NiSource
 from ..drivers.replay import ReplaySource
-from ..feeds import WithFeeds
-from ..source import Source
+from ..sources.feeds import WithFeeds
+from ..sources.source import Source
 from .tables import NiDevice, ReplayDevice, Session
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from acquisition import Channel
 from foundation import Band, InputError
 
-from ..quantities import frf_quantity
+from ..frf_matrix.quantities import frf_quantity
 from .cutting_out import segments_of
 from .screening import FoundTaps
 from .segments import TapSettings

@@ -14,10 +14,10 @@ from modal_fit import read_modal_model, write_modal_model
 
 from ..gate import check_model_and_recordings
 from ..progress import Watch, silent
-from ..report.diagnosis_page import with_location, write_diagnosis_report
+from ..report.diagnoses.diagnosis_page import with_location, write_diagnosis_report
 from ..result_folder import refuse_file
-from .fit import fit_recordings
-from .fit_options import SUBSPACE, FitOptions
+from .fitting.fit import fit_recordings
+from .fitting.fit_options import SUBSPACE, FitOptions
 
 
 @dataclass(frozen=True)

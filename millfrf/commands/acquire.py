@@ -25,7 +25,7 @@ def acquire(
     """Record from the devices of a session until its duration is over, Stop is pressed or Ctrl-C."""
     from foundation import InputError
 
-    from ..chain.acquire import open_session
+    from ..chain.measuring.acquire import open_session
     from .options import check_output
 
     if (out is None) == (not check):
@@ -40,7 +40,7 @@ def acquire(
     if out is None:
         _check(opened.source, seconds)
     elif live:
-        from ..chain.acquire_live import acquire_live
+        from ..chain.measuring.acquire_live import acquire_live
 
         tally = acquire_live(opened, out, address=live_address, port=live_port, at_once=at_once, say=_say)
         _report(tally, out)
@@ -52,8 +52,8 @@ def _check(source: object, seconds: float) -> None:
     from acquisition import Source
     from foundation import MillfrfError
 
-    from ..chain.preflight import listen, preflight
-    from ..tables import show
+    from ..chain.measuring.preflight import listen, preflight
+    from ..tables.result_tables import show
 
     assert isinstance(source, Source)
     found = preflight(listen(source, seconds))
@@ -69,7 +69,7 @@ def _check(source: object, seconds: float) -> None:
 
 
 def _record(opened: object, out: Path) -> None:
-    from ..chain.acquire import OpenedSession, acquire
+    from ..chain.measuring.acquire import OpenedSession, acquire
     from ..progress import bar
 
     assert isinstance(opened, OpenedSession)
@@ -84,7 +84,7 @@ def _say(line: str) -> None:
 
 
 def _report(tally: object, out: Path) -> None:
-    from ..chain.acquire import Tally
+    from ..chain.measuring.acquire import Tally
 
     if not isinstance(tally, Tally):
         typer.echo("stopped before Start; nothing was recorded")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from acquisition import Channel
 from estimation import Frf, SpectralAccumulator, h1, settings_for
 from estimation.band_records import BandDecimator
-from estimation.recording_spectra import EXCITING, RESPONDING
+from estimation.spectra.recording_spectra import EXCITING, RESPONDING
 from foundation import InputError
 
 Real = NDArray[np.float64]

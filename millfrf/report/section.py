@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from ..tables import Table
+from ..tables.result_tables import Table
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, Concealed, forces, linear_acceleration, trial
 
-from millfrf.report.diagnosis_answers import named, verdict_sentence
+from millfrf.report.diagnoses.diagnosis_answers import named, verdict_sentence
 from mismatch import Diagnosis, Hypothesis, LabError, ModelShape, Trial, band_of, diagnose, windowed_lines
 from mismatch.adapters.structure.acceptance import LEAST_EVIDENCE
 from mismatch.adapters.structure.confirmed import helps

@@ -8,8 +8,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from millfrf.chain.fit import fit_recordings
-from millfrf.chain.fit_options import FitOptions
+from millfrf.chain.fitting.fit import fit_recordings
+from millfrf.chain.fitting.fit_options import FitOptions
 from mismatch import diagnose, read_trials
 
 pytestmark = pytest.mark.shared_data
