@@ -12,6 +12,7 @@ from .inference import (
     write_diagnosis,
 )
 from .joints.joint_law import JointLaw, JointMotion
+from .location.structure_details import StructureDetails, StructureDiagnosis
 from .models.fitting import Fit, fit, residual
 from .models.hypothesis import Cause, Hypothesis, predict_lines
 from .models.model_shape import ModelShape
@@ -37,6 +38,8 @@ __all__ = [
     "Prediction",
     "SeenMotion",
     "Settings",
+    "StructureDetails",
+    "StructureDiagnosis",
     "Trial",
     "WindowedLines",
     "band_of",

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from foundation import DegreeOfFreedom
-from mismatch import AcceptedCause, Diagnosis
+from mismatch import AcceptedCause, StructureDiagnosis
 from mismatch.physics import form_of
 
 from .next_tests import next_test
@@ -49,7 +49,7 @@ def number(value: float, error: float | None = None) -> str:
     return f"{value:.{digits}g} ± {error:.2g}"
 
 
-def verdict_sentence(diagnosis: Diagnosis) -> str:
+def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
     """The whole result in one sentence."""
     gain = diagnosis.improvement
     found = " and ".join(f"{named(cause)} ({next_test(cause.name).meaning})" for cause in diagnosis.physics)
@@ -87,7 +87,7 @@ def named(cause: AcceptedCause) -> str:
     return f"{words(cause.name)} at {shown} Hz"
 
 
-def answers(diagnosis: Diagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
+def answers(diagnosis: StructureDiagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Question and sentences, in the order in which an engineer asks."""
     return (
         ("Where?", where(diagnosis)),
@@ -98,11 +98,10 @@ def answers(diagnosis: Diagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
     )
 
 
-def where(diagnosis: Diagnosis) -> tuple[str, ...]:
+def where(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     """Place of each cause, then what the maps located."""
     said = [f"{named(cause)[:1].upper()}{named(cause)[1:]}: {place(diagnosis, cause)}." for cause in diagnosis.physics]
-    if diagnosis.band is not None:
-        said.append(f"Model and recordings are {diagnosis.band.sentence}.")
+    said.append(f"Model and recordings are {diagnosis.details.band.sentence}.")
     located = diagnosis.located
     bands = located.get("frequency_bands", [])
     if not bands:
@@ -123,11 +122,11 @@ def where(diagnosis: Diagnosis) -> tuple[str, ...]:
     return tuple(said)
 
 
-def place(diagnosis: Diagnosis, cause: AcceptedCause) -> str:
+def place(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
     """Location of a cause in words."""
     location = cause.location
     if "direction" in location:
-        model = diagnosis.final.hypothesis.model
+        model = diagnosis.details.final.hypothesis.model
         parts = [DegreeOfFreedom.parse(label) for label in model.excitations][: len(location["direction"])]
         axes = ", ".join(f"{value:+.3f} {part.axis}" for value, part in zip(location["direction"], parts, strict=False))
         return f"in a joint that acts along {axes} at {parts[0].node}"
@@ -144,10 +143,10 @@ def place(diagnosis: Diagnosis, cause: AcceptedCause) -> str:
     return "in the whole measuring chain or structure"
 
 
-def _times(diagnosis: Diagnosis) -> list[str]:
+def _times(diagnosis: StructureDiagnosis) -> list[str]:
     """Said only where a recording is not affected as a whole."""
     said = []
-    for one in diagnosis.lines:
+    for one in diagnosis.details.recordings:
         stretches = [row for row in diagnosis.located["times"] if row["recording"] == one.trial.name]
         held = sum(row["end_s"] - row["start_s"] for row in stretches)
         if stretches and held < 0.8 * (one.trial.duration - one.start / one.trial.rate):
@@ -164,7 +163,7 @@ def _orders(located: Mapping[str, Any]) -> list[str]:
     return [f"Spindle orders: {note}."] if note else []
 
 
-def what(diagnosis: Diagnosis) -> tuple[str, ...]:
+def what(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     """Equation and source of each cause, and how the residual grows with the level."""
     said = []
     for cause in diagnosis.physics:
@@ -181,7 +180,7 @@ def what(diagnosis: Diagnosis) -> tuple[str, ...]:
     return tuple(said) or ("Nothing beyond the refitted modal parameters.",)
 
 
-def how_sure(diagnosis: Diagnosis) -> tuple[str, ...]:
+def how_sure(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     """Evidence, and what it is worth on data that was held out."""
     said = [
         f"{first_word(cause.name)}: evidence {cause.evidence:.0f} (twice the logarithm of the odds; 20 is the "
@@ -193,14 +192,14 @@ def how_sure(diagnosis: Diagnosis) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _errors(diagnosis: Diagnosis) -> str:
+def _errors(diagnosis: StructureDiagnosis) -> str:
     """Errors on the recording held out, and the test that was made on them."""
     gain = diagnosis.improvement
     told = (
         f"the error is {100 * gain.before:.3g} % of the response for the nominal model, {100 * gain.refitted:.3g} % "
         f"refitted, {100 * gain.after:.3g} % for the final one; noise is {100 * gain.noise_floor:.3g} %."
     )
-    if len(diagnosis.lines) < 2:
+    if len(diagnosis.details.recordings) < 2:
         return f"On {gain.held_out}, the only recording, {told} Nothing was held out, so nothing confirms this."
     told = (
         f"On {gain.held_out}, which the fit did not see, {told} Final over nominal: {gain.interval[0]:.3g} to "
@@ -212,7 +211,7 @@ def _errors(diagnosis: Diagnosis) -> str:
     return f"{told} Chance that the final model is no better there than {than} one: p = {gain.p_value:.2g}."
 
 
-def rivals(diagnosis: Diagnosis) -> list[tuple[str, float]]:
+def rivals(diagnosis: StructureDiagnosis) -> list[tuple[str, float]]:
     """Other causes that were fitted with their best evidence, best first."""
     accepted = {cause.name for cause in diagnosis.physics}
     best: dict[str, float] = {}
@@ -222,7 +221,7 @@ def rivals(diagnosis: Diagnosis) -> list[tuple[str, float]]:
     return sorted(best.items(), key=lambda item: -item[1])
 
 
-def what_else(diagnosis: Diagnosis) -> tuple[str, ...]:
+def what_else(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     """Causes that the data cannot separate, then the nearest ones that it can."""
     said = []
     if diagnosis.equivalents:
@@ -249,7 +248,7 @@ def what_else(diagnosis: Diagnosis) -> tuple[str, ...]:
     return tuple(said) or ("No other cause of the library came near.",)
 
 
-def which_test(diagnosis: Diagnosis) -> tuple[str, ...]:
+def which_test(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     """The next test for each accepted cause, for its equivalents, or for the verdict."""
     names = [cause.name for cause in diagnosis.physics] + list(diagnosis.equivalents)
     if diagnosis.verdict != "explained":
@@ -258,14 +257,14 @@ def which_test(diagnosis: Diagnosis) -> tuple[str, ...]:
     return tuple((f"{first_word(name)}: " if several else "") + next_test(name).test for name in dict.fromkeys(names))
 
 
-def warnings(diagnosis: Diagnosis) -> tuple[str, ...]:
+def warnings(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     """What should make a reader careful."""
     gain, said = diagnosis.improvement, [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in diagnosis.doubts]
-    if len(diagnosis.lines) < 2:
+    if len(diagnosis.details.recordings) < 2:
         said.append("There is a single recording: nothing could be held out, and errors are those of the fit.")
-    elif len(diagnosis.lines) < 3:
+    elif len(diagnosis.details.recordings) < 3:
         said.append("There are two recordings only: how the residual grows with the level is known from two points.")
-    if diagnosis.physics and len(diagnosis.lines) > 1 and gain.p_value > 0.01:
+    if diagnosis.physics and len(diagnosis.details.recordings) > 1 and gain.p_value > 0.01:
         said.append(f"On the held-out recording the improvement is not significant (p = {gain.p_value:.2g}).")
     if not diagnosis.physics and gain.refitted > max(gain.before, 1.5 * gain.noise_floor):
         said.append(

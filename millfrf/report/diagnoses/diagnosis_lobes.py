@@ -5,7 +5,7 @@ import numpy as np
 from cutting import MillingProcess
 from figures import as_data_uri, lobes_figure
 from foundation import InputError
-from mismatch import Diagnosis, Hypothesis
+from mismatch import Hypothesis, StructureDiagnosis
 from mismatch.adapters.structure.pruning import zero_of
 from mismatch.models.equivalent_receptance import equivalent_receptance
 from stability import StabilityLobes, zero_order
@@ -29,7 +29,7 @@ ASSUMED = MillingProcess(
 SPEEDS, LINES, DEEPEST = 240, 4000, 0.2
 
 
-def diagnosis_lobes_section(diagnosis: Diagnosis, process: MillingProcess | None) -> Section:
+def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProcess | None) -> Section:
     """Depth limits of the nominal and of the improved structure, the latter at the weakest and strongest level.
 
     Parameters
@@ -65,8 +65,8 @@ def diagnosis_lobes_section(diagnosis: Diagnosis, process: MillingProcess | None
     return Section(title, (sentence,), (table,), (picture,))
 
 
-def _curves(diagnosis: Diagnosis, cut: MillingProcess) -> dict[str, StabilityLobes]:
-    final, lines = diagnosis.final.hypothesis, diagnosis.lines
+def _curves(diagnosis: StructureDiagnosis, cut: MillingProcess) -> dict[str, StabilityLobes]:
+    final, lines = diagnosis.details.final.hypothesis, diagnosis.details.recordings
     nominal = zero_of(final.shape)
     natural = nominal.model.natural_frequencies
     frequencies = np.linspace(natural.min() / 3, 3 * natural.max(), LINES)

@@ -1,8 +1,7 @@
 """The page that an engineer reads after a diagnosis."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable
 from datetime import UTC, datetime
 from functools import partial
 from importlib.resources import files
@@ -12,11 +11,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from cutting import MillingProcess
 from foundation import writing_whole_file
-from mismatch import Diagnosis, Trial
+from mismatch import StructureDiagnosis
 from mismatch.inference.process_pool import in_processes
-from mismatch.location.locate import located
-from mismatch.location.residual_view import ResidualView, residual_view
-from mismatch.location.spindle_orders import SpindleSpeed
 
 from ...provenance import versions
 from ..section import Section
@@ -33,27 +29,11 @@ from .diagnosis_sections import (
 )
 
 
-def with_location(
-    diagnosis: Diagnosis, trials: Sequence[Trial], speeds: Mapping[str, SpindleSpeed]
-) -> tuple[Diagnosis, ResidualView]:
-    """The diagnosis with its ``located`` filled in, and the maps for the page.
-
-    Parameters
-    ----------
-    diagnosis
-        As found.
-    trials
-        Recordings as read.
-    speeds
-        Spindle speed by recording's name, where known.
-    """
-    view = residual_view(diagnosis, trials)
-    full = replace(diagnosis, located=located(view, speeds))
-    return full, replace(view, diagnosis=full)
-
-
 def write_diagnosis_report(
-    path: str | os.PathLike[str], view: ResidualView, model_name: str = "", process: MillingProcess | None = None
+    path: str | os.PathLike[str],
+    diagnosis: StructureDiagnosis,
+    model_name: str = "",
+    process: MillingProcess | None = None,
 ) -> None:
     """Write one HTML page, figures inside, that needs no other file and no network.
 
@@ -61,8 +41,8 @@ def write_diagnosis_report(
     ----------
     path
         Of the page.
-    view
-        Of a located diagnosis (:func:`with_location`).
+    diagnosis
+        Diagnosis of a structure, with its fits and maps.
     model_name
         Of the nominal model, for the title.
     process
@@ -73,17 +53,16 @@ def write_diagnosis_report(
     InputError
         The folder cannot be written to.
     """
-    text = report_text(view, model_name, process)
+    text = report_text(diagnosis, model_name, process)
     with writing_whole_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
 
 
-def _drawn_sections(view: ResidualView, process: MillingProcess | None) -> list[Section]:
+def _drawn_sections(diagnosis: StructureDiagnosis, process: MillingProcess | None) -> list[Section]:
     """Sections with figures, drawn side by side, the longest first."""
-    diagnosis = view.diagnosis
     makers: list[Callable[[], Section]] = [
         lambda: if_possible(lambda: held_out_section(diagnosis), "On data that was not fitted"),
-        partial(location_section, view),
+        partial(location_section, diagnosis),
         lambda: if_possible(lambda: diagnosis_lobes_section(diagnosis, process), "What it does to the lobes"),
         lambda: if_possible(lambda: law_section(diagnosis), "The measured force of the joint"),
         partial(growth_section, diagnosis),
@@ -92,11 +71,10 @@ def _drawn_sections(view: ResidualView, process: MillingProcess | None) -> list[
     return [law, held_out, lobes, location, growth]
 
 
-def report_text(view: ResidualView, model_name: str = "", process: MillingProcess | None = None) -> str:
+def report_text(diagnosis: StructureDiagnosis, model_name: str = "", process: MillingProcess | None = None) -> str:
     """The page as text."""
-    diagnosis = view.diagnosis
-    sections = (number_section(diagnosis), *_drawn_sections(view, process), candidate_section(diagnosis))
-    names = ", ".join(one.trial.name for one in diagnosis.lines)
+    sections = (number_section(diagnosis), *_drawn_sections(diagnosis, process), candidate_section(diagnosis))
+    names = ", ".join(one.trial.name for one in diagnosis.details.recordings)
     environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
     return environment.get_template("diagnosis.html.j2").render(
         title=f"{model_name or 'Nominal model'} against {names}",

@@ -7,12 +7,11 @@ from matplotlib.figure import Figure
 
 from figures import as_data_uri, channel_map_figure, growth_figure, law_figure, spectra_figure, time_map_figure
 from foundation import InputError
-from mismatch import Candidate, Diagnosis
+from mismatch import Candidate, StructureDiagnosis
 from mismatch.location.free_form_law import free_form_laws
 from mismatch.location.held_out_spectra import held_out_spectra
 from mismatch.location.locate import significant_cells
 from mismatch.location.recording_errors import recording_errors
-from mismatch.location.residual_view import ResidualView
 
 from ...tables.result_tables import Table
 from ..section import Picture, Section
@@ -21,9 +20,10 @@ from .diagnosis_answers import number, place, words
 MOST_CANDIDATES = 15
 
 
-def location_section(view: ResidualView) -> Section:
+def location_section(diagnosis: StructureDiagnosis) -> Section:
     """Maps of the residual."""
-    diagnosis = view.diagnosis
+    view = diagnosis.details.view
+    assert view is not None
     located = diagnosis.located
     level = 100 * located["family_wise_level"]
     mask = significant_cells(located, view.before.ratio.shape)
@@ -39,10 +39,10 @@ def location_section(view: ResidualView) -> Section:
     return Section("Where the residual sits", (), (), (maps, times))
 
 
-def growth_section(diagnosis: Diagnosis) -> Section:
+def growth_section(diagnosis: StructureDiagnosis) -> Section:
     """How the residual grows with the level."""
     growth = diagnosis.located["growth"]
-    if "residual" not in growth or len(diagnosis.lines) < 2:
+    if "residual" not in growth or len(diagnosis.details.recordings) < 2:
         return Section("Growth with the level")
     caption = (
         "Residual with the power of the noise taken off, relative to the response averaged over all recordings, "
@@ -53,7 +53,7 @@ def growth_section(diagnosis: Diagnosis) -> Section:
     )
 
 
-def law_section(diagnosis: Diagnosis) -> Section:
+def law_section(diagnosis: StructureDiagnosis) -> Section:
     """The measured force of the joint."""
     title = "The measured force of the joint"
     laws = free_form_laws(diagnosis)
@@ -71,7 +71,7 @@ def law_section(diagnosis: Diagnosis) -> Section:
     return Section(title, sentences, (), pictures)
 
 
-def held_out_section(diagnosis: Diagnosis) -> Section:
+def held_out_section(diagnosis: StructureDiagnosis) -> Section:
     """Errors and spectra on the recording that was held out."""
     rows = tuple(
         (
@@ -92,7 +92,7 @@ def held_out_section(diagnosis: Diagnosis) -> Section:
         "final over noise",
     )
     without = "Error as a share of the response, all channels together"
-    if len(diagnosis.lines) > 1:
+    if len(diagnosis.details.recordings) > 1:
         without += f"; fitted without {diagnosis.improvement.held_out}"
     table = Table(without, columns, rows)
     spectra = held_out_spectra(diagnosis)
@@ -104,7 +104,7 @@ def held_out_section(diagnosis: Diagnosis) -> Section:
     return Section("On data that was not fitted", (), (table,), (picture,))
 
 
-def number_section(diagnosis: Diagnosis) -> Section:
+def number_section(diagnosis: StructureDiagnosis) -> Section:
     """Parameters of each accepted cause with standard errors."""
     rows = []
     for cause in diagnosis.physics:
@@ -117,7 +117,7 @@ def number_section(diagnosis: Diagnosis) -> Section:
     )
 
 
-def candidate_section(diagnosis: Diagnosis) -> Section:
+def candidate_section(diagnosis: StructureDiagnosis) -> Section:
     """What was weighed."""
     accepted = {cause.name: cause.evidence for cause in diagnosis.physics}
     rows, seen = [], set()

@@ -14,15 +14,11 @@ from ...inference import (
     Candidate,
     Diagnosis,
     EvidenceSettings,
-    Findings,
-    Improvement,
     Progress,
     Remainder,
     Search,
     Settings,
-    leaves_too_much,
     search,
-    verdict_of,
 )
 from ...location.locate import located
 from ...location.residual_view import residual_view
@@ -39,11 +35,11 @@ from ...records.true_forces import without_force_noise
 from ...records.windowed_lines import WindowedLines, windowed_lines
 from ...remainder.beyond_model import beyond_model
 from ...remainder.leftover import leftover
-from .acceptance import strained
 from .comparison import StructureComparison
 from .confirmation import confirmed
 from .form_errors import with_form_spread
 from .held_out import HeldOut, Recordings, held_out_improvement, scored
+from .structure_verdict import verdict_of_structure
 from .told_causes import modal_deviation, told_causes
 
 FIRST_FIT = 30
@@ -187,29 +183,15 @@ def _answer(
     deviation = _deviation(both.mended, spread)
     causes += [] if deviation is None else [deviation]
     left = leftover(current.hypothesis, both.mended)
-    verdict = _verdict(comparison, current, causes, left, held_out.improvement)
+    verdict = verdict_of_structure(
+        current.hypothesis, causes, (comparison.before, left), held_out.improvement, settings.verdict
+    )
     if verdict != "unexplained":
         return _Answer(verdict, tuple(causes), current, left, held_out)
     rejected = tuple(Candidate(one.name, one.evidence, "rejected", one.location) for one in causes)
     base, measured = found.base, Recordings(both.measured, both.measured)
     held_out = held_out_improvement(measured, base.hypothesis, base.noises, (), settings.proof)
     return _Answer(verdict, (), base, comparison.before, held_out, rejected)
-
-
-def _verdict(
-    comparison: StructureComparison,
-    current: Fit,
-    causes: Sequence[AcceptedCause],
-    left: Remainder,
-    gain: Improvement,
-) -> str:
-    """What is left and the recording held out decide; a law beyond what its name means explains nothing."""
-    limits = comparison.settings.verdict
-    most = limits.most_of_response
-    incomplete = leaves_too_much(gain, limits) if causes else min(gain.before, gain.after) > most
-    excluded = strained(current.hypothesis) and not left.noise_like(limits.noise_like)
-    findings = Findings(comparison.before, left, bool(causes), excluded=excluded, incomplete=incomplete)
-    return verdict_of(findings, limits)
 
 
 def _deviation(lines: list[WindowedLines], current: Fit) -> AcceptedCause | None:
