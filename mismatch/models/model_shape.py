@@ -8,32 +8,12 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
+from ..inference import LabError as LabError
 from ..noise.line_loops import modal_slopes
 from .outside_band import OutsideBand, outside_band
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class LabError:
-    """One standard deviation of what a laboratory's modal fit is usually off.
-
-    Defaults are those of round-robin comparisons of modal tests: frequencies agree to a per cent, dampings scatter by
-    some ten, shapes by a few (Ewins, Modal Testing, 2nd ed., section 1.5, on the SAMM survey). They set what
-    counts as a deviation, not how well anything is estimated.
-
-    Parameters
-    ----------
-    frequency, damping
-        Relative.
-    shape
-        Of each real and imaginary part of a vector's entries, relative to the vector's root mean square.
-    """
-
-    frequency: float = 0.01
-    damping: float = 0.12
-    shape: float = 0.03
 
 
 @dataclass(frozen=True)
