@@ -84,13 +84,12 @@ def read_diagnosis(path: str | os.PathLike[str]) -> Diagnosis[None]:
     except (OSError, ValueError) as error:
         raise FileFormatError(f"{name} cannot be read as a diagnosis: {error}") from error
     kind = content.get("format") if isinstance(content, dict) else None
-    if kind == OLD_ROBOT_FORMAT:
-        content = _of_old_robot(content)
-    elif kind != FORMAT or content.get("format_version", 0) > FORMAT_VERSION:
+    newest = {FORMAT: FORMAT_VERSION, OLD_ROBOT_FORMAT: 1}
+    if kind not in newest or content.get("format_version", 0) > newest[kind]:
         said = f"{kind!r} version {content.get('format_version')}" if isinstance(content, dict) else "no JSON object"
         raise FileFormatError(f"{name} is {said}; wanted is {FORMAT!r} up to version {FORMAT_VERSION}")
     try:
-        return _diagnosis(content)
+        return _diagnosis(_of_old_robot(content) if kind == OLD_ROBOT_FORMAT else content)
     except (KeyError, TypeError) as error:
         raise FileFormatError(f"{name} lacks a part of a diagnosis: {error}; diagnose again") from error
 
