@@ -243,7 +243,7 @@ def picture(drives: dict[str, Drive], train: Record, test: Record) -> Figure:
 
 
 def study(folder: Path) -> tuple[StructureDiagnosis, dict[str, Drive], dict[str, float]]:
-    """StructureDiagnosis of the training record, drives before and after, and the tool's own relative error on the test."""
+    """Diagnosis of the training record, drives before and after, and the tool's own relative error on the test."""
     train, test = (read_record(folder / name) for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"))
     rigid = by_inverse_dynamics(train)
     loop, nominal = known_loop(rigid), modal_model(rigid)

@@ -6,8 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mismatch.adapters.robot import RobotDiagnosis
-from mismatch.adapters.robot.robot_receptance import predicted_lines
+from mismatch.adapters.robot import RobotDiagnosis, predicted_spectrum
 
 from ..style import COLOURS, legend_above, new_figure
 
@@ -19,25 +18,25 @@ MOST_LINES = 250
 
 def robot_spectra_figure(found: RobotDiagnosis) -> Figure:
     """Response over force, all channels together, a panel a posture: measured, as modelled, with the changes."""
-    recordings = found.setting.recordings
+    recordings = found.details.robot.recordings
     figure = new_figure(55.0 + 12.0 * (len(recordings) > 3))
     panels = figure.subplots(1, len(recordings), squeeze=False, sharey=True)[0]
-    before, after = found.setting.modes(()), found.setting.modes(found.final.changes)
+    before, after = (found.details.robot.modes(one.changes) for one in (found.details.nominal, found.details.final))
     for number, (axes, recording) in enumerate(zip(panels, recordings, strict=True)):
-        lines = recording.lines
+        spectrum = recording.spectrum
         drawn: list[tuple[Any, dict[str, Any]]] = [
-            (lines.measured, {"color": "0.65", "linewidth": 2.2, "label": "measured"}),
+            (spectrum.measured, {"color": "0.65", "linewidth": 2.2, "label": "measured"}),
             (
-                predicted_lines(before[number], lines),
+                predicted_spectrum(before[number], spectrum),
                 {"color": COLOURS[2], "linestyle": (0, (4, 1.5)), "label": "as modelled"},
             ),
         ]
-        if found.causes:
-            changed = predicted_lines(after[number], lines)
+        if found.physics:
+            changed = predicted_spectrum(after[number], spectrum)
             drawn.append((changed, {"color": COLOURS[1], "label": "with the change"}))
-        force = _averaged(np.sum(np.abs(lines.force_here) ** 2, axis=1))
-        at = _averaged(lines.frequencies)
-        shift = _averaged(np.abs(lines.kinematic[:, 0]))
+        force = _averaged(np.sum(np.abs(spectrum.force_here) ** 2, axis=1))
+        at = _averaged(spectrum.frequencies)
+        shift = _averaged(np.abs(spectrum.kinematic[:, 0]))
         for values, look in drawn:
             power = _averaged(np.sum(np.abs(values) ** 2, axis=1))
             axes.semilogy(at, 1e6 * np.sqrt(power / force) / shift, **look)
@@ -60,7 +59,7 @@ def robot_evidence_figure(found: RobotDiagnosis) -> Figure:
     causes = found.candidates[::-1]
     figure = new_figure(18.0 + 5.0 * len(causes))
     axes = figure.subplots()
-    accepted = {cause.name for cause in found.causes} | set(found.equivalents)
+    accepted = {cause.name for cause in found.physics} | set(found.equivalents)
     colours = [COLOURS[1] if cause.name in accepted else "0.7" for cause in causes]
     axes.barh([cause.name for cause in causes], [cause.evidence for cause in causes], color=colours, height=0.7)
     axes.set_xscale("symlog", linthresh=20.0, linscale=0.5)

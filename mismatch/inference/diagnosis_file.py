@@ -84,13 +84,12 @@ def read_diagnosis(path: str | os.PathLike[str]) -> Diagnosis[None]:
     except (OSError, ValueError) as error:
         raise FileFormatError(f"{name} cannot be read as a diagnosis: {error}") from error
     kind = content.get("format") if isinstance(content, dict) else None
-    if kind == OLD_ROBOT_FORMAT:
-        content = _of_old_robot(content)
-    elif kind != FORMAT or content.get("format_version", 0) > FORMAT_VERSION:
+    newest = {FORMAT: FORMAT_VERSION, OLD_ROBOT_FORMAT: 1}
+    if kind not in newest or content.get("format_version", 0) > newest[kind]:
         said = f"{kind!r} version {content.get('format_version')}" if isinstance(content, dict) else "no JSON object"
         raise FileFormatError(f"{name} is {said}; wanted is {FORMAT!r} up to version {FORMAT_VERSION}")
     try:
-        return _diagnosis(content)
+        return _diagnosis(_of_old_robot(content) if kind == OLD_ROBOT_FORMAT else content)
     except (KeyError, TypeError) as error:
         raise FileFormatError(f"{name} lacks a part of a diagnosis: {error}; diagnose again") from error
 
@@ -102,32 +101,33 @@ def _diagnosis(content: Mapping[str, Any]) -> Diagnosis[None]:
     left = content.get("remainder", unknown)
     kind = content.get("compared", "cut" if "cut" in content else "structure")
     known = {*Diagnosis.__dataclass_fields__, "format", "format_version", "leftover_share", "remainder", "warnings"}
-    gain = dict(content["improvement"])
+    gain = _part(content["improvement"])
     gain["interval"] = tuple(gain["interval"])
     return Diagnosis(
         kind,
         content["verdict"],
-        tuple(AcceptedCause(**cause) for cause in content["physics"]),
-        tuple(Candidate(**candidate) for candidate in content["candidates"]),
+        tuple(AcceptedCause(**_part(cause)) for cause in content["physics"]),
+        tuple(Candidate(**_part(candidate)) for candidate in content["candidates"]),
         tuple(content["equivalents"]),
         Improvement(**gain),
         _remainder(left["before"]),
         _remainder(left["after"]),
         content["located"],
         None,
-        tuple(HeldOutError(**one) for one in content.get("held_out", ())),
+        tuple(HeldOutError(**_part(one)) for one in content.get("held_out", ())),
         tuple(content.get("warnings", ())),
         {key: value for key, value in content.items() if key not in known},
     )
 
 
 def _of_old_robot(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Content of a robot diagnosis of the older format, in that of version 2."""
+    """Content of a robot diagnosis of the older format as version 2 has it."""
     rows = content["held_out"]
     before, after, floor = (
         math.sqrt(sum(row[key] ** 2 for row in rows) / len(rows)) for key in ("before", "after", "free")
     )
-    gain = Improvement(", ".join(row["name"] for row in rows), before, before, after, floor, content["p_value"], (0, 0))
+    names = ", ".join(row["name"] for row in rows)
+    gain = Improvement(names, before, before, after, floor, content["p_value"], (0, 0), against="nominal")
     excess = content["excess"]
     return {
         "format": FORMAT,
@@ -140,10 +140,8 @@ def _of_old_robot(content: Mapping[str, Any]) -> dict[str, Any]:
                 "name": one["name"],
                 "evidence": one["evidence"],
                 "stage": one["stage"] or "fitted",
-                "location": {"kind": one["kind"], "unit": one["unit"]},
-                "parameters": {one["name"]: one["number"]},
-                "standard_errors": {one["name"]: one["standard_error"]},
             }
+            | _old_numbers(one)
             for one in content["candidates"]
         ],
         "equivalents": content["equivalents"],
@@ -159,23 +157,40 @@ def _of_old_robot(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _old_cause(cause: Mapping[str, Any]) -> dict[str, Any]:
-    """One accepted cause of the older format."""
-    numbers = [(cause["name"], cause["number"], cause["standard_error"])]
-    numbers += [(one["name"], one["number"], one["standard_error"]) for one in cause["beside"]]
+    """One accepted cause of the robots' older format."""
+    parts = {"fit": cause["fitted_error"], "spread": cause["spread"], "form": cause["form"]}
+    named = {"name": cause["name"], "evidence": cause["evidence"], "error_parts": {cause["name"]: parts}}
+    return named | _old_numbers(cause)
+
+
+def _old_numbers(cause: Mapping[str, Any]) -> dict[str, Any]:
+    """Location, numbers and errors of a cause of the robots' older format, its companions after it."""
+    numbers = (cause, *cause["beside"])
+    location: dict[str, Any] = {"kind": cause["kind"], "unit": cause["unit"]}
+    if cause["beside"]:
+        location["companions"] = {one["name"]: {"unit": one["unit"], "spread": one["spread"]} for one in numbers[1:]}
     return {
-        "name": cause["name"],
-        "location": {"kind": cause["kind"], "unit": cause["unit"]},
-        "parameters": {name: number for name, number, _ in numbers},
-        "standard_errors": {name: error for name, _, error in numbers},
-        "evidence": cause["evidence"],
-        "error_parts": {
-            cause["name"]: {"fit": cause["fitted_error"], "spread": cause["spread"], "form": cause["form"]}
-        },
+        "location": location,
+        "parameters": {one["name"]: one["number"] for one in numbers},
+        "standard_errors": {one["name"]: one["standard_error"] for one in numbers},
     }
 
 
 def _remainder(content: Mapping[str, Any]) -> Remainder:
     return Remainder(_number(content["share"]), _number(content["size"]))
+
+
+def _part(content: Mapping[str, Any]) -> dict[str, Any]:
+    """A cause, a candidate or errors with NaN where null stands for a number; a location is left as it is."""
+    return {key: value if key == "location" else _with_nan(value) for key, value in content.items()}
+
+
+def _with_nan(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _with_nan(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_with_nan(one) for one in value]
+    return math.nan if value is None else value
 
 
 def _number(value: float | None) -> float:

@@ -39,8 +39,6 @@ def _loaded(name: str) -> ModuleType:
 
 
 _MODULE = _loaded("concealed_recordings")
-_loaded("independent_robot")
-_loaded("payload_information")
 
 
 @pytest.fixture(scope="session")

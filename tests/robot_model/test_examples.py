@@ -86,9 +86,9 @@ def test_a_robot_that_mills_is_diagnosed(tmp_path: Path, change: str, name: str)
     assert example.main(tmp_path, change, 2, 30.0) == 0
     content = json.loads((tmp_path / "diagnosis" / "robot_diagnosis.json").read_text())
     assert content["verdict"] == "explained"
-    cause = content["causes"][0]
+    cause = content["physics"][0]
     assert cause["name"] == name
     truth = {"joint-3": 0.7, "payload": 12.0}[change]
-    assert cause["number"] == pytest.approx(truth, abs=3.5 * cause["standard_error"])
+    assert cause["parameters"][name] == pytest.approx(truth, abs=3.5 * cause["standard_errors"][name])
     for one in content["held_out"]:
         assert one["after"] < 0.15 * one["before"]

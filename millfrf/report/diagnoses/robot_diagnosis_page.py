@@ -1,7 +1,6 @@
 """The page that a robot's diagnosis leaves behind."""
 
 import os
-from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.resources import files
 from pathlib import Path
@@ -11,10 +10,11 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from figures import as_data_uri, house_style, robot_evidence_figure, robot_spectra_figure
 from foundation import writing_whole_file
-from mismatch.adapters.robot import NOISE_LIKE, RobotCause, RobotDiagnosis
+from mismatch.adapters.robot import ROBOT, RobotDiagnosis, number_of, standard_error_of
+from mismatch.inference import Candidate
 
 from ...provenance import versions
-from ...robot.diagnosis.diagnosis_words import UNITS, told_number, what_is_asked
+from ...robot.diagnosis.diagnosis_words import UNITS, refusal, told_number, what_is_asked
 from ...tables.result_tables import Table
 from ..section import Picture, Section
 
@@ -24,32 +24,29 @@ def write_robot_report(
     found: RobotDiagnosis,
     robot_name: str,
     summary: list[str],
-    doubts: Sequence[str] = (),
 ) -> None:
     """Write one HTML page, figures inside, that needs no other file and no network.
 
     Parameters
     ----------
     path
-        Of the page.
+        The page; an older one is replaced.
     found
         The diagnosis.
     robot_name
-        For the title.
+        Name of the robot, for the title.
     summary
         Verdict, a sentence on it, and a line for each cause and held-out recording.
-    doubts
-        About the recordings, one sentence each.
     """
     environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
-    names = ", ".join(one.name for one in found.setting.recordings)
+    names = ", ".join(one.name for one in found.details.robot.recordings)
     text = environment.get_template("diagnosis.html.j2").render(
         title=f"{robot_name} against {names}",
         written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
         verdict=f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",
         answers=[("What was found", summary[2:] or ["Nothing to change."])],
-        warnings=[*doubts, *_warnings(found)],
+        warnings=[*found.doubts, *_warnings(found)],
         sections=[_spectra(found), _candidates(found), _postures(found)],
         versions=versions(),
     )
@@ -58,18 +55,18 @@ def write_robot_report(
 
 
 def _warnings(found: RobotDiagnosis) -> list[str]:
-    error = found.setting.error
+    error = found.details.robot.error
     warnings = [
         f"A right model is taken to be off by {100 * error.frequency:g} % in frequency, {100 * error.damping:g} % in "
         f"damping and {100 * error.shape:g} % of a shape's size in each posture; what is smaller is not named."
     ]
-    if len(found.setting.recordings) == 1:
+    if len(found.details.robot.recordings) == 1:
         warnings.append("One posture loads the joints in one way: causes are told apart better from several.")
     warnings.append(what_is_asked())
-    if found.excess_after > NOISE_LIKE:
+    if found.after.share > ROBOT.verdict.noise_like:
         warnings.append(
-            f"What is left is {found.excess_after:.2g} times what a right model's modes are off (passes up to "
-            f"{NOISE_LIKE:g}): some of the physics is missing."
+            f"What is left is {found.after.share:.2g} times what a right model's modes are off (passes up to "
+            f"{ROBOT.verdict.noise_like:g}): some of the physics is missing."
         )
     return warnings
 
@@ -83,9 +80,9 @@ def _spectra(found: RobotDiagnosis) -> Section:
     )
     columns: tuple[str, ...] = ("recording", "as modelled", "modes fitted freely")
     rows: list[tuple[str, ...]] = [
-        (one.name, f"{100 * one.before:.3g}", f"{100 * one.free:.3g}") for one in found.held_out
+        (one.name, f"{100 * one.before:.3g}", f"{100 * one.floor:.3g}") for one in found.held_out
     ]
-    if found.causes:
+    if found.physics:
         columns = (*columns[:2], "with the change", columns[2])
         pairs = zip(rows, found.held_out, strict=True)
         rows = [(*row[:2], f"{100 * one.after:.3g}", row[2]) for row, one in pairs]
@@ -96,29 +93,29 @@ def _spectra(found: RobotDiagnosis) -> Section:
 def _candidates(found: RobotDiagnosis) -> Section:
     with house_style():
         picture = as_data_uri(robot_evidence_figure(found))
-    rows = tuple((one.name, *_number(one), f"{one.evidence:.1f}", one.stage or "-") for one in found.candidates)
+    rows = tuple((one.name, *_number(one), f"{one.evidence:.1f}", refusal(one) or "-") for one in found.candidates)
     columns = ("change", "number", "unit", "evidence", "recordings left out")
     table = Table("Every change alone with its number, error of the fit alone", columns, rows)
     caption = "Gain in score of each single change (twice a log Bayes factor); blue: accepted, or as good."
-    tables = (_errors(found), table) if found.causes else (table,)
+    tables = (_errors(found), table) if found.physics else (table,)
     return Section("What was weighed", (), tables, (Picture(picture, caption, "Evidence of the candidates"),))
 
 
 def _errors(found: RobotDiagnosis) -> Table:
     """Where the errors of the numbers told come from."""
     rows = []
-    for one in found.causes:
+    for one in found.physics:
         number, unit = told_number(one)
-        factor = UNITS.get(one.unit, ("", 1.0))[1]
-        parts = (f"{factor * part:.2g}" for part in (one.fitted_error, one.spread, one.form))
+        factor = UNITS.get(one.location["unit"], ("", 1.0))[1]
+        parts = (f"{factor * part:.2g}" for part in one.error_parts[one.name].values())
         rows.append((one.name, number, unit or "times", *parts))
     columns = ("change", "number", "unit", "fit", "between recordings", "another change free")
     return Table("What was found, and the parts of its error", columns, tuple(rows))
 
 
-def _number(cause: RobotCause) -> tuple[str, str]:
-    size = {"m/N": 0.0}.get(cause.unit, 0.5)
-    if not cause.standard_error < 3 * abs(cause.number) + size:
+def _number(cause: Candidate) -> tuple[str, str]:
+    size = {"m/N": 0.0}.get(cause.location["unit"], 0.5)
+    if not standard_error_of(cause) < 3 * abs(number_of(cause)) + size:
         return "not told by the data", ""
     number, unit = told_number(cause)
     return number, unit or "times"
@@ -129,10 +126,10 @@ def _postures(found: RobotDiagnosis) -> Section:
         (
             one.name,
             ", ".join(f"{angle:.1f}" for angle in np.degrees(one.q)),
-            f"{one.lines.frequencies[0]:.3g} to {one.lines.frequencies[-1]:.3g}",
+            f"{one.spectrum.frequencies[0]:.3g} to {one.spectrum.frequencies[-1]:.3g}",
             ", ".join(one.responses),
         )
-        for one in found.setting.recordings
+        for one in found.details.robot.recordings
     )
     table = Table("Recordings and their postures", ("recording", "joints (deg)", "band (Hz)", "responses"), rows)
     return Section("What was compared", (), (table,))

@@ -1,7 +1,7 @@
 """From a robot's file and recordings in several postures to a folder with the diagnosis, models and a report."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +14,8 @@ from mismatch.adapters.robot import (
     diagnose_robot,
     posed_channels,
     read_posed,
-    write_robot_diagnosis,
 )
+from mismatch.inference import write_diagnosis
 from modal_fit import write_modal_model
 from robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot, tool_down
 
@@ -69,17 +69,18 @@ def diagnose_robot_files(robot: str, paths: Sequence[Path], out: Path, asking: A
             sensor=_place(asking.sensor),
             error=asking.error,
         )
+    found = replace(found, doubts=tuple(doubts))
     out.mkdir(parents=True, exist_ok=True)
-    write_robot_diagnosis(out / "robot_diagnosis.json", found, doubts)
-    improved, offset = found.improved_robot()
+    write_diagnosis(out / "robot_diagnosis.json", found)
+    improved, offset = found.details.improved_robot()
     for recording in recordings:
         modes = modes_at(improved, recording.q + offset)
-        top = 3 * float(recording.lines.frequencies[-1])
+        top = 3 * float(recording.spectrum.frequencies[-1])
         model = model_of_modes(modes, improved, axes=recording.axes, highest_frequency=top)
         write_modal_model(out / f"model_{recording.name}.json", model)
     lines = summary(found)
     with bar("writing the report"):
-        write_robot_report(out / "report.html", found, case.name, lines, doubts)
+        write_robot_report(out / "report.html", found, case.name, lines)
     lines += [f"warning: {doubt}" for doubt in doubts]
     return [*lines, f"wrote {out / 'robot_diagnosis.json'}, {out / 'report.html'} and a model for each recording"]
 

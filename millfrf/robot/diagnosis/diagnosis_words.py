@@ -2,7 +2,15 @@
 
 import numpy as np
 
-from mismatch.adapters.robot import EXPLAINED, NOISE_LIKE, SIGNIFICANT, Beside, RobotCause, RobotDiagnosis
+from mismatch.adapters.robot import (
+    ROBOT,
+    CompanionNumber,
+    RobotDiagnosis,
+    companions_of,
+    number_of,
+    standard_error_of,
+)
+from mismatch.inference import AcceptedCause, Candidate
 
 from ...tables.result_tables import with_error
 
@@ -25,63 +33,70 @@ SENTENCES = {
 def summary(found: RobotDiagnosis) -> list[str]:
     """A few lines for the terminal and the head of the report."""
     lines = [f"verdict: {found.verdict}", _sentence(found)]
-    for cause in found.causes:
+    for cause in found.physics:
         lines += [describe(cause), *_beside(cause)]
     if found.equivalents:
         lines.append(f"cannot be told from: {', '.join(found.equivalents)}; record in another posture")
-    if found.causes or found.verdict == "unexplained":
+    if found.physics or found.verdict == "unexplained":
         lines.append(what_is_left(found))
     for one in found.held_out:
-        changed = f"{100 * one.after:.3g} % changed, " if found.causes else ""
+        changed = f"{100 * one.after:.3g} % changed, " if found.physics else ""
         lines.append(
             f"error on {one.name}, held out: {100 * one.before:.3g} % as modelled, {changed}"
-            f"{100 * one.free:.3g} % with modes fitted freely"
+            f"{100 * one.floor:.3g} % with modes fitted freely"
         )
-    if found.causes:
-        lines.append(f"that the change does not lower the error held out has p = {found.p_value:.1g}")
+    if found.physics:
+        lines.append(f"that the change does not lower the error held out has p = {found.improvement.p_value:.1g}")
     else:
-        lines += [f"{one.name} was fitted, but {one.stage}" for one in found.candidates if one.stage]
+        lines += [f"{one.name} was fitted, but {refusal(one)}" for one in found.candidates if refusal(one)]
     return lines
 
 
 def what_is_left(found: RobotDiagnosis) -> str:
     """What is left beside what may be left for `explained`."""
-    share = found.excess_after / max(found.excess_before, 1e-300)
+    limits, share = ROBOT.verdict, found.after.size / max(found.before.size, 1e-300)
     return (
-        f"left: {100 * share:.2g} % of what the model leaves beyond noise, {found.excess_after:.2g} times what a right "
-        f"model's modes are off; explained: at most {100 * (1 - EXPLAINED):.0f} % or {NOISE_LIKE:g} times"
+        f"left: {100 * share:.2g} % of what the model leaves beyond noise, {found.after.share:.2g} times what a right "
+        f"model's modes are off; explained: at most {100 * (1 - limits.explained):.0f} % or {limits.noise_like:g} times"
     )
 
 
 def what_is_asked() -> str:
     """What a change must do to be told."""
     return (
-        f"A change is told if it lowers the error on recordings left out of the fit with p < {SIGNIFICANT:g}. Its ± is "
-        "one standard error: root of the sum of squares of the fit's own, of the spread between fits that leave one "
-        "recording out, and of the largest shift with another change free beside it."
+        "A change is told if it lowers the error on recordings left out of the fit with "
+        f"p < {ROBOT.proof.significance:g}. Its ± is one standard error: root of the sum of squares of the fit's own, "
+        "of the spread between fits that leave one recording out, and of the largest shift with another change free "
+        "beside it."
     )
 
 
-def describe(cause: RobotCause) -> str:
+def refusal(candidate: Candidate) -> str:
+    """Why a change with evidence was not chosen; empty where nothing speaks against it."""
+    return "" if candidate.stage == "fitted" else candidate.stage
+
+
+def describe(cause: AcceptedCause) -> str:
     """One cause with its number, in a user's units."""
     number, unit = told_number(cause)
     what = f"times {number}" if not unit else f"{number} {unit}"
-    lighter = " (lighter than modelled)" if cause.kind == "payload" and cause.number < 0 else ""
+    lighter = " (lighter than modelled)" if cause.location["kind"] == "payload" and number_of(cause) < 0 else ""
     return f"{cause.name}: {what}{lighter}; evidence {cause.evidence:.0f}"
 
 
-def told_number(cause: RobotCause) -> tuple[str, str]:
+def told_number(cause: AcceptedCause | Candidate) -> tuple[str, str]:
     """The number with its error, and its unit, in a user's units."""
-    unit, factor = UNITS.get(cause.unit, (cause.unit, 1.0))
-    text = with_error(factor * cause.number, factor * cause.standard_error, sign=cause.kind in ("posture", "payload"))
+    unit, factor = UNITS.get(cause.location["unit"], (cause.location["unit"], 1.0))
+    signed = cause.location["kind"] in ("posture", "payload")
+    text = with_error(factor * number_of(cause), factor * standard_error_of(cause), sign=signed)
     return text, unit
 
 
-def _beside(cause: RobotCause) -> list[str]:
+def _beside(cause: AcceptedCause) -> list[str]:
     """Companions that the recordings tell; a sentence on a place that they do not tell."""
-    lines = [f"  {cause.name}, {_companion(one)}" for one in cause.beside if one.told]
-    hidden = [one.name.removesuffix(" from the tip") for one in cause.beside if not one.told]
-    if hidden and cause.kind == "payload":
+    lines = [f"  {cause.name}, {_companion(one)}" for one in companions_of(cause) if one.told]
+    hidden = [one.name.removesuffix(" from the tip") for one in companions_of(cause) if not one.told]
+    if hidden and cause.location["kind"] == "payload":
         lines.append(
             f"  {cause.name}: mass and {', '.join(hidden)} cannot be told apart by these recordings; "
             "the error of the mass holds this; --payload-at X Y Z states the place"
@@ -89,7 +104,7 @@ def _beside(cause: RobotCause) -> list[str]:
     return lines
 
 
-def _companion(one: Beside) -> str:
+def _companion(one: CompanionNumber) -> str:
     unit, factor = UNITS.get(one.unit, (one.unit, 1.0))
     return f"{one.name}: {with_error(factor * one.number, factor * one.standard_error)} {unit}"
 
@@ -98,5 +113,5 @@ def _sentence(found: RobotDiagnosis) -> str:
     if found.verdict != "explained":
         return SENTENCES[found.verdict]
     return (
-        "one change explains the recordings and stands alone" if len(found.causes) == 1 else "two changes together do"
+        "one change explains the recordings and stands alone" if len(found.physics) == 1 else "two changes together do"
     )

@@ -1,30 +1,28 @@
 """What is wrong with a robot's model: recordings in several postures against a few numbers of the robot."""
 
+from .diagnosis import diagnose_robot
+from .fit import RobotFit, fit_robot
 from .posed_recording import PosedRecording, posed, posed_channels, read_posed
-from .robot_diagnosis import EXPLAINED, NOISE_LIKE, ROBOT_ERROR, diagnose_robot
-from .robot_diagnosis_file import robot_diagnosis_content, write_robot_diagnosis
-from .robot_fit import RobotFit, fit_robot
-from .robot_held_out import SIGNIFICANT
-from .robot_results import Beside, HeldOut, RobotCause, RobotDiagnosis
-from .robot_setting import Setting
+from .posed_robot import PosedRobot
+from .receptance import predicted_spectrum
+from .results import CompanionNumber, RobotDetails, RobotDiagnosis, companions_of, number_of, standard_error_of
+from .settings import ROBOT
 
 __all__ = [
-    "EXPLAINED",
-    "NOISE_LIKE",
-    "ROBOT_ERROR",
-    "SIGNIFICANT",
-    "Beside",
-    "HeldOut",
+    "ROBOT",
+    "CompanionNumber",
     "PosedRecording",
-    "RobotCause",
+    "PosedRobot",
+    "RobotDetails",
     "RobotDiagnosis",
     "RobotFit",
-    "Setting",
+    "companions_of",
     "diagnose_robot",
     "fit_robot",
+    "number_of",
     "posed",
     "posed_channels",
+    "predicted_spectrum",
     "read_posed",
-    "robot_diagnosis_content",
-    "write_robot_diagnosis",
+    "standard_error_of",
 ]

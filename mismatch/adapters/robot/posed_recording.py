@@ -1,4 +1,4 @@
-"""`PosedRecording`: one recording, the posture it was made in, and its lines that are compared with a robot's model."""
+"""`PosedRecording`: one recording, the posture it was made in, and its spectrum in the band that is compared."""
 
 import os
 from collections.abc import Collection, Sequence
@@ -32,25 +32,25 @@ class PosedRecording:
     axes : (3, 3)
         Columns: X, Y, Z of the channels in the base frame.
     responses, excitations
-        Degrees of freedom of the trial's columns, of the tip or the housing.
-    lines
-        The trial on the lines that count.
+        Degrees of freedom of the recording's columns, at the tip or the housing.
+    spectrum
+        Windowed spectrum of the recording in the band that is compared.
     """
 
     q: Real
     axes: Real
     responses: tuple[str, ...]
     excitations: tuple[str, ...]
-    lines: WindowedLines
+    spectrum: WindowedLines
 
     @property
     def name(self) -> str:
-        """Of the recording."""
-        return self.lines.trial.name
+        """Name of the recording."""
+        return self.spectrum.trial.name
 
 
 def posed(
-    trial: Trial,
+    recording: Trial,
     q: Real,
     band: tuple[float, float],
     *,
@@ -59,19 +59,22 @@ def posed(
     axes: Real | None = None,
     decay: float = 2.0,
 ) -> PosedRecording:
-    """Prepare a trial in a posture.
+    """Put a recording in the posture that it was made in.
 
     Parameters
     ----------
-    trial
+    recording
         Forces in the order of ``excitations``, responses in that of ``responses``.
     q : (n_moving,), rad
+        Joint values as stated.
     band
-        Lowest and highest frequency compared, Hz.
-    axes
+        Lowest and highest frequency that are compared, Hz.
+    responses, excitations
+        Degrees of freedom of the columns, at the tip or the housing.
+    axes : (3, 3)
         As :class:`PosedRecording`; None: the base frame.
     decay
-        Of the slowest mode, 1/s.
+        Decay rate of the slowest mode, 1/s.
 
     Raises
     ------
@@ -81,17 +84,17 @@ def posed(
     strange = [label for label in (*responses, *excitations) if label not in (*TIP, *HOUSING)]
     if strange or any(label not in TIP for label in excitations):
         raise InputError(
-            f"{trial.name}: a robot's model gives motion at {', '.join((*TIP, *HOUSING))} for forces at the tip, "
+            f"{recording.name}: a robot's model gives motion at {', '.join((*TIP, *HOUSING))} for forces at the tip, "
             f"not at {', '.join(strange) or 'the housing'}"
         )
-    lines = windowed_lines(trial, band, decay)
-    if len(lines.frequencies) < 50:
+    spectrum = windowed_lines(recording, band, decay)
+    if len(spectrum.frequencies) < 50:
         raise InputError(
-            f"{trial.name}: {len(lines.frequencies)} lines between {band[0]:g} and {band[1]:g} Hz; 50 are the least: "
-            "record longer, or widen --band"
+            f"{recording.name}: {len(spectrum.frequencies)} lines between {band[0]:g} and {band[1]:g} Hz; "
+            "50 are the least: record longer, or widen --band"
         )
     turn = np.eye(3) if axes is None else np.asarray(axes, dtype=float)
-    return PosedRecording(np.asarray(q, dtype=float), turn, tuple(responses), tuple(excitations), lines)
+    return PosedRecording(np.asarray(q, dtype=float), turn, tuple(responses), tuple(excitations), spectrum)
 
 
 def posed_channels(stream: Stream) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -172,18 +175,23 @@ def _over(model: ModalModel, responses: tuple[str, ...], excitations: tuple[str,
 def halves(recording: PosedRecording) -> tuple[PosedRecording, PosedRecording]:
     """First and second half of a recording, so that one can be held out.
 
+    Parameters
+    ----------
+    recording
+        The whole recording.
+
     Raises
     ------
     InputError
         A half with too few lines.
     """
-    trial, lines = recording.lines.trial, recording.lines
-    band = (float(lines.frequencies[0]), float(lines.frequencies[-1]))
-    middle = len(trial.force) // 2
+    whole, frequencies = recording.spectrum.trial, recording.spectrum.frequencies
+    band = (float(frequencies[0]), float(frequencies[-1]))
+    middle = len(whole.force) // 2
     cuts = (("first half", slice(0, middle)), ("second half", slice(middle, None)))
-    parts = [
+    first, second = (
         posed(
-            replace(trial, name=f"{trial.name}, {name}", force=trial.force[cut], response=trial.response[cut]),
+            replace(whole, name=f"{whole.name}, {name}", force=whole.force[cut], response=whole.response[cut]),
             recording.q,
             band,
             responses=recording.responses,
@@ -191,5 +199,5 @@ def halves(recording: PosedRecording) -> tuple[PosedRecording, PosedRecording]:
             axes=recording.axes,
         )
         for name, cut in cuts
-    ]
-    return parts[0], parts[1]
+    )
+    return first, second

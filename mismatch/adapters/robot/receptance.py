@@ -9,7 +9,7 @@ from scipy.optimize import linear_sum_assignment
 from robot_model import SpatialRobot, housing_node, modes_at
 from robot_model.spatial.spatial_modes import modal_damping
 
-from ...models.model_shape import LabError
+from ...inference import LabError
 from ...records.windowed_lines import WindowedLines
 from .posed_recording import HOUSING, TIP, PosedRecording
 
@@ -30,6 +30,7 @@ class RobotModes:
     Parameters
     ----------
     natural : (n_modes,), rad/s
+        Natural angular frequencies.
     damping : (n_modes,), 1
         Damping ratios; above 1 where a mode is overdamped.
     shapes : (n_modes, n_places)
@@ -37,7 +38,7 @@ class RobotModes:
     rows, columns
         Places of the recording's responses and excitations among them.
     count
-        Modes, from the lowest, that may be off.
+        Number of modes, from the lowest, that may be off.
     """
 
     natural: Real
@@ -58,7 +59,15 @@ class RobotModes:
         return self.count * self.per_mode
 
     def moved(self, u: Real, error: LabError) -> "RobotModes":
-        """The modes at deviations u (size,), in units of ``error``."""
+        """The modes with deviations from the robot's.
+
+        Parameters
+        ----------
+        u : (size,)
+            Deviations in units of ``error``.
+        error
+            One standard deviation of each.
+        """
         table = u.reshape(self.count, self.per_mode)
         natural, damping, shapes = self.natural.copy(), self.damping.copy(), self.shapes.copy()
         natural[: self.count] *= np.exp(error.frequency * table[:, 0])
@@ -71,6 +80,11 @@ class RobotModes:
 
         Modes may cross when the robot changes, and an eigenvector's sign means nothing: modes are paired so that
         frequencies and shapes (modal assurance criterion, Allemang & Brown 1982) agree best.
+
+        Parameters
+        ----------
+        reference
+            Modes at the same places.
         """
         near = min(self.count + MARGIN, len(self.natural), len(reference.natural))
         mine, theirs = self.shapes[:near], reference.shapes[:near]
@@ -85,7 +99,15 @@ class RobotModes:
         return RobotModes(self.natural[whole], self.damping[whole], shapes, self.rows, self.columns, self.count)
 
     def deviations(self, seen: "RobotModes", error: LabError) -> Real:
-        """u (size,) that moves these modes onto those seen, mode by mode."""
+        """Deviations u (size,) that move these modes onto those seen, mode by mode.
+
+        Parameters
+        ----------
+        seen
+            Modes at the same places, in any order.
+        error
+            One standard deviation of each deviation.
+        """
         table = np.zeros((self.count, self.per_mode))
         seen = seen.aligned(self)
         first = slice(0, self.count)
@@ -98,7 +120,13 @@ class RobotModes:
         return np.asarray(error.shape * np.sqrt(np.mean(self.shapes[: self.count] ** 2, axis=1)))
 
     def receptance(self, frequencies: Real) -> Complex:
-        """``sum phi phi^T / (w_r^2 - w^2 + 2 i zeta_r w_r w)``, overdamped modes exactly, (n, n_rows, n_columns)."""
+        """``sum phi phi^T / (w_r^2 - w^2 + 2 i zeta_r w_r w)``, overdamped modes exactly, (n, n_rows, n_columns), m/N.
+
+        Parameters
+        ----------
+        frequencies : (n,), Hz
+            Where it is evaluated.
+        """
         gain = self._gain(frequencies)
         rows, columns = self.shapes[:, list(self.rows)], self.shapes[:, list(self.columns)]
         pairs = (rows[:, :, None] * columns[:, None, :]).reshape(len(self.natural), -1)
@@ -109,7 +137,19 @@ class RobotModes:
         return np.asarray(1 / (self.natural**2 - omega**2 + 2j * self.damping * self.natural * omega))
 
     def slopes(self, base: "RobotModes", frequencies: Real, force: Complex, error: LabError) -> Complex:
-        """Derivative of displacement lines by u at force lines, (n_lines, n_rows, size); ``base``: modes at u = 0."""
+        """Derivative of displacement lines by the deviations u, (n_lines, n_rows, size), m.
+
+        Parameters
+        ----------
+        base
+            The modes at u = 0.
+        frequencies : (n_lines,), Hz
+            Frequencies of the lines.
+        force : (n_lines, n_columns), N
+            Force at the lines.
+        error
+            One standard deviation of each deviation.
+        """
         omega = 2 * np.pi * frequencies[:, None]
         gain = self._gain(frequencies)[:, : self.count]
         natural, damping = self.natural[: self.count], self.damping[: self.count]
@@ -138,15 +178,16 @@ def robot_modes(robot: SpatialRobot, recording: PosedRecording, offset: Real, se
     Parameters
     ----------
     robot
+        The robot, changed or not.
     recording
         Its posture, axes and degrees of freedom.
     offset : (n_moving,), rad
-        By how much the joints stand elsewhere than stated.
+        Angle by which each joint stands elsewhere than stated.
     sensor : (3,), m
         Housing sensor from the tip, in the recording's axes: it moves by ``t + theta x r`` with the node before the
         tool's spring.
     count
-        Modes that may be off.
+        Number of modes, from the lowest, that may be off.
     """
     modes = modes_at(robot, recording.q + offset)
     tip = modes.shapes[:, modes.structure.tip]
@@ -168,21 +209,35 @@ def robot_modes(robot: SpatialRobot, recording: PosedRecording, offset: Real, se
     )
 
 
-def predicted_lines(modes: RobotModes, lines: WindowedLines) -> Complex:
+def predicted_spectrum(modes: RobotModes, spectrum: WindowedLines) -> Complex:
     """Windowed response lines (n_lines, n_responses) that the modes give for the recorded forces.
 
     Lines above 1.5 times the band are left out: they reach into it by leakage alone.
+
+    Parameters
+    ----------
+    modes
+        Modes in the recording's posture.
+    spectrum
+        Windowed spectrum of the recording.
     """
-    frequencies = lines.padded_frequencies
-    needed = frequencies <= 1.5 * float(lines.frequencies[-1])
+    frequencies = spectrum.padded_frequencies
+    needed = frequencies <= 1.5 * float(spectrum.frequencies[-1])
     response = np.zeros((len(frequencies), len(modes.rows)), dtype=complex)
-    near = frequencies[needed]
-    moved = np.einsum("kpq,kq->kp", modes.receptance(near), lines.force_lines[needed])
-    response[needed] = moved * lines.padded_kinematic[needed]
-    return lines.cut(lines.signal(response))
+    moved = np.einsum("kpq,kq->kp", modes.receptance(frequencies[needed]), spectrum.force_lines[needed])
+    response[needed] = moved * spectrum.padded_kinematic[needed]
+    return spectrum.cut(spectrum.signal(response))
 
 
-def quick_lines(modes: RobotModes, lines: WindowedLines) -> Complex:
-    """The same from the windowed forces, line by line: for searches and derivatives, no leakage."""
-    moved = np.einsum("kpq,kq->kp", modes.receptance(lines.frequencies), lines.force_here)
-    return np.asarray(moved * lines.kinematic)
+def quick_spectrum(modes: RobotModes, spectrum: WindowedLines) -> Complex:
+    """The same from the windowed forces, line by line: for searches and derivatives, without leakage.
+
+    Parameters
+    ----------
+    modes
+        Modes in the recording's posture.
+    spectrum
+        Windowed spectrum of the recording.
+    """
+    moved = np.einsum("kpq,kq->kp", modes.receptance(spectrum.frequencies), spectrum.force_here)
+    return np.asarray(moved * spectrum.kinematic)

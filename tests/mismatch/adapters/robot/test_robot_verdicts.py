@@ -10,8 +10,17 @@ from payload_information import Recorded, mass_errors
 
 from millfrf.robot.diagnosis.diagnosis_words import describe, summary
 from mismatch import Trial
-from mismatch.adapters.robot import PosedRecording, RobotCause, RobotDiagnosis, diagnose_robot, posed
-from mismatch.adapters.robot.robot_held_out import chance
+from mismatch.adapters.robot import (
+    PosedRecording,
+    RobotDiagnosis,
+    companions_of,
+    diagnose_robot,
+    number_of,
+    posed,
+    standard_error_of,
+)
+from mismatch.adapters.robot.held_out import chance
+from mismatch.inference import AcceptedCause
 from robot_model import (
     LumpedBody,
     SpatialRobot,
@@ -64,20 +73,24 @@ def recorded(truth: OtherRobot, count: int = 3, noise: float = 0.02, seed: int =
     return made
 
 
-def holds(cause: RobotCause, truth: float, errors: float = 2.5) -> None:
-    assert abs(cause.number - truth) < errors * cause.standard_error, cause
+def holds(cause: AcceptedCause, truth: float, errors: float = 2.5) -> None:
+    assert abs(number_of(cause) - truth) < errors * standard_error_of(cause), cause
+
+
+def fit_error(cause: AcceptedCause) -> float:
+    return cause.error_parts[cause.name]["fit"]
 
 
 def nothing_gets_worse(found: RobotDiagnosis) -> None:
     """What every answer keeps: a cause lowers the error held out; without a cause nothing changes."""
     before, after = (np.array([getattr(one, name) for one in found.held_out]) for name in ("before", "after"))
-    if found.causes:
+    if found.physics:
         assert np.mean(after**2) < np.mean(before**2)
-        assert found.p_value < 0.01
+        assert found.improvement.p_value < 0.01
     else:
         assert (after == before).all()
-        assert found.final is found.nominal
-    assert (found.verdict in ("none", "unexplained")) == (found.causes == ())
+        assert found.details.final is found.details.nominal
+    assert (found.verdict in ("none", "unexplained")) == (found.physics == ())
 
 
 def test_the_two_robots_are_one() -> None:
@@ -113,31 +126,31 @@ def test_a_housing_does_not_feel_the_tools_spring() -> None:
 def test_a_tool_that_gives_way_is_named_and_no_joint_blamed() -> None:
     """Before: joints and postures were blamed, and the error held out rose."""
     found = diagnose_robot(believed(), recorded(replace(TRUTH, tool=(1.5e-7, 1.5e-7, 0.0)), 2))
-    assert [cause.name for cause in found.causes] == ["tool compliance"]
+    assert [cause.name for cause in found.physics] == ["tool compliance"]
     assert found.verdict == "explained"
-    holds(found.causes[0], 1.5e-7)
+    holds(found.physics[0], 1.5e-7)
     nothing_gets_worse(found)
-    assert "tool compliance: 0.1" in describe(found.causes[0])
-    assert "µm/N" in describe(found.causes[0])
+    assert "tool compliance: 0.1" in describe(found.physics[0])
+    assert "µm/N" in describe(found.physics[0])
 
 
 def test_a_lighter_spindle_is_a_negative_payload() -> None:
     """Before: joint 3 times 1.10, with more than half of the error left."""
     found = diagnose_robot(believed(), recorded(TRUTH.loaded(-10.0, (0.0, 0.0, -0.265)), 2))
-    assert [cause.name for cause in found.causes] == ["payload"]
-    holds(found.causes[0], -10.0)
+    assert [cause.name for cause in found.physics] == ["payload"]
+    holds(found.physics[0], -10.0)
     nothing_gets_worse(found)
-    assert "lighter than modelled" in describe(found.causes[0])
+    assert "lighter than modelled" in describe(found.physics[0])
 
 
 def test_the_error_of_a_payload_holds_the_place_that_nobody_stated() -> None:
     """Before: joint 3 times 0.947 ± 0.0085 stood alone."""
     found = diagnose_robot(believed(), recorded(TRUTH.loaded(8.0, (0.0, 0.0, -0.45)), 2))
-    assert "payload" in {found.causes[0].name, *found.equivalents}
-    if found.causes[0].name == "payload":
-        holds(found.causes[0], 8.0)
+    assert "payload" in {found.physics[0].name, *found.equivalents}
+    if found.physics[0].name == "payload":
+        holds(found.physics[0], 8.0)
     told = "\n".join(summary(found))
-    assert "cannot be told" in told or found.causes[0].beside[2].told
+    assert "cannot be told" in told or companions_of(found.physics[0])[2].told
 
 
 def recorded_lines(mass: float, place: tuple[float, float, float], noise: float = 0.02) -> list[Recorded]:
@@ -167,17 +180,17 @@ def test_a_stated_place_sharpens_the_mass_by_what_the_recordings_hold() -> None:
         diagnose_robot(believed(), recorded(TRUTH.loaded(8.0, place)), payload_at=at) for at in (None, np.array(place))
     )
     for found in (free, known):
-        assert found.causes[0].name == "payload"
-        holds(found.causes[0], 8.0)
-    assert known.causes[0].beside == ()
-    told = [free.causes[0].fitted_error, *(one.standard_error for one in free.causes[0].beside)]
-    belief = np.array([one.spread for one in free.causes[0].beside])
+        assert found.physics[0].name == "payload"
+        holds(found.physics[0], 8.0)
+    assert companions_of(known.physics[0]) == ()
+    told = [fit_error(free.physics[0]), *(one.standard_error for one in companions_of(free.physics[0]))]
+    belief = np.array([one.spread for one in companions_of(free.physics[0])])
     bound = mass_errors(TRUTH, 8.0, np.array(place), recorded_lines(8.0, place), belief)
     assert bound == pytest.approx([1.050, 0.0489, 0.0579, 0.0516, 0.973], rel=2e-3)
-    assert [*told, known.causes[0].fitted_error] == pytest.approx(bound, rel=0.1)
-    ratio = known.causes[0].fitted_error / free.causes[0].fitted_error
+    assert [*told, fit_error(known.physics[0])] == pytest.approx(bound, rel=0.1)
+    ratio = fit_error(known.physics[0]) / fit_error(free.physics[0])
     assert ratio == pytest.approx(bound[4] / bound[0], rel=0.02)
-    assert known.causes[0].standard_error < free.causes[0].standard_error
+    assert standard_error_of(known.physics[0]) < standard_error_of(free.physics[0])
 
 
 def test_a_change_without_a_gain_elsewhere_is_by_chance() -> None:
@@ -235,9 +248,9 @@ def test_intervals_hold_the_truth_or_the_tool_abstains() -> None:
         nothing_gets_worse(found)
         if found.verdict != "explained":
             continue
-        for cause in found.causes:
+        for cause in found.physics:
             if cause.name in numbers:
-                inside.append(abs(cause.number - numbers[cause.name]) < 1.96 * cause.standard_error)
+                inside.append(abs(number_of(cause) - numbers[cause.name]) < 1.96 * standard_error_of(cause))
             else:
                 wrong.append(cause.name)
     assert len(inside) >= 8
@@ -251,7 +264,7 @@ def test_beams_and_a_lighter_spindle() -> None:
     bodies = (*KUKA.bodies[:-1], replace(KUKA.bodies[-1], mass=KUKA.bodies[-1].mass - 10.0))
     from_beams = []
     for recording, q in zip(recorded(TRUTH), POSTURES, strict=True):
-        trial = recording.lines.trial
+        trial = recording.spectrum.trial
         n = len(trial.force)
         lines = np.fft.rfftfreq(n, 1 / RATE)
         pushed = np.fft.rfft(trial.force, axis=0)
@@ -259,7 +272,7 @@ def test_beams_and_a_lighter_spindle() -> None:
         response = np.fft.irfft(moved * (2j * np.pi * lines[:, None]) ** 2, n=n, axis=0)
         from_beams.append(posed(replace(trial, response=response), q, BAND))
     found = diagnose_robot(KUKA, from_beams)
-    assert [cause.name for cause in found.causes] == ["payload"]
-    holds(found.causes[0], -10.0)
+    assert [cause.name for cause in found.physics] == ["payload"]
+    holds(found.physics[0], -10.0)
     payload = diagnose_robot(with_payload(KUKA, 5.0, np.array([0.0, 0.0, -0.2])), from_beams, most_causes=1)
-    assert "links" not in [cause.name for cause in payload.causes]
+    assert "links" not in [cause.name for cause in payload.physics]
