@@ -126,6 +126,7 @@ def picture(signals: Signals, nominal: ModalModel, found: StructureDiagnosis) ->
         cause for cause in found.details.final.hypothesis.causes if cause.physics.name == "stiffness_hardening"
     )
     assert cause.direction is not None
+    final = found.details.final
     linear = replace(final, hypothesis=replace(final.hypothesis, causes=()))
     floor = linear_floor(linear, list(found.details.recordings))
     seen = [seen_motion(record, linear.hypothesis, cause.direction) for record in floor.records]

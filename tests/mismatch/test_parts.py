@@ -109,7 +109,7 @@ def test_every_cause_is_a_short_file_with_its_source() -> None:
 
 TOY = """
 import numpy as np
-from mismatch.joint_law import JointLaw
+from mismatch.joints.joint_law import JointLaw
 from mismatch.physics import Parameter
 
 
