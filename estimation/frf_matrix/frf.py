@@ -1,11 +1,16 @@
 """`Frf`: a matrix of frequency response functions with its axes, quality and covariance."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import Band, InputError, checked_band
+from foundation import Band, InputError, Result, Summary, checked_band, counted, drawing, listed, optional_library
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -32,8 +37,8 @@ class FrfCovariance:
         return np.asarray(rows[:, :, None] * columns[:, None, :])
 
 
-@dataclass(frozen=True)
-class Frf:
+@dataclass(frozen=True, eq=False, repr=False)
+class Frf(Result):
     """Frequency response functions ``X = H F`` on a frequency axis.
 
     Parameters
@@ -146,6 +151,70 @@ class Frf:
             unknown = np.divide(1 - coherence, coherence)
         variance = np.abs(self.values) ** 2 * unknown / spare
         return None if np.isnan(variance[self.valid]).all() else np.asarray(variance)
+
+    def plot(
+        self,
+        axes: "Axes | None" = None,
+        *,
+        response: str | None = None,
+        excitation: str | None = None,
+        part: str = "magnitude",
+        **line: Any,
+    ) -> "Axes":
+        """Draw entries over frequency and return the axes; see :func:`figures.draw_frf` for the parameters."""
+        return drawing("draw_frf")(self, axes, response=response, excitation=excitation, part=part, **line)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Values and quality as a data set with the axes ``frequency`` (Hz), ``response`` and ``excitation``.
+
+        The variables are named by the quantity (``receptance`` ...), ``valid``, and, where they are known,
+        ``coherence``, ``multiple_coherence`` and ``variance``.
+
+        Raises
+        ------
+        InputError
+            xarray is not installed.
+        """
+        xr = optional_library("xarray", "Frf.to_xarray")
+        axes = ("frequency", "response", "excitation")
+        known = {
+            "valid": (axes[:1], self.valid),
+            "coherence": (axes, self.coherence),
+            "multiple_coherence": (axes[:2], self.multiple_coherence),
+            "variance": (axes, self.entry_variance()),
+        }
+        variables = {name: held for name, held in known.items() if held[1] is not None}
+        places = dict(zip(axes, (self.frequencies, list(self.responses), list(self.excitations)), strict=True))
+        attributes = {"unit": self.unit} | ({} if self.band is None else {"band_hz": self.band})
+        made = xr.Dataset({self.quantity: (axes, self.values, {"unit": self.unit}), **variables}, places, attributes)
+        made["frequency"].attrs["unit"] = "Hz"
+        return made
+
+    def _summary(self) -> Summary:
+        f, lines = self.frequencies, int(self.valid.sum())
+        span = f"{f[0]:.4g} to {f[-1]:.4g} Hz" if len(f) else "no line"
+        holds = "" if self.band is None else f"; holds in {self.band[0]:.4g} to {self.band[1]:.4g} Hz"
+        quality = [name for name in ("covariance", "coherence") if getattr(self, name) is not None]
+        shape = f"{counted(len(self.responses), 'response')} x {counted(len(self.excitations), 'excitation')}"
+        rows = tuple((name, *self._level(p)) for p, name in enumerate(self.responses))
+        return Summary(
+            f"Frf: {self.quantity} in {self.unit}, {shape}",
+            (
+                f"{counted(len(f), 'line')}, {span}, {lines} valid{holds}",
+                f"responses {listed(self.responses)}",
+                f"excitations {listed(self.excitations)}" + (f"; with {' and '.join(quality)}" if quality else ""),
+            ),
+            ("response", f"largest ({self.unit})", "at (Hz)"),
+            rows,
+        )
+
+    def _level(self, response: int) -> tuple[str, str]:
+        """Largest magnitude of a response on valid lines, and its frequency, as texts."""
+        if not self.valid.any():
+            return "", ""
+        magnitude = np.where(self.valid, np.abs(self.values[:, response]).max(axis=1, initial=0.0), 0.0)
+        line = int(magnitude.argmax())
+        return f"{magnitude[line]:.3g}", f"{self.frequencies[line]:.4g}"
 
 
 def _check_coherence(

@@ -1,11 +1,17 @@
 """`CrossSpectra`: averaged one-sided spectra between excitations and responses, with how they were made."""
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Channel
+from foundation import Result, Summary, counted, drawing, listed, optional_library
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -30,8 +36,8 @@ class SpectralSettings:
     detrend: str = "constant"
 
 
-@dataclass(frozen=True)
-class CrossSpectra:
+@dataclass(frozen=True, eq=False, repr=False)
+class CrossSpectra(Result):
     """One-sided power and cross spectral densities, averaged over segments.
 
     ``input_spectra[k, i, j] = <F_i conj(F_j)>``, ``cross_spectra[k, p, q] = <X_p conj(F_q)>``.
@@ -68,6 +74,47 @@ class CrossSpectra:
     sample_rate: float
     n_tests: int = 1
     n_excluded: int = 0
+
+    def plot(self, axes: "Axes | None" = None, *, side: str = "excitations") -> "Axes":
+        """Draw the power of each channel of one side and return the axes; see :func:`figures.draw_spectra`."""
+        return drawing("draw_spectra")(self, axes, side=side)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Input, cross and output spectra as a data set with the axes ``frequency`` (Hz) and the channels' names.
+
+        Raises
+        ------
+        InputError
+            xarray is not installed.
+        """
+        xr = optional_library("xarray", "CrossSpectra.to_xarray")
+        inputs, outputs = ([one.name for one in side] for side in (self.excitations, self.responses))
+        spectra = {
+            "input_spectra": (("frequency", "excitation", "excitation_conj"), self.input_spectra),
+            "cross_spectra": (("frequency", "response", "excitation_conj"), self.cross_spectra),
+            "output_spectra": (("frequency", "response", "response_conj"), self.output_spectra),
+        }
+        names = {"excitation": inputs, "excitation_conj": inputs, "response": outputs, "response_conj": outputs}
+        return xr.Dataset(spectra, {"frequency": self.frequencies, **names})
+
+    def _summary(self) -> Summary:
+        f, seconds = self.frequencies, self.settings.segment_length / self.sample_rate
+        span = f"{f[0]:.4g} to {f[-1]:.4g} Hz" if len(f) else "no line"
+        shape = f"{counted(len(self.excitations), 'excitation')}, {counted(len(self.responses), 'response')}"
+        made = f"{counted(self.n_tests, 'test')}, {counted(self.n_segments, 'segment')} of {seconds:.4g} s"
+        left = f", {self.n_excluded} left out" if self.n_excluded else ""
+        sides = (("excitation", self.excitations), ("response", self.responses))
+        rows = tuple((kind, one.name, one.degree_of_freedom, one.unit) for kind, side in sides for one in side)
+        return Summary(
+            f"CrossSpectra: {shape}, {counted(len(f), 'line')}, {span}",
+            (
+                f"{made}{left}, worth {self.effective_averages:.3g} averages",
+                f"excitations {listed([one.name for one in self.excitations])}",
+                f"responses {listed([one.name for one in self.responses])}",
+            ),
+            ("side", "channel", "degree of freedom", "unit"),
+            rows,
+        )
 
 
 def lines_of(spectra: CrossSpectra, chosen: NDArray[np.bool_]) -> CrossSpectra:

@@ -47,14 +47,13 @@ def draw_model(
     """
     grid = _grid(model, axes) if frequencies is None else np.asarray(frequencies, dtype=float)
     drawn_over = axes is not None and axes.has_data()
-    look = {"linestyle": (0, (5, 1.5)), "color": FITTED, "linewidth": 1.4} if drawn_over else {}
+    look = {"linestyle": (0, (5, 1.5)), "color": FITTED, "linewidth": 1.4, "label": "model"} if drawn_over else {}
     with given_or_new(axes) as shown:
         for number, frequency in enumerate(model.natural_frequencies):
             label = "natural frequencies" if number == 0 and not drawn_over else None
             shown.axvline(frequency, color="#777777", linewidth=0.7, linestyle=(0, (1, 1.5)), label=label, zorder=1)
-        chosen = {"response": response, "excitation": excitation, "part": part}
-        named = {"label": "model"} if drawn_over else {}
-        draw_frf(model.frf(grid), shown, **chosen, **{**look, **named, **line})
+        style = {**look, **line}
+        draw_frf(model.frf(grid), shown, response=response, excitation=excitation, part=part, **style)
         if axes is None:
             shown.set_xlim(grid[0], grid[-1])
     return shown

@@ -1,18 +1,23 @@
 """`StabilityLobes`: the depth limit over spindle speed, with chatter frequency and type."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
+from foundation import InputError, Result, Summary, counted, drawing, optional_library
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
 
 BIFURCATIONS = ("hopf", "period-doubling", "fold", "none")
 STATUSES = ("verified", "not-verified", "lower-bound", "unresolved")
 
 
-@dataclass(frozen=True)
-class StabilityLobes:
+@dataclass(frozen=True, eq=False, repr=False)
+class StabilityLobes(Result):
     """Largest stable axial depth at each spindle speed.
 
     Parameters
@@ -65,3 +70,46 @@ class StabilityLobes:
     def spindle_speeds_rpm(self) -> NDArray[np.float64]:
         """Spindle speeds in revolutions per minute, for the user's edge."""
         return self.spindle_speeds * 60 / (2 * np.pi)
+
+    def plot(self, axes: "Axes | None" = None, *, label: str | None = None) -> "Axes":
+        """Draw the depth limits over spindle speed and return the axes; see :func:`figures.draw_lobes`."""
+        return drawing("draw_lobes")(self, axes, label=label)
+
+    def to_frame(self) -> "pandas.DataFrame":
+        """One row a spindle speed, with the columns of the file of lobes.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        columns = {
+            "spindle_speed_rpm": self.spindle_speeds_rpm,
+            "depth_limit_m": self.depth_limits,
+            "chatter_frequency_hz": self.chatter_frequencies,
+            "bifurcation": list(self.bifurcations),
+            "status": list(self.status),
+        }
+        return optional_library("pandas", "StabilityLobes.to_frame").DataFrame(columns)
+
+    def _summary(self) -> Summary:
+        rpm, known = self.spindle_speeds_rpm, np.isfinite(self.depth_limits)
+        span = f", {rpm.min():.5g} to {rpm.max():.5g} rpm" if len(rpm) else ""
+        counts = [f"{self.status.count(name)} {name}" for name in STATUSES if name in self.status]
+        lowest = "no depth limit at any speed"
+        if known.any():
+            least = int(np.where(known, self.depth_limits, np.inf).argmin())
+            lowest = f"lowest limit {1e3 * self.depth_limits[least]:.4g} mm at {rpm[least]:.5g} rpm"
+            lowest += f", {self.bifurcations[least]}, {self.status[least]}"
+        doubts = f"; {counted(len(self.warnings), 'warning')}" if self.warnings else ""
+        columns = (rpm, 1e3 * self.depth_limits, self.chatter_frequencies, self.bifurcations, self.status)
+        rows = tuple(
+            (f"{speed:.5g}", f"{depth:.4g}", f"{chatter:.4g}", kind, status)
+            for speed, depth, chatter, kind, status in zip(*columns, strict=True)
+        )
+        return Summary(
+            f"StabilityLobes: {self.method}, {counted(len(rpm), 'spindle speed')}{span}",
+            (lowest, f"status: {', '.join(counts) or 'none'}{doubts}"),
+            ("speed (rpm)", "depth limit (mm)", "chatter (Hz)", "bifurcation", "status"),
+            rows,
+        )
