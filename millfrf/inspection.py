@@ -41,16 +41,16 @@ LARGEST = 100.0
 
 @dataclass(frozen=True)
 class Findings:
-    """What a look at a file gave.
+    """Findings of a look at a file.
 
     Parameters
     ----------
     kind, summary
-        What it is, in one line.
+        Kind of the file, and its content in one line.
     tables
-        Its contents.
+        Tables that show its contents.
     concerns
-        What looks wrong, one sentence each with the remedy; empty where nothing does.
+        Doubts about the file, one sentence each with the remedy; empty where there is none.
     """
 
     kind: str

@@ -27,20 +27,20 @@ class ModalFit:
     Parameters
     ----------
     model
-        Modes, residuals and covariance.
+        Modal model: modes, residuals and covariance.
     chart
-        Poles over order.
+        Stabilisation chart: poles over order.
     dropped
         Groups of poles that were not taken for modes, each with its reason.
-    band
-        Hz.
+    band : Hz
+        Lowest and highest frequency of the fit.
     reduced_chi_square
         Misfit over what the noise explains; 1 is perfect, much above 1 means more than noise is left. NaN
         where the FRF came without a covariance.
     relative_error : (n_responses, n_excitations)
         Root mean square misfit over root mean square FRF in the band.
     warnings
-        One sentence each.
+        Doubts about the fit, one sentence each.
     status
         ``refined``, or ``poly-reference poles`` where the refinement did not hold on lines that it had not seen.
     """

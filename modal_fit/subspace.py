@@ -31,18 +31,18 @@ class SubspaceFit:
     model
         Receptance model with residuals and covariance.
     chart
-        Poles over order.
+        Stabilisation chart: poles over order.
     dropped
         Groups of poles not taken for modes, each with its reason.
-    band
-        Hz.
+    band : Hz
+        Lowest and highest frequency of the fit.
     reduced_chi_square
         Misfit over the noise found; noise is estimated from the misfit itself, so 1 only says that the error
         is spread over channels and lines as noise on forces and responses would be.
     noise
         Noise variances found on responses and forces, per test.
     warnings
-        One sentence each.
+        Doubts about the fit, one sentence each.
     """
 
     model: ModalModel

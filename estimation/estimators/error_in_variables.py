@@ -54,9 +54,11 @@ def hv(spectra: CrossSpectra, response_noise: Real | None = None, excitation_noi
     Parameters
     ----------
     spectra
-        Of one test or several summed.
-    response_noise : (n_responses,), excitation_noise : (n_excitations,), or None
-        Relative noise powers; None: each channel's mean power, that is, noise in equal shares.
+        Spectra of one test, or of several summed by :func:`sum_tests`.
+    response_noise : (n_responses,), or None
+        Relative noise power of each response; None: its mean power, that is, noise in equal shares.
+    excitation_noise : (n_excitations,), or None
+        Relative noise power of each excitation; None: its mean power.
 
     Raises
     ------

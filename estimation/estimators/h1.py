@@ -24,7 +24,7 @@ def h1(spectra: CrossSpectra) -> Frf:
     Parameters
     ----------
     spectra
-        Of one test, or of several summed by :func:`sum_tests`.
+        Spectra of one test, or of several summed by :func:`sum_tests`.
 
     Returns
     -------

@@ -32,7 +32,7 @@ def local_half_width(n_tests: int, n_excitations: int, degree: int = 2) -> int:
 def local_polynomial(
     records: Sequence[BandRecord], band: tuple[float, float], *, degree: int = 2, half_width: int | None = None
 ) -> Frf:
-    """FRF matrix on every Fourier line of the records inside ``band`` (Hz).
+    """Estimate the FRF matrix on every Fourier line of the records inside ``band`` (Hz).
 
     Around line k, ``X(k+r) = (H_k + sum_s h_s r^s) F(k+r) + T_k + sum_s t_s r^s``: leakage is the transient T, as
     smooth in frequency as H, one for each record. 2 n + 1 neighbouring lines of all records give H_k, T_k and the
@@ -42,13 +42,13 @@ def local_polynomial(
     Parameters
     ----------
     records
-        One a test; cut to the shortest.
-    band
-        Hz.
+        One record for each test; all are cut to the shortest.
+    band : Hz
+        Lowest and highest frequency of the lines.
     degree
-        Of the polynomials.
+        Degree of the polynomials.
     half_width
-        n; None: the smallest with at least 8 equations more than unknowns.
+        Number n of lines on either side; None: the smallest with at least 8 equations more than unknowns.
 
     Returns
     -------

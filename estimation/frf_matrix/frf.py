@@ -24,7 +24,9 @@ class FrfCovariance:
     Parameters
     ----------
     response : (n_frequencies, n_responses, n_responses)
+        Covariance factor of the responses on each line.
     excitation : (n_frequencies, n_excitations, n_excitations)
+        Covariance factor of the excitations on each line.
     """
 
     response: NDArray[np.complex128]
@@ -43,29 +45,34 @@ class Frf(Result):
 
     Parameters
     ----------
-    frequencies : (n_frequencies,), Hz, increasing
-    values : (n_frequencies, n_responses, n_excitations), complex, in ``unit``
+    frequencies : (n_frequencies,), Hz
+        Frequencies of the lines, increasing.
+    values : (n_frequencies, n_responses, n_excitations), complex
+        The FRF matrix on each line, in ``unit``.
     responses, excitations
         Degrees of freedom along the axes, ``node:direction``.
     quantity
         ``receptance`` (m/N), ``mobility``, ``accelerance`` (m/s^2/N) or ``transfer`` (anything else).
     unit
-        Response unit over excitation unit.
+        Unit of the response over that of the excitation, for example ``m/N``.
     valid : (n_frequencies,), bool
         False where no FRF can be given (excitation rank below the number of inputs); every later
         step leaves those lines out. Values there are zero.
     multiple_coherence : (n_frequencies, n_responses) or None
+        Multiple coherence of each response with all excitations, 0 to 1.
     covariance : FrfCovariance or None
-    band
-        Lowest and highest frequency (Hz) between which the FRF holds; None: not known. Whoever uses it outside says so.
+        Covariance of the estimate; None: not known.
+    band : (2,), Hz, or None
+        Lowest and highest frequency between which the FRF holds; None: not known. Whoever uses it outside says so.
     coherence : (n_frequencies, n_responses, n_excitations) or None
         Ordinary coherence of each entry, 0 to 1; NaN in entries where it is not known (a single tap).
     averages : (n_responses, n_excitations), int, or None
         Number of averages behind each entry; 0 where it is not known.
-    exponential_time_constant
-        tau (s) of the window ``exp(-t / tau)`` that force and response were multiplied by; None: no such window. The
-        values then stand on the line ``s = i w + 1/tau`` beside the imaginary axis (:attr:`laplace`), where every pole
-        seems ``1/tau`` further away: an FRF that is read as it stands shows too much damping. A fit takes it back.
+    exponential_time_constant : s, or None
+        Time constant tau of the window ``exp(-t / tau)`` that force and response were multiplied by; None: no such
+        window. The values then stand on the line ``s = i w + 1/tau`` beside the imaginary axis (:attr:`laplace`), where
+        every pole seems ``1/tau`` further away: an FRF that is read as it stands shows too much damping. A fit takes it
+        back.
 
     Raises
     ------

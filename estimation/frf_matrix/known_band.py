@@ -16,7 +16,7 @@ BRIDGED = 8
 
 
 def known_band(frf: Frf, driven: NDArray[np.bool_]) -> Band | None:
-    """The stretch of known lines that holds most of the structure's motion.
+    """Find the stretch of known lines that holds most of the structure's motion.
 
     A line is known where it is valid, driven, above 0 Hz and coherent in one response at least. Of several stretches (a
     sweep of a cutter drives one for each harmonic of its teeth) the one with the most energy of the mobility counts.
@@ -24,9 +24,9 @@ def known_band(frf: Frf, driven: NDArray[np.bool_]) -> Band | None:
     Parameters
     ----------
     frf
-        Estimated.
+        Estimated FRF, with its multiple coherence if it is known.
     driven : (n_frequencies,), bool
-        Where the inputs have power.
+        Whether the inputs have power on the line.
 
     Returns
     -------

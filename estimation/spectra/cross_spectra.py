@@ -45,21 +45,25 @@ class CrossSpectra(Result):
     Parameters
     ----------
     frequencies : (n_frequencies,), Hz
+        Frequencies of the lines, from 0 Hz up.
     input_spectra : (n_frequencies, n_excitations, n_excitations), unit_i * unit_j / Hz
-    cross_spectra : (n_frequencies, n_responses, n_excitations)
-    output_spectra : (n_frequencies, n_responses, n_responses)
+        Power and cross spectral densities of the excitations.
+    cross_spectra : (n_frequencies, n_responses, n_excitations), unit_p * unit_q / Hz
+        Cross spectral densities of responses with excitations.
+    output_spectra : (n_frequencies, n_responses, n_responses), unit_p * unit_u / Hz
+        Power and cross spectral densities of the responses.
     excitations, responses
-        The channels along the axes.
+        Channels along the axes.
     n_segments
-        Segments averaged.
+        Number of segments that were averaged.
     effective_averages
         Number of independent averages worth as much as the overlapping segments.
     settings, sample_rate
-        How they were made; sample_rate in Hz.
+        Spectral settings and sample rate (Hz) with which the spectra were made.
     n_tests
-        Tests (recordings) that were summed.
+        Number of tests (recordings) that were summed.
     n_excluded
-        Segments left out because of overload, clipping or dropped samples.
+        Number of segments left out because of overload, clipping or dropped samples.
     """
 
     frequencies: NDArray[np.float64]

@@ -30,10 +30,10 @@ class SpectralAccumulator:
     ----------
     excitations, responses
         Channels along the columns of what ``add`` gets.
-    sample_rate
-        Hz.
+    sample_rate : Hz
+        Samples a second.
     settings
-        Segment length, overlap, window, detrending.
+        Settings of the spectra: segment length, overlap, window, detrending.
 
     Raises
     ------

@@ -15,7 +15,7 @@ _REPEATED = 8  # equal rows in a row: a buffer that was handed out twice, or not
 
 
 def usable_samples(samples: NDArray[np.floating], channels: Sequence[Channel]) -> NDArray[np.bool_]:
-    """False where a sample is not finite, overloaded, clipped or repeated.
+    """Say which samples are usable: finite, not overloaded, not clipped and not repeated.
 
     Overload needs a channel's ``full_scale``. Clipping is also found without: at least four equal samples in a
     row at the block's extreme of a channel. Rows of which at least eight in a row are equal in every channel are a
@@ -24,8 +24,9 @@ def usable_samples(samples: NDArray[np.floating], channels: Sequence[Channel]) -
     Parameters
     ----------
     samples : (n_samples, n_channels)
+        Samples in the unit of their channels.
     channels
-        Along the columns.
+        Channels along the columns.
 
     Returns
     -------

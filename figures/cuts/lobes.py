@@ -36,12 +36,14 @@ class TriedCut:
 
 @dataclass(frozen=True)
 class LobesBand:
-    """Interval of a depth limit.
+    """Confidence interval of a depth limit over spindle speed.
 
     Parameters
     ----------
     spindle_speeds_rpm : (n_speeds,), rpm
+        Spindle speeds of the limits.
     low, high : (n_speeds,), m
+        Lower and upper end of the interval.
     """
 
     spindle_speeds_rpm: NDArray[np.float64]

@@ -22,7 +22,7 @@ class Summary:
     headline
         Name of the type and what it holds, one line.
     lines
-        At most three more lines.
+        Further lines, at most three.
     columns, rows
         Headings and cells of the table that a notebook shows below the headline; empty: the lines are shown instead.
     """

@@ -58,9 +58,9 @@ def check_output(path: Path, suffixes: Sequence[str], inputs: Sequence[Path] = (
     Parameters
     ----------
     path
-        As typed.
+        Name of the output as it was typed.
     suffixes
-        That the command writes.
+        Suffixes that the command writes.
     inputs
         Files that the command reads, none of which it may overwrite.
 

@@ -18,16 +18,16 @@ _FACTORS = ((math.pi / 30, "rad/s"), (1 / 60, "Hz"), (2 / 60, "tooth passings a 
 
 @dataclass(frozen=True)
 class StatedCut:
-    """Numbers of a recording's set-up; None where it says nothing.
+    """Numbers that a recording's set-up states about the cut; None where it says nothing.
 
     Parameters
     ----------
-    rpm
+    rpm : rpm
         Constant spindle speed.
-    sweep
-        First and last spindle speed of a sweep, rpm.
+    sweep : rpm
+        First and last spindle speed of a sweep.
     teeth
-        Of the cutter.
+        Number of teeth of the cutter.
     """
 
     rpm: float | None = None
@@ -61,13 +61,13 @@ def check_one_speed(name: str, setup: str, process: MillingProcess, typed: float
     Parameters
     ----------
     name
-        Of the recording.
+        Name of the recording.
     setup
-        What it states, TOML.
+        Set-up that it states, TOML text.
     process
-        Cutter of the cutting file.
-    typed
-        Spindle speed that was typed, rpm; None: none was.
+        Milling process of the cutting file.
+    typed : rpm
+        Spindle speed that was typed; None: none was.
 
     Returns
     -------

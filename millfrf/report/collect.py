@@ -26,11 +26,11 @@ class SourceFile:
     Parameters
     ----------
     path, kind
-        Where and what it is.
+        Path of the file, and its kind.
     sha256
-        Of its bytes.
+        SHA-256 hash of its bytes.
     provenance
-        What it says of its making; empty where it says nothing.
+        Sources and versions that the file states; empty where it states none.
     """
 
     path: Path
@@ -55,9 +55,9 @@ class Collected:
     Parameters
     ----------
     files
-        In the order given.
+        All files, in the order given.
     recordings, frfs, models, lobes, cutting, chatter
-        By kind, with the file each came from.
+        Contents by kind, each with the file it came from.
     doubts
         Files that do not belong together, and FRFs that look wrong; one sentence each.
     """

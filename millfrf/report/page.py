@@ -36,14 +36,14 @@ from .sections.stability_section import stability_findings
 
 @dataclass(frozen=True)
 class ReportOptions:
-    """What a report shall show.
+    """Options of a report.
 
     Parameters
     ----------
     title
-        Of the page.
-    band
-        Frequency axis of its figures, Hz; None: chosen by the fit.
+        Title of the page.
+    band : Hz
+        Frequency axis of its figures; None: chosen by the fit.
     reference
         Model file with known dynamics to draw beside the measured ones.
     """

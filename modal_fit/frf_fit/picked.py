@@ -34,11 +34,11 @@ def fit_picked(
     Parameters
     ----------
     frf, inside, band
-        As in :func:`fit_matrix`.
+        FRF, lines to use and band (Hz), as in :func:`fit_matrix`.
     max_order
-        Of the stabilisation chart beside it.
+        Highest order of the stabilisation chart beside the fit.
     poles : (n_modes,), rad/s
-        Upper half of the pairs.
+        Poles to keep, in the upper half plane.
     refine
         Whether poles and vectors are refined from there, as those of an automatic fit are.
     """

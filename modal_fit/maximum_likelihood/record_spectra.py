@@ -22,11 +22,16 @@ class RecordSpectra:
 
     Parameters
     ----------
-    s : (n_lines,), 2 pi i f
-    test : (n_lines,), number of the test each line is from
-    excitation : (n_lines, n_excitations), DFT / sqrt(n_samples): a white noise of variance v gives E|.|^2 = v
-    response : (n_lines, n_responses), the same
-    derivative : (n_responses,), times the response was differentiated: 2 for accelerations
+    s : (n_lines,), rad/s
+        Laplace variable 2 pi i f of each line.
+    test : (n_lines,), int
+        Number of the test that each line comes from.
+    excitation : (n_lines, n_excitations)
+        DFT / sqrt(n_samples) of the excitations: white noise of variance v gives E|.|^2 = v.
+    response : (n_lines, n_responses)
+        DFT / sqrt(n_samples) of the responses.
+    derivative : (n_responses,), int
+        Number of times each response was differentiated: 2 for accelerations.
     """
 
     s: NDArray[np.complex128]

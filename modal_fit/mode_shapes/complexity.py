@@ -6,7 +6,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 
 def mode_complexity(vectors: NDArray[np.complex128]) -> NDArray[np.float64]:
-    r"""Area of the polygon around a vector's components over the circle of the largest (Imregun & Ewins 1995).
+    r"""Compute the area of the polygon around a vector's components over the largest circle (Imregun & Ewins 1995).
 
     *Complex modes: origins and limits*, Proc. IMAC 13: ``area(hull of all components and the origin) / (pi max|x|^2)``,
     0 for components on one line through the origin, as of a real mode; 1 for very many components evenly around a
@@ -14,7 +14,8 @@ def mode_complexity(vectors: NDArray[np.complex128]) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    vectors : (n_modes, n_dof)
+    vectors : (n_modes, n_dof), complex
+        Mode shapes, one a row.
 
     Returns
     -------

@@ -13,12 +13,12 @@ from ..models.shape_measures import modal_assurance, reciprocity_residual
 
 @dataclass(frozen=True)
 class ModeReciprocity:
-    """How far left and right vectors of each mode agree on the points that are both excited and measured.
+    """Agreement of left and right vectors of each mode on the points that are both excited and measured.
 
     Parameters
     ----------
     points
-        ``node:axis``.
+        Points that are compared, ``node:axis``.
     assurance : (n_modes,)
         MAC of right and left vector on these points: 1 for a reciprocal structure.
     residual : (n_modes,)

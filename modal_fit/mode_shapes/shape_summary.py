@@ -16,7 +16,7 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ModeShapes:
-    """The shapes of a model and what they are like.
+    """The shapes of a model, with measures of how real and how distinct they are.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class ModeShapes:
     side
         ``right`` (responses) or ``left`` (excitations): the side with more degrees of freedom, right if even.
     assurance : (n_modes, n_modes)
-        Auto-MAC, 0 to 1.
+        Auto-MAC: modal assurance of all pairs of shapes, 0 to 1.
     collinearity : (n_modes,)
         Modal phase collinearity (MPC), 1 for a real mode.
     deviation : (n_modes,), rad

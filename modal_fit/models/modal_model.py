@@ -86,28 +86,30 @@ class ModalModel(Result):
     Parameters
     ----------
     poles : (n_modes,), rad/s
-        Upper half of the conjugate pairs: imaginary part > 0.
-    right : (n_modes, n_responses), left : (n_modes, n_excitations)
-        Their product has the unit of the FRF times rad/s.
+        Poles with positive imaginary part: the upper half of the conjugate pairs.
+    right : (n_modes, n_responses)
+        Right vectors (mode shapes at the responses).
+    left : (n_modes, n_excitations)
+        Left vectors (participation of the excitations). Right times left has the unit of the FRF times rad/s.
     responses, excitations
         Degrees of freedom along the axes, ``node:direction``.
     quantity, unit
-        Of the FRF the model gives: ``receptance`` in ``m/N``, or ``transfer`` in any unit.
+        Quantity and unit of the FRF that the model gives: ``receptance`` in ``m/N``, or ``transfer`` in any unit.
     residuals
         Out-of-band terms, or None.
     covariance : (n_parameters, n_parameters) or None
-        Of the real numbers Re poles, Im poles, Re right, Im right, Re left, Im left, each laid out row by
+        Covariance of the real numbers Re poles, Im poles, Re right, Im right, Re left, Im left, each laid out row by
         row (mode by mode), in SI units.
     physics
         Terms ``{name, location, parameters}`` that a diagnosis added; empty for a linear model.
-    delay
-        Pure delay of the measuring chain, s: the whole expression times ``exp(-i w delay)``. Of a ``transfer`` only,
-        whose input passes converters and amplifiers; a structure has none.
-    band
-        Lowest and highest frequency (Hz) between which the model holds, as a rule those of its fit; None: not known.
-        Whoever uses the model outside says so.
+    delay : s
+        Pure delay of the measuring chain: the whole expression is multiplied by ``exp(-i w delay)``. Only a
+        ``transfer`` has one, whose input passes converters and amplifiers; a structure has none.
+    band : (2,), Hz, or None
+        Lowest and highest frequency between which the model holds, as a rule those of its fit; None: not known. Whoever
+        uses the model outside says so.
     errors
-        Standard errors of frequencies and damping ratios by where they come from; None: only ``covariance`` is known.
+        Standard errors of frequencies and damping ratios by their source; None: only ``covariance`` is known.
 
     Raises
     ------

@@ -20,8 +20,9 @@ class Synthesis:
     Parameters
     ----------
     frequencies : (n_lines,), Hz
+        Frequencies of the lines that are compared.
     measured, synthesised : (n_lines, n_responses, n_excitations)
-        NaN in entries whose degrees of freedom the model does not have.
+        FRFs of the measurement and of the model; NaN in entries whose degrees of freedom the model does not have.
     responses, excitations
         Degrees of freedom along the axes.
     misfit : (n_responses, n_excitations)
@@ -52,11 +53,11 @@ def synthesis(frf: Frf, model: ModalModel, band: Band | None = None) -> Synthesi
     Parameters
     ----------
     frf
-        Measured; an accelerance or mobility is compared as such.
+        Measured FRF; an accelerance or mobility is compared as such.
     model
-        Of receptance, or a transfer in the FRF's unit.
-    band
-        Hz; None: the model's, or all lines.
+        Modal model of receptance, or of a transfer in the FRF's unit.
+    band : Hz
+        Lowest and highest frequency; None: the model's, or all lines.
 
     Raises
     ------

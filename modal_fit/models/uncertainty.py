@@ -33,14 +33,14 @@ def unpack_parameters(model: ModalModel, packed: Real) -> ModalModel:
 
 
 def derived_covariance(model: ModalModel, derived: Callable[[ModalModel], Real]) -> Real | None:
-    """Covariance of any real vector computed from the model, ``J C J^T`` with J by central differences.
+    """Compute the covariance of any real vector derived from the model, ``J C J^T`` with J by central differences.
 
     Parameters
     ----------
     model
-        With a covariance; without one the result is None.
+        Modal model with a covariance; without one the result is None.
     derived
-        From a model to a real vector (n,).
+        Function that takes a model and gives a real vector (n,).
 
     Returns
     -------

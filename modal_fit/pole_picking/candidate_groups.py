@@ -12,20 +12,20 @@ _SAME = 0.003  # relative distance in the complex plane within which a pole of a
 
 @dataclass(frozen=True)
 class CandidateGroup:
-    """A group of poles.
+    """A group of poles of the stabilisation chart, from which a user may pick.
 
     Parameters
     ----------
     number
-        From 1 on, in order of frequency.
-    pole
-        rad/s.
+        Number of the group, from 1 on, in order of frequency.
+    pole : rad/s
+        Pole of the group, in the upper half plane.
     n_orders
-        Orders of the chart that have it.
+        Number of orders of the chart that have it.
     taken
         Whether the automatic fit took it for a mode.
     reason
-        Why it did not; empty where it did.
+        Reason why it was not taken; empty where it was.
     """
 
     number: int
@@ -46,12 +46,12 @@ class CandidateGroup:
 
 
 def candidate_groups(fit: ModalFit) -> tuple[CandidateGroup, ...]:
-    """Modes and dropped groups of a fit, numbered by frequency.
+    """Number modes and dropped groups of a fit by frequency.
 
     Parameters
     ----------
     fit
-        Of :func:`fit_polyreference`.
+        Result of :func:`fit_polyreference`.
     """
     poles = [(complex(pole), _orders_near(fit.chart, complex(pole)), True, "") for pole in fit.model.poles]
     poles += [(group.pole, group.n_orders, False, group.reason) for group in fit.dropped if group.pole.real < 0]

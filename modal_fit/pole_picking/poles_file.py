@@ -154,15 +154,15 @@ def write_pole_candidates(
     Parameters
     ----------
     path
-        ``.json``.
+        File to write, ``.json``.
     groups
-        Of :func:`candidate_groups`.
-    band
-        Hz.
+        Candidates, from :func:`candidate_groups`.
+    band : Hz
+        Lowest and highest frequency of the fit.
     stabilisation
         The chart as lists, for a picker to draw.
     provenance
-        Where the candidates come from.
+        Sources and versions behind the candidates.
 
     Raises
     ------

@@ -18,16 +18,16 @@ _SHARE = 0.4  # of all orders that a mode must be found in
 
 @dataclass(frozen=True)
 class StabilisationChart:
-    """All poles of all orders, with how stable each is.
+    """All poles of all orders, each with how stable it is.
 
     Parameters
     ----------
     orders, poles, stability : (n_poles,)
-        Model order, pole in rad/s, and 0 new, 1 stable in frequency, 2 also in damping, 3 also in vector.
+        Model order, pole (rad/s), and class: 0 new, 1 stable in frequency, 2 also in damping, 3 also in vector.
     vectors : (n_poles, n_dof)
         Unit modal vectors (participation or shape).
-    band
-        Hz.
+    band : Hz
+        Lowest and highest frequency of the chart.
     """
 
     orders: NDArray[np.int64]

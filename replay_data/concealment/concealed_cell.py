@@ -66,13 +66,13 @@ class ConcealedCell:
     structure
         What taps at rest would find: real modes at the tip.
     force : (n, 3), N
-        On the tip, at :data:`FINE_RATE`.
+        Force on the tip, at :data:`FINE_RATE`.
     effect
-        What is hidden.
+        The effect that is hidden.
     noise
         White noise of the accelerations, as a share of each channel's standard deviation; half of it on the forces.
     seed
-        Of the noise.
+        Seed of the noise.
     """
 
     def __init__(self, structure: ModalModel, force: Real, effect: ConcealedEffect, noise: float, seed: int) -> None:

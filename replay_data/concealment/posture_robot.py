@@ -25,7 +25,7 @@ def posture_robot(generator: np.random.Generator) -> ModalModel:
     Parameters
     ----------
     generator
-        Of frequencies, damping, modal masses and directions.
+        Random generator that draws frequencies, damping, modal masses and directions.
 
     Returns
     -------
@@ -45,13 +45,16 @@ def posture_robot(generator: np.random.Generator) -> ModalModel:
 
 
 def real_modes(natural: NDArray[np.float64], zeta: NDArray[np.float64], shapes: NDArray[np.float64]) -> ModalModel:
-    """Modal model at the tip of mass-normalised real shapes.
+    """Build the modal model at the tip from mass-normalised real shapes.
 
     Parameters
     ----------
     natural : (n_modes,), rad/s
+        Angular natural frequencies.
     zeta : (n_modes,)
+        Damping ratios of the modes.
     shapes : (n_modes, 3), kg^-1/2
+        Mass-normalised shapes at the tip in X, Y, Z.
     """
     damped = natural * np.sqrt(1 - zeta**2)
     poles = -zeta * natural + 1j * damped

@@ -137,11 +137,11 @@ class ResponseMap:
     structure
         Modal model; its responses are looked up by degree of freedom.
     quantities
-        Per channel: ``force``, ``displacement``, ``velocity`` or ``acceleration``.
+        Quantity of each channel: ``force``, ``displacement``, ``velocity`` or ``acceleration``.
     places
-        Per channel: degree of freedom.
-    step
-        Between instants, s.
+        Degree of freedom of each channel.
+    step : s
+        Time between two instants.
 
     Raises
     ------

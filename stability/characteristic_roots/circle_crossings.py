@@ -28,16 +28,16 @@ MOST_ROOTS = 256
 
 @dataclass(frozen=True)
 class CircleCrossings:
-    """Crossings with what belongs to them, and how far down the search can be trusted.
+    """Crossings with frequency and error of each, and how far down the search can be trusted.
 
     Parameters
     ----------
     crossings
-        By speed and then by depth.
+        The crossings, by speed and then by depth.
     frequency : (n_crossings,), Hz
-        Of the strongest line of the tool's motion.
+        Frequency of the strongest line of the tool's motion.
     error : (n_crossings,), m
-        What more nodes change.
+        Change of the depth when more nodes are used.
     resolved : (n_speeds,), m
         Depth below which no cell of the search was left unresolved; infinite where all were resolved.
     """
@@ -49,7 +49,7 @@ class CircleCrossings:
 
 
 def circle_crossings(system: DelaySystem, periods: Real, max_depth: float, *, lowest: bool = False) -> CircleCrossings:
-    """All crossings up to ``max_depth`` (m) at several tooth periods.
+    """Find all crossings up to ``max_depth`` (m) at several tooth periods.
 
     Depths are searched in stages that begin where the small-gain theorem ends and do not depend on ``max_depth``.
 
@@ -58,11 +58,11 @@ def circle_crossings(system: DelaySystem, periods: Real, max_depth: float, *, lo
     system
         Structure and process.
     periods : (n_speeds,), s
-        They share their nodes, so they should not differ by much.
-    max_depth
-        m.
+        Tooth periods. They share their nodes, so they should not differ by much.
+    max_depth : m
+        Largest axial depth that is searched.
     lowest
-        The lowest crossing at each speed will do.
+        Whether the search may end with the lowest crossing at each speed.
 
     Raises
     ------

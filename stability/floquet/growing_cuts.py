@@ -22,15 +22,16 @@ BATCH = 4_000_000
 
 
 def unstable_cuts(system: DelaySystem, speeds: Real, depths: Real, *, extra: int = 0) -> NDArray[np.bool_]:
-    """Whether a Floquet multiplier lies on or beyond the unit circle, at pairs of speed and depth.
+    """Decide whether a Floquet multiplier lies on or beyond the unit circle, at pairs of speed and depth.
 
     Parameters
     ----------
     system
         Structure and process.
-    speeds, depths : (n_pairs,), rad/s, m
+    speeds, depths : (n_pairs,)
+        Spindle speed (rad/s) and axial depth (m) of each cut.
     extra
-        Nodes a piece beyond what the structure's fastest mode needs.
+        Number of nodes a piece beyond what the structure's fastest mode needs.
 
     Raises
     ------

@@ -18,7 +18,7 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PeriodOperator:
-    """What the chip thickness of one period does to itself and to the structure, per unit depth, at several speeds.
+    """Effect of one period's chip thickness on itself and on the structure, per unit depth, at several speeds.
 
     With h the regenerated chip at the nodes, z = (Re q, Im q) the structure at the period's beginning and a the depth:
     ``y = E z + a G h`` is the tool's motion along the chip at the nodes and ``z_next = Phi z + a S h``.
@@ -26,20 +26,21 @@ class PeriodOperator:
     Parameters
     ----------
     within : (n_speeds, n_nodes, n_nodes)
-        G, nearly triangular: a chip acts only later.
+        Matrix G, nearly triangular: a chip acts only later.
     motion : (n_speeds, n_nodes, 2 n_modes)
-        E.
+        Matrix E: motion along the chip for a unit of each coordinate of the structure.
     impulse : (n_speeds, 2 n_modes, n_nodes)
-        S.
+        Matrix S: state at the period's end for a unit chip at each node.
     free : (n_speeds, 2 n_modes, 2 n_modes)
-        Phi, the structure left alone for a period.
+        Matrix Phi: the structure left alone for a period.
     times : (n_nodes,)
-        Of the nodes, in periods.
+        Times of the nodes, in periods.
     weights : (n_nodes,)
-        Quadrature over the period, in periods.
+        Weights of the quadrature over the period, in periods.
     forces : (n_nodes, 3)
         Force per unit depth and chip, Pa.
     periods : (n_speeds,), s
+        Tooth period at each speed.
     """
 
     within: Real

@@ -36,20 +36,21 @@ class TransitionSeries:
     Parameters
     ----------
     coefficients : (n_speeds, n_windows, n_powers, n, n)
-        Of b / radius; n = 2 n_modes, real and imaginary parts of the modal coordinates.
+        Coefficients of the powers of b / radius; n = 2 n_modes, real and imaginary parts of the modal coordinates.
     chips : (n_speeds, n_powers, n, n_nodes)
         Chip at the nodes for a unit of each coordinate before the node's window; no powers if not kept.
     needed : (n_speeds, 16)
         Powers that matter in each sixteenth of the radius: enough to find roots, not to refine.
-    radius
-        Largest ``|b|`` meant, m.
+    radius : m
+        Largest ``|b|`` that the series are made for.
     windows : (n_nodes,)
-        Which window a node is in.
+        Index of the window in which each node lies.
     times, weights : (n_nodes,)
-        Of the nodes and their quadrature, in periods.
-    forces : (n_nodes, 3)
-        Force per unit depth and chip, Pa.
+        Times of the nodes and weights of their quadrature, in periods.
+    forces : (n_nodes, 3), Pa
+        Force per unit depth and chip.
     periods : (n_speeds,), s
+        Tooth period at each speed.
     complete
         Whether all series have converged.
     """
@@ -73,17 +74,17 @@ class Windows:
     Parameters
     ----------
     begins, lengths : (n_windows,)
-        In periods.
+        Begin and length of each window, in periods.
     teeth : (n_windows,)
-        In the cut.
-    immersions : (sum of teeth,)
-        Of each tooth at the beginning of its window, rad, window by window.
-    radius
-        Largest ``|b|`` meant, m.
+        Number of teeth in the cut in each window.
+    immersions : (sum of teeth,), rad
+        Immersion angle of each tooth at the beginning of its window, window by window.
+    radius : m
+        Largest ``|b|`` that the series are made for.
     turn, growth
-        By how much the fastest mode turns in a window, rad, and the exponent by which solutions grow, at most.
+        Angle (rad) by which the fastest mode turns in a window, and exponent by which solutions grow, at most.
     total_growth
-        The latter over the period.
+        Exponent by which solutions grow over the period, at most.
     """
 
     begins: Real
@@ -146,7 +147,7 @@ def _too_many(system: DelaySystem, longest: float) -> InputError:
 def transition_series(
     system: DelaySystem, periods: Real, windows: Windows, *, extra: int = 0, chips: bool = False
 ) -> TransitionSeries:
-    """Series at several tooth periods, which share windows and nodes.
+    """Compute the series at several tooth periods, which share windows and nodes.
 
     In a window the forced motion is ``y = A z + b G y`` with ``G = Q o (A B^T)``: Q integrates at Radau's nodes, and A
     and B^T are the structure's free motion to and from a node. So ``y = sum b^k G^k A z``, and the k-th term dies out
@@ -157,12 +158,13 @@ def transition_series(
     system
         Structure without residual flexibility, and process.
     periods : (n_speeds,), s
+        Tooth periods at which the series are wanted.
     windows
-        For the longest of them.
+        Windows made for the longest of the periods.
     extra
-        Nodes a window beyond what is needed, to see what they change.
+        Number of nodes a window beyond what is needed, to see what they change.
     chips
-        Keep the chips at the nodes.
+        Whether the chips at the nodes are kept.
 
     Raises
     ------
@@ -245,16 +247,17 @@ def _fill(
     seen, pushed : (n_nodes, n_modes)
         Chip per modal coordinate and modal force per chip at all nodes, window by window and tooth by tooth.
     nodes, integral : (count,), (count, count)
-        In (-1, 1], and the integral from -1 to each node.
+        Nodes in (-1, 1], and the matrix that integrates from -1 to each node.
     begins, lengths : (n_windows,)
-        In periods.
+        Begin and length of each window, in periods.
     teeth : (n_windows,)
-        In the cut.
+        Number of teeth in the cut in each window.
     periods : (n_speeds,), s
-    radius
-        m.
+        Tooth periods at which the series are wanted.
+    radius : m
+        Largest ``|b|`` that the series are made for.
     coefficients, chips, needed
-        Receive the result.
+        Arrays that receive the result, as in ``TransitionSeries``.
     """
     count, size = len(nodes), 2 * len(poles)
     largest_block = count * teeth.max()

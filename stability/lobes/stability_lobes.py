@@ -23,21 +23,24 @@ class StabilityLobes(Result):
     Parameters
     ----------
     spindle_speeds : (n_speeds,), rad/s
+        Spindle speeds of the limits.
     depth_limits : (n_speeds,), m
-        Infinite where the cut is stable at every depth that was asked for; NaN where ``status`` is ``unresolved``.
+        Largest stable axial depth; infinite where the cut is stable at every depth that was asked for, NaN where
+        ``status`` is ``unresolved``.
     chatter_frequencies : (n_speeds,), Hz
-        At the limit; NaN exactly where ``bifurcations`` is ``none``.
+        Chatter frequency at the limit; NaN exactly where ``bifurcations`` is ``none``.
     bifurcations
-        One of ``hopf``, ``period-doubling``, ``fold``, ``none`` a speed.
+        Kind of instability, one word a speed: ``hopf``, ``period-doubling``, ``fold`` or ``none``.
     method
-        Solver's name: ``zero-order``, ``nyquist`` ...
+        Name of the solver: ``zero-order``, ``nyquist`` ...
     warnings
-        What a user should know before trusting the lines; one sentence each.
+        Doubts that a user should know before trusting the limits; one sentence each.
     status
-        One a speed. ``verified``: Floquet multipliers agree below, above and on a ladder beneath the limit (or up to
-        the largest depth, where there is no limit). ``not-verified``: the solver's word alone. ``lower-bound``: cuts
-        up to the depth given are stable, the limit itself was not found. ``unresolved``: the depth is NaN, nothing is
-        known. Empty when made: ``not-verified`` at every speed.
+        Worth of each limit, one word a speed. ``verified``: Floquet multipliers agree below, above and on a ladder
+        beneath the limit (or up to the largest depth, where there is no limit). ``not-verified``: nothing but the
+        solver says so. ``lower-bound``: cuts up to the depth given are stable, the limit itself was not found.
+        ``unresolved``: the depth is NaN, nothing is known. If it is left empty, it becomes ``not-verified`` at every
+        speed.
     """
 
     spindle_speeds: NDArray[np.float64]

@@ -129,15 +129,15 @@ def acquire(
     Parameters
     ----------
     opened
-        From `open_session`.
+        Session whose devices are set up, from `open_session`.
     out
-        New file.
+        New file to write.
     watchers
-        Shown every block and event after it was written.
+        Functions that are shown every block and event after it was written.
     stop
-        Asked before every block.
+        Function that is asked before every block; True ends the recording.
     progress
-        Called with the number of samples written.
+        Function that is called with the number of samples written.
 
     Raises
     ------

@@ -54,15 +54,15 @@ def acquire_live(
     Parameters
     ----------
     opened
-        From `open_session`.
+        Session whose devices are set up, from `open_session`.
     out
-        New file.
+        New file to write.
     address, port
-        Of the page.
+        Network address and port of the page.
     at_once
-        Record without waiting for Start.
+        Whether to record without waiting for Start.
     say
-        Told the page's address.
+        Function that is told the page's address.
 
     Returns
     -------

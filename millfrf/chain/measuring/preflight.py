@@ -36,14 +36,14 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class ChannelCheck:
-    """One channel in quiet or while tapping.
+    """Levels of one channel in quiet, or while tapping.
 
     Parameters
     ----------
     channel
-        Whose.
+        The channel that was checked.
     mean, deviation, peak
-        In the channel's unit; the peak about zero.
+        Mean, standard deviation and peak about zero, in the channel's unit.
     noise_density
         Median of the spectral density's root, unit/sqrt(Hz).
     """
@@ -83,9 +83,9 @@ class TapCheck:
     Parameters
     ----------
     force, acceleration
-        Channels.
-    delay
-        Of the acceleration after the force, s, beyond what the channels' known input delays explain.
+        Channels of the force and of the acceleration.
+    delay : s
+        Delay of the acceleration behind the force, beyond what the channels' known input delays explain.
     agrees
         Whether both point the way that their signed directions say.
     """
@@ -107,12 +107,12 @@ class TapCheck:
 
 @dataclass(frozen=True)
 class Preflight:
-    """All of it.
+    """All checks made before a recording.
 
     Parameters
     ----------
     checks, taps
-        By channel; by pair of channels where there were taps.
+        Checks of each channel, and of each pair of channels where there were taps.
     """
 
     checks: tuple[ChannelCheck, ...]

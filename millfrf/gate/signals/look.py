@@ -67,9 +67,9 @@ def look(stream: Stream, names: Sequence[str] | None = None, watch: Watch = sile
     Parameters
     ----------
     stream
-        Of an open recording.
+        Stream of an open recording.
     names
-        Channels to look at; None: all.
+        Names of the channels to look at; None: all.
     watch
         Shows progress while samples are read.
     """

@@ -36,16 +36,16 @@ from .diagnosis_sections import (
 def with_location(
     diagnosis: Diagnosis, trials: Sequence[Trial], speeds: Mapping[str, SpindleSpeed]
 ) -> tuple[Diagnosis, ResidualView]:
-    """The diagnosis with its ``located`` filled in, and the maps for the page.
+    """Fill in ``located`` of a diagnosis, and make the maps for the page.
 
     Parameters
     ----------
     diagnosis
-        As found.
+        Diagnosis without locations.
     trials
-        Recordings as read.
+        Recordings as they were read.
     speeds
-        Spindle speed by recording's name, where known.
+        Spindle speed by name of the recording, where it is known.
     """
     view = residual_view(diagnosis, trials)
     full = replace(diagnosis, located=located(view, speeds))
@@ -60,13 +60,13 @@ def write_diagnosis_report(
     Parameters
     ----------
     path
-        Of the page.
+        File of the page.
     view
-        Of a located diagnosis (:func:`with_location`).
+        Maps of a located diagnosis (:func:`with_location`).
     model_name
-        Of the nominal model, for the title.
+        Name of the nominal model, for the title.
     process
-        Cut for the lobes; None: one that is assumed.
+        Milling process for the lobes; None: one that is assumed.
 
     Raises
     ------

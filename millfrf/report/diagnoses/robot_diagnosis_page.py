@@ -31,15 +31,15 @@ def write_robot_report(
     Parameters
     ----------
     path
-        Of the page.
+        File of the page.
     found
-        The diagnosis.
+        Diagnosis of the robot.
     robot_name
-        For the title.
+        Name of the robot, for the title.
     summary
         Verdict, a sentence on it, and a line for each cause and held-out recording.
     doubts
-        About the recordings, one sentence each.
+        Doubts about the recordings, one sentence each.
     """
     environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
     names = ", ".join(one.name for one in found.setting.recordings)

@@ -25,12 +25,12 @@ class Candidate:
 
     Parameters
     ----------
-    pole
-        rad/s.
+    pole : rad/s
+        The pole, in the upper half plane.
     share
-        Of the orders of the range in which it is steadiest.
+        Share of the orders that have it, in the range of orders in which it is steadiest.
     n_orders
-        Orders it was found in.
+        Number of orders in which it was found.
     participation : (n_excitations,)
         Left vector up to a factor, of the order whose pole is nearest.
     """
@@ -69,7 +69,7 @@ def default_order(n_lines: int, n_excitations: int) -> int:
 def candidates(
     frf: Frf, band: tuple[float, float], max_order: int, weights: NDArray[np.float64] | None
 ) -> tuple[StabilisationChart, tuple[Candidate, ...]]:
-    """Poles over all orders, and their groups in falling order of steadiness.
+    """Find poles over all orders, and their groups in falling order of steadiness.
 
     Each response and each excitation is scaled to unit root mean square before, so that no entry decides alone. An
     exponential window's damping is taken back.
@@ -77,7 +77,7 @@ def candidates(
     Parameters
     ----------
     frf, band, max_order, weights
-        As in :func:`matrix_fraction_poles`.
+        FRF, band (Hz), highest order and weights, as in :func:`matrix_fraction_poles`.
     """
     balanced, scale = _balanced(frf, band)
     by_order = list(matrix_fraction_poles(balanced, band, max_order, weights))

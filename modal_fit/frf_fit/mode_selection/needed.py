@@ -33,11 +33,11 @@ class Trial:
     Parameters
     ----------
     lines
-        Of the neighbourhood, freed of the far modes.
+        Lines of the neighbourhood, from which the far modes are subtracted.
     before, after
-        Fit without and with the mode.
+        Fits without and with the mode.
     modes
-        The near modes, the one in question last.
+        The near modes; the mode in question stands last.
     far_power : (n_lines,)
         Power of the far modes on each line.
     """

@@ -23,18 +23,18 @@ _ALIKE = 0.9  # assurance of two participation vectors
 
 @dataclass(frozen=True)
 class Selection:
-    """Modes taken and candidates refused.
+    """Modes that were taken, and candidates that were refused.
 
     Parameters
     ----------
     modes
-        In the order in which they were taken.
+        Modes in the order in which they were taken.
     taken
         The candidate that each mode started from.
     refused
-        The others, each with its reason.
+        The other candidates, each with the reason why it was refused.
     lines
-        The lines with their last weights.
+        Lines of the fit with their last weights.
     """
 
     modes: Modes

@@ -37,7 +37,7 @@ def _seen_by_curve(frf: Frf) -> float:
 
 
 def neighbour_noise(values: Complex) -> Real:
-    """Noise that is white over the lines, from what a cubic through five neighbouring lines leaves.
+    """Estimate noise that is white over the lines, from the residual of a cubic through five neighbouring lines.
 
     ``|x_(k-2) - 4 x_(k-1) + 6 x_k - 4 x_(k+1) + x_(k+2)|^2`` has 70 times the noise's variance. Its median over
     the lines passes resonances by, which are narrow; the median of an exponentially distributed power is ln 2 of the
@@ -46,6 +46,7 @@ def neighbour_noise(values: Complex) -> Real:
     Parameters
     ----------
     values : (n_lines, n_responses, n_excitations)
+        Values of the FRF on neighbouring lines.
 
     Returns
     -------

@@ -30,9 +30,9 @@ class MeasuredLines:
     Parameters
     ----------
     s : (n_lines,), rad/s
-        Laplace variable: 2 pi i f, moved to the right by the damping of an exponential window.
+        Laplace variable of each line: 2 pi i f, moved to the right by the damping of an exponential window.
     factor : (n_lines,)
-        ``s^d``: 1 for a receptance, s for a mobility, s^2 for an accelerance.
+        Factor ``s^d``: 1 for a receptance, s for a mobility, s^2 for an accelerance.
     values : (n_lines, n_columns, n_responses)
         FRFs times ``drive``, weighted and whitened.
     drive : (n_lines, n_columns, n_excitations)
@@ -40,17 +40,17 @@ class MeasuredLines:
     whitening : (n_responses, n_responses)
         ``values = (H drive) whitening^T``.
     weights : (n_lines, n_columns)
-        Of the amplitude; they are inside ``values`` and ``drive``.
-    outside_poles
-        Fixed poles (rad/s) that stand for modes outside the band.
+        Weights of the amplitude; ``values`` and ``drive`` contain them.
+    outside_poles : rad/s
+        Fixed poles that stand for modes outside the band.
     basis : (n_terms, n_lines)
         Out-of-band functions on receptance.
-    band
-        Hz.
+    band : Hz
+        Lowest and highest frequency of the fit.
     noise : (n_lines,)
         Noise power expected on each line, summed over columns and responses, in the units of ``values``.
     correlation
-        Lines per independent value of the noise; above 1 under an exponential window.
+        Number of lines per independent value of the noise; above 1 under an exponential window.
     stated
         Whether the FRF came with a covariance; else the noise is that of neighbouring lines or of the coherence.
     """
@@ -98,16 +98,16 @@ class MeasuredLines:
 
 
 def measured_lines(frf: Frf, chosen: NDArray[np.bool_], band: tuple[float, float], variance: Real) -> MeasuredLines:
-    """Lines of an FRF whose entries have independent noise, such as a hammer test's.
+    """Take lines of an FRF whose entries have independent noise, such as a hammer test's.
 
     Parameters
     ----------
     frf
-        Receptance, mobility, accelerance or transfer.
+        FRF to fit: receptance, mobility, accelerance or transfer.
     chosen : (n_frequencies,), bool
-        Lines to take.
-    band
-        Hz.
+        Whether each line is taken.
+    band : Hz
+        Lowest and highest frequency of the fit.
     variance : (n_lines, n_responses, n_excitations)
         Noise power of each entry on each chosen line. The weights are its best split (by the means of the logarithm)
         into a factor a response and a factor a line and excitation.
