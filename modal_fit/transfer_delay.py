@@ -6,7 +6,7 @@ from scipy.optimize import minimize_scalar
 
 from .maximum_likelihood.likelihood_model import Setting
 from .maximum_likelihood.linear_start import regressors
-from .maximum_likelihood.record_spectra import RecordSpectra
+from .maximum_likelihood.whole_records import RecordSpectra
 from .models.out_of_band import out_of_band_basis
 
 Complex = NDArray[np.complex128]

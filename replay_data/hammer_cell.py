@@ -10,7 +10,7 @@ from foundation import InputError
 from modal_fit import ModalModel
 
 from .laboratory.sensors import Sensor, hammer_sensors
-from .laboratory.setup_text import setup_text
+from .laboratory.setup_notes import setup_text
 from .robot_structure import TOOL_TIP
 from .sampled_cell import March, SampledCell
 from .simulation.modal_integrator import discretise, respond

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cutting import MillingProcess, refuse_varied
-from cutting.tooth_force import tooth_offsets
+from cutting.one_tooth import tooth_offsets
 from foundation import InputError
 from modal_fit import ModalModel
 
 from .laboratory.sensors import Sensor, milling_sensors
-from .laboratory.setup_text import cutting_table, setup_text
+from .laboratory.setup_notes import cutting_table, setup_text
 from .sampled_cell import March, SampledCell
 from .simulation.material import Material, material_named
 from .simulation.milling_loop import empty_memory, mill, prepare_cut

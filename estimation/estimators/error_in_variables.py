@@ -11,8 +11,8 @@ from foundation import InputError
 from ..frf_matrix.frf import Frf, FrfCovariance
 from ..frf_matrix.quantities import frf_quantity
 from ..spectra.coherence import multiple_coherence
-from ..spectra.cross_spectra import CrossSpectra
 from ..spectra.independence import RANK_TOLERANCE, input_independence
+from ..spectra.spectral_matrix import CrossSpectra
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .cross_spectra import CrossSpectra
+from .spectral_matrix import CrossSpectra
 
 RANK_TOLERANCE = 1e-4
 

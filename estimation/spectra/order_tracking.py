@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from .cross_spectra import CrossSpectra
+from .spectral_matrix import CrossSpectra
 
 Real = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from collections.abc import Callable, Sequence
 from acquisition import Channel, Recording, Stream
 from foundation import InputError
 
-from .cross_spectra import CrossSpectra, SpectralSettings
 from .spectral_accumulator import SpectralAccumulator
-from .usable_samples import usable_samples
+from .spectral_matrix import CrossSpectra, SpectralSettings
+from .trusted_samples import usable_samples
 
 EXCITING = ("force", "moment", "voltage")
 RESPONDING = ("acceleration", "velocity", "displacement")

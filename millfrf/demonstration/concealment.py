@@ -19,7 +19,7 @@ from modal_fit import ModalModel
 from replay_data import HammerCell, dynamometer, tip_accelerometers
 from replay_data.concealment.concealed_cell import FINE_RATE, LEVELS, ConcealedCell, milling_force
 from replay_data.concealment.concealed_effect import ConcealedEffect, draw_effect, draw_name, joint_scale
-from replay_data.concealment.posture_robot import posture_robot
+from replay_data.concealment.random_posture import posture_robot
 from replay_data.simulation.joint_march import tip_motion
 
 from ..chain.estimating.estimate import estimate_recordings, write_estimate

@@ -11,7 +11,7 @@ from ..models.modal_model import ModalModel
 from ..models.mode_errors import ModeErrors
 from ..models.out_of_band import residuals_with_poles
 from .variable_projection.elimination import Elimination, Modes, Real, derivatives
-from .variable_projection.measured_lines import MeasuredLines
+from .variable_projection.whitened_lines import MeasuredLines
 
 _MOST_PARAMETERS = 700  # with a covariance matrix: its file would pass 10 MB
 

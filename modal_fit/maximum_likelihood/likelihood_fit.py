@@ -14,7 +14,7 @@ from .likelihood_model import (
     transfer,
 )
 from .noise_levels import NoiseLevels, flat_noise, noise_levels
-from .record_spectra import RecordSpectra
+from .whole_records import RecordSpectra
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

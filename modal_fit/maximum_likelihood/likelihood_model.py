@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .record_spectra import RecordSpectra
+from .whole_records import RecordSpectra
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

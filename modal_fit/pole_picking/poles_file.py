@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from foundation import Band, FileFormatError, InputError, mistake_in_words, writing_whole_file
 
-from .candidate_groups import CandidateGroup
+from .offered_groups import CandidateGroup
 
 FORMAT, FORMAT_VERSION = "millfrf.poles", 1
 _STRICT = ConfigDict(extra="forbid", frozen=True)

@@ -11,7 +11,7 @@ from cutting import MillingProcess
 from modal_fit import ModalModel
 
 from ..laboratory.sensors import Sensor, dynamometer, tip_accelerometers
-from ..laboratory.setup_text import setup_text
+from ..laboratory.setup_notes import setup_text
 from ..laboratory.signal_chain import Decimator
 from ..milling_cell import MillingCell
 from ..sampled_cell import STREAM

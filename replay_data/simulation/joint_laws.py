@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 
 JOINT_LAWS = {
     "linear": 0,

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 from modal_fit import ModalModel
 
 from ..robot_structure import TOOL_TIP, select

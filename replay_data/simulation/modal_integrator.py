@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 from foundation import InputError
 from modal_fit import ModalModel
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..floquet.period_operator import PeriodOperator, period_operator
+from ..floquet.collocated_period import PeriodOperator, period_operator
 from ..milling_loop.delayed_state import DelaySystem
 from .crossings import Crossings
 

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 
-from ..floquet.transition_series import TransitionSeries
+from ..floquet.depth_series import TransitionSeries
 from ..milling_loop.delayed_state import DelaySystem
 from .characteristic import eliminate, transition
 from .crossings import Crossings

@@ -11,7 +11,7 @@ from foundation import InputError
 from modal_fit import ModalModel
 
 from ..milling_loop.delayed_state import delay_system
-from .period_operator import PeriodOperator, period_operator
+from .collocated_period import PeriodOperator, period_operator
 from .varied_edges import varied_cut
 
 Complex = NDArray[np.complex128]

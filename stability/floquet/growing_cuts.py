@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import ArpackError, eigs
 
 from ..milling_loop.delayed_state import DelaySystem
+from .collocated_period import period_operator
 from .floquet_multipliers import monodromies
-from .period_operator import period_operator
 from .varied_edges import varied_cut
 
 Real = NDArray[np.float64]

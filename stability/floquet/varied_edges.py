@@ -10,7 +10,7 @@ from cutting import MillingProcess, damping_matrices, edge_matrices
 from foundation import InputError
 
 from ..milling_loop.delayed_state import DelaySystem
-from .period_operator import radau_nodes
+from .collocated_period import radau_nodes
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

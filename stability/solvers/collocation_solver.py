@@ -10,7 +10,7 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from ..characteristic_roots.circle_crossings import CircleCrossings, circle_crossings
+from ..characteristic_roots.unit_circle import CircleCrossings, circle_crossings
 from ..lobes.stability_limits import StabilityLimits
 from ..lobes.stability_lobes import StabilityLobes
 from ..milling_loop.delayed_state import DelaySystem, delay_system

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..variable_projection.elimination import Elimination, Modes, Real, eliminate
-from ..variable_projection.measured_lines import MeasuredLines
 from ..variable_projection.neighbourhood import (
     around,
     half_power_lines,
@@ -16,8 +15,9 @@ from ..variable_projection.neighbourhood import (
     without_modes,
 )
 from ..variable_projection.refinement import refine
-from .candidates import Candidate
+from ..variable_projection.whitened_lines import MeasuredLines
 from .needed import CLEAN, NEAR, NEEDED, Trial, as_good_without, copy_of_near_mode, most_missed, unneeded
+from .steady_poles import Candidate
 
 _TRIAL_STEPS, _TRIAL_TOLERANCE = 12, 1e-3
 _DOUBTFUL = 0.4  # share of the orders below which a candidate is tried only where much is left

@@ -7,12 +7,12 @@ import numpy as np
 
 from ...models.shape_measures import modal_assurance
 from ..variable_projection.elimination import Elimination, Modes, eliminate
-from ..variable_projection.measured_lines import MeasuredLines
 from ..variable_projection.neighbourhood import participations
 from ..variable_projection.outer_modes import inside, just_outside
 from ..variable_projection.refinement import refine
-from .candidates import Candidate
+from ..variable_projection.whitened_lines import MeasuredLines
 from .judging import judge, judge_again, judge_early
+from .steady_poles import Candidate
 
 _ROUNDS = 4
 _LOOKS = 3

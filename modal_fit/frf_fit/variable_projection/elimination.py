@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .measured_lines import MeasuredLines
+from .whitened_lines import MeasuredLines
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

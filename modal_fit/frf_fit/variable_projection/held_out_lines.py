@@ -3,8 +3,8 @@
 import numpy as np
 
 from .elimination import Elimination, Modes, eliminate, predicted
-from .measured_lines import MeasuredLines
 from .refinement import refine
+from .whitened_lines import MeasuredLines
 
 _EVERY = 4  # each fourth line is held out
 _STEPS, _TOLERANCE = 10, 1e-4

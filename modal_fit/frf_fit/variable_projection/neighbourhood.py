@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .elimination import Complex, Elimination, Modes, Real, shaped
-from .measured_lines import MeasuredLines
+from .whitened_lines import MeasuredLines
 
 _WIDTH = 6.0  # half widths of the pole's half-power band
 _FEWEST = 24  # lines

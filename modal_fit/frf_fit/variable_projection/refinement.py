@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .elimination import Complex, Elimination, Modes, Real, derivatives, eliminate
-from .measured_lines import MeasuredLines
+from .whitened_lines import MeasuredLines
 
 _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e8

@@ -5,7 +5,7 @@ from figures import as_data_uri, reciprocity_figure
 
 from ...gate import shown_pairs
 from ...tables.reciprocity_tables import pair_table, vector_table
-from ..collect import Collected
+from ..collection import Collected
 from ..section import Picture, Section
 
 MOST_DRAWN = 6

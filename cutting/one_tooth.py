@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from .compiled import compiled
+from .compilation import compiled
 from .milling_process import MillingProcess
 from .refusal import refuse_varied
 

@@ -7,7 +7,7 @@ from figures import FrfCurves, as_data_uri, frf_figures, synthesis_figure
 from foundation import InputError
 from modal_fit import ModalModel, Synthesis, synthesis
 
-from ...collect import Collected, SourceFile
+from ...collection import Collected, SourceFile
 from ...section import Fold, Picture, Section
 from .choice import Band, axis_of, band_of, knows, shown_frf
 from .gallery import gallery_folds

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from .milling_process import MillingProcess
+from .one_tooth import tooth_force
 from .refusal import refuse_varied
-from .tooth_force import tooth_force
 
 _NODES = 200  # of the quadrature over the immersion; the integrand is a few waves of smooth function
 

@@ -12,7 +12,7 @@ from ...chain.estimating.estimate_options import EstimateOptions
 from ...chain.fitting.fit_options import chart_from_json
 from ...progress import Watch
 from ...tables.result_tables import error_table, mode_table
-from ..collect import Collected, SourceFile
+from ..collection import Collected, SourceFile
 from ..section import Fold, Picture, Section
 from .dropped_part import dropped_part
 from .frfs import Band, axis_of, band_of, shown_frf

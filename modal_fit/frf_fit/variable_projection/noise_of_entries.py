@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from estimation import Frf
 
-from .measured_lines import noise_correlation
+from .whitened_lines import noise_correlation
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -12,7 +12,7 @@ from ...gate.signals import level_table, look
 from ...progress import Watch
 from ...tables.result_tables import Table
 from ...tap_concerns import tap_concerns
-from ..collect import Collected, SourceFile
+from ..collection import Collected, SourceFile
 from ..section import Picture, Section
 
 MOST_OVERVIEWS = 4

@@ -10,7 +10,7 @@ from figures import LobesBand, as_data_uri, lobes_figure
 from stability import StabilityLobes
 
 from ...tables.result_tables import Table
-from ..collect import Collected
+from ..collection import Collected
 from ..lobes_check import CheckedLobes, checked_lobes, lobes_warnings
 from ..recommendation import recommendation
 from ..section import Picture, Section

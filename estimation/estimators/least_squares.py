@@ -10,8 +10,8 @@ from foundation import InputError
 from ..frf_matrix.frf import Frf, FrfCovariance
 from ..frf_matrix.quantities import frf_quantity
 from ..spectra.coherence import multiple_coherence
-from ..spectra.cross_spectra import CrossSpectra, lines_of
 from ..spectra.independence import independent_lines
+from ..spectra.spectral_matrix import CrossSpectra, lines_of
 from ..spectra.stacking import check_stackable, sum_tests
 
 

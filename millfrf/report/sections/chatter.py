@@ -6,7 +6,7 @@ from figures import ShownCut, as_data_uri, chatter_figure
 
 from ...chain.cuts.chatter import tone_table, verdict_table
 from ...chain.cuts.chatter_file import KeptCut
-from ..collect import Collected
+from ..collection import Collected
 from ..section import Picture, Section
 
 TOGETHER = 3

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cutting import chip_direction, force_direction
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 from foundation import InputError
 
 from ..milling_loop.delayed_state import DelaySystem
 from ..milling_loop.engagement import Piece, engagement_pieces
-from .period_operator import radau_nodes
+from .collocated_period import radau_nodes
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

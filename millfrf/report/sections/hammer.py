@@ -3,7 +3,7 @@
 from typing import Any
 
 from ...tables.result_tables import Table
-from ..collect import Collected
+from ..collection import Collected
 from ..section import Section
 
 MOST = 60

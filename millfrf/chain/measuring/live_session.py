@@ -16,7 +16,7 @@ from foundation import MillfrfError
 from ...live import LiveControl, LiveMonitor, LiveServer, LiveSettings
 from ...live.control import MARKS
 from ...live.server import LOOPBACK
-from .acquire import OpenedSession, Tally, acquire, interrupts
+from .record_session import OpenedSession, Tally, acquire, interrupts
 
 _LINGER = 3.0  # s in which open pages learn how it ended
 

@@ -5,7 +5,7 @@ import numpy as np
 from modal_fit import ModalModel, ModePair, compare_modes
 
 from ...tables.result_tables import Table, with_error
-from ..collect import Collected, SourceFile
+from ..collection import Collected, SourceFile
 from ..section import Section
 
 
