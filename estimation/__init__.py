@@ -2,11 +2,11 @@
 
 from .band_records import BandDecimator, BandRecord, band_record, widest_band
 from .estimators.error_in_variables import h2, hv, instrumental_variable
-from .estimators.h1 import h1, h1_side_by_side
-from .estimators.local_polynomial import local_half_width, local_polynomial
+from .estimators.least_squares import h1, h1_side_by_side
+from .estimators.local_polynomials import local_half_width, local_polynomial
+from .frf_matrix.band_of_frf import known_band
 from .frf_matrix.frf import Frf, FrfCovariance
 from .frf_matrix.frf_file import read_frf, write_frf
-from .frf_matrix.known_band import known_band
 from .frf_matrix.quantities import correct_high_pass, to_receptance
 from .frf_matrix.uff_file import is_uff_number, uff_node_numbers, write_frf_uff
 from .geometry import Geometry, import_geometry, is_geometry_table, read_geometry, write_geometry
@@ -52,13 +52,13 @@ from .spectra.coherence import (
     principal_inputs,
     virtual_coherence,
 )
-from .spectra.cross_spectra import CrossSpectra, SpectralSettings
 from .spectra.independence import RANK_TOLERANCE, InputIndependence, bands_text, input_independence
 from .spectra.order_tracking import excitation_map, spectrogram, track_order
 from .spectra.recording_spectra import choose_channels, cross_spectra
 from .spectra.spectral_accumulator import SpectralAccumulator
+from .spectra.spectral_matrix import CrossSpectra, SpectralSettings
 from .spectra.stacking import sum_tests
-from .spectra.usable_samples import usable_samples
+from .spectra.trusted_samples import usable_samples
 from .spectra.windows import effective_averages, settings_for
 from .sweep_plan import SweepDemand, SweepPlan, plan_sweeps, predicted_spectra
 

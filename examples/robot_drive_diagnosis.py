@@ -25,7 +25,7 @@ from scipy.io import loadmat
 from scipy.optimize import least_squares
 from scipy.signal import butter, filtfilt, resample_poly
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 from figures import COLOURS, house_style, new_figure
 from mismatch import StructureDiagnosis, Trial, diagnose, predict
 from mismatch.models.model_terms import improved_model

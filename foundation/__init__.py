@@ -7,7 +7,7 @@ from .atomic_files import writing_whole_file
 from .degrees_of_freedom import DegreeOfFreedom
 from .errors import FileFormatError, InputError, MillfrfError, MillfrfWarning
 from .noted_table import WARNING, apart, warning_lines
-from .results import Result, Summary, drawing, listed, optional_library, same_values
+from .results import Result, Summary, counted, drawing, listed, optional_library, same_values
 from .table_mistakes import mistake_in_words, shown
 from .units import SI_UNITS, si_factor, unit_factor
 from .valid_band import Band, checked_band, shared_band
@@ -25,6 +25,7 @@ __all__ = [
     "Summary",
     "apart",
     "checked_band",
+    "counted",
     "drawing",
     "listed",
     "mistake_in_words",

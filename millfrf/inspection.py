@@ -28,11 +28,11 @@ from .gate import (
 from .gate.signals import level_table, look
 from .progress import Watch, silent
 from .provenance import read_provenance
+from .tables.mode_shapes import shape_table
 from .tables.point_words import points_in_words
 from .tables.poles_table import poles_in_words
 from .tables.reciprocity_tables import pair_table, vector_table
 from .tables.result_tables import Table, error_table, mode_table
-from .tables.shape_table import shape_table
 from .tap_concerns import tap_concerns
 
 LARGEST = 100.0
@@ -41,16 +41,16 @@ LARGEST = 100.0
 
 @dataclass(frozen=True)
 class Findings:
-    """What a look at a file gave.
+    """Findings of a look at a file.
 
     Parameters
     ----------
     kind, summary
-        What it is, in one line.
+        Kind of the file, and its content in one line.
     tables
-        Its contents.
+        Tables that show its contents.
     concerns
-        What looks wrong, one sentence each with the remedy; empty where nothing does.
+        Doubts about the file, one sentence each with the remedy; empty where there is none.
     """
 
     kind: str

@@ -7,13 +7,12 @@ from .indicators import (
     complex_mode_indicator,
     multivariate_mode_indicator,
 )
-from .mode_shapes import ModeReciprocity, ModeShapes, mode_complexity, mode_reciprocity, mode_shapes
 from .models.comparison import ModePair, compare_modes
 from .models.modal_model import ModalModel, Residuals
 from .models.modal_model_file import read_modal_model, write_modal_model
 from .models.mode_errors import ModeErrors
 from .models.shape_measures import modal_assurance, phase_collinearity, phase_deviation, reciprocity_residual
-from .models.synthesis import Synthesis, synthesis
+from .models.synthesised import Synthesis, synthesis
 from .models.uncertainty import derived_covariance, frequency_and_damping_errors
 from .pole_picking import (
     CandidateGroup,
@@ -24,7 +23,8 @@ from .pole_picking import (
     write_pole_candidates,
 )
 from .polyreference import ModalFit, fit_polyreference
-from .stabilisation.stabilisation_chart import PoleGroup, StabilisationChart
+from .shapes import ModeReciprocity, ModeShapes, mode_complexity, mode_reciprocity, mode_shapes
+from .stabilisation.chart import PoleGroup, StabilisationChart
 from .subspace import SubspaceFit, fit_subspace
 from .tip_calibration import TipCalibration, calibrate_to_tip
 from .uff_modes import import_modes_uff, read_modes_uff, write_modes_uff

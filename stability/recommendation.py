@@ -36,18 +36,18 @@ class RecommendedCut:
 
     Parameters
     ----------
-    spindle_speed
-        rad/s.
-    depth
-        Axial, m.
+    spindle_speed : rad/s
+        Spindle speed of the cut.
+    depth : m
+        Axial depth of cut.
     confidence
-        Probability that it is stable wherever the speed drifts.
-    removal
-        Depth times speed, the part of the removal rate that was chosen, m rad/s.
+        Probability that the cut is stable wherever the speed drifts.
+    removal : m rad/s
+        Depth times speed, the part of the removal rate that was chosen.
     drift
         Largest relative deviation of the speed that it allows for.
     draws
-        Structures and coefficients drawn from their errors at which it was tried; 0: first order alone.
+        Number of structures and coefficients drawn from their errors at which the cut was tried; 0: first order alone.
     """
 
     spindle_speed: float
@@ -70,13 +70,13 @@ def recommended_cut(
     Parameters
     ----------
     lobes, errors
-        Limits and their standard errors.
+        Limits, and their standard errors ((n_speeds,), m).
     confidence
-        Between 0.5 and 1.
+        Probability of stability that is asked for, between 0.5 and 1.
     drift
         Largest relative deviation of the spindle's speed.
-    max_depth
-        That the cutter allows, m.
+    max_depth : m
+        Largest axial depth that the cutter allows.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def certified_cut(
     max_depth: float,
     seed: int = 0,
 ) -> RecommendedCut:
-    """As :func:`recommended_cut`, with the limits inside the drift computed anew and tried with draws.
+    """Recommend a cut as :func:`recommended_cut` does, with limits inside the drift computed anew and tried with draws.
 
     Speeds are taken in the order of what they promise. The limits of one are computed at 17 speeds inside its drift, so
     that no notch between two speeds of ``lobes`` is passed over, and lessened by their errors. Then 39 or more
@@ -115,13 +115,13 @@ def certified_cut(
     Parameters
     ----------
     structure, process
-        What the lobes are of, with its errors.
+        Structure and cut that the lobes were computed from, with their errors.
     lobes, errors
-        Of :func:`certified_lobes` and :func:`depth_errors`.
+        Limits from :func:`certified_lobes`, and their standard errors from :func:`depth_errors` ((n_speeds,), m).
     confidence, drift, max_depth
-        As :func:`recommended_cut`; the depth is finite, and draws are solved up to it.
+        Options of :func:`recommended_cut`; the depth is finite, and draws are solved up to it.
     seed
-        Of the draws.
+        Seed of the generator that draws.
 
     Raises
     ------

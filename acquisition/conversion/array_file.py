@@ -28,13 +28,13 @@ class ArrayFile:
     Parameters
     ----------
     path
-        The file.
+        Path of the file.
     fields
-        Whatever it holds, by name.
+        Everything the file holds, by name.
     headings
-        Of the columns of its only table.
-    sample_rate
-        Hz, where the file states it.
+        Headings of the columns of its only table.
+    sample_rate : Hz
+        Sample rate, where the file states it.
     """
 
     def __init__(

@@ -30,7 +30,7 @@ def convert(
     input_path
         A recording, a file written by this function, or, with a mapping, one of another program.
     output_path
-        Where the result shall be; with ``split`` in the mapping ``rec.h5`` becomes ``rec-1.h5``, ``rec-2.h5`` ...
+        File to write; with ``split`` in the mapping ``rec.h5`` becomes ``rec-1.h5``, ``rec-2.h5`` ...
     mapping_path
         TOML file that says which array or column is which channel, see :class:`Mapping`.
     progress

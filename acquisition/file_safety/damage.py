@@ -45,14 +45,14 @@ def whole_rows(samples: h5py.Dataset, file_size: int) -> int:
 
 
 def open_for_reading(path: Path, *, accept_cut: bool = False) -> h5py.File:
-    """Open for reading, also beside a living writer, and what a killed one left behind.
+    """Open a recording for reading, also beside a living writer, or after its writer was killed.
 
     Parameters
     ----------
     path
-        The file.
+        Path of the file.
     accept_cut
-        Open a file that ends before it says; parts of it must then not be read.
+        Whether to open a file that ends before it says; parts of it must then not be read.
 
     Raises
     ------

@@ -27,9 +27,9 @@ class SpareSpace:
     Parameters
     ----------
     folder
-        On the disk that is written to.
+        Folder on the disk that is written to.
     size
-        Bytes; more than the metadata and the block in hand.
+        Number of bytes to hold; more than the metadata and the block in hand.
 
     Raises
     ------

@@ -31,9 +31,9 @@ class Aligner:
     Parameters
     ----------
     delays : (n_channels,), s
-        By which each channel's samples come late; only their differences matter, none may be below zero.
-    sample_rate
-        Hz.
+        Time by which each channel's samples come late; only their differences matter, none may be below zero.
+    sample_rate : Hz
+        Samples a second.
 
     Examples
     --------

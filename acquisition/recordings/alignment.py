@@ -20,7 +20,7 @@ class Alignment:
     Parameters
     ----------
     stream
-        Whose samples the times shall lie on.
+        Stream on whose samples the times shall lie.
     pairs : (n_pairs, 2)
         The stream's sample counts with the host's monotonic times, s.
     series

@@ -21,9 +21,9 @@ class EventSeries:
     Parameters
     ----------
     group
-        ``/events/<name>``.
+        The HDF5 group ``/events/<name>``.
     aligned
-        Gives the times on the samples' axis and the values; None: the stored times are taken as they are.
+        Function that gives the times on the samples' axis and the values; None: the stored times are taken as they are.
     """
 
     def __init__(self, group: h5py.Group, aligned: Callable[[], Pair] | None = None) -> None:

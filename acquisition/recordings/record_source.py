@@ -31,19 +31,19 @@ def record(
     Parameters
     ----------
     source
-        Not yet open.
+        Source of samples, not yet open.
     path
-        New file.
+        New file to write.
     dtype
-        How samples are stored.
+        Number format in which samples are stored.
     progress
         Called with the number of samples written so far, over all streams.
     stop
-        Asked before each block; True ends the recording in order.
+        Function that is asked before each block; True ends the recording in order.
     watch
         Shown every block and event after it was written; it must return quickly.
     spare_bytes
-        Disk space kept aside.
+        Disk space kept aside, in bytes.
 
     Raises
     ------

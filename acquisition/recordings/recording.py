@@ -31,7 +31,7 @@ class Stream:
     samples
         The dataset ``(n_samples, n_channels)``; rows are read when asked for.
     path
-        Of the file, for messages.
+        Path of the file, for messages.
     """
 
     def __init__(self, description: StreamDescription, samples: h5py.Dataset, path: Path) -> None:

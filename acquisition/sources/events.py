@@ -58,14 +58,15 @@ class Events:
     Parameters
     ----------
     series
-        Its name.
+        Name of the series.
     times : (n,), s
-        In the clock that the series' axis names.
+        Times in the clock that the series' axis names.
     values : (n,)
+        Values at these times.
     arrivals : (n,), s, or None
-        Host's monotonic time at which each was there; needed where the axis is a device's.
+        Host's monotonic time at which each value was there; needed where the axis is a device's.
     texts : n of them, or None
-        Needed where the axis has texts; longer ones are cut to `TEXT_BYTES` bytes of UTF-8.
+        Text of each value, needed where the axis has texts; longer ones are cut to `TEXT_BYTES` bytes of UTF-8.
     """
 
     series: str

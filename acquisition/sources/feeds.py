@@ -38,9 +38,9 @@ class WithFeeds(AroundSource):
     Parameters
     ----------
     source
-        The sampled one; it sets the pace.
+        The source of samples; it sets the pace.
     feeds
-        Of events.
+        Feeds of events, in the order in which they are opened.
 
     Raises
     ------

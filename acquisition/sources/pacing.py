@@ -50,9 +50,9 @@ class Paced(AroundSource):
     Parameters
     ----------
     source
-        Any source.
+        Source of any kind.
     speed
-        1: real time; 10: ten times faster; infinity: as fast as it comes.
+        Factor over real time. 1: real time; 10: ten times faster; infinity: as fast as it comes.
 
     Raises
     ------

@@ -15,7 +15,7 @@ class Receiver:
     Parameters
     ----------
     name
-        Of the thread, for messages.
+        Name of the thread, for messages.
     """
 
     def __init__(self, name: str) -> None:

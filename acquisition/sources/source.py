@@ -20,12 +20,12 @@ class StreamDescription:
     ----------
     name
         Name of the clock, the group's name in a recording.
-    sample_rate
-        Hz, positive.
-    start_time
-        Of the first sample on the recording's time axis, s.
+    sample_rate : Hz
+        Samples a second, positive.
+    start_time : s
+        Time of the first sample on the recording's time axis.
     channels
-        One a column; names unique.
+        Channels along the columns; their names are unique.
 
     Raises
     ------
@@ -63,14 +63,15 @@ class Block:
     Parameters
     ----------
     stream
-        Name of the clock.
+        Name of the sample clock.
     first_sample
         Index of the first row since the start of the recording.
-    samples : (n_samples, n_channels), SI units
-    host_time
-        Host's monotonic time when the last sample was there, s; NaN where there is none.
+    samples : (n_samples, n_channels)
+        Samples in SI units.
+    host_time : s
+        Host's monotonic time when the last sample was there; NaN where there is none.
     host_sample
-        Samples that were there at ``host_time``, where the device can tell; None: up to the block's last.
+        Number of samples that were there at ``host_time``, where the device can tell; None: up to the block's last.
     """
 
     stream: str

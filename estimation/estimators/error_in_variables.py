@@ -11,8 +11,8 @@ from foundation import InputError
 from ..frf_matrix.frf import Frf, FrfCovariance
 from ..frf_matrix.quantities import frf_quantity
 from ..spectra.coherence import multiple_coherence
-from ..spectra.cross_spectra import CrossSpectra
 from ..spectra.independence import RANK_TOLERANCE, input_independence
+from ..spectra.spectral_matrix import CrossSpectra
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -54,9 +54,11 @@ def hv(spectra: CrossSpectra, response_noise: Real | None = None, excitation_noi
     Parameters
     ----------
     spectra
-        Of one test or several summed.
-    response_noise : (n_responses,), excitation_noise : (n_excitations,), or None
-        Relative noise powers; None: each channel's mean power, that is, noise in equal shares.
+        Spectra of one test, or of several summed by :func:`sum_tests`.
+    response_noise : (n_responses,), or None
+        Relative noise power of each response; None: its mean power, that is, noise in equal shares.
+    excitation_noise : (n_excitations,), or None
+        Relative noise power of each excitation; None: its mean power.
 
     Raises
     ------

@@ -1,11 +1,16 @@
 """`Frf`: a matrix of frequency response functions with its axes, quality and covariance."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import Band, InputError, checked_band
+from foundation import Band, InputError, Result, Summary, checked_band, counted, drawing, listed, optional_library
+
+if TYPE_CHECKING:
+    import xarray
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)
@@ -19,7 +24,9 @@ class FrfCovariance:
     Parameters
     ----------
     response : (n_frequencies, n_responses, n_responses)
+        Covariance factor of the responses on each line.
     excitation : (n_frequencies, n_excitations, n_excitations)
+        Covariance factor of the excitations on each line.
     """
 
     response: NDArray[np.complex128]
@@ -32,35 +39,40 @@ class FrfCovariance:
         return np.asarray(rows[:, :, None] * columns[:, None, :])
 
 
-@dataclass(frozen=True)
-class Frf:
+@dataclass(frozen=True, eq=False, repr=False)
+class Frf(Result):
     """Frequency response functions ``X = H F`` on a frequency axis.
 
     Parameters
     ----------
-    frequencies : (n_frequencies,), Hz, increasing
-    values : (n_frequencies, n_responses, n_excitations), complex, in ``unit``
+    frequencies : (n_frequencies,), Hz
+        Frequencies of the lines, increasing.
+    values : (n_frequencies, n_responses, n_excitations), complex
+        The FRF matrix on each line, in ``unit``.
     responses, excitations
         Degrees of freedom along the axes, ``node:direction``.
     quantity
         ``receptance`` (m/N), ``mobility``, ``accelerance`` (m/s^2/N) or ``transfer`` (anything else).
     unit
-        Response unit over excitation unit.
+        Unit of the response over that of the excitation, for example ``m/N``.
     valid : (n_frequencies,), bool
         False where no FRF can be given (excitation rank below the number of inputs); every later
         step leaves those lines out. Values there are zero.
     multiple_coherence : (n_frequencies, n_responses) or None
+        Multiple coherence of each response with all excitations, 0 to 1.
     covariance : FrfCovariance or None
-    band
-        Lowest and highest frequency (Hz) between which the FRF holds; None: not known. Whoever uses it outside says so.
+        Covariance of the estimate; None: not known.
+    band : (2,), Hz, or None
+        Lowest and highest frequency between which the FRF holds; None: not known. Whoever uses it outside says so.
     coherence : (n_frequencies, n_responses, n_excitations) or None
         Ordinary coherence of each entry, 0 to 1; NaN in entries where it is not known (a single tap).
     averages : (n_responses, n_excitations), int, or None
         Number of averages behind each entry; 0 where it is not known.
-    exponential_time_constant
-        tau (s) of the window ``exp(-t / tau)`` that force and response were multiplied by; None: no such window. The
-        values then stand on the line ``s = i w + 1/tau`` beside the imaginary axis (:attr:`laplace`), where every pole
-        seems ``1/tau`` further away: an FRF that is read as it stands shows too much damping. A fit takes it back.
+    exponential_time_constant : s, or None
+        Time constant tau of the window ``exp(-t / tau)`` that force and response were multiplied by; None: no such
+        window. The values then stand on the line ``s = i w + 1/tau`` beside the imaginary axis (:attr:`laplace`), where
+        every pole seems ``1/tau`` further away: an FRF that is read as it stands shows too much damping. A fit takes it
+        back.
 
     Raises
     ------
@@ -146,6 +158,70 @@ class Frf:
             unknown = np.divide(1 - coherence, coherence)
         variance = np.abs(self.values) ** 2 * unknown / spare
         return None if np.isnan(variance[self.valid]).all() else np.asarray(variance)
+
+    def plot(
+        self,
+        axes: "Axes | None" = None,
+        *,
+        response: str | None = None,
+        excitation: str | None = None,
+        part: str = "magnitude",
+        **line: Any,
+    ) -> "Axes":
+        """Draw entries over frequency and return the axes; see :func:`figures.draw_frf` for the parameters."""
+        return drawing("draw_frf")(self, axes, response=response, excitation=excitation, part=part, **line)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Values and quality as a data set with the axes ``frequency`` (Hz), ``response`` and ``excitation``.
+
+        The variables are named by the quantity (``receptance`` ...), ``valid``, and, where they are known,
+        ``coherence``, ``multiple_coherence`` and ``variance``.
+
+        Raises
+        ------
+        InputError
+            xarray is not installed.
+        """
+        xr = optional_library("xarray", "Frf.to_xarray")
+        axes = ("frequency", "response", "excitation")
+        known = {
+            "valid": (axes[:1], self.valid),
+            "coherence": (axes, self.coherence),
+            "multiple_coherence": (axes[:2], self.multiple_coherence),
+            "variance": (axes, self.entry_variance()),
+        }
+        variables = {name: held for name, held in known.items() if held[1] is not None}
+        places = dict(zip(axes, (self.frequencies, list(self.responses), list(self.excitations)), strict=True))
+        attributes = {"unit": self.unit} | ({} if self.band is None else {"band_hz": self.band})
+        made = xr.Dataset({self.quantity: (axes, self.values, {"unit": self.unit}), **variables}, places, attributes)
+        made["frequency"].attrs["unit"] = "Hz"
+        return made
+
+    def _summary(self) -> Summary:
+        f, lines = self.frequencies, int(self.valid.sum())
+        span = f"{f[0]:.4g} to {f[-1]:.4g} Hz" if len(f) else "no line"
+        holds = "" if self.band is None else f"; holds in {self.band[0]:.4g} to {self.band[1]:.4g} Hz"
+        quality = [name for name in ("covariance", "coherence") if getattr(self, name) is not None]
+        shape = f"{counted(len(self.responses), 'response')} x {counted(len(self.excitations), 'excitation')}"
+        rows = tuple((name, *self._level(p)) for p, name in enumerate(self.responses))
+        return Summary(
+            f"Frf: {self.quantity} in {self.unit}, {shape}",
+            (
+                f"{counted(len(f), 'line')}, {span}, {lines} valid{holds}",
+                f"responses {listed(self.responses)}",
+                f"excitations {listed(self.excitations)}" + (f"; with {' and '.join(quality)}" if quality else ""),
+            ),
+            ("response", f"largest ({self.unit})", "at (Hz)"),
+            rows,
+        )
+
+    def _level(self, response: int) -> tuple[str, str]:
+        """Largest magnitude of a response on valid lines, and its frequency, as texts."""
+        if not self.valid.any():
+            return "", ""
+        magnitude = np.where(self.valid, np.abs(self.values[:, response]).max(axis=1, initial=0.0), 0.0)
+        line = int(magnitude.argmax())
+        return f"{magnitude[line]:.3g}", f"{self.frequencies[line]:.4g}"
 
 
 def _check_coherence(

@@ -68,9 +68,9 @@ def correct_high_pass(frf: Frf, corners: Sequence[float | None]) -> Frf:
     Parameters
     ----------
     frf
-        Measured.
-    corners
-        Corner of each response's high-pass, Hz; None or 0: none.
+        Measured FRF to correct.
+    corners : Hz
+        Corner of each response's high-pass; None or 0: none.
 
     Raises
     ------

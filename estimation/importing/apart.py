@@ -118,14 +118,15 @@ def _unit(source: FrfSource, places: Mapping[str, int | str], table: FrfTable) -
 
 
 def entries_of(sources: Sequence[FrfSource], mapping: FrfMapping) -> tuple[list[FrfEntry], StatedUnit, tuple[str, ...]]:
-    """All entries that a mapping lists, in SI units, with what they are and what was inferred.
+    """Read all entries that a mapping lists, in SI units, with what they are and what was inferred.
 
     Parameters
     ----------
     sources
-        The files.
+        The files, opened as sources.
     mapping
-        With an entry for each FRF; without entries one response and one excitation of the only file.
+        Mapping with an entry for each FRF; without entries it describes one response and one excitation of the only
+        file.
 
     Raises
     ------

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .cross_spectra import CrossSpectra
+from .spectral_matrix import CrossSpectra
 
 
 def input_coherence(spectra: CrossSpectra) -> NDArray[np.float64]:

@@ -5,29 +5,30 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .cross_spectra import CrossSpectra
+from .spectral_matrix import CrossSpectra
 
 RANK_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)
 class InputIndependence:
-    """How many independent inputs each line has.
+    """Number of independent inputs on each line.
 
     Parameters
     ----------
     frequencies : (n_frequencies,), Hz
-    singular_values : (n_frequencies, n_excitations)
-        Of the input spectra, in N^2/Hz for forces, largest first.
+        Frequencies of the lines.
+    singular_values : (n_frequencies, n_excitations), N^2/Hz for forces
+        Singular values of the input spectra, largest first.
     condition : (n_frequencies,)
         Largest over smallest singular value after each input is scaled to unit power on the line.
     rank : (n_frequencies,)
-        Singular values of the scaled matrix above 1e-4 of the largest: an input direction with
-        less than a ten-thousandth of the power (-40 dB) gives an FRF column that noise of 1 % rules.
+        Number of singular values of the scaled matrix above 1e-4 of the largest: an input direction with less than a
+        ten-thousandth of the power (-40 dB) gives an FRF column that noise of 1 % rules.
     independent : (n_frequencies,), bool
-        Rank equals the number of inputs; no FRF is given elsewhere.
+        Whether the rank equals the number of inputs; elsewhere no FRF is given.
     n_tests
-        Tests stacked.
+        Number of tests that are stacked.
     warnings
         One sentence each, naming bands and remedy.
     """

@@ -7,21 +7,22 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from .cross_spectra import CrossSpectra
+from .spectral_matrix import CrossSpectra
 
 Real = NDArray[np.float64]
 
 
 def spectrogram(samples: Real, sample_rate: float, segment: float) -> tuple[Real, Real, Real]:
-    """One-sided power spectral density over time (Hann windows of ``segment`` seconds, three quarters overlapped).
+    """Compute the one-sided power spectral density over time (Hann windows, three quarters overlapped).
 
     Parameters
     ----------
     samples : (n_samples,)
-    sample_rate
-        Hz.
-    segment
-        s.
+        Samples of one channel.
+    sample_rate : Hz
+        Samples a second.
+    segment : s
+        Duration of a window.
 
     Returns
     -------
@@ -47,7 +48,7 @@ def spectrogram(samples: Real, sample_rate: float, segment: float) -> tuple[Real
 
 
 def track_order(samples: Real, angle: Real, order: float, periods: float = 20.0) -> NDArray[np.complex128]:
-    """Complex amplitude of ``order`` times the spindle's rotation along a record.
+    """Follow the complex amplitude of ``order`` times the spindle's rotation along a record.
 
     The samples are turned back by ``exp(-i order angle)`` and averaged by a Hann window over ``periods`` turns of the
     order, so that ``samples ~ Re(amplitude exp(i order angle))``. Forces tracked in three immersions show by their
@@ -56,12 +57,13 @@ def track_order(samples: Real, angle: Real, order: float, periods: float = 20.0)
     Parameters
     ----------
     samples : (n_samples, n_channels)
-    angle : (n_samples,), rad, rising
-        Of the spindle.
+        Samples at equal steps of time.
+    angle : (n_samples,), rad
+        Angle of the spindle at each sample, rising.
     order
-        Of the line: the number of teeth for the tooth-passing line.
+        Order of the line: the number of teeth for the tooth-passing line.
     periods
-        Of the order, in the window.
+        Number of periods of the order in the window.
 
     Returns
     -------

@@ -5,9 +5,9 @@ from collections.abc import Callable, Sequence
 from acquisition import Channel, Recording, Stream
 from foundation import InputError
 
-from .cross_spectra import CrossSpectra, SpectralSettings
 from .spectral_accumulator import SpectralAccumulator
-from .usable_samples import usable_samples
+from .spectral_matrix import CrossSpectra, SpectralSettings
+from .trusted_samples import usable_samples
 
 EXCITING = ("force", "moment", "voltage")
 RESPONDING = ("acceleration", "velocity", "displacement")
@@ -51,20 +51,20 @@ def cross_spectra(
     exclude_unusable: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> CrossSpectra:
-    """Welch spectra of one recording, read once, block by block.
+    """Compute Welch spectra of one recording, read once, block by block.
 
     Parameters
     ----------
     recording
-        Open recording.
+        Open recording to read.
     settings
-        Segment length, overlap, window, detrending.
+        Settings of the spectra: segment length, overlap, window, detrending.
     stream
-        Sample clock; None: the only one.
+        Name of the sample clock; None: the only one.
     excitations, responses
-        Channel names; None: chosen by quantity, see :func:`choose_channels`.
+        Names of the channels; None: chosen by quantity, see :func:`choose_channels`.
     exclude_unusable
-        Leave out segments with overload, clipping, dropped or missing samples (:func:`usable_samples`).
+        Whether to leave out segments with overload, clipping, dropped or missing samples (:func:`usable_samples`).
     progress
         Called with the number of samples read so far.
 

@@ -10,7 +10,7 @@ from scipy import fft
 from acquisition import Channel
 from foundation import InputError
 
-from .cross_spectra import CrossSpectra, SpectralSettings
+from .spectral_matrix import CrossSpectra, SpectralSettings
 from .windows import check_settings, effective_averages, hop_length, window_samples
 
 _BATCH_BYTES = 20 << 20  # of segments transformed at once
@@ -30,10 +30,10 @@ class SpectralAccumulator:
     ----------
     excitations, responses
         Channels along the columns of what ``add`` gets.
-    sample_rate
-        Hz.
+    sample_rate : Hz
+        Samples a second.
     settings
-        Segment length, overlap, window, detrending.
+        Settings of the spectra: segment length, overlap, window, detrending.
 
     Raises
     ------

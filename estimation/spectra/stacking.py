@@ -7,7 +7,7 @@ import numpy as np
 
 from foundation import InputError
 
-from .cross_spectra import CrossSpectra
+from .spectral_matrix import CrossSpectra
 
 
 def check_stackable(tests: Sequence[CrossSpectra]) -> None:

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from .cross_spectra import SpectralSettings
+from .spectral_matrix import SpectralSettings
 
 WINDOWS = ("hann", "hamming", "boxcar")
 DETRENDS = ("constant", "linear", "none")

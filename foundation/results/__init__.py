@@ -4,6 +4,6 @@ from .drawing import drawing
 from .equality import same_values
 from .optional import optional_library
 from .result import Result
-from .summary import Summary, listed
+from .summary import Summary, counted, listed
 
-__all__ = ["Result", "Summary", "drawing", "listed", "optional_library", "same_values"]
+__all__ = ["Result", "Summary", "counted", "drawing", "listed", "optional_library", "same_values"]

@@ -16,7 +16,7 @@ def drawing(name: str) -> "Callable[..., Axes]":
     Parameters
     ----------
     name
-        Of the function, such as ``draw_frf``.
+        Name of the function, such as ``draw_frf``.
     """
     import figures
 

@@ -12,7 +12,7 @@ def optional_library(name: str, purpose: str) -> ModuleType:
     Parameters
     ----------
     name
-        Of the module, such as ``xarray``.
+        Name of the module, such as ``xarray``.
     purpose
         What needs it, such as ``Frf.to_xarray``, for the message.
 

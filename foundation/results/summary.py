@@ -22,7 +22,7 @@ class Summary:
     headline
         Name of the type and what it holds, one line.
     lines
-        At most three more lines.
+        Further lines, at most three.
     columns, rows
         Headings and cells of the table that a notebook shows below the headline; empty: the lines are shown instead.
     """
@@ -63,3 +63,14 @@ def listed(names: Sequence[str], most: int = 6) -> str:
     if len(names) <= most:
         return ", ".join(names)
     return f"{', '.join(names[:most])} and {len(names) - most} more"
+
+
+def counted(number: int, thing: str) -> str:
+    """A number with the name of what is counted, in the plural where it is not one.
+
+    Examples
+    --------
+    >>> counted(1, "mode"), counted(3, "mode")
+    ('1 mode', '3 modes')
+    """
+    return f"{number} {thing}" + ("" if number == 1 else "s")

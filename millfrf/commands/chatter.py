@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Stream, check_output, names
+from ..options import Stream, check_output, names
 
 
 def chatter(

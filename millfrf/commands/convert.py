@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import check_output
+from ..options import check_output
 
 
 def convert(
@@ -25,7 +25,7 @@ def convert(
     from acquisition.conversion.can_log import add_can_log
     from foundation import InputError
 
-    from ..chain.converting.convert_files import FRF_SUFFIXES, convert_files, is_frf_conversion
+    from ..chain.converting.conversions import FRF_SUFFIXES, convert_files, is_frf_conversion
     from ..chain.converting.convert_uff import is_uff_conversion
     from ..progress import bar
 

@@ -30,7 +30,7 @@ def demo(
 
 def _concealed(out: Path, noise: float, seed: int | None) -> None:
     from ..demonstration.concealment import ConcealOptions, run_concealed
-    from ..demonstration.concealment_table import concealment_table
+    from ..demonstration.concealment_result import concealment_table
     from ..progress import bar
     from ..tables.result_tables import show
 

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Band, Output, Stream, check_band, check_output, names
+from ..options import Band, Output, Stream, check_band, check_output, names
 
 
 def estimate(

@@ -8,7 +8,7 @@ import typer
 
 from foundation import InputError
 
-from .options import Output, check_output
+from ..options import Output, check_output
 
 
 def lobes(

@@ -19,7 +19,7 @@ from modal_fit import ModalModel
 from replay_data import HammerCell, dynamometer, tip_accelerometers
 from replay_data.concealment.concealed_cell import FINE_RATE, LEVELS, ConcealedCell, milling_force
 from replay_data.concealment.concealed_effect import ConcealedEffect, draw_effect, draw_name, joint_scale
-from replay_data.concealment.posture_robot import posture_robot
+from replay_data.concealment.random_posture import posture_robot
 from replay_data.simulation.joint_march import tip_motion
 
 from ..chain.estimating.estimate import estimate_recordings, write_estimate
@@ -37,20 +37,20 @@ TAP_FIT = FitOptions((6.0, 45.0))
 
 @dataclass(frozen=True)
 class ConcealOptions:
-    """What to simulate, and where to put it.
+    """Options of a concealed simulation, and where its files go.
 
     Parameters
     ----------
     out
-        Folder; made where it is not there.
+        Folder for the files; it is made where it is not there.
     noise
-        Of every acceleration, as a share of its signal; half of it on the forces.
+        Noise of every acceleration, as a share of its signal; the forces have half of it.
     seed
-        Of robot, effect, taps, material and noise; None: another at every run.
+        Seed of robot, effect, taps, material and noise; None: another at every run.
     effect
-        Hide this one instead of one drawn.
-    seconds
-        Of each recording.
+        Name of the effect to hide; None: one is drawn.
+    seconds : s
+        Duration of each recording.
     """
 
     out: Path
@@ -62,7 +62,7 @@ class ConcealOptions:
 
 @dataclass(frozen=True)
 class ConcealResult:
-    """What was hidden beside what was found.
+    """The hidden effect beside the diagnosis.
 
     Parameters
     ----------
@@ -72,8 +72,8 @@ class ConcealResult:
         Content of ``diagnosis.json``.
     fingerprint
         SHA-256 that was shown before the diagnosis.
-    seconds
-        Wall-clock time.
+    seconds : s
+        Wall-clock time of the run.
     """
 
     hidden: ConcealedEffect

@@ -72,18 +72,18 @@ MAX_DEPTH = 10e-3
 
 @dataclass(frozen=True)
 class DemoOptions:
-    """What to simulate, and where to put it.
+    """Options of the demonstration, and where its files go.
 
     Parameters
     ----------
     out
-        Folder; made where it is not there. Nothing is written elsewhere.
+        Folder for the files; it is made where it is not there. Nothing is written elsewhere.
     noise
-        Of every sensor, as a share of its signal.
+        Noise of every sensor, as a share of its signal.
     seed
-        Of noise and taps.
-    seconds
-        Duration of each sweep, s.
+        Seed of noise and taps.
+    seconds : s
+        Duration of each sweep.
     """
 
     out: Path
@@ -101,13 +101,13 @@ class DemoResult:
     identified, true
         Modal models of the tool tip.
     lobes
-        ``identified``, ``hammer`` and ``true``, at :data:`COMPARED_RPM`.
+        Certified lobes of ``identified``, ``hammer`` and ``true``, at :data:`COMPARED_RPM`.
     trap
         A cut for which the zero-order limit is unsafe.
     report
-        The page.
-    seconds
-        Wall-clock time.
+        Path of the page.
+    seconds : s
+        Wall-clock time of the run.
     """
 
     identified: ModalModel

@@ -24,8 +24,8 @@ from robot_model import (
     write_compensated_path,
 )
 
-from ..commands.options import check_band, check_output
 from ..gate import check_depth, check_speed, read_checked_cutting
+from ..options import check_band, check_output
 from ..progress import bar
 from ..provenance import add_to_json, versions
 from ..tables.result_tables import Table, show

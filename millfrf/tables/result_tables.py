@@ -15,11 +15,11 @@ class Table:
     Parameters
     ----------
     title
-        One line.
+        Title of the table, one line.
     columns
         Headings with units.
     rows
-        As many cells as columns.
+        Rows of text, with as many cells as there are columns.
     """
 
     title: str

@@ -45,14 +45,15 @@ class ComplexModeIndicator:
     Parameters
     ----------
     frequencies : (n_lines,), Hz
+        Frequencies of the lines.
     singular_values : (n_lines, n_curves)
-        Falling along the second axis, in ``unit``.
+        Singular values in ``unit``, falling along the second axis.
     vectors : (n_lines, n_curves, n_references)
         Unit singular vectors over ``references``.
     references
-        Degrees of freedom of the side with fewer of them.
+        Degrees of freedom of the side with fewer of them, ``node:direction``.
     unit
-        Of the FRF.
+        Unit of the FRF.
     """
 
     frequencies: NDArray[np.float64]

@@ -14,7 +14,7 @@ from .likelihood_model import (
     transfer,
 )
 from .noise_levels import NoiseLevels, flat_noise, noise_levels
-from .record_spectra import RecordSpectra
+from .whole_records import RecordSpectra
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -32,13 +32,13 @@ class LikelihoodFit:
     model
         The unknowns at the optimum.
     covariance : (n_unknowns, n_unknowns)
-        Of the packed unknowns, free of the scaling that changes no prediction.
+        Covariance of the packed unknowns, free of the scaling that changes no prediction.
     noise
-        Noise variances found.
+        Noise variances that were found.
     reduced_chi_square
         Weighted error power over its expectation; 1 where model and noise description hold.
     log_likelihood
-        Up to a constant.
+        Logarithm of the likelihood, up to a constant.
     converged
         Whether the last step gained less than 1e-8 of the cost.
     """

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .record_spectra import RecordSpectra
+from .whole_records import RecordSpectra
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -22,9 +22,13 @@ class LikelihoodModel:
     Parameters
     ----------
     poles : (n_modes,), rad/s
-    right : (n_modes, n_responses), left : (n_modes, n_excitations)
+        Poles in the upper half plane.
+    right : (n_modes, n_responses)
+        Right vectors (mode shapes at the responses).
+    left : (n_modes, n_excitations)
+        Left vectors (participation of the excitations).
     outside : (n_terms, n_responses, n_excitations), real
-        Coefficients of ``basis``.
+        Coefficients of the out-of-band functions ``basis``.
     transient : (n_tests, n_modes), or (0, n_modes) where there is no leakage
         Free decay left by each record's start and end, in units of ``left`` times force.
     smooth : (n_tests, n_smooth, n_responses), or (0, n_smooth, n_responses)

@@ -13,7 +13,7 @@ from ..models.out_of_band import ABOVE, out_of_band_basis, residuals_from
 from .likelihood_fit import LikelihoodFit, maximise_likelihood
 from .likelihood_model import LikelihoodModel, Setting
 from .linear_start import linear_start
-from .record_spectra import RecordSpectra
+from .whole_records import RecordSpectra
 
 
 def best_fit(

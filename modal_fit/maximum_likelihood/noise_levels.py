@@ -16,7 +16,9 @@ class NoiseLevels:
     Parameters
     ----------
     response : (n_tests, n_responses), unit^2
+        Noise variance of each response.
     excitation : (n_tests, n_excitations), unit^2
+        Noise variance of each excitation.
     """
 
     response: NDArray[np.float64]
@@ -52,12 +54,15 @@ def noise_levels(
     Parameters
     ----------
     error : (n_lines, n_responses)
+        Equation error of the fitted model on each line.
     frf : (n_lines, n_responses, n_excitations)
-    test : (n_lines,), number of each line's test
+        FRF of the fitted model on each line.
+    test : (n_lines,), int
+        Number of the test that each line comes from.
     n_tests
         Number of tests.
     n_unknowns
-        Real unknowns already fitted: they took their share of the error.
+        Number of real unknowns already fitted: they took their share of the error.
     """
     n_lines, n_responses = error.shape
     shrink = 1 - n_unknowns / (2 * n_lines * n_responses)

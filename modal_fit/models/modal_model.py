@@ -1,19 +1,23 @@
 """`ModalModel`: poles, left and right vectors, and the terms that stand for modes out of band."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf
-from foundation import Band, InputError, checked_band
+from foundation import Band, InputError, Result, Summary, checked_band, counted, drawing, listed, optional_library
 
 from .mode_errors import ModeErrors
 
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
 
-@dataclass(frozen=True)
-class Residuals:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Residuals(Result):
     """What the modes outside the band leave inside it.
 
     ``upper + lower / (i w)^2 + sum_k residues[k] / (i w - poles[k]) + conjugate``, on receptance. The two
@@ -66,9 +70,14 @@ class Residuals:
             values = values + np.einsum("kn,npq->kpq", 1 / (s[:, None] - self.poles.conj()), self.residues.conj())
         return np.asarray(values)
 
+    def _summary(self) -> Summary:
+        terms = 0 if self.poles is None else len(self.poles)
+        parts = [name for name in ("upper", "lower") if getattr(self, name).any()]
+        return Summary(f"Residuals: {' and '.join(parts) or 'no'} residual, {terms} terms at poles outside the band")
 
-@dataclass(frozen=True)
-class ModalModel:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ModalModel(Result):
     """Modal model of a linear structure that need not be reciprocal.
 
     ``H(w)[p, q] = sum_r right[r, p] left[r, q] / (i w - pole[r]) + conjugate term + residuals``
@@ -77,28 +86,30 @@ class ModalModel:
     Parameters
     ----------
     poles : (n_modes,), rad/s
-        Upper half of the conjugate pairs: imaginary part > 0.
-    right : (n_modes, n_responses), left : (n_modes, n_excitations)
-        Their product has the unit of the FRF times rad/s.
+        Poles with positive imaginary part: the upper half of the conjugate pairs.
+    right : (n_modes, n_responses)
+        Right vectors (mode shapes at the responses).
+    left : (n_modes, n_excitations)
+        Left vectors (participation of the excitations). Right times left has the unit of the FRF times rad/s.
     responses, excitations
         Degrees of freedom along the axes, ``node:direction``.
     quantity, unit
-        Of the FRF the model gives: ``receptance`` in ``m/N``, or ``transfer`` in any unit.
+        Quantity and unit of the FRF that the model gives: ``receptance`` in ``m/N``, or ``transfer`` in any unit.
     residuals
         Out-of-band terms, or None.
     covariance : (n_parameters, n_parameters) or None
-        Of the real numbers Re poles, Im poles, Re right, Im right, Re left, Im left, each laid out row by
+        Covariance of the real numbers Re poles, Im poles, Re right, Im right, Re left, Im left, each laid out row by
         row (mode by mode), in SI units.
     physics
         Terms ``{name, location, parameters}`` that a diagnosis added; empty for a linear model.
-    delay
-        Pure delay of the measuring chain, s: the whole expression times ``exp(-i w delay)``. Of a ``transfer`` only,
-        whose input passes converters and amplifiers; a structure has none.
-    band
-        Lowest and highest frequency (Hz) between which the model holds, as a rule those of its fit; None: not known.
-        Whoever uses the model outside says so.
+    delay : s
+        Pure delay of the measuring chain: the whole expression is multiplied by ``exp(-i w delay)``. Only a
+        ``transfer`` has one, whose input passes converters and amplifiers; a structure has none.
+    band : (2,), Hz, or None
+        Lowest and highest frequency between which the model holds, as a rule those of its fit; None: not known. Whoever
+        uses the model outside says so.
     errors
-        Standard errors of frequencies and damping ratios by where they come from; None: only ``covariance`` is known.
+        Standard errors of frequencies and damping ratios by their source; None: only ``covariance`` is known.
 
     Raises
     ------
@@ -188,4 +199,66 @@ class ModalModel:
             self.unit,
             valid,
             band=self.band,
+        )
+
+    def standard_errors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Standard errors of natural frequencies (Hz) and damping ratios, each (n_modes,); None where none is known.
+
+        Its :class:`ModeErrors` are taken where the model has them, else its covariance, which holds the noise alone:
+        ``f = |p| / 2 pi`` and ``zeta = -Re p / |p|`` are linearised at each pole ``p``.
+        """
+        if self.errors is not None:
+            return self.errors.frequency, self.errors.damping
+        if self.covariance is None:
+            return None
+        n, size = len(self.poles), np.abs(self.poles)
+        a, b = self.poles.real / size, self.poles.imag / size
+        blocks = self.covariance[: 2 * n, : 2 * n].reshape(2, n, 2, n)
+        own = np.einsum("irjr->rij", blocks)  # covariance of real and imaginary part of each pole
+        slopes = np.stack([[a / (2 * np.pi), b / (2 * np.pi)], [-(b**2) / size, a * b / size]])
+        variances = np.einsum("kir,rij,kjr->kr", slopes, own, slopes)
+        frequency, damping = np.sqrt(np.maximum(variances, 0.0))
+        return frequency, damping
+
+    def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
+        """Draw the FRF that the model gives and return the axes; see :func:`figures.draw_model` for the choices."""
+        return drawing("draw_model")(self, axes, **choices)
+
+    def to_frame(self) -> "pandas.DataFrame":
+        """One row a mode: natural frequency (Hz), damping ratio and, where they are known, their standard errors.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        columns = {"natural_frequency_hz": self.natural_frequencies, "damping_ratio": self.damping_ratios}
+        errors = self.standard_errors()
+        if errors is not None:
+            columns |= {"natural_frequency_error_hz": errors[0], "damping_ratio_error": errors[1]}
+        pd = optional_library("pandas", "ModalModel.to_frame")
+        return pd.DataFrame(columns, index=pd.RangeIndex(1, len(self.poles) + 1, name="mode"))
+
+    def _summary(self) -> Summary:
+        frequencies, damping = self.natural_frequencies, 100 * self.damping_ratios
+        band = "" if self.band is None else f", holds in {self.band[0]:.4g} to {self.band[1]:.4g} Hz"
+        modes = [f"{f:.4g} Hz {zeta:.3g} %" for f, zeta in zip(frequencies, damping, strict=True)]
+        terms = "" if self.residuals is None else "; with out-of-band terms"
+        terms += f"; physics {listed([str(term.get('name')) for term in self.physics])}" if self.physics else ""
+        columns: tuple[str, ...] = ("mode", "frequency (Hz)", "damping ratio (%)")
+        cells = [[f"{f:.5g}" for f in frequencies], [f"{zeta:.3g}" for zeta in damping]]
+        errors = self.standard_errors()
+        if errors is not None:
+            columns = (*columns[:2], "± 2 standard errors", columns[2], "± 2 standard errors")
+            spread = [[f"{2 * error:.2g}" for error in errors[0]], [f"{200 * error:.2g}" for error in errors[1]]]
+            cells = [cells[0], spread[0], cells[1], spread[1]]
+        return Summary(
+            f"ModalModel: {counted(len(self.poles), 'mode')}, {self.quantity} in {self.unit}{band}",
+            (
+                f"modes {listed(modes) or 'none'}{terms}",
+                f"responses {listed(self.responses)}",
+                f"excitations {listed(self.excitations)}",
+            ),
+            columns,
+            tuple((str(r + 1), *row) for r, row in enumerate(zip(*cells, strict=True))),
         )

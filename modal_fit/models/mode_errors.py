@@ -18,9 +18,10 @@ class ModeErrors:
     Parameters
     ----------
     noise : (n_modes, 2)
-        From the noise of the FRF, or from the misfit where that is larger.
+        Standard errors from the noise of the FRF, or from the misfit where that is larger.
     points : (n_modes, 2)
-        Jackknife over the responses: how far the answer hangs on single points. NaN with fewer than four responses.
+        Jackknife over the responses: change of the result when single points are left out. NaN with fewer than four
+        responses.
     band : (n_modes, 2)
         Root mean square change when an edge of the band moves inwards by a twentieth of the band. NaN where no edge can
         move.

@@ -15,7 +15,7 @@ _DAMPING = 0.05
 
 
 def out_of_band_basis(s: Complex, band: tuple[float, float], above: Sequence[float] = ABOVE[1]) -> Complex:
-    """Basis on receptance: 1, (w0/s)^2 and two functions of each fixed pole above the band.
+    """Give the basis on receptance: 1, (w0/s)^2 and two functions of each fixed pole above the band.
 
     The two textbook terms leave an error of order (w / w_mode)^2 of a near out-of-band mode, which a fit puts
     into the damping inside the band. Real and imaginary part of a residue at a fixed pole above take it up; where
@@ -23,12 +23,12 @@ def out_of_band_basis(s: Complex, band: tuple[float, float], above: Sequence[flo
 
     Parameters
     ----------
-    s : (n_lines,)
-        2 pi i f.
-    band
-        Hz.
+    s : (n_lines,), rad/s
+        Laplace variable 2 pi i f of each line.
+    band : Hz
+        Lowest and highest frequency of the fit.
     above
-        Where the fixed poles lie, over the band's upper end.
+        Places of the fixed poles, as multiples of the band's upper end.
 
     Returns
     -------

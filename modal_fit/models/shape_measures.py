@@ -11,11 +11,14 @@ Complex = NDArray[np.complex128]
 
 
 def modal_assurance(first: Complex, second: Complex) -> NDArray[np.float64]:
-    """``|a^H b|^2 / (a^H a b^H b)`` between all vectors (Allemang & Brown 1982).
+    """Compute the MAC ``|a^H b|^2 / (a^H a b^H b)`` between all vectors (Allemang & Brown 1982).
 
     Parameters
     ----------
-    first : (n, n_dof), second : (m, n_dof)
+    first : (n, n_dof), complex
+        Vectors a, one a row.
+    second : (m, n_dof), complex
+        Vectors b, one a row.
 
     Returns
     -------

@@ -33,14 +33,14 @@ def unpack_parameters(model: ModalModel, packed: Real) -> ModalModel:
 
 
 def derived_covariance(model: ModalModel, derived: Callable[[ModalModel], Real]) -> Real | None:
-    """Covariance of any real vector computed from the model, ``J C J^T`` with J by central differences.
+    """Compute the covariance of any real vector derived from the model, ``J C J^T`` with J by central differences.
 
     Parameters
     ----------
     model
-        With a covariance; without one the result is None.
+        Modal model with a covariance; without one the result is None.
     derived
-        From a model to a real vector (n,).
+        Function that takes a model and gives a real vector (n,).
 
     Returns
     -------
@@ -65,14 +65,4 @@ def frequency_and_damping_errors(model: ModalModel) -> tuple[Real, Real] | None:
 
     A model's :class:`ModeErrors` are taken where it has them, else its covariance, which holds the noise alone.
     """
-    if model.errors is not None:
-        return model.errors.frequency, model.errors.damping
-    covariance = derived_covariance(model, _frequencies_and_damping)
-    if covariance is None:
-        return None
-    errors = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return errors[: len(model.poles)], errors[len(model.poles) :]
-
-
-def _frequencies_and_damping(model: ModalModel) -> Real:
-    return np.concatenate([model.natural_frequencies, model.damping_ratios])
+    return model.standard_errors()

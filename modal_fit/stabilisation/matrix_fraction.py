@@ -25,7 +25,8 @@ class OrderPoles:
     order
         Degree of the denominator. Its coefficients are complex and its band is one-sided, so that each degree holds a
         mode an excitation; the real polynomials of the textbooks need two degrees for one.
-    poles : (n_poles,), rad/s, stable and inside the band
+    poles : (n_poles,), rad/s
+        Poles of that order that are stable and lie inside the band.
     participation : (n_poles, n_excitations)
         Unit participation vectors: the left vectors up to a factor.
     """
@@ -44,7 +45,7 @@ class _NormalMatrices:
 def matrix_fraction_poles(
     frf: Frf, band: tuple[float, float], max_order: int, weights: NDArray[np.float64] | None = None
 ) -> Iterator[OrderPoles]:
-    """Poles of every order 1 ... ``max_order`` from one factorisation.
+    """Give the poles of every order 1 ... ``max_order`` from one factorisation.
 
     ``H(z) = B(z) A(z)^-1`` with complex polynomials in ``z = exp(i arc (f - f_low) / (f_high - f_low))``,
     so that a narrow band far from 0 Hz is as well posed as any. The numerator is eliminated by the Cholesky factor
@@ -55,13 +56,13 @@ def matrix_fraction_poles(
     Parameters
     ----------
     frf
-        Valid lines inside ``band`` are used.
-    band
-        Hz.
+        FRF; its valid lines inside ``band`` are used.
+    band : Hz
+        Lowest and highest frequency of the fit.
     max_order
         Highest order of the denominator.
     weights : (n_frequencies,), or None
-        Of the squared error on each line; None: equal.
+        Weight of the squared error on each line; None: equal weights.
     """
     inside = frf.valid & (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
     angles = _ARC * (frf.frequencies[inside] - band[0]) / (band[1] - band[0])

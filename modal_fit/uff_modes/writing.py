@@ -33,9 +33,9 @@ def write_modes_uff(path: str | os.PathLike[str], model: ModalModel) -> None:
     Parameters
     ----------
     path
-        ``.uff`` or ``.unv``.
+        File to write, ``.uff`` or ``.unv``.
     model
-        With translations and rotations as degrees of freedom.
+        Modal model with translations and rotations as degrees of freedom.
 
     Raises
     ------

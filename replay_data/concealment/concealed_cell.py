@@ -11,7 +11,7 @@ from cutting import MillingProcess
 from modal_fit import ModalModel
 
 from ..laboratory.sensors import Sensor, dynamometer, tip_accelerometers
-from ..laboratory.setup_text import setup_text
+from ..laboratory.setup_notes import setup_text
 from ..laboratory.signal_chain import Decimator
 from ..milling_cell import MillingCell
 from ..sampled_cell import STREAM
@@ -66,13 +66,13 @@ class ConcealedCell:
     structure
         What taps at rest would find: real modes at the tip.
     force : (n, 3), N
-        On the tip, at :data:`FINE_RATE`.
+        Force on the tip, at :data:`FINE_RATE`.
     effect
-        What is hidden.
+        The effect that is hidden.
     noise
         White noise of the accelerations, as a share of each channel's standard deviation; half of it on the forces.
     seed
-        Of the noise.
+        Seed of the noise.
     """
 
     def __init__(self, structure: ModalModel, force: Real, effect: ConcealedEffect, noise: float, seed: int) -> None:

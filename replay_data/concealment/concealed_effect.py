@@ -46,15 +46,15 @@ class JointScale:
     Parameters
     ----------
     direction : (3,)
-        Unit vector.
-    stiffness
-        ``1 / (d^T H(0) d)``, N/m.
+        Unit vector of the direction at the tip.
+    stiffness : N/m
+        Static stiffness along the direction, ``1 / (d^T H(0) d)``.
     deflection, velocity
-        Root mean square, m, m/s.
-    channels
-        Root mean square of ``ax ay az`` without their mean, m/s^2.
-    duration
-        Of a recording, s.
+        Root mean square of displacement (m) and velocity (m/s) along the direction.
+    channels : m/s^2
+        Root mean square of ``ax ay az`` without their mean.
+    duration : s
+        Duration of a recording.
     """
 
     direction: NDArray[np.float64]

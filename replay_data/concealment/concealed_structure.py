@@ -9,7 +9,7 @@ from modal_fit import ModalModel
 
 from ..simulation.joint_march import LINEAR, JointLaw
 from .concealed_effect import JOINT_EFFECTS, ConcealedEffect
-from .posture_robot import real_modes
+from .random_posture import real_modes
 
 
 def concealed_structure(structure: ModalModel, effect: ConcealedEffect) -> ModalModel:

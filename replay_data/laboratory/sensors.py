@@ -16,20 +16,20 @@ class Sensor:
     Parameters
     ----------
     name
-        Of the channel, ``fx``.
+        Name of the channel, such as ``fx``.
     quantity
-        ``force`` (on the tool, as a table dynamometer under the workpiece gives with its sign turned),
-        ``acceleration``, ``velocity`` or ``displacement``.
+        Measured quantity: ``force`` (on the tool, as a table dynamometer under the workpiece gives with its sign
+        turned), ``acceleration``, ``velocity`` or ``displacement``.
     degree_of_freedom
-        ``TCP:+X``.
+        Node and direction of the sensor, such as ``TCP:+X``.
     noise
         White noise, as a share of the channel's own standard deviation.
     full_scale
         Largest magnitude, SI; larger values are clipped to it.
     bits
-        Of the converter: steps of ``full_scale / 2^(bits - 1)``.
-    high_pass_hz
-        Corner of a first-order high-pass (IEPE supply), Hz; None: down to 0 Hz.
+        Number of bits of the converter: steps of ``full_scale / 2^(bits - 1)``.
+    high_pass_hz : Hz
+        Corner of a first-order high-pass (IEPE supply); None: down to 0 Hz.
 
     Raises
     ------

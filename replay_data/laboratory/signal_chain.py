@@ -25,9 +25,9 @@ class Decimator:
     Parameters
     ----------
     factor
-        Input samples per output sample; 1 passes everything on.
+        Number of input samples per output sample; 1 passes everything on.
     n_channels
-        Columns.
+        Number of columns of the samples.
     """
 
     def __init__(self, factor: int, n_channels: int) -> None:
@@ -66,13 +66,13 @@ class SignalChain:
     Parameters
     ----------
     sensors
-        One a channel.
-    sample_rate
-        Hz.
+        Sensors, one a channel.
+    sample_rate : Hz
+        Samples a second.
     noise_rms : (n_channels,)
         Standard deviation of the white noise, SI.
     seed
-        Of the noise.
+        Seed of the noise.
     """
 
     def __init__(

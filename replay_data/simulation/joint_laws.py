@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 
 JOINT_LAWS = {
     "linear": 0,
@@ -22,23 +22,23 @@ JOINT_LAWS = {
 
 @compiled
 def joint_force(law: int, p: NDArray[np.float64], x: float, v: float, time: float, stretch: float) -> float:
-    """Force of the joint, N, against its deflection.
+    """Compute the force of the joint, N, against its deflection.
 
     Parameters
     ----------
     law
-        From :data:`JOINT_LAWS`.
+        Number of the law, from :data:`JOINT_LAWS`.
     p : (3,)
-        1: cubic stiffness (N/m^3), ``p0 x^3``. 2: stiffness lost (N/m), knee (m), ``p0 (p1 atan(x / p1) - x)``.
-        3: stiffness lost (N/m) within half a gap (m), ``-p0 x`` there. 4: friction (N), creep speed (m/s),
-        ``p0 v / sqrt(v^2 + p1^2)``. 5: stiffness (N/m) of the stretch. 6: stiffness change (N/m) over a duration (s),
-        ``p0 (t / p1 - 1/2) x``. 7: stiffness (N/m) at an angular frequency (rad/s), ``p0 cos(p1 t) x``.
+        Parameters of the law. 1: cubic stiffness (N/m^3), ``p0 x^3``. 2: stiffness lost (N/m), knee (m), ``p0 (p1
+        atan(x / p1) - x)``. 3: stiffness lost (N/m) within half a gap (m), ``-p0 x`` there. 4: friction (N), creep
+        speed (m/s), ``p0 v / sqrt(v^2 + p1^2)``. 5: stiffness (N/m) of the stretch. 6: stiffness change (N/m) over a
+        duration (s), ``p0 (t / p1 - 1/2) x``. 7: stiffness (N/m) at an angular frequency (rad/s), ``p0 cos(p1 t) x``.
     x, v
-        m, m/s.
-    time
-        s.
-    stretch
-        Of the element with memory, m.
+        Deflection (m) and velocity (m/s) of the joint.
+    time : s
+        Time since the beginning of the recording.
+    stretch : m
+        Stretch of the element with memory.
     """
     if law == 1:
         return float(p[0] * x * x * x)

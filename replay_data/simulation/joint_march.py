@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 from modal_fit import ModalModel
 
 from ..robot_structure import TOOL_TIP, select
@@ -22,13 +22,13 @@ class JointLaw(NamedTuple):
     Parameters
     ----------
     name
-        Of the law.
+        Name of the law, a key of :data:`JOINT_LAWS`.
     direction : (3,)
-        Of the joint, unit length.
+        Direction of the joint, unit length.
     parameters : (3,)
-        See :func:`joint_force`.
+        Parameters of the law, see :func:`joint_force`.
     coupling : (3, 3), N s/m
-        Force ``-coupling V`` on the tip.
+        Matrix of the force ``-coupling V`` on the tip.
     """
 
     name: str
@@ -43,7 +43,7 @@ LINEAR = JointLaw("linear", np.array([1.0, 0.0, 0.0]), np.zeros(3), np.zeros((3,
 def tip_motion(
     structure: ModalModel, force: NDArray[np.float64], step: float, law: JointLaw = LINEAR
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Displacement (m), velocity (m/s) and acceleration (m/s^2) of the tip, each (n, 3), from rest.
+    """Compute displacement (m), velocity (m/s) and acceleration (m/s^2) of the tip, each (n, 3), from rest.
 
     ``q' = p q + L (F - d g(d.X, d.V) - G V)`` with the force in brackets linear over a step, exact but for that; g at
     the end of the step by fixed-point iteration.
@@ -51,13 +51,13 @@ def tip_motion(
     Parameters
     ----------
     structure
-        Receptances at ``TCP:+X +Y +Z``.
+        Modal model of receptances at ``TCP:+X +Y +Z``.
     force : (n, 3), N
-        At the tip.
-    step
-        s.
+        Force at the tip at each instant.
+    step : s
+        Time between two instants.
     law
-        What the linear structure leaves out.
+        Law of the joint, which the linear structure leaves out.
 
     Raises
     ------

@@ -18,11 +18,11 @@ class Material:
     Parameters
     ----------
     name
-        For the recording's set-up.
+        Name of the material, for the recording's set-up.
     spread
-        0 (homogeneous) to 1.
-    pore_size
-        Length of a cell along the tooth path, m.
+        Standard deviation of the specific forces over their mean, 0 (homogeneous) to 1.
+    pore_size : m
+        Length of a cell along the tooth path.
     passes_per_pore
         Number of successive tooth passes that meet the same cells (pore size over feed per tooth); 1: every tooth
         meets new ones.

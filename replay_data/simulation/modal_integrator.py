@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 from foundation import InputError
 from modal_fit import ModalModel
 
@@ -137,11 +137,11 @@ class ResponseMap:
     structure
         Modal model; its responses are looked up by degree of freedom.
     quantities
-        Per channel: ``force``, ``displacement``, ``velocity`` or ``acceleration``.
+        Quantity of each channel: ``force``, ``displacement``, ``velocity`` or ``acceleration``.
     places
-        Per channel: degree of freedom.
-    step
-        Between instants, s.
+        Degree of freedom of each channel.
+    step : s
+        Time between two instants.
 
     Raises
     ------

@@ -14,7 +14,7 @@ _PIECE = 3.0
 
 
 def planar_dynamic_stiffness(section: Section, length: float, omega: Real, loss_factor: float = 0.0) -> Complex:
-    """Forces over displacements of the two ends, in the local x-y plane.
+    """Give the forces over displacements of the two ends of a beam, in the local x-y plane.
 
     Displacements ``(u, v, phi)`` of the first end, then of the second; forces ``(N, Q, M)`` on the beam in the same
     order. Chen et al. 2026, Eq. 2 and appendix (whose printed coefficients lost their signs in the text).
@@ -22,11 +22,11 @@ def planar_dynamic_stiffness(section: Section, length: float, omega: Real, loss_
     Parameters
     ----------
     section, length
-        Uniform beam, m.
+        Cross-section of the uniform beam, and its length (m).
     omega : (n_frequencies,), rad/s
-        Zero is allowed: it gives the static stiffness.
+        Angular frequencies. Zero is allowed: it gives the static stiffness.
     loss_factor
-        Of the material: E and G become ``E (1 + i loss_factor)``.
+        Loss factor of the material: E and G become ``E (1 + i loss_factor)``.
 
     Returns
     -------

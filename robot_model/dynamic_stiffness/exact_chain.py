@@ -15,7 +15,7 @@ Real = NDArray[np.float64]
 
 
 def exact_receptance(robot: PlanarRobot, angles: Real, frequencies: Real) -> Frf:
-    """Receptance at the tip: reach, height, rotation; links by their exact dynamic stiffness.
+    """Compute the receptance at the tip (reach, height, rotation) with the exact dynamic stiffness of the links.
 
     Neighbouring links share translations and have a rotation each, with the joint's spring between them (Chen et al.
     2026, Eqs. 10-17; the first spring stands on the base).
@@ -25,6 +25,7 @@ def exact_receptance(robot: PlanarRobot, angles: Real, frequencies: Real) -> Frf
     robot, angles : (n_links,), rad
         A robot with sections; relative joint angles.
     frequencies : (n_frequencies,), Hz
+        Frequencies of the lines.
 
     Raises
     ------

@@ -20,17 +20,21 @@ Real = NDArray[np.float64]
 
 
 def exact_frf_at(robot: SpatialRobot, q: Real, frequencies: Real, loss_factor: float = 0.0) -> Frf:
-    """Receptance at the tool, links by their exact dynamic stiffness, joints and bodies lumped.
+    """Compute the receptance at the tool, links by their exact dynamic stiffness, joints and bodies lumped.
 
     ``H = S (T^T (K_joints - omega^2 M_bodies + sum B D(omega) B^T) T)^-1 S^T`` with T from :func:`coordinate_basis`:
     the planar coupling of Chen et al. 2026, Eqs. 10-17, in three dimensions.
 
     Parameters
     ----------
-    robot, q : (n_moving,)
+    robot
+        Robot whose structure is computed.
+    q : (n_moving,), rad or m
+        Joint values of the posture.
     frequencies : (n_frequencies,), Hz
+        Frequencies of the lines.
     loss_factor
-        Of links and joints alike: ``K (1 + i loss_factor)``; a robot's Rayleigh damping has no place here.
+        Loss factor of links and joints alike: ``K (1 + i loss_factor)``; a robot's Rayleigh damping has no place here.
     """
     structure = structure_at(robot, q)
     omega = 2 * np.pi * np.asarray(frequencies, dtype=float)

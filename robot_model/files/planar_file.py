@@ -52,16 +52,16 @@ class _File(BaseModel):
 
 @dataclass(frozen=True)
 class PlanarCase:
-    """A planar robot with the postures it was published at.
+    """A planar robot with the postures at which it was published.
 
     Parameters
     ----------
     robot
-        With sections.
-    poses
-        Joint angles by name, rad.
-    measured, predicted
-        First natural frequency by name of the pose, Hz, where the source gives one.
+        The robot, with sections of its links.
+    poses : rad
+        Joint angles by name of the pose.
+    measured, predicted : Hz
+        First natural frequency by name of the pose, where the source gives one.
     """
 
     robot: PlanarRobot

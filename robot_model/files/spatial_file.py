@@ -125,11 +125,13 @@ class SpatialCase:
     Parameters
     ----------
     name
+        Name of the robot.
     robot
+        The robot as a structure and mechanism.
     poses
         Driven joint values by name, rad and (prismatic joints) m.
-    repeatability
-        Pose repeatability after ISO 9283 (RP: radius of the sphere), m; None: the file does not tell it.
+    repeatability : m
+        Pose repeatability after ISO 9283 (RP: radius of the sphere); None: the file does not tell it.
     """
 
     name: str

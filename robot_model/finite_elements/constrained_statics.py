@@ -20,8 +20,10 @@ class ConstrainedSystem:
 
     Parameters
     ----------
-    stiffness : (n, n), constraints : (n_rows, n)
-        K and A over the free nodes, n = 6 (H - 1).
+    stiffness : (n, n)
+        Stiffness K over the free nodes, n = 6 (H - 1).
+    constraints : (n_rows, n)
+        Constraints A over the free nodes.
     whole : (n + n_rows, n + n_rows)
         The rows of A are scaled by ``scale`` to the size of K, so that the matrix is well conditioned.
     tip : int

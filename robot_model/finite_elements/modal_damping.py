@@ -10,13 +10,14 @@ Real = NDArray[np.float64]
 
 
 def modal_damping_matrix(mass: Real, stiffness: Real, ratios: Real) -> Real:
-    """``C = M Phi diag(2 zeta_n omega_n) Phi^T M`` with ``Phi^T M Phi = I``, N s/m.
+    """Compute ``C = M Phi diag(2 zeta_n omega_n) Phi^T M`` with ``Phi^T M Phi = I``, N s/m.
 
     Clough & Penzien, Dynamics of Structures, section 12-5; Chen et al. 2026, Eq. 20.
 
     Parameters
     ----------
     mass, stiffness : (n, n), symmetric
+        Mass and stiffness matrix.
     ratios : (n,)
         Damping ratio of each mode in rising frequency.
 

@@ -21,7 +21,7 @@ def modal_model(
     labels: Sequence[str],
     highest_frequency: float = np.inf,
 ) -> ModalModel:
-    """Modal model of ``M x'' + C x' + K x = S^T f``, ``y = S x``.
+    """Reduce ``M x'' + C x' + K x = S^T f``, ``y = S x`` to a modal model.
 
     Where the modes of M and K diagonalise C (modal, Rayleigh) they are real:
     ``phi phi^T / (2 i w_d) / (i w - pole) + conjugate``. Otherwise the poles and vectors of
@@ -31,12 +31,13 @@ def modal_model(
     Parameters
     ----------
     mass, damping, stiffness : (n, n), symmetric, mass positive definite
+        Matrices M, C and K of the structure.
     observed : (n_labels, n)
-        S: displacement of the labelled degrees of freedom over x.
+        Matrix S: displacement of the labelled degrees of freedom over x.
     labels
-        Of responses and excitations, ``node:direction``.
-    highest_frequency
-        Hz, undamped.
+        Degrees of freedom of responses and excitations, ``node:direction``.
+    highest_frequency : Hz
+        Highest undamped natural frequency that is kept as a mode.
 
     Raises
     ------

@@ -21,13 +21,14 @@ class Spring:
     Parameters
     ----------
     nodes
-        On the body before the joint, and on the body after it.
+        Node on the body before the joint, and node on the body after it.
     axes : (3, 3)
-        Columns: joint frame in the base frame, z the joint's axis.
+        Joint frame as columns in the base frame, with z along the joint's axis.
     stiffness : (6,)
-        ``(K_r, K_r, K_a, K_rr, K_rr, K_ar)``: radial and axial, N/m, then rotational, N m/rad; infinite: rigid.
+        Stiffnesses ``(K_r, K_r, K_a, K_rr, K_rr, K_ar)``: radial and axial, N/m, then rotational, N m/rad; infinite:
+        rigid.
     place : (3,), m
-        Where the joint is, base frame.
+        Position of the joint in the base frame.
     """
 
     nodes: tuple[int, int]
@@ -74,13 +75,15 @@ class Structure:
     Parameters
     ----------
     positions : (n_nodes, 3), m
+        Positions of the nodes in the base frame.
     springs, beams, bodies
+        Springs of the joints, beams of the links, and bodies with mass.
     rigid
         Pairs of nodes that a rigid link joins.
     tip
-        Node of the tool tip.
+        Number of the node of the tool tip.
     weight : (6 n_nodes, 6 n_nodes) or None
-        Stiffness of the weight that the joints carry; None: left out.
+        Stiffness by the weight that the joints carry; None: left out.
     """
 
     positions: Real

@@ -18,13 +18,14 @@ UNKNOWN_BEYOND = 1.0
 
 @dataclass(frozen=True)
 class Identification:
-    """Positive parameters fitted to data.
+    """Positive parameters that were fitted to data, with their errors.
 
     Parameters
     ----------
     names
-        Of the parameters.
+        Names of the parameters.
     values : (n_parameters,)
+        Fitted values, in the parameters' units.
     relative_errors : (n_parameters,)
         Standard error of the logarithm; without a prior, within the identifiable directions only.
     identifiable : (n_parameters,), bool
@@ -63,7 +64,7 @@ def identify(
     seed: int = 0,
     generations: int = 120,
 ) -> Identification:
-    """Least squares on the logarithms of positive parameters within bounds.
+    """Fit the logarithms of positive parameters within bounds by least squares.
 
     Without a start the bounds are searched by differential evolution (Storn & Price 1997), where Chen et al. 2026,
     section 3.1, use a particle swarm; both need no gradient. Either way a trust-region polish follows. Standard errors
@@ -73,18 +74,18 @@ def identify(
     Parameters
     ----------
     residuals
-        From parameter values (n_parameters,) to deviations divided by their expected error.
+        Function that takes parameter values (n_parameters,) and gives deviations divided by their expected error.
     names, lower, upper : (n_parameters,)
-        Bounds are positive.
+        Names of the parameters and their bounds, which are positive.
     start : (n_parameters,) or None
-        None: global search.
+        Values to start from; None: global search.
     jacobian
         Derivative of the residuals over the logarithms, (n_data, n_parameters); None: by differences.
     prior
         Standard deviation of ln(parameter) about the start, before the data speaks: it keeps parameters that the data
         does not fix from running off; infinite: none.
     seed, generations
-        Of the global search.
+        Seed and number of generations of the global search.
 
     Raises
     ------

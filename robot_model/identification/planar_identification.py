@@ -32,20 +32,20 @@ def identify_from_frfs(
     search: bool = True,
     seed: int = 0,
 ) -> Identification:
-    """Rigid-link model fitted to receptances, relative deviation on every valid line (Chen et al. 2026, Eq. 21).
+    """Fit the rigid-link model to receptances, relative deviation on every valid line (Chen et al. 2026, Eq. 21).
 
     Parameters
     ----------
     robot
-        Values of what is not free; the start where ``search`` is False.
+        Robot that gives the values of what is not free, and the start where ``search`` is False.
     measured
         Joint angles (rad) and the receptance there, over any of the tip's degrees of freedom in the plane.
     free
-        Of ``masses``, ``stiffness``, ``lengths``, ``damping_ratios``.
+        Parameters to fit, among ``masses``, ``stiffness``, ``lengths``, ``damping_ratios``.
     bounds
-        By the same names.
+        Lowest and highest value of each parameter, by the same names, in SI units.
     search
-        Search the bounds globally first.
+        Whether the bounds are searched globally first.
 
     Raises
     ------

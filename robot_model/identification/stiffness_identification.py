@@ -48,7 +48,7 @@ def identify_joint_stiffness(
     bounds: tuple[float, float] = (1e3, 1e12),
     prior: float = 1.0,
 ) -> Identification:
-    """Joint stiffnesses that bring the model's deflections nearest to the measured ones.
+    """Find joint stiffnesses that bring the model's deflections nearest to the measured ones.
 
     ``min sum |delta(k) - delta_measured|^2 / error^2`` over the logarithms (Belchior et al. 2013, Eqs. 26-27; they
     search with a genetic algorithm). The derivative of the compliance at the tool is
@@ -57,15 +57,15 @@ def identify_joint_stiffness(
     Parameters
     ----------
     robot
-        Its stiffnesses are the start.
+        Robot whose stiffnesses are the start.
     measured
         Deflections at several postures and loads.
-    error
-        Standard error of a measured displacement, m.
+    error : m
+        Standard error of a measured displacement.
     bounds
-        Of every stiffness, N/m or N m/rad.
+        Lowest and highest stiffness, the same for every joint, N/m or N m/rad.
     prior
-        How well the start is known: standard deviation of ln k, 1.0: within a factor e.
+        Standard deviation of ln k, which says how well the start is known; 1.0: within a factor e.
 
     Raises
     ------

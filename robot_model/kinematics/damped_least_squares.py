@@ -12,18 +12,21 @@ Real = NDArray[np.float64]
 
 
 def inverse_kinematics(mechanism: Mechanism, target: Real, start: Real, *, tolerance: float = 1e-10) -> Real:
-    """All joint values (n_moving,) that bring the tool to ``target``, near the driven values ``start``.
+    """Find all joint values (n_moving,) that bring the tool to ``target``, near the driven values ``start``.
 
     Levenberg-Marquardt on position (m) and rotation vector (rad) together (Nakamura & Hanafusa 1986); closed loops
     are closed in every step.
 
     Parameters
     ----------
-    mechanism, target : (4, 4)
-        Tool frame in the base frame.
-    start : (n_active,)
+    mechanism
+        Mechanism with its driven joints.
+    target : (4, 4)
+        Wanted tool frame in the base frame.
+    start : (n_active,), rad or m
+        Driven joint values to start from.
     tolerance
-        Largest error that is left, m and rad.
+        Largest error that may remain, m and rad.
 
     Raises
     ------

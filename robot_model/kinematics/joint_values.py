@@ -27,13 +27,14 @@ def joint_unit(frame: Frame) -> str:
 
 
 def driven_values(mechanism: Mechanism, typed: Sequence[float]) -> Real:
-    """Driven joint values in rad and m from what a user typed: degrees for revolute joints, metres for prismatic ones.
+    """Convert what a user typed to joint values in rad and m: degrees for revolute joints, metres for prismatic ones.
 
     Parameters
     ----------
     mechanism
+        Mechanism whose joints are driven.
     typed : (n_active,)
-        In the order of the driven frames.
+        Typed values in the order of the driven frames.
 
     Raises
     ------

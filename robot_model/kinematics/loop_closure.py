@@ -14,13 +14,16 @@ _CLOSED = 1e-12
 
 
 def close_loops(mechanism: Mechanism, driven: Real, start: Real | None = None) -> Real:
-    """All joint values (n_moving,) from the driven ones, by Newton's method on the gaps of the cut joints.
+    """Compute all joint values (n_moving,) from the driven ones, by Newton's method on the gaps of the cut joints.
 
     Each closure asks for equal origins and attitudes of two frames (Khalil & Kleinfinger 1986, section 4).
 
     Parameters
     ----------
-    mechanism, driven : (n_active,)
+    mechanism
+        Mechanism with its closed loops.
+    driven : (n_active,), rad or m
+        Values of the driven joints.
     start : (n_passive,) or None
         Passive values to start from: they choose the assembly; None: zeros.
 

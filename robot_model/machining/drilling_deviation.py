@@ -27,7 +27,7 @@ def drilling_wrench(load: DrillingLoad, tool_axis: Real) -> Real:
 
 
 def joint_deformation(robot: SpatialRobot, q: Real, wrench: Real, position_gain: Real | None = None) -> Real:
-    """Small motions of the driven joints, rad (m): ``phi = tau / k`` and the controller's ``tau / K_pos``, (n_active,).
+    """Compute small motions of the driven joints, rad (m): ``phi = tau / k`` plus the controller's ``tau / K_pos``.
 
     ``tau = J^T W`` are the torques with which the process turns the joints; the simulated angles are
     ``psi + Delta psi_Kpos + phi`` (Ferreras-Higuero et al., Eq. 41).
@@ -36,9 +36,12 @@ def joint_deformation(robot: SpatialRobot, q: Real, wrench: Real, position_gain:
     ----------
     robot
         An open chain; the stiffness of its joints about (prismatic ones: along) their axes is taken.
-    q : (n_moving,), wrench : (6,)
+    q : (n_moving,), rad or m
+        Joint values of the posture.
+    wrench : (6,), N and N m
+        Force and moment on the tool, in the base frame.
     position_gain : (n_active,), N m/rad or N/m, or None
-        Of the controller; None: it holds the motor's angle whatever the torque.
+        Position gain of the controller; None: it holds the motor's angle whatever the torque.
 
     Raises
     ------
@@ -70,15 +73,19 @@ class DeviationMap:
     Parameters
     ----------
     positions : (n, 3), m
+        Nominal places of the tool.
     deviations : (n, 3), m
-        Nominal minus real place; NaN exactly where not reached.
+        Nominal minus real place; NaN exactly where the place is not reached.
     q : (n, 6), rad
+        Joint values at each place; NaN where it is not reached.
     weight : (n, 3), m
-        Nominal minus real place under own weight and payload alone; NaN where not reached or where masses are unknown.
+        Nominal minus real place under own weight and payload alone; NaN where the place is not reached or masses are
+        unknown.
     reached : (n,), bool
+        Whether the robot reaches the place.
     switches : (n,), bool
-        True where the branch of the inverse kinematics is another than at the place before: a jump of the deviation
-        is the robot's, not the material's (Ferreras-Higuero et al., Fig. 13).
+        Whether the branch of the inverse kinematics is another than at the place before: a jump of the deviation is the
+        robot's, not the material's (Ferreras-Higuero et al., Fig. 13).
     """
 
     positions: Real
@@ -98,20 +105,20 @@ def deviation_map(
     links: bool = False,
     payload: Payload = NO_PAYLOAD,
 ) -> DeviationMap:
-    """Deviation at each place, on the branch nearest to the posture at the place before.
+    """Compute the deviation at each place, on the branch nearest to the posture at the place before.
 
     Parameters
     ----------
     robot
-        With a spherical wrist.
+        Robot with a spherical wrist.
     places
         Tool axis and position of each hole.
     load, position_gain
-        As :func:`joint_deformation`.
+        Drilling load, and the controller's position gain as in :func:`joint_deformation`.
     links
-        Add the compliance of links and of the joints' other directions: the whole elastic structure, linear.
+        Whether to add the compliance of links and of the joints' other directions: the whole elastic structure, linear.
     payload
-        What the robot carries besides the bodies of its file.
+        Load that the robot carries besides the bodies of its file.
 
     Raises
     ------

@@ -26,15 +26,16 @@ _SETTLED = 1e-9
 
 @dataclass(frozen=True)
 class ToolPath:
-    """Places of the tool with the forces expected there.
+    """Places of the tool on a path, with the forces expected there.
 
     Parameters
     ----------
     positions : (n, 3), m
+        Positions of the tool in the base frame.
     attitudes : (n, 3), rad
         Rotation vectors of the tool frame.
     wrenches : (n, 6), N and N m
-        On the tool, in the base frame.
+        Forces and moments on the tool, in the base frame.
     """
 
     positions: Real
@@ -44,14 +45,14 @@ class ToolPath:
 
 @dataclass(frozen=True)
 class CompensatedPath:
-    """The corrected path, and what was predicted without correction.
+    """A corrected path, and the deviations predicted with and without the correction.
 
     Parameters
     ----------
     path
-        Send this to the controller.
+        The corrected path, to be sent to the controller.
     deviations : (n, 6), m and rad
-        Of the tool on the uncorrected path.
+        Deviation of the tool on the uncorrected path.
     weight : (n, 6), m and rad
         Whole deflection under own weight (where it is known) and payload on the uncorrected path; ``deviations`` holds
         the part of it that was asked for.
@@ -60,7 +61,7 @@ class CompensatedPath:
     q : (n, n_moving), rad or m
         Joint values on the corrected path.
     warnings
-        Limits and singularities on the way, and what the robot's file does not tell: one sentence each.
+        Doubts about limits, singularities and missing data of the robot's file: one sentence each.
     """
 
     path: ToolPath
@@ -80,7 +81,7 @@ def compensate_path(
     payload: Payload = NO_PAYLOAD,
     weight: str = "all",
 ) -> CompensatedPath:
-    """Corrected path ``x_c = x - delta(x_c)``, found by repetition (Belchior et al. 2013, section 5, one round).
+    """Correct a path by ``x_c = x - delta(x_c)``, found by repetition (Belchior et al. 2013, section 5, one round).
 
     ``delta = C (F + F_payload) + sag``: the forces of the path, the weight of the payload and the robot's own weight
     (:func:`robot_model.static_response`). Forces are taken as given: those of a stiff machine, as the part should take
@@ -88,16 +89,19 @@ def compensate_path(
 
     Parameters
     ----------
-    robot, path
+    robot
+        Robot with its structure and masses.
+    path
+        Nominal path with the forces on it.
     start : (n_active,), rad or m
         Driven joint values near the first place.
     rounds
-        At most; compliance changes slowly, so two or three settle.
+        Largest number of repetitions; compliance changes slowly, so two or three settle.
     payload
-        What the robot carries besides the bodies of its file.
+        Load that the robot carries besides the bodies of its file.
     weight
-        ``all``, ``change`` or ``none``: see :func:`robot_model.counted_weight`; with ``change`` the correction of the
-        first place is that of its force alone.
+        Part of the weight that is corrected, ``all``, ``change`` or ``none``: see :func:`robot_model.counted_weight`.
+        With ``change`` the correction of the first place is that of its force alone.
 
     Raises
     ------

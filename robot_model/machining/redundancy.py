@@ -21,15 +21,16 @@ REDUNDANCIES = ("tool", "table")
 
 @dataclass(frozen=True)
 class CutPlace:
-    """Where and how the tool cuts.
+    """Position and attitude of the tool in a cut, and the axes of the cut.
 
     Parameters
     ----------
     position : (3,), m
+        Position of the tool tip in the base frame.
     attitude : (3, 3)
-        Tool frame in the base frame: columns x, y, z, z along the tool.
+        Tool frame in the base frame, as columns x, y, z; z points along the tool.
     axes : (3, 3)
-        Columns: feed, normal and axial direction of the cut in the base frame.
+        Feed, normal and axial direction of the cut as columns, in the base frame.
     """
 
     position: Real
@@ -39,18 +40,20 @@ class CutPlace:
 
 @dataclass(frozen=True)
 class PostureMap:
-    """One value of a cut for each redundancy angle, best branch of the inverse kinematics.
+    """One value of a cut for each redundancy angle, on the best branch of the inverse kinematics.
 
     Parameters
     ----------
     angles : (n_angles,), rad
+        Redundancy angles that were tried.
     values : (n_angles,)
-        What the criterion gave; NaN exactly where ``reached`` is False.
+        Values of the criterion; NaN exactly where ``reached`` is False.
     q : (n_angles, 6), rad
-        The posture behind each value; NaN where not reached.
+        Joint values behind each value; NaN where the place is not reached.
     frequencies : (n_angles,), Hz
-        Lowest natural frequency there.
+        Lowest natural frequency at each angle.
     reached : (n_angles,), bool
+        Whether the robot reaches the place at the angle.
     """
 
     angles: Real
@@ -81,7 +84,7 @@ def posture_map(
     redundancy: str = "table",
     branches: str = "best",
 ) -> PostureMap:
-    """A criterion (a depth limit, a stiffness) over a redundancy angle.
+    """Evaluate a criterion (a depth limit, a stiffness) over a redundancy angle.
 
     ``tool``: the robot turns about the tool's axis, the cut stays (first redundancy of Mousavi et al., Fig. 9).
     ``table``: tool, workpiece and cut turn together about the feed direction while the tip stays, a rotary table
@@ -90,10 +93,14 @@ def posture_map(
     Parameters
     ----------
     robot
-        With a spherical wrist.
-    place, angles : (n_angles,), rad
+        Robot with a spherical wrist.
+    place
+        Position and attitude of the tool, and axes of the cut.
+    angles : (n_angles,), rad
+        Redundancy angles to try.
     criterion
-        From the modal model in the axes of the cut (feed, normal, axial) to a number; larger is better.
+        Function that takes the modal model in the axes of the cut (feed, normal, axial) and gives a number; larger is
+        better.
     branches
         ``best``: the branch with the largest value; ``near``: the first branch at the first angle, then that nearest
         to the last posture, as a robot would move.

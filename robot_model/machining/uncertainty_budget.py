@@ -115,7 +115,7 @@ def deformation_uncertainty(robot: SpatialRobot, q: Real, wrench: Real, known: L
 def lateral_uncertainty(
     robot: SpatialRobot, q: Real, wrench: Real, known: LoadUncertainty, axis: Real, resting: Real | None = None
 ) -> float:
-    """Expanded uncertainty of the deviation across the drill's axis, in the worst direction, first order, m.
+    """Compute the expanded uncertainty (m) of the deviation across the drill's axis, worst direction, first order.
 
     ``U = 2 sqrt(lambda_max)`` of the covariance ``P (s_k^2 sum_j d_j d_j^T + s_w^2 d d^T) P`` with d_j the part of
     joint j, d their sum under the process alone, and P across the axis.
@@ -123,9 +123,9 @@ def lateral_uncertainty(
     Parameters
     ----------
     robot, q, wrench, known
-        As :func:`deformation_uncertainty`.
+        Robot, joint values, load on the tool and its uncertainty, as in :func:`deformation_uncertainty`.
     axis : (3,)
-        Unit vector of the hole.
+        Unit vector along the hole.
     resting : (3, n_active), m, or None
         Deflection by each joint under weight (:func:`robot_model.sag_parts`) where weight counts: it has the error of
         the stiffness, not of the forces.
@@ -169,16 +169,16 @@ def position_tolerance(systematic: float, expanded: float) -> float:
 
 
 def position_verdict(needed: float, allowed: float, unknown: tuple[str, ...] = ()) -> str:
-    """``holds``, ``does not hold``, or ``cannot tell`` where parts of the budget are unknown.
+    """Say ``holds``, ``does not hold``, or ``cannot tell`` where parts of the budget are unknown.
 
     Parameters
     ----------
-    needed
-        :func:`position_tolerance` of what is known, m.
-    allowed
-        Of the drawing, m.
+    needed : m
+        The :func:`position_tolerance` of what is known.
+    allowed : m
+        Position tolerance of the drawing.
     unknown
-        Parts that are left out: they can only make it worse.
+        Parts of the budget that are left out: they can only make it worse.
 
     Examples
     --------

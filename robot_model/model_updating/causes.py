@@ -34,19 +34,19 @@ class PostureFrequencies:
 
 @dataclass(frozen=True)
 class Cause:
-    """One explanation, fitted.
+    """One explanation of measured frequencies, fitted to them.
 
     Parameters
     ----------
     name
-        As :class:`robot_model.Change`, or ``as modelled`` (nothing changed).
+        Name of the change, as in :class:`robot_model.Change`, or ``as modelled`` (nothing changed).
     parameter, standard_error
         The change's number (a factor, kg, rad, m/s^2); 1 and 0 where nothing changed. Infinite: the frequencies do not
         depend on it.
     chi_square
         Sum of squared deviations in units of their expected error.
     n_data
-        Frequencies compared; an explanation that is right leaves a chi^2 near it.
+        Number of frequencies compared; an explanation that is right leaves a chi^2 near it.
     """
 
     name: str
@@ -59,7 +59,7 @@ class Cause:
 def explain_frequencies(
     robot: SpatialRobot, found: Sequence[PostureFrequencies], relative_error: float = 0.005
 ) -> tuple[Cause, ...]:
-    """Every single cause fitted to the frequencies, best first; ``as modelled`` among them.
+    """Fit every single cause to the frequencies; give them best first, ``as modelled`` among them.
 
     Each cause has one parameter, so the causes are compared by chi^2 alone; those within ``AS_GOOD`` of the best cannot
     be told apart from these postures (:func:`equivalent_causes`). One posture rarely tells joints apart; several do,
@@ -69,9 +69,9 @@ def explain_frequencies(
     Parameters
     ----------
     robot
-        As modelled.
+        The robot as modelled.
     found
-        Lowest frequencies at one or more postures.
+        Lowest frequencies at one posture or more.
     relative_error
         Standard error of a frequency over its value.
 

@@ -16,14 +16,14 @@ Changed = tuple[SpatialRobot, Real]
 
 @dataclass(frozen=True)
 class Companion:
-    """A number that is fitted beside a change's own, with what is believed of it: a place, a second direction.
+    """A number that is fitted beside a change's own, with a prior belief: a place, a second direction.
 
     Parameters
     ----------
     name, unit
-        For people.
+        Name and unit of the number, for people.
     bounds
-        Within which the number is sought.
+        Lowest and highest value of the number, in ``unit``.
     centre, spread
         Mean and standard deviation of the belief.
     scale
@@ -67,22 +67,23 @@ class Change:
     kind
         ``stiffness``, ``links``, ``payload``, ``tool``, ``posture``, ``gravity`` or ``damping``.
     unit
-        Of the number; "" for a factor.
+        Unit of the number; "" for a factor.
     logarithmic
-        The number is positive and is fitted by its logarithm.
+        Whether the number is positive and is fitted by its logarithm.
     values
         Numbers from which a search starts, from small to large change.
     bounds
-        Within which the number is sought.
+        Lowest and highest value of the number, in ``unit``.
     neutral
         Number at which next to nothing is changed.
     apply
-        From a robot, the number and the companions' numbers (their neutral ones where left out) to the changed robot
-        and the offset of its joints.
+        Function that takes a robot, the number and the companions' numbers (their neutral ones where left out) and
+        gives the changed robot and the offset of its joints.
     scale
-        Where positive, the number may have both signs and is fitted as ``asinh(number / scale)``.
+        Scale of the number. Where it is positive, the number may have both signs and is fitted as ``asinh(number /
+        scale)``.
     companions
-        Fitted with it.
+        Further numbers that are fitted with it.
     """
 
     name: str

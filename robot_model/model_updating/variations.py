@@ -52,7 +52,7 @@ def end_bodies(robot: SpatialRobot) -> tuple[int, ...]:
 
 
 def with_lighter_end(robot: SpatialRobot, mass: float, place: Real | None = None) -> SpatialRobot:
-    """The heaviest body that the last joint carries without ``mass`` (kg): a spindle lighter than modelled.
+    """Take ``mass`` (kg) off the heaviest body that the last joint carries: a spindle lighter than modelled.
 
     Its centre moves to ``(M c - m p) / (M - m)``, its inertia about the centre is taken as ``(M - m) / M`` of what it
     was, so that the body stays a possible one.
@@ -60,10 +60,11 @@ def with_lighter_end(robot: SpatialRobot, mass: float, place: Real | None = None
     Parameters
     ----------
     robot
-    mass
-        Taken away, kg.
+        Robot as modelled.
+    mass : kg
+        Mass that is taken away.
     place : (3,), m
-        Where from the tool tip in the tool frame it was; None: at the body's centre, which stays.
+        Place of that mass from the tool tip, in the tool frame; None: at the body's centre, which stays.
 
     Raises
     ------

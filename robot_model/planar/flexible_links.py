@@ -26,17 +26,18 @@ _IN_PLANE = [0, 1, 5, 6, 7, 11]
 
 @dataclass(frozen=True)
 class FlexibleChain:
-    """Matrices of the chain about a posture, base clamped.
+    """Matrices of a chain of flexible links about a posture, with the base clamped.
 
     Parameters
     ----------
     mass, stiffness : (n, n)
+        Mass and stiffness matrix.
     links : (n_links, n, n)
-        Each link's part of the stiffness, its joint's spring included: for its share of the damping.
+        Each link's part of the stiffness, with its joint's spring: for its share of the damping.
     ratios : (n_links,)
         Damping ratio of each link with its joint.
     weight : (n,), N and N m
-        Load of the links' own weight.
+        Load by the links' own weight.
     tip
         Index of the tip's reach; height and rotation follow.
     """
@@ -84,8 +85,9 @@ def flexible_chain(robot: PlanarRobot, angles: Real) -> FlexibleChain:
     Parameters
     ----------
     robot
-        With sections.
+        Planar robot with sections.
     angles : (n_links,), rad
+        Relative joint angles of the posture.
     """
     assert robot.sections is not None
     size = len(robot.lengths) * (3 * ELEMENTS + 1)

@@ -22,13 +22,16 @@ class PlanarRobot:
     Parameters
     ----------
     lengths : (n_links,), m
+        Lengths of the links.
     masses : (n_links,), kg
+        Masses of the links.
     stiffness : (n_links,), N m/rad
-        Of the joint before each link; the first stands on the base.
+        Stiffness of the joint before each link; the first stands on the base.
     damping_ratios : (n_links,)
-        One a mode of the rigid model; ``2 zeta`` is taken for the loss factor of link and joint in the exact model.
+        Damping ratios, one a mode of the rigid model; ``2 zeta`` is taken for the loss factor of link and joint in the
+        exact model.
     sections
-        Of the links where they are flexible, or None: rigid.
+        Cross-sections of the links where they are flexible; None: the links are rigid.
 
     Raises
     ------

@@ -18,7 +18,7 @@ HOUSING = ("HOUSING:+X", "HOUSING:+Y", "HOUSING:+Z")
 def cell_structure_at(
     robot: SpatialRobot, q: Real, sensor: Real, *, axes: Real | None = None, highest_frequency: float = 2000.0
 ) -> ModalModel:
-    """Modal model with motion at the tip and at a sensor on the spindle, forces at the tip.
+    """Give the modal model with motion at the tip and at a sensor on the spindle, and forces at the tip.
 
     The sensor sits on the spindle: it moves by ``t + theta x r`` with the translation and rotation, in every mode, of
     the tip, or of the node before the tool's spring where the robot has one (Mohammadi & Ahmadi, Fig. 12 a). Modes are
@@ -27,13 +27,16 @@ def cell_structure_at(
 
     Parameters
     ----------
-    robot, q : (n_moving,)
+    robot
+        Robot whose structure is computed.
+    q : (n_moving,), rad or m
+        Joint values of the posture.
     sensor : (3,), m
-        From the tip, in the axes of the model.
+        Place of the sensor from the tip, in the axes of the model.
     axes : (3, 3) or None
-        Columns: X, Y, Z of the model in the base frame.
-    highest_frequency
-        Hz, undamped.
+        Axes X, Y, Z of the model as columns, in the base frame.
+    highest_frequency : Hz
+        Highest undamped natural frequency that is kept.
 
     Raises
     ------

@@ -28,10 +28,11 @@ class StructureModes:
     Parameters
     ----------
     structure
+        Structure whose modes these are.
     squares : (n_modes,), (rad/s)^2
-        omega^2, rising.
+        Squared angular natural frequencies omega^2, rising.
     shapes : (n_modes, n_nodes, 6)
-        Displacement and rotation of every node, mass-normalised, base frame.
+        Displacement and rotation of every node, mass-normalised, in the base frame.
     """
 
     structure: Structure
@@ -74,17 +75,20 @@ def modal_model_at(
     rotations: bool = False,
     highest_frequency: float = np.inf,
 ) -> ModalModel:
-    """Modal model at the tool tip in a posture, damped as the robot says (Rayleigh or one ratio for all modes).
+    """Give the modal model at the tool tip in a posture, damped as the robot says (Rayleigh, or one ratio).
 
     Parameters
     ----------
-    robot, q : (n_moving,)
+    robot
+        Robot whose structure is computed.
+    q : (n_moving,), rad or m
+        Joint values of the posture.
     axes : (3, 3) or None
-        Columns: X, Y, Z of the wanted frame (feed, normal, axial) in the base frame; None: the base frame.
+        Axes X, Y, Z of the wanted frame (feed, normal, axial) as columns in the base frame; None: the base frame.
     rotations
-        Rotations and moments too: six degrees of freedom instead of three.
-    highest_frequency
-        Hz; higher modes, and overdamped ones, are left as their static flexibility.
+        Whether rotations and moments are included: six degrees of freedom instead of three.
+    highest_frequency : Hz
+        Highest natural frequency that is kept; higher modes, and overdamped ones, are left as their static flexibility.
     """
     return model_of_modes(
         modes_at(robot, q), robot, axes=axes, rotations=rotations, highest_frequency=highest_frequency

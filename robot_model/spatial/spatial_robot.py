@@ -63,17 +63,19 @@ class SpatialRobot:
     Parameters
     ----------
     mechanism
+        Kinematics of the robot: frames, joints and closed loops.
     joints, links, bodies
+        Elastic joints, flexible links, and lumped bodies with mass.
     points
-        Nodes that are at no joint: frame and place in it, m.
+        Nodes that are at no joint, each with its frame and its place in it (m).
     tip
-        Node of the tool tip.
+        Number of the node of the tool tip.
     rayleigh
-        ``(a, b)`` of ``C = a M + b K``, 1/s and s.
+        Constants ``(a, b)`` of ``C = a M + b K``, 1/s and s.
     damping_ratio
-        One for all modes, instead of Rayleigh's constants; or None.
-    gravity
-        m/s^2 against ``up``: the stiffness of weight is added to that of the joints; 0: left out.
+        Damping ratio of all modes, instead of Rayleigh's constants; or None.
+    gravity : m/s^2
+        Gravity against ``up``: the stiffness of weight is added to that of the joints; 0: left out.
     up
         Unit vector against which weight acts, in the base frame: ``(0, 0, -1)`` for a robot that hangs from a ceiling.
 

@@ -26,14 +26,14 @@ NO_MASSES = (
 
 @dataclass(frozen=True)
 class Payload:
-    """What the robot carries besides the bodies of its file: a tool, a spindle, a workpiece.
+    """Load that the robot carries besides the bodies of its file: a tool, a spindle, a workpiece.
 
     Parameters
     ----------
-    mass
-        kg.
-    centre
-        Centre of mass from the tool tip, in the tool frame, m.
+    mass : kg
+        Mass of the payload.
+    centre : (3,), m
+        Centre of mass from the tool tip, in the tool frame.
 
     Raises
     ------
@@ -53,11 +53,12 @@ class Payload:
 
 @dataclass(frozen=True)
 class StaticResponse:
-    """What gives way at the tool in one posture, base frame.
+    """Static compliance and sag of the tool in one posture, in the base frame.
 
     Parameters
     ----------
     compliance : (6, 6), m/N, rad/N, rad/(N m)
+        Displacement and rotation of the tool over force and moment on it.
     own_weight : (6,), m and rad, or None
         Displacement and rotation of the tool under the weight of the robot's links and bodies; None: the file gives
         no bodies.
@@ -68,7 +69,7 @@ class StaticResponse:
 
 
 def static_response(robot: SpatialRobot, structure: Structure) -> StaticResponse:
-    """Compliance and sag at the tool from one factorisation: ``sag = C (-g M u)``, u a unit step of all nodes upwards.
+    """Compute compliance and sag at the tool: ``sag = C (-g M u)``, with u a unit step of all nodes upwards.
 
     ``M u`` is the mass that each node carries: beams give their consistent share (with end moments, so that the sag at
     the nodes is exact), bodies theirs with the arm of their centre. The posture is that of the unloaded robot; the
@@ -77,9 +78,9 @@ def static_response(robot: SpatialRobot, structure: Structure) -> StaticResponse
     Parameters
     ----------
     robot
-        Its ``gravity`` where it is positive, else 9.80665 m/s^2.
+        Robot; its ``gravity`` counts where it is positive, else 9.80665 m/s^2.
     structure
-        Of the same robot at one posture.
+        Structure of the same robot at one posture.
     """
     system = constrained_system(structure)
     responses = system.tip_responses()

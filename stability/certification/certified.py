@@ -22,7 +22,7 @@ Real = NDArray[np.float64]
 def certified_lobes(
     structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
 ) -> StabilityLobes:
-    """Lowest limit at each speed with coefficients as they vary, and with a status that says how sure it is.
+    """Give the lowest limit at each speed with time-periodic coefficients, and a status that says how sure it is.
 
     Of a modal model: collocation; each limit is then verified with Floquet multipliers just below it (0.05 %), just
     above it, and on a ladder of depths beneath it, or up to ``max_depth`` where there is none. Where they disagree the
@@ -37,8 +37,9 @@ def certified_lobes(
     process
         Cutter and engagement.
     spindle_speeds : (n_speeds,), rad/s
-    max_depth
-        Depths above it are not looked for, m.
+        Spindle speeds at which limits are wanted.
+    max_depth : m
+        Largest axial depth that is searched.
 
     Raises
     ------

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from ..characteristic_roots.chatter_frequency import strongest_line
+from ..floquet.collocated_period import period_operator
 from ..floquet.floquet_multipliers import kind_of, monodromies
 from ..floquet.growing_cuts import unstable_cuts
-from ..floquet.period_operator import period_operator
 from ..milling_loop.delayed_state import DelaySystem
 from ..solvers.semi_discretisation_solver import semi_discretised
 from ..solvers.varied_limits import critical_motion
@@ -27,18 +27,18 @@ CLIMB = 1.15
 
 @dataclass(frozen=True)
 class SecondLook:
-    """One speed's limit found anew.
+    """Limit at one speed, found anew.
 
     Parameters
     ----------
-    depth
-        m; infinite where no cut of the ladder is unstable, NaN where nothing is known.
-    frequency
-        Hz; NaN where there is no limit.
+    depth : m
+        Limit; infinite where no cut of the ladder is unstable, NaN where nothing is known.
+    frequency : Hz
+        Chatter frequency; NaN where there is no limit.
     kind
-        As in ``StabilityLobes``.
+        Bifurcation, as in ``StabilityLobes``.
     status
-        As in ``StabilityLobes``.
+        Worth of the limit, as in ``StabilityLobes``.
     """
 
     depth: float
@@ -63,16 +63,16 @@ def second_look(
     ----------
     system
         Structure and process.
-    speed
-        rad/s.
-    claimed
-        Limit that the multipliers did not confirm, m; infinite where it was said that there is none.
-    max_depth
-        m.
-    first
-        Lowest rung, m.
+    speed : rad/s
+        Spindle speed of the cut.
+    claimed : m
+        Limit that the multipliers did not confirm; infinite where it was said that there is none.
+    max_depth : m
+        Largest axial depth that is searched.
+    first : m
+        Lowest depth of the ladder.
     ratio
-        Of two depths of the ladder.
+        Ratio of two neighbouring depths of the ladder.
     """
     rungs = ladder(first, max_depth, ratio)
     if np.isfinite(claimed):

@@ -51,19 +51,20 @@ def ladder(first: float, top: float, ratio: float = RUNG) -> Real:
 
 
 def verify(system: DelaySystem, speeds: Real, limits: Real, max_depth: float, first: float) -> Verification:
-    """Ask the multipliers about lowest limits.
+    """Check lowest limits with Floquet multipliers.
 
     Parameters
     ----------
     system
         Structure and process.
     speeds : (n_speeds,), rad/s
+        Spindle speeds of the limits.
     limits : (n_speeds,), m
-        Infinite where there is said to be none.
-    max_depth
-        Up to which the ladder goes where there is no limit, m.
-    first
-        Lowest rung, m.
+        Lowest limits; infinite where there is said to be none.
+    max_depth : m
+        Depth up to which the ladder goes where there is no limit.
+    first : m
+        Lowest depth of the ladder.
     """
     limited = np.isfinite(limits)
     tops = np.where(limited, (1 - JUST) * np.where(limited, limits, 1.0), max_depth)

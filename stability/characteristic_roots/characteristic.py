@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -33,15 +33,15 @@ def values(
     Parameters
     ----------
     series : (n_windows, n_powers, n, n)
-        Of one speed, as in ``TransitionSeries``.
+        Power series of the transition at one speed, as in ``TransitionSeries``.
     needed : (16,)
         Powers that matter in each sixteenth of the radius.
-    radius
-        m.
+    radius : m
+        Largest ``|b|`` that the series are made for.
     theta, depth : (count or more,)
-        rad, m.
+        Arguments of the multiplier (rad) and axial depths (m) at the points.
     work
-        From :func:`workspace`.
+        Work arrays, made by :func:`workspace`.
     out : (count or more,)
         Receives F, or zero where F is lost in rounding: where M has grown by seven orders of magnitude or so.
     """

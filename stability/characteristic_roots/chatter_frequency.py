@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..floquet.period_operator import PeriodOperator, period_operator
+from ..floquet.collocated_period import PeriodOperator, period_operator
 from ..milling_loop.delayed_state import DelaySystem
 from .crossings import Crossings
 
@@ -47,18 +47,18 @@ def strongest_lines(system: DelaySystem, operator: PeriodOperator, found: Crossi
 
 
 def strongest_line(system: DelaySystem, speed: float, depth: float, multiplier: complex) -> float:
-    """Frequency (Hz) of the strongest line of one motion whose multiplier lies on the circle, or near it.
+    """Give the frequency (Hz) of the strongest line of one motion whose multiplier lies on the circle, or near it.
 
     Parameters
     ----------
     system
         Structure and process.
-    speed
-        Of the spindle, rad/s.
-    depth
-        m.
+    speed : rad/s
+        Spindle speed of the cut.
+    depth : m
+        Axial depth of cut.
     multiplier
-        Of the motion.
+        Floquet multiplier of the motion.
     """
     operator = period_operator(system, np.array([2 * np.pi / (system.process.teeth * speed)]))
     theta = np.array([abs(float(np.angle(multiplier)))])

@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 
-from ..floquet.transition_series import TransitionSeries
+from ..floquet.depth_series import TransitionSeries
 from ..milling_loop.delayed_state import DelaySystem
 from .characteristic import eliminate, transition
 from .crossings import Crossings
@@ -18,14 +18,14 @@ Index = NDArray[np.int64]
 
 
 def critical_lines(system: DelaySystem, series: TransitionSeries, found: Crossings) -> Real:
-    """Frequency (Hz) of the strongest line of the tool's motion at each crossing, as ``strongest_lines``.
+    """Give the frequency (Hz) of the strongest line of the tool's motion at each crossing, as ``strongest_lines`` does.
 
     Parameters
     ----------
     system
         Structure and process.
     series
-        With chips.
+        Power series that keep the chips at the nodes.
     found
         Crossings at the series' speeds.
     """
@@ -120,14 +120,15 @@ def _lines(
     Parameters
     ----------
     series, chips, radius, windows, times, weights, periods
-        Of ``TransitionSeries``.
+        Fields of ``TransitionSeries``, of the same names.
     pushed, pushed_back : (n_nodes, n_modes)
         Modal forces per chip, of the poles and of their conjugates.
     poles, right
-        Of ``DelaySystem``.
+        Poles and right vectors of ``DelaySystem``.
     speeds, thetas, depths
-        Of ``Crossings``.
+        Fields ``speed``, ``theta`` and ``depth`` of ``Crossings``.
     result : (n_crossings,), Hz
+        Receives the frequency of the strongest line.
     """
     modes, size, nodes = len(poles), 2 * len(poles), len(times)
     chip = np.empty(nodes, dtype=np.complex128)

@@ -17,13 +17,14 @@ SLOPE_STEP = 1e-6
 
 @dataclass(frozen=True)
 class Crossings:
-    """Where multipliers cross the unit circle, one entry each, by speed and then by depth.
+    """Points at which multipliers cross the unit circle, one entry each, by speed and then by depth.
 
     Parameters
     ----------
     speed : (n,), int
         Index of the spindle speed.
     depth : (n,), m
+        Axial depth of the crossing.
     theta : (n,), rad
         Argument of the multiplier, 0 <= theta <= pi; pi is period doubling, 0 a fold.
     outward : (n,), bool
@@ -186,16 +187,16 @@ def _roots(
 
 
 def moved_depths(spectrum: Spectrum, found: Crossings) -> Real:
-    """How far another loop gain would move each depth, to first order, m.
+    """Estimate to first order how far another loop gain would move each depth, m.
 
     The root moves along the circle until the imaginary part vanishes again; at pi it stays where it is.
 
     Parameters
     ----------
     spectrum
-        Of the other loop gain: more nodes, fewer FRF lines ...
+        Function that gives the eigenvalues of the other loop gain: more nodes, fewer FRF lines ...
     found
-        Crossings of the first.
+        Crossings of the first loop gain.
     """
     if not len(found.depth):
         return np.zeros(0)
@@ -210,16 +211,16 @@ def moved_depths(spectrum: Spectrum, found: Crossings) -> Real:
 
 
 def followed(spectrum: Spectrum, found: Crossings, *, steps: int = 3) -> Crossings:
-    """Crossings moved to where they lie for another loop gain that differs little, by Newton's steps along the circle.
+    """Move crossings to where they lie for another loop gain that differs little, by Newton's steps along the circle.
 
     Parameters
     ----------
     spectrum
-        Of the other loop gain.
+        Function that gives the eigenvalues of the other loop gain.
     found
-        Crossings of the first.
+        Crossings of the first loop gain.
     steps
-        Of Newton's method.
+        Number of steps of Newton's method.
     """
     if not len(found.depth):
         return found

@@ -59,12 +59,12 @@ def stages(first: float, max_depth: float) -> list[tuple[float, float]]:
 
 
 def row_edges(bottom: float, top: float, growth: float) -> Real:
-    """Edges of the rows of cells between two depths (m): geometric, and finer where solutions grow fast.
+    """Give edges of the rows of cells between two depths (m): geometric, and finer where solutions grow fast.
 
     Parameters
     ----------
-    bottom, top
-        m.
+    bottom, top : m
+        Depths between which the rows lie.
     growth
         Exponent by which solutions grow over a period at ``top``, at most; it rises with the root of depth.
 

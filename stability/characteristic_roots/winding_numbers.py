@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 
 from .cell_search import clear, put, search
 from .characteristic import newton, values, workspace
@@ -38,9 +38,9 @@ def roots(
     Parameters
     ----------
     series, needed, radius
-        Of one speed, as for :func:`values`.
+        Power series of the transition at one speed, as for :func:`values`.
     edges : (n_rows + 1,), m
-        Of the rows of cells, increasing.
+        Depths that bound the rows of cells, increasing.
     angles : (n_angles,), rad
         Edges of cells in theta, increasing, the last pi.
     lowest
@@ -147,10 +147,12 @@ def refined(finer: Real, radius: float, speed: Index, theta: Real, depth: Real, 
     Parameters
     ----------
     finer : (n_speeds, n_windows, n_powers, n, n)
-    radius
-        m.
+        Power series with more nodes, as in ``TransitionSeries``.
+    radius : m
+        Largest ``|b|`` that the series are made for.
     speed, theta, depth, growth : (n_roots,)
-        Overwritten.
+        Index of the speed, argument of the multiplier (rad), depth (m) and growth of each root; the last three are
+        overwritten.
     error : (n_roots,), m
         Receives the error; the depth itself where the root is lost.
     """

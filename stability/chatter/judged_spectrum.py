@@ -15,21 +15,21 @@ MOST_POINTS = 1500
 
 @dataclass(frozen=True)
 class CutSpectrum:
-    """Spectrum of one channel in the second half of a recording, its spindle orders apart.
+    """Spectrum of one channel in the second half of a recording, with the orders of the spindle apart.
 
     Parameters
     ----------
     channel
-        Its number among the channels that were judged.
-    frequencies : (n_points,)
-        Hz, increasing.
+        Number of the channel among those that were judged.
+    frequencies : (n_points,), Hz
+        Frequencies of the points, increasing.
     amplitude : (n_points,)
         Root mean square of what does not repeat with the revolution, a line of resolution, in the unit of the samples;
         the largest within a point. NaN where an order of the spindle hides it.
     floor : (n_points,)
-        The same of the noise.
+        Root mean square of the noise floor, a line of resolution, in the unit of the samples.
     order_frequencies, order_amplitudes : (n_orders,)
-        Orders of the spindle that were taken away: Hz, and root mean square.
+        Frequencies (Hz) and root mean squares of the orders of the spindle that were taken away.
     """
 
     channel: int
@@ -41,14 +41,14 @@ class CutSpectrum:
 
 
 def cut_spectrum(evidence: Evidence, highest: float) -> CutSpectrum:
-    """The channel in which lines stand out most, up to a frequency.
+    """Give the spectrum of the channel in which lines stand out most, up to a frequency.
 
     Parameters
     ----------
     evidence
-        Of the recording, see :func:`gather_evidence`.
-    highest
-        Hz; no more than was searched is shown.
+        Evidence of the recording, from :func:`gather_evidence`.
+    highest : Hz
+        Highest frequency to show; no more than was searched is shown.
     """
     spectrum, spindle = evidence.spectrum, evidence.track.mean_frequency
     channel = _channel(evidence)

@@ -11,7 +11,7 @@ from foundation import InputError
 from modal_fit import ModalModel
 
 from ..milling_loop.delayed_state import delay_system
-from .period_operator import PeriodOperator, period_operator
+from .collocated_period import PeriodOperator, period_operator
 from .varied_edges import varied_cut
 
 Complex = NDArray[np.complex128]
@@ -25,8 +25,9 @@ class Multipliers:
     Parameters
     ----------
     values : (n,)
-    tooth_period
-        s; of a turn where the pitch is not equal.
+        Floquet multipliers, largest first.
+    tooth_period : s
+        Period of the tooth passing; of a turn where the pitch is not equal.
     """
 
     values: Complex
@@ -58,7 +59,7 @@ def kind_of(multiplier: complex) -> str:
 def multipliers(
     model: ModalModel, process: MillingProcess, spindle_speed: float, depth: float, *, extra_nodes: int = 0
 ) -> Multipliers:
-    """Floquet multipliers of a cut, by collocation split at tooth entry and exit.
+    """Compute the Floquet multipliers of a cut, by collocation split at tooth entry and exit.
 
     The chip at the nodes is ``h = E z + a G (h - h_before)`` with h_before a tooth period ago, and the structure goes
     on by ``z_next = Phi z + a S (h - h_before)``; both together are the monodromy operator of (z, h_before)
@@ -67,13 +68,13 @@ def multipliers(
     Parameters
     ----------
     model, process
-        Structure at the tool tip, and cut.
-    spindle_speed
-        rad/s.
-    depth
-        m.
+        Modal model at the tool tip, and cut.
+    spindle_speed : rad/s
+        Spindle speed of the cut.
+    depth : m
+        Axial depth of cut.
     extra_nodes
-        Nodes a piece beyond what the structure's fastest mode needs.
+        Number of nodes a piece beyond what the structure's fastest mode needs.
 
     Raises
     ------

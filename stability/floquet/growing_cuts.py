@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import ArpackError, eigs
 
 from ..milling_loop.delayed_state import DelaySystem
+from .collocated_period import period_operator
 from .floquet_multipliers import monodromies
-from .period_operator import period_operator
 from .varied_edges import varied_cut
 
 Real = NDArray[np.float64]
@@ -22,15 +22,16 @@ BATCH = 4_000_000
 
 
 def unstable_cuts(system: DelaySystem, speeds: Real, depths: Real, *, extra: int = 0) -> NDArray[np.bool_]:
-    """Whether a Floquet multiplier lies on or beyond the unit circle, at pairs of speed and depth.
+    """Decide whether a Floquet multiplier lies on or beyond the unit circle, at pairs of speed and depth.
 
     Parameters
     ----------
     system
         Structure and process.
-    speeds, depths : (n_pairs,), rad/s, m
+    speeds, depths : (n_pairs,)
+        Spindle speed (rad/s) and axial depth (m) of each cut.
     extra
-        Nodes a piece beyond what the structure's fastest mode needs.
+        Number of nodes a piece beyond what the structure's fastest mode needs.
 
     Raises
     ------

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .period_operator import PeriodOperator
+from .collocated_period import PeriodOperator
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -10,7 +10,7 @@ from cutting import MillingProcess, damping_matrices, edge_matrices
 from foundation import InputError
 
 from ..milling_loop.delayed_state import DelaySystem
-from .period_operator import radau_nodes
+from .collocated_period import radau_nodes
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -28,15 +28,17 @@ class VariedCut:
     Parameters
     ----------
     monodromy : (size, size)
-        From (z, Y) of one period to those of the next.
-    force : (n_nodes * n_directions, size)
-        Force at the nodes, N, from (z, Y).
+        Matrix that takes (z, Y) of one period to those of the next.
+    force : (n_nodes * n_directions, size), N
+        Matrix that gives the force at the nodes from (z, Y).
     times : (n_nodes,), s
+        Times of the nodes in the period.
     weights : (n_nodes,), s
-        Quadrature over the period.
+        Weights of the quadrature over the period.
     period : s
+        Period that is collocated: a tooth period, or a turn where the pitch is not equal.
     directions
-        In which the tool moves.
+        Indices of the directions in which the tool moves.
     """
 
     monodromy: Real

@@ -23,7 +23,7 @@ AVERAGED = ("zero-order", "nyquist")
 
 
 def depth_errors(structure: Frf | ModalModel, process: MillingProcess, lobes: StabilityLobes) -> Real:
-    """Standard error of each certified depth limit from those of structure and cutting coefficients, to first order.
+    """Estimate each certified limit's standard error from those of structure and cutting coefficients, to first order.
 
     ``var(a) = g^T C g + sum_k (da/dk)^2 std_k^2`` with g the limit's derivatives by the modal parameters (or by the
     FRF's lines) and k the coefficients K_tc, k_rc, k_ac; see :func:`limit_sensitivities`. Hopf, period doubling and
@@ -32,11 +32,11 @@ def depth_errors(structure: Frf | ModalModel, process: MillingProcess, lobes: St
     Parameters
     ----------
     structure
-        What the lobes were computed from.
+        FRF or modal model that the lobes were computed from.
     process
         Cutter and engagement, with the coefficients' standard errors where they are known.
     lobes
-        Of :func:`certified_lobes`.
+        Certified limits, from :func:`certified_lobes`.
 
     Returns
     -------

@@ -40,11 +40,12 @@ class LimitBand:
     Parameters
     ----------
     spindle_speeds : (n_speeds,), rad/s
+        Spindle speeds of the limits.
     low, high : (n_speeds,), m
-        ``high`` is infinite where the limit may lie above the largest depth looked at; both are NaN where nothing is
-        known.
+        Ends of the interval. ``high`` is infinite where the limit may lie above the largest depth looked at; both are
+        NaN where nothing is known.
     basis
-        One a speed: ``first-order``, ``samples``, or ``none``.
+        How the interval was found, one word a speed: ``first-order``, ``samples``, or ``none``.
     """
 
     spindle_speeds: Real
@@ -56,7 +57,7 @@ class LimitBand:
 def limit_band(
     structure: Frf | ModalModel, process: MillingProcess, lobes: StabilityLobes, max_depth: float, seed: int = 0
 ) -> LimitBand:
-    """95 % interval of each limit of ``certified_lobes``, from errors of the structure and the coefficients.
+    """Give the 95 % interval of each limit of ``certified_lobes``, from errors of the structure and the coefficients.
 
     Where the first order may fail (two lobes meet nearby, no limit was found, the error is large) 39 draws of a modal
     model are solved; a speed at which they contradict the first order has their smallest and largest limit instead. Of
@@ -65,11 +66,11 @@ def limit_band(
     Parameters
     ----------
     structure, process, lobes
-        As :func:`depth_errors`.
-    max_depth
-        Largest depth that draws are solved to, m.
+        Structure, cut and certified limits, as for :func:`depth_errors`.
+    max_depth : m
+        Largest depth up to which draws are solved.
     seed
-        Of the draws.
+        Seed of the generator that draws.
 
     Raises
     ------

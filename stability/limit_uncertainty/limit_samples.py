@@ -20,20 +20,20 @@ TRIES = 20
 
 
 def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> list[tuple[ModalModel, MillingProcess]]:
-    """Structures and cuts as they may be: normal draws from the model's covariance and the coefficients' errors.
+    """Draw structures and cuts from the model's covariance and the coefficients' errors, normally distributed.
 
     A draw with a pole that does not decay is drawn again; K_tc stays above a twentieth of its value.
 
     Parameters
     ----------
     model
-        With its covariance; without one it stays as it is.
+        Modal model with its covariance; without one it stays as it is.
     process
-        With the coefficients' standard errors; zero ones stay as they are.
+        Cut with the standard errors of its coefficients; zero ones stay as they are.
     count
-        How many.
+        Number of draws.
     seed
-        Of the generator.
+        Seed of the generator that draws.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def drawn(model: ModalModel, process: MillingProcess, count: int, seed: int) -> 
 def sampled_limits(
     model: ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float, count: int, seed: int = 0
 ) -> Real:
-    """Lowest limits of ``count`` draws, (count, n_speeds), m; infinite above ``max_depth``, 0 where not resolved.
+    """Give the lowest limits of ``count`` draws, (count, n_speeds), m; infinite above ``max_depth``, 0 if not resolved.
 
     By the solver of :func:`certified_lobes`. In place of its ladder each draw is asked once more for its multipliers
     at the lowest of its limits; a draw that is not stable just below it counts with 0.
@@ -78,10 +78,11 @@ def sampled_limits(
     Parameters
     ----------
     model, process, count, seed
-        As :func:`drawn`.
+        Modal model, cut, number of draws and seed, as for :func:`drawn`.
     spindle_speeds : (n_speeds,), rad/s
-    max_depth
-        Depths above it are not looked for, m.
+        Spindle speeds at which limits are wanted.
+    max_depth : m
+        Largest axial depth that is searched.
 
     Raises
     ------

@@ -30,7 +30,7 @@ STEEP = 0.02
 
 @dataclass(frozen=True)
 class LimitSensitivity:
-    """What a limit's depth changes by when the receptance at the lines of its motion changes.
+    """Derivatives of a limit's depth by the receptance at the lines of its motion and by the cutting coefficients.
 
     ``da = Re sum_q sum_ij weights[q, i, j] dH(lines[q])[i, j] + coefficients . (dK_tc, dk_rc, dk_ac)``
 
@@ -39,8 +39,9 @@ class LimitSensitivity:
     lines : (n_lines,), Hz
         Frequencies of the tool's motion at the limit, negative ones too.
     weights : (n_lines, 3, 3), N
+        Derivative of the depth by each entry of the receptance, at each line.
     coefficients : (3,)
-        da / dK_tc (m/Pa), da / dk_rc and da / dk_ac (m).
+        Derivatives of the depth: da / dK_tc (m/Pa), da / dk_rc and da / dk_ac (m).
     """
 
     lines: Real

@@ -27,11 +27,11 @@ def write_lobes(path: str | os.PathLike[str], lobes: StabilityLobes, *, provenan
     Parameters
     ----------
     path
-        File.
+        Lobes file to write, CSV.
     lobes
-        Their warnings are written above the headings, one ``# warning: ...`` a line.
+        Limits to write; their warnings are written above the headings, one ``# warning: ...`` a line.
     provenance
-        JSON without line breaks, written as ``# provenance: ...``; empty: none.
+        Sources and versions as JSON without line breaks, written as ``# provenance: ...``; empty: none.
 
     Raises
     ------

@@ -19,26 +19,27 @@ class StabilityLimits:
     ----------
     spindle_speeds : (n_speeds,), rad/s
         Speeds that were looked at, whether or not they have a limit.
-    max_depth
-        Largest depth that was looked at, m.
+    max_depth : m
+        Largest depth that was searched.
     speed : (n_limits,)
-        Index into ``spindle_speeds``.
+        Index of each limit's speed in ``spindle_speeds``.
     depth : (n_limits,), m
+        Axial depth of each limit.
     frequency : (n_limits,), Hz
-        Strongest line of the tool's motion there.
+        Frequency of the strongest line of the tool's motion at the limit.
     bifurcation
         ``hopf``, ``period-doubling`` or ``fold``, one a limit.
     change : (n_limits,)
-        How many multipliers more are unstable just above the depth: 2 or -2 (Hopf), 1 or -1 (the other two).
+        Change of the number of unstable multipliers just above the depth: 2 or -2 (Hopf), 1 or -1 (the other two).
     error : (n_limits,), m
         Estimated numerical error of the depth.
     method
-        Solver's name.
+        Name of the solver.
     warnings
-        One sentence each.
+        Doubts about the limits, one sentence each.
     resolved : (n_speeds,), m
-        Depth below which the search left nothing unresolved; infinite where that is so up to ``max_depth``. Empty when
-        made: infinite everywhere.
+        Depth below which the search left nothing unresolved; infinite where that is so up to ``max_depth``. If it is
+        left empty, it becomes infinite everywhere.
     """
 
     spindle_speeds: Real

@@ -14,10 +14,10 @@ class Piece:
 
     Parameters
     ----------
-    begin, end
-        Spindle angle from the beginning of the period, rad.
-    immersions
-        Of each engaged tooth at ``begin``, rad.
+    begin, end : rad
+        Spindle angles of begin and end, from the beginning of the period.
+    immersions : rad
+        Immersion angle of each engaged tooth at ``begin``.
     """
 
     begin: float

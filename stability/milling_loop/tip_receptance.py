@@ -24,15 +24,15 @@ class ToolReceptance:
     Parameters
     ----------
     evaluate
-        From frequencies (n,) Hz inside ``span`` to (n, 3, 3), m/N.
+        Function that takes frequencies (n,) in Hz inside ``span`` and gives the receptance (n, 3, 3), m/N.
     grid : (n_lines,), Hz
-        Fine enough that nothing between two lines is missed.
-    span
-        Lowest and highest frequency it is known at, Hz.
+        Frequencies so close that nothing between two of them is missed.
+    span : Hz
+        Lowest and highest frequency at which the receptance is known.
     warnings
-        One sentence each.
+        Doubts about the receptance, one sentence each.
     open_above
-        Whether it may be evaluated above ``span`` too, as a modal model.
+        Whether it may be evaluated above ``span`` too, as a modal model may.
     """
 
     evaluate: Callable[[Real], Complex]
@@ -51,7 +51,7 @@ def tool_receptance(structure: Frf | ModalModel, *, node: str | None = None) -> 
     Parameters
     ----------
     structure
-        With responses and excitations at the tool.
+        FRF or modal model with responses and excitations at the tool.
     node
         Name of the tool's node; None: the excitations' only node.
 
@@ -164,7 +164,7 @@ def _from_model(model: ModalModel, placed: Callable[[Complex], Complex]) -> Tool
 
 
 def reaching(source: ToolReceptance, force: Real, max_depth: float) -> ToolReceptance:
-    """A modal model's receptance followed up to where no depth that is asked for can close the loop.
+    """Follow a modal model's receptance up to where no depth that is asked for can close the loop.
 
     That is where ``2 a |force| |H|`` stays below 1: at high spindle speed a damped structure chatters far above its
     natural frequencies, since cutting stiffens it. A measured FRF ends where it ends.
@@ -172,11 +172,11 @@ def reaching(source: ToolReceptance, force: Real, max_depth: float) -> ToolRecep
     Parameters
     ----------
     source
-        Receptance.
+        Receptance at the tool; a measured one is returned as it is.
     force : (3, 3), Pa
-        Force per depth and motion.
-    max_depth
-        m.
+        Cutting force per depth and motion.
+    max_depth : m
+        Largest axial depth that is asked for.
     """
     if not source.open_above:
         return source

@@ -33,12 +33,12 @@ class StabilityBoundary:
     Parameters
     ----------
     limits
-        At each speed that was needed the lowest crossing; all of them where ``every_limit`` was asked for.
+        The lowest crossing at each speed that was needed, or all crossings where ``every_limit`` was asked for.
     tolerance
-        Between neighbouring speeds the lowest limit bends away from a straight line by less than this share of itself,
-        except where it jumps or has a corner; those are known in speed to 1e-4 of themselves.
+        Largest bend of the lowest limit away from a straight line between neighbouring speeds, as a share of the limit.
+        Jumps and corners are excepted; they are known in speed to 1e-4 of themselves.
     evaluations
-        Speeds that were solved for.
+        Number of speeds that were solved for.
     """
 
     limits: StabilityLimits
@@ -71,19 +71,19 @@ def trace_boundary(
     Parameters
     ----------
     structure, process
-        As for the solver.
-    lowest_speed, highest_speed
-        rad/s.
-    max_depth
-        m.
+        Structure at the tool tip and cut, as the solver takes them.
+    lowest_speed, highest_speed : rad/s
+        Spindle speeds between which the boundary is followed.
+    max_depth : m
+        Largest axial depth that is searched.
     tolerance
-        Of depth, as a share of it.
+        Largest error of a depth between two speeds, as a share of the depth.
     every_limit
         Hold all limits to the tolerance, not the lowest alone: islands are then drawn as finely.
     solver
-        Gives all limits at given speeds; collocation looks for the lowest alone unless all are wanted.
+        Function that gives all limits at given speeds; collocation looks for the lowest alone unless all are wanted.
     threads
-        Of collocation; None: one a core.
+        Number of threads of collocation; None: one a core.
 
     Raises
     ------
@@ -182,11 +182,13 @@ class StabilityGrid:
     Parameters
     ----------
     spindle_speeds : (n_speeds,), rad/s
+        Spindle speeds of the grid.
     depths : (n_depths,), m
+        Axial depths of the grid.
     unstable_multipliers : (n_speeds, n_depths)
-        Zero: stable.
+        Number of Floquet multipliers outside the unit circle; zero where the cut is stable.
     limits
-        From which it was filled.
+        The limits from which the grid was filled.
     """
 
     spindle_speeds: Real
@@ -208,12 +210,13 @@ def stability_grid(
     Parameters
     ----------
     model, process
-        As for :func:`collocation_limits`.
+        Modal model at the tool tip and cut, as :func:`collocation_limits` takes them.
     spindle_speeds : (n_speeds,), rad/s
+        Spindle speeds of the grid.
     depths : (n_depths,), m
-        Zero or more.
+        Axial depths of the grid, zero or more.
     threads
-        None: one a core.
+        Number of threads over which the speeds are spread; None: one a core.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from ..characteristic_roots.circle_crossings import CircleCrossings, circle_crossings
+from ..characteristic_roots.unit_circle import CircleCrossings, circle_crossings
 from ..lobes.stability_limits import StabilityLimits
 from ..lobes.stability_lobes import StabilityLobes
 from ..milling_loop.delayed_state import DelaySystem, delay_system
@@ -25,7 +25,7 @@ Index = NDArray[np.int64]
 def collocation(
     structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
 ) -> StabilityLobes:
-    """Lowest unstable depth at each speed; Hopf and period doubling.
+    """Give the lowest unstable depth at each speed; Hopf and period doubling.
 
     Parameters
     ----------
@@ -34,8 +34,9 @@ def collocation(
     process
         Cutter and engagement.
     spindle_speeds : (n_speeds,), rad/s
-    max_depth
-        Depths above it are not looked for, m.
+        Spindle speeds at which limits are wanted.
+    max_depth : m
+        Largest axial depth that is searched.
 
     Raises
     ------
@@ -53,7 +54,7 @@ def collocation_limits(
     *,
     threads: int = 1,
 ) -> StabilityLimits:
-    """All depths at which a Floquet multiplier crosses the unit circle, with frequency, kind and error.
+    """Find all depths at which a Floquet multiplier crosses the unit circle, with frequency, kind and error.
 
     Each tooth period is collocated on pieces between entries and exits (Butcher et al. 2009; Insperger & Stepan 2011),
     and 1 / depth is found as an eigenvalue of the loop gain on the unit circle, so no grid of depths is needed. With a
@@ -65,9 +66,9 @@ def collocation_limits(
     Parameters
     ----------
     structure, process, spindle_speeds, max_depth
-        As :func:`collocation`.
+        Modal model at the tool tip, cut, speeds (rad/s) and largest depth (m), as for :func:`collocation`.
     threads
-        Over which the speeds are spread.
+        Number of threads over which the speeds are spread.
 
     Raises
     ------
@@ -89,7 +90,7 @@ def lowest_limits(
     *,
     threads: int = 1,
 ) -> StabilityLimits:
-    """The lowest limit alone at each speed, several times faster than :func:`collocation_limits`.
+    """Find the lowest limit alone at each speed, several times faster than :func:`collocation_limits`.
 
     Depths are searched from zero up, and the search ends with the row of cells in which a limit has been found.
     Islands below the limit are seen.
@@ -97,7 +98,7 @@ def lowest_limits(
     Parameters
     ----------
     structure, process, spindle_speeds, max_depth, threads
-        As :func:`collocation_limits`.
+        Modal model, cut, speeds (rad/s), largest depth (m) and threads, as for :func:`collocation_limits`.
 
     Raises
     ------

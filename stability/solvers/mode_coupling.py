@@ -23,10 +23,11 @@ class ModeCouplingLimit:
 
     Parameters
     ----------
-    depth
-        m; infinite where there is none up to the largest depth.
-    frequency
-        Of the growing vibration, Hz; 0 where the tool is drawn in without oscillation; NaN where there is no limit.
+    depth : m
+        Lowest unstable depth; infinite where there is none up to the largest depth.
+    frequency : Hz
+        Frequency of the growing vibration; 0 where the tool is drawn in without oscillation; NaN where there is no
+        limit.
     kind
         ``hopf`` (two modes couple), ``fold`` (cutting stiffness exceeds the structure's), ``none``.
     """
@@ -39,7 +40,7 @@ class ModeCouplingLimit:
 def mode_coupling_limit(
     model: ModalModel, process: MillingProcess, max_depth: float, *, n_depths: int = 400
 ) -> ModeCouplingLimit:
-    """Stability of ``x' = (A + a K_tc B alpha_0 C) x``: the mean cutting force follows the tool's place alone.
+    """Judge the stability of ``x' = (A + a K_tc B alpha_0 C) x``: the mean force follows the tool's place alone.
 
     The robot's modes lie far below tooth passing, so that the force is its average over the tooth; the force's
     direction differs from the motion's, the matrix is not symmetric, and two close modes are drawn together until
@@ -54,10 +55,10 @@ def mode_coupling_limit(
         Structure at the tool tip, without residual flexibility.
     process
         Cutter and engagement; helix and pitch do not change the mean.
-    max_depth
-        m.
+    max_depth : m
+        Largest axial depth that is searched.
     n_depths
-        Steps of the scan; the limit is then halved to 1e-9 of ``max_depth``.
+        Number of steps of the scan; the limit is then halved to 1e-9 of ``max_depth``.
 
     Raises
     ------

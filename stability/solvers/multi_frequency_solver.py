@@ -38,17 +38,18 @@ CONVERGED = 2e-4
 def multi_frequency(
     structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
 ) -> StabilityLobes:
-    """Lowest unstable depth at each speed from FRF samples; Hopf and period doubling.
+    """Give the lowest unstable depth at each speed from FRF samples; Hopf and period doubling.
 
     Parameters
     ----------
     structure
-        Tip receptance, measured or modal.
+        Receptance at the tip, measured or modal.
     process
         Cutter and engagement.
     spindle_speeds : (n_speeds,), rad/s
-    max_depth
-        Depths above it are not looked for, m.
+        Spindle speeds at which limits are wanted.
+    max_depth : m
+        Largest axial depth that is searched.
 
     Raises
     ------
@@ -66,7 +67,7 @@ def multi_frequency_limits(
     *,
     lowest: bool = False,
 ) -> StabilityLimits:
-    """All limits from ``det[I - a (1 - exp(-i w tau)) K_tc alpha_(p-q) H(w + q w_T)] = 0``.
+    """Find all limits from ``det[I - a (1 - exp(-i w tau)) K_tc alpha_(p-q) H(w + q w_T)] = 0``.
 
     Forces at ``w + p w_T`` come from motions at ``w + q w_T`` through the harmonics of the directional matrix;
     harmonics at which the structure does not move drop out. The frequency above which it is taken to stand still is
@@ -83,9 +84,9 @@ def multi_frequency_limits(
     Parameters
     ----------
     structure, process, spindle_speeds, max_depth
-        As :func:`multi_frequency`.
+        Receptance, cut, speeds (rad/s) and largest depth (m), as for :func:`multi_frequency`.
     lowest
-        The lowest limits and those up to a tenth above them will do.
+        Whether the lowest limits, and those up to a tenth above them, suffice.
 
     Raises
     ------

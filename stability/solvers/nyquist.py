@@ -18,7 +18,7 @@ Real = NDArray[np.float64]
 def unstable_poles(
     structure: Frf | ModalModel, process: MillingProcess, spindle_speed: float, depths: Real
 ) -> NDArray[np.int64]:
-    """Number of unstable closed-loop pole pairs at each depth, by encirclements of the origin.
+    """Count the unstable closed-loop pole pairs at each depth, by encirclements of the origin.
 
     ``det[I - a K_tc alpha_0 mean_j(1 - exp(-s tau_j)) H(s)]`` is followed along the positive imaginary axis, process
     damping added as ``a s (C / V) P_0 H``; the structure itself is stable, so each turn of its argument by -2 pi is one
@@ -28,10 +28,11 @@ def unstable_poles(
     Parameters
     ----------
     structure, process
-        As for :func:`zero_order`.
-    spindle_speed
-        rad/s.
+        Receptance and cut, as for :func:`zero_order`.
+    spindle_speed : rad/s
+        Spindle speed of the cut.
     depths : (n_depths,), m
+        Axial depths at which poles are counted.
 
     Returns
     -------

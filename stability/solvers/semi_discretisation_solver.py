@@ -27,7 +27,7 @@ ORDERS = (1, 3)
 def semi_discretised_multipliers(
     model: ModalModel, process: MillingProcess, spindle_speed: float, depth: float, *, steps: int = 40, order: int = 1
 ) -> Multipliers:
-    """Floquet multipliers of a cut by semi-discretisation.
+    """Compute the Floquet multipliers of a cut by semi-discretisation.
 
     Order 1 is the classic: on each step the coefficients are their average and the delayed motion is a straight line;
     the multipliers converge with the square of the step (Insperger & Stepan, Semi-Discretization for Time-Delay
@@ -38,15 +38,15 @@ def semi_discretised_multipliers(
     Parameters
     ----------
     model, process
-        Structure at the tool tip, without residual flexibility, and cut.
-    spindle_speed
-        rad/s.
-    depth
-        m.
+        Modal model at the tool tip, without residual flexibility, and cut.
+    spindle_speed : rad/s
+        Spindle speed of the cut.
+    depth : m
+        Axial depth of cut.
     steps
-        In the cutting part of a tooth period, at least 4.
+        Number of steps in the cutting part of a tooth period, at least 4.
     order
-        Of the polynomial for the delayed motion, 1 or 3.
+        Degree of the polynomial for the delayed motion, 1 or 3.
 
     Raises
     ------

@@ -25,7 +25,7 @@ class _Limit:
 def varied_limits(
     system: DelaySystem, speeds: Real, max_depth: float, *, n_depths: int = 48, tolerance: float = 1e-7
 ) -> StabilityLimits:
-    """All depths at which multipliers cross the unit circle, by a scan over depth and halving.
+    """Find all depths at which multipliers cross the unit circle, by a scan over depth and halving.
 
     A crossing is where the number of unstable multipliers changes between two depths of the scan; an island thinner
     than a step, ``max_depth / n_depths``, may be missed, and the result says so. The stated error is what five more
@@ -36,12 +36,13 @@ def varied_limits(
     system
         Structure and process.
     speeds : (n_speeds,), rad/s
-    max_depth
-        m.
+        Spindle speeds at which limits are wanted.
+    max_depth : m
+        Largest axial depth that is searched.
     n_depths
-        Steps of the scan.
+        Number of steps of the scan.
     tolerance
-        Of the depth, as a share of ``max_depth``.
+        Largest error of a depth, as a share of ``max_depth``.
     """
     found = [
         (k, limit) for k, speed in enumerate(speeds) for limit in _at(system, speed, max_depth, n_depths, tolerance)

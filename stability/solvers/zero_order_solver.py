@@ -20,7 +20,7 @@ Real = NDArray[np.float64]
 def zero_order(
     structure: Frf | ModalModel, process: MillingProcess, spindle_speeds: Real, max_depth: float
 ) -> StabilityLobes:
-    """Depth limit at each speed from ``det[I - a K_tc alpha_0 (1 - exp(-i w tau)) H(w)] = 0``.
+    """Give the depth limit at each speed from ``det[I - a K_tc alpha_0 (1 - exp(-i w tau)) H(w)] = 0``.
 
     With an eigenvalue lambda(w) of ``alpha_0 H``, the depth is ``1 / (K_tc lambda (1 - exp(-i w tau)))`` where that is
     real and positive. Roots of its imaginary part are bracketed on every continuous branch of eigenvalues and refined
@@ -31,12 +31,13 @@ def zero_order(
     Parameters
     ----------
     structure
-        Tip receptance, measured or modal.
+        Receptance at the tip, measured or modal.
     process
         Cutter and engagement.
     spindle_speeds : (n_speeds,), rad/s
-    max_depth
-        Depths above it are not looked for, m.
+        Spindle speeds at which limits are wanted.
+    max_depth : m
+        Largest axial depth that is searched.
 
     Raises
     ------

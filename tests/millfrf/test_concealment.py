@@ -8,7 +8,7 @@ import pytest
 
 from foundation import InputError
 from millfrf.demonstration.concealment import ConcealOptions, run_concealed
-from millfrf.demonstration.concealment_table import concealment_table, direction_error, judgement
+from millfrf.demonstration.concealment_result import concealment_table, direction_error, judgement
 from millfrf.demonstration.seal import PADDED, open_seal, seal
 from replay_data.concealment.concealed_effect import FOREIGN, ConcealedEffect
 

@@ -19,7 +19,7 @@ from replay_data.concealment.concealed_effect import (
     draw_name,
     joint_scale,
 )
-from replay_data.concealment.posture_robot import posture_robot
+from replay_data.concealment.random_posture import posture_robot
 from replay_data.simulation.joint_march import tip_motion
 
 SECONDS = 8.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from replay_data.concealment.posture_robot import posture_robot
+from replay_data.concealment.random_posture import posture_robot
 from replay_data.simulation.joint_laws import JOINT_LAWS, joint_force, stretched
 from replay_data.simulation.joint_march import LINEAR, tip_motion
 

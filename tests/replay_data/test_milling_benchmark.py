@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cutting import MillingProcess
-from cutting.tooth_force import tooth_offsets
+from cutting.one_tooth import tooth_offsets
 from modal_fit import ModalModel
 from replay_data.robot_structure import TOOL_TIP
 from replay_data.simulation.material import material_named

@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from cutting import MillingProcess
-from cutting.tooth_force import rigid_force, tooth_force, tooth_offsets
+from cutting.one_tooth import rigid_force, tooth_force, tooth_offsets
 from modal_fit import ModalModel
 from replay_data import ConstantSpeed, LinearSweep, SpeedProfile, default_structure, table_one_model, tip_model
 from replay_data.simulation.material import material_named

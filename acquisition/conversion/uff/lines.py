@@ -20,11 +20,11 @@ class UffLines:
     Parameters
     ----------
     place
-        In the file, counted from 1.
+        Place of the data set in the file, counted from 1.
     kind
         Number of the data set.
     lines
-        Text of an 8-bit code page.
+        Lines of text of an 8-bit code page.
     """
 
     place: int
@@ -33,12 +33,12 @@ class UffLines:
 
 
 def read_uff_lines(path: Path, kinds: Collection[int]) -> tuple[UffLines, ...]:
-    """Lines of all data sets of the kinds asked for: for those that pyuff does not read, or not rightly.
+    """Read the lines of all data sets of given kinds: of those that pyuff does not read, or reads wrongly.
 
     Parameters
     ----------
     path, kinds
-        As in `read_uff_sets`.
+        Path of the file and numbers of the data sets, as in `read_uff_sets`.
 
     Raises
     ------

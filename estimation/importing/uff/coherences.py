@@ -27,12 +27,13 @@ class Coherence:
     Parameters
     ----------
     response, excitation
-        ``node:direction``.
+        Degrees of freedom, ``node:direction``.
     values : (n_frequencies,)
+        Ordinary coherence of each line, 0 to 1.
     has_reference
         Whether the file names a node of the excitation; some programs leave it out.
     source
-        File and place in it, for messages.
+        Name of the file and place in it, for messages.
     """
 
     response: str

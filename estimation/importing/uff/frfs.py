@@ -30,19 +30,19 @@ DataSet = dict[str, Any]
 
 @dataclass(frozen=True)
 class UffChoice:
-    """What a mapping says of a UFF file; each may be left out.
+    """The part of a mapping that concerns a UFF file; each field may be left out.
 
     Parameters
     ----------
     quantity, unit
-        Of the FRFs, where the file does not say it or says it wrong.
+        Quantity and unit of the FRFs, where the file does not say it or says it wrong.
     responses, excitations
         Degrees of freedom to take; empty: all.
     places
         Response and excitation of data sets by their place in the file, counted from 1; None: as the file says. Those
         that are not named are left out.
     conjugate
-        The file's phases stand for ``exp(-i w t)``.
+        Whether the file's phases stand for ``exp(-i w t)``.
     averages
         Number of averages behind each FRF; None: not known.
     """

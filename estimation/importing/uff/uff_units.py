@@ -16,16 +16,16 @@ _ASKED = 'write unit = "m/s^2/N" (or m/N, m/s/N, g/N ...) under [frf] in a mappi
 
 @dataclass(frozen=True)
 class StatedUnit:
-    """What FRFs are and how they become SI.
+    """Quantity and unit of FRFs, and the factor that takes them to SI.
 
     Parameters
     ----------
     quantity, unit
-        As in an `Frf`.
+        Quantity and unit, as in an `Frf`.
     factor
-        From the file's numbers to ``unit``.
+        Factor from the file's numbers to ``unit``.
     inferred, doubts
-        As in an `ImportedFrf`.
+        Sentences about what was inferred or left open, as in an `ImportedFrf`.
     """
 
     quantity: str
@@ -42,18 +42,18 @@ def stated_unit(
     quantity: str | None = None,
     unit: str | None = None,
 ) -> StatedUnit:
-    """Quantity, unit and factor of all FRFs of a file.
+    """Find quantity, unit and factor of all FRFs of a file.
 
     Parameters
     ----------
     path
-        For messages.
+        Path of the file, for messages.
     frfs
-        Data sets 58.
+        Data sets 58 of the file.
     units
         Data sets 164 of the file.
     quantity, unit
-        What a mapping says; it counts for more than the file.
+        Quantity and unit that a mapping states; they count for more than the file.
 
     Raises
     ------

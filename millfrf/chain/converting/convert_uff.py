@@ -84,16 +84,16 @@ def convert_geometry(source: str | os.PathLike[str], target: str | os.PathLike[s
 
 
 def write_imported(target: str | os.PathLike[str], found: ImportedFrf, files: Files) -> Told:
-    """Ask the gate about an FRF that comes from elsewhere, and write it by suffix, with its sources and doubts.
+    """Ask the gate about an FRF from another program, and write it by suffix, with its sources and doubts.
 
     Parameters
     ----------
     target
-        ``.h5``, ``.uff`` or ``.unv``.
+        File to write: ``.h5``, ``.uff`` or ``.unv``.
     found
-        What was read.
+        FRF that was read, with what was inferred.
     files
-        From which files.
+        Files from which it was read.
 
     Raises
     ------

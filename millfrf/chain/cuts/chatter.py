@@ -30,27 +30,27 @@ _CERTAIN = 0.01  # p-value below which its order of magnitude is enough
 
 @dataclass(frozen=True)
 class CutOptions:
-    """How cuts are judged.
+    """Options with which cuts are judged.
 
     Parameters
     ----------
     teeth
         Number of teeth.
-    speed_rpm
-        Spindle speed; None: what each recording states.
-    runout
-        Radial offset of the spindle's axis, m; NaN: not stated, see :func:`stability.classify_cut`.
-    chip
-        Thickest chip of the cut, m; NaN: not known.
+    speed_rpm : rpm
+        Spindle speed; None: the speed that each recording states.
+    runout : m
+        Radial offset of the spindle's axis; NaN: not stated, see :func:`stability.classify_cut`.
+    chip : m
+        Thickest chip of the cut; NaN: not known.
     responses
-        Channel names; empty: chosen by quantity.
+        Names of the channels; empty: chosen by quantity.
     stream
-        Sample clock; None: the only one.
+        Name of the sample clock; None: the only one.
     model
-        Of the structure; with it the line nearest to a mode is the chatter frequency. Where it is of the tip and the
-        tip's motion was recorded, unequal teeth are judged with it too. None: not known.
+        Modal model of the structure; with it the line nearest to a mode is the chatter frequency. Where it is of the
+        tip and the tip's motion was recorded, unequal teeth are judged with it too. None: not known.
     process
-        Cutter, to go with the model.
+        Milling process of the cut, to go with the model.
     """
 
     teeth: int
@@ -73,16 +73,16 @@ DERIVATIVES = {"acceleration": 2, "velocity": 1}
 
 @dataclass(frozen=True)
 class JudgedCut:
-    """A recording and what it says.
+    """A recording of a cut, with its verdict.
 
     Parameters
     ----------
     name
         Name of the recording's file.
-    stated_rpm
+    stated_rpm : rpm
         Spindle speed that the recording or the user states.
     verdict
-        See :class:`stability.ChatterVerdict`.
+        Verdict on the cut, see :class:`stability.ChatterVerdict`.
     """
 
     name: str

@@ -32,9 +32,9 @@ class KeptCut:
     channel
         Name of the channel whose spectrum is kept.
     unit
-        Of the spectrum.
+        Unit of the spectrum.
     spectrum
-        See :class:`stability.CutSpectrum`.
+        Spectrum of that channel, see :class:`stability.CutSpectrum`.
     """
 
     cut: JudgedCut

@@ -21,16 +21,16 @@ ABOVE = 1.5
 def keep_spectra(
     paths: Sequence[str | os.PathLike[str]], cuts: Sequence[JudgedCut], options: CutOptions, watch: Watch = silent
 ) -> tuple[KeptCut, ...]:
-    """The spectrum behind each verdict.
+    """Compute the spectrum behind each verdict.
 
     Parameters
     ----------
     paths
         Recordings, in the order of their verdicts.
     cuts
-        From :func:`millfrf.chain.cuts.chatter.judge_recordings` with the same options.
+        Judged cuts, from :func:`millfrf.chain.chatter.judge_recordings` with the same options.
     options
-        How they were judged.
+        Options with which they were judged.
     """
     kept = []
     for path, cut in zip(paths, cuts, strict=True):

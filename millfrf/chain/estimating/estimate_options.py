@@ -13,26 +13,26 @@ TITLES = {INSTRUMENTAL: "FRF by instrumental variables", LOCAL: "FRF by local po
 
 @dataclass(frozen=True)
 class EstimateOptions:
-    """How recordings are turned into an FRF.
+    """Options with which recordings are turned into an FRF.
 
     Parameters
     ----------
-    segment
-        Duration of a segment, s.
+    segment : s
+        Duration of a segment.
     overlap, window
-        As in :class:`estimation.SpectralSettings`.
+        Overlap and window of the segments, as in :class:`estimation.SpectralSettings`.
     stack
-        ``sum`` or ``side-by-side``.
+        Way of stacking tests: ``sum`` or ``side-by-side``.
     excitations, responses
-        Channel names; empty: chosen by quantity.
-    band
-        Lines to keep, Hz; None: all.
+        Names of the channels; empty: chosen by quantity.
+    band : Hz
+        Lowest and highest frequency of the lines to keep; None: all.
     stream
-        Sample clock; None: the only one.
+        Name of the sample clock; None: the only one.
     estimator
-        One of :data:`ESTIMATORS`; all but H1 take the tests together.
+        Estimator, one of :data:`ESTIMATORS`; all but H1 take the tests together.
     exclude
-        Leave out segments with overload, clipping or dropped samples.
+        Whether to leave out segments with overload, clipping or dropped samples.
     instruments
         Channels that drive the forces and that no disturbance reaches, for ``instrumental-variable``.
     """
@@ -52,18 +52,18 @@ class EstimateOptions:
 
 @dataclass(frozen=True)
 class Estimate:
-    """An FRF with what it was made from.
+    """An estimated FRF, with the spectra it was made from.
 
     Parameters
     ----------
     frf
-        In the recordings' own quantity (accelerance from accelerations).
+        FRF in the recordings' own quantity (accelerance from accelerations).
     tests
-        Spectra test by test.
+        Spectra, test by test.
     independence
-        Of the stacked inputs.
+        Independence of the stacked inputs, line by line.
     warnings
-        One sentence each.
+        Doubts about the FRF, one sentence each.
     """
 
     frf: Frf

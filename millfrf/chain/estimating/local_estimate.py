@@ -30,12 +30,12 @@ def band_records(
     highest: float,
     watch: Watch,
 ) -> tuple[BandRecord, ...]:
-    """Each recording up to ``highest`` (Hz).
+    """Read each recording up to ``highest`` (Hz).
 
     Parameters
     ----------
     names
-        Of excitations and responses; empty: chosen by quantity.
+        Names of excitations and responses; empty: chosen by quantity.
 
     Raises
     ------

@@ -19,26 +19,26 @@ KEPT_ABOVE = 1.6
 
 @dataclass(frozen=True)
 class FitOptions:
-    """How a model is fitted.
+    """Options with which a model is fitted.
 
     Parameters
     ----------
-    band
-        Hz.
+    band : Hz
+        Lowest and highest frequency of the fit.
     method
-        ``polyreference`` of an FRF, ``subspace`` of recordings.
+        Name of the method: ``polyreference`` of an FRF, ``subspace`` of recordings.
     max_order
         Highest order of the denominator or of the state space; None: by the data, or the method's own.
     n_modes
-        Modes to keep; None: as many as are found.
+        Number of modes to keep; None: as many as are found.
     excitations, responses
-        Channel names, for recordings; empty: chosen by quantity.
+        Names of the channels, for recordings; empty: chosen by quantity.
     stream
-        Sample clock, for recordings; None: the only one.
+        Name of the sample clock, for recordings; None: the only one.
     poles
         File of picked poles, for an FRF; None: the modes are chosen by the fit.
     refine
-        Refine picked poles; False: they are kept.
+        Whether picked poles are refined; False: they are kept.
     """
 
     band: tuple[float, float]

@@ -26,7 +26,7 @@ class ChannelLevel:
     Parameters
     ----------
     channel
-        Whose samples these are.
+        Channel whose samples these are.
     """
 
     channel: Channel

@@ -24,11 +24,11 @@ def write_cut_report(path: str | os.PathLike[str], found: CutDiagnosis, cut_name
     Parameters
     ----------
     path
-        Of the page.
+        File of the page.
     found
-        The diagnosis.
+        Diagnosis of the cut.
     cut_name
-        For the title.
+        Name of the cut, for the title.
     summary
         Verdict, a sentence on it, and a line for each finding.
     """

@@ -30,14 +30,14 @@ SPEEDS, LINES, DEEPEST = 240, 4000, 0.2
 
 
 def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProcess | None) -> Section:
-    """Depth limits of the nominal and of the improved structure, the latter at the weakest and strongest level.
+    """Compare depth limits of the nominal and the improved structure, the latter at the weakest and strongest level.
 
     Parameters
     ----------
     diagnosis
-        With something found.
+        Diagnosis in which something was found.
     process
-        Cut; None: a slot that is assumed.
+        Milling process of the cut; None: a slot that is assumed.
 
     Raises
     ------

@@ -40,13 +40,13 @@ def write_diagnosis_report(
     Parameters
     ----------
     path
-        Of the page.
+        File of the page.
     diagnosis
         Diagnosis of a structure, with its fits and maps.
     model_name
-        Of the nominal model, for the title.
+        Name of the nominal model, for the title.
     process
-        Cut for the lobes; None: one that is assumed.
+        Milling process for the lobes; None: one that is assumed.
 
     Raises
     ------

@@ -32,7 +32,7 @@ def write_robot_report(
     path
         The page; an older one is replaced.
     found
-        The diagnosis.
+        Diagnosis of the robot.
     robot_name
         Name of the robot, for the title.
     summary

@@ -1,7 +1,7 @@
 """Poles that an automatic fit did not take for modes, with the reasons, folded."""
 
 from ...tables.result_tables import Table
-from ..collect import SourceFile
+from ..collection import SourceFile
 from ..section import Fold
 
 

@@ -21,18 +21,18 @@ def has_lines(frf: Frf, band: Band) -> bool:
 
 
 def indicator_part(name: str, frf: Frf, model: ModalModel, band: Band) -> tuple[Picture, tuple[str, ...]]:
-    """The picture of both indicators in the band of a fit, and a sentence on peaks without a mode.
+    """Make the picture of both indicators in the band of a fit, and a sentence on peaks without a mode.
 
     Parameters
     ----------
     name
-        File of the model.
+        Name of the model's file.
     frf
-        What it was fitted to.
+        FRF to which the model was fitted.
     model
-        Its modes are marked.
-    band
-        Hz.
+        Modal model whose modes are marked.
+    band : Hz
+        Lowest and highest frequency of the fit.
     """
     indicator, multivariate = complex_mode_indicator(frf, band), multivariate_mode_indicator(frf, band)
     single = len(multivariate.references) == 1

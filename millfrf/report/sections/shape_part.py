@@ -3,8 +3,8 @@
 from figures import as_data_uri, assurance_figure, compass_figure, mode_figure
 from modal_fit import ModalModel, ModeShapes
 
+from ...tables.mode_shapes import shape_table, shapes_of
 from ...tables.result_tables import Table
-from ...tables.shape_table import shape_table, shapes_of
 from ..section import Picture
 
 FEW = 6
@@ -18,14 +18,14 @@ ALIKE = 0.9
 
 
 def shape_part(name: str, model: ModalModel) -> tuple[tuple[Table, ...], tuple[Picture, ...], tuple[str, ...]]:
-    """Tables, pictures and sentences on the shapes of a model, empty where it has none.
+    """Give tables, pictures and sentences on the shapes of a model, empty where it has none.
 
     Parameters
     ----------
     name
-        File of the model.
+        Name of the model's file.
     model
-        With at least two degrees of freedom on one side.
+        Modal model with at least two degrees of freedom on one side.
     """
     shapes, table = shapes_of(model), shape_table(model, f"{name}: mode shapes")
     if shapes is None or table is None:

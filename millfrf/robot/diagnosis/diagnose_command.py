@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ...commands.options import check_shares
+from ...options import check_shares
 
 
 def diagnose(

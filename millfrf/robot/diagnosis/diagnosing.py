@@ -19,8 +19,8 @@ from mismatch.inference import write_diagnosis
 from modal_fit import write_modal_model
 from robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot, tool_down
 
-from ...commands.options import check_band
 from ...gate import RECORD_AGAIN, check_channels
+from ...options import check_band
 from ...progress import bar
 from ...report.diagnoses.robot_diagnosis_page import write_robot_report
 from ...result_folder import refuse_file

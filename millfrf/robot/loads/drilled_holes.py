@@ -31,7 +31,7 @@ from robot_model import (
 )
 from robot_model.spatial.weight import NO_MASSES
 
-from ...commands.options import check_output
+from ...options import check_output
 from ...tables.result_tables import Table, show
 from ..asked_loads import Loads, check_axis, check_places, check_positive
 from ..postures import spatial

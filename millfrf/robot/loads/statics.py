@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from foundation import writing_whole_file
 from robot_model import PlanarCase, PostureResult, SpatialCase, in_posture, read_robot, shown_values
 
-from ...commands.options import check_output
+from ...options import check_output
 from ...provenance import versions
 from ...tables.result_tables import Table, show
 from ..asked_loads import Loads, check_positive

@@ -14,7 +14,7 @@ Real = NDArray[np.float64]
 
 
 def depth_limits(models: Sequence[ModalModel], process: MillingProcess, spindle_speed: float, max_depth: float) -> Real:
-    """Largest stable depth of each model at one speed (rad/s), m, (n_models,); infinite above ``max_depth``.
+    """Give the largest stable depth of each model at one speed, m, (n_models,); infinite above ``max_depth``.
 
     :func:`stability.certified_lobes` of each model. Where the limit has a lower bound only, that bound; where it is
     not resolved, zero: no depth is proven there.
@@ -22,13 +22,13 @@ def depth_limits(models: Sequence[ModalModel], process: MillingProcess, spindle_
     Parameters
     ----------
     models
-        Receptances over TCP X, Y, Z in the axes of the cut.
+        Modal models of receptances over TCP X, Y, Z in the axes of the cut.
     process
         Cutter and engagement.
-    spindle_speed
-        rad/s.
-    max_depth
-        Depths above it are not looked for, m.
+    spindle_speed : rad/s
+        Spindle speed of the cut.
+    max_depth : m
+        Largest axial depth that is searched.
 
     Raises
     ------

@@ -13,8 +13,8 @@ from robot_model import in_posture, read_robot
 from stability import with_residual_flexibility, write_lobes
 
 from ...chain.cuts.lobes import compute_lobes, lobes_summary, speed_axis
-from ...commands.options import check_output
 from ...gate import check_depth, check_speed, check_speeds, lowest_frequency, read_checked_cutting
+from ...options import check_output
 from ...progress import bar
 from ..postures import Asked, cut_place, posture_of, spatial
 from ..results import RPM, say_doubts

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..variable_projection.elimination import Elimination, Modes, Real
-from ..variable_projection.measured_lines import MeasuredLines
 from ..variable_projection.neighbourhood import half_power_lines
-from .candidates import Candidate
+from ..variable_projection.whitened_lines import MeasuredLines
+from .steady_poles import Candidate
 
 _COLOUR = 0.1  # correlation of neighbouring lines' errors from which a mode may stand for two
 _SHIFTS = (-1.0, 1.0)  # half bandwidths from the mode

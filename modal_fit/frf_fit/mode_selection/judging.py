@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..variable_projection.elimination import Elimination, Modes, Real, eliminate
-from ..variable_projection.measured_lines import MeasuredLines
 from ..variable_projection.neighbourhood import (
     around,
     half_power_lines,
@@ -16,8 +15,9 @@ from ..variable_projection.neighbourhood import (
     without_modes,
 )
 from ..variable_projection.refinement import refine
-from .candidates import Candidate
+from ..variable_projection.whitened_lines import MeasuredLines
 from .needed import CLEAN, NEAR, NEEDED, Trial, as_good_without, copy_of_near_mode, most_missed, unneeded
+from .steady_poles import Candidate
 
 _TRIAL_STEPS, _TRIAL_TOLERANCE = 12, 1e-3
 _DOUBTFUL = 0.4  # share of the orders below which a candidate is tried only where much is left
@@ -28,16 +28,16 @@ _NO_VIBRATION = 0.5  # damping ratio
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a trial said of a candidate.
+    """Result of the trial of a candidate.
 
     Parameters
     ----------
     reason
-        Why it is no mode; empty where it is one.
+        Reason why the candidate is no mode; empty where it is one.
     modes
         The modes of the neighbourhood with the candidate last, refined there.
     near : (n_modes,), bool
-        Which of the modes so far were refined with it.
+        Whether each of the modes so far was refined with it.
     """
 
     reason: str
@@ -56,11 +56,11 @@ def judge(candidate: Candidate, modes: Modes, found: Elimination, lines: Measure
     Parameters
     ----------
     candidate
-        Pole to try.
+        Candidate whose pole is tried.
     modes, found
-        Modes so far and their elimination.
+        Modes so far, and their elimination.
     lines
-        All lines.
+        All lines of the fit.
     """
     local, near, far_power = _neighbourhood(candidate, modes, found, lines)
     if candidate.share < _DOUBTFUL:
@@ -98,7 +98,7 @@ def judge_early(candidate: Candidate, modes: Modes, found: Elimination, lines: M
 
 
 def judge_again(candidate: Candidate, modes: Modes, found: Elimination, lines: MeasuredLines, *, thorough: bool) -> str:
-    """Weigh the last of the modes against the fit without it; the reason why it is not needed, or empty.
+    """Weigh the last of the modes against the fit without it; give the reason why it is not needed, or empty.
 
     With poles held, leaving a mode out raises the misfit at least as much as with the others refined. That is enough
     for a mode that stands alone; else the others are refined with and without it. A mode that overlaps no other stays,
@@ -107,11 +107,11 @@ def judge_again(candidate: Candidate, modes: Modes, found: Elimination, lines: M
     Parameters
     ----------
     candidate
-        The pole that the mode came from.
+        Candidate that the mode started from.
     modes, found
         All modes, the one in question last, and their elimination.
     lines
-        All lines.
+        All lines of the fit.
     thorough
         Whether to refine the others too where the mode passes with poles held but does not stand alone.
     """

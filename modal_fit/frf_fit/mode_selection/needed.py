@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from ...models.shape_measures import modal_assurance
 from ..variable_projection.elimination import Elimination, Modes, Real
-from ..variable_projection.measured_lines import MeasuredLines
 from ..variable_projection.neighbourhood import half_power_lines, mode_power, outside_power
-from .candidates import Candidate
+from ..variable_projection.whitened_lines import MeasuredLines
+from .steady_poles import Candidate
 
 CLEAN = 2.0  # misfit over the noise expected up to which noise alone decides
 _WHITE = 0.35  # correlation of neighbouring lines' errors up to which they are noise, whatever its level
@@ -33,11 +33,11 @@ class Trial:
     Parameters
     ----------
     lines
-        Of the neighbourhood, freed of the far modes.
+        Lines of the neighbourhood, from which the far modes are subtracted.
     before, after
-        Fit without and with the mode.
+        Fits without and with the mode.
     modes
-        The near modes, the one in question last.
+        The near modes; the mode in question stands last.
     far_power : (n_lines,)
         Power of the far modes on each line.
     """

@@ -7,12 +7,12 @@ import numpy as np
 
 from ...models.shape_measures import modal_assurance
 from ..variable_projection.elimination import Elimination, Modes, eliminate
-from ..variable_projection.measured_lines import MeasuredLines
 from ..variable_projection.neighbourhood import participations
 from ..variable_projection.outer_modes import inside, just_outside
 from ..variable_projection.refinement import refine
-from .candidates import Candidate
+from ..variable_projection.whitened_lines import MeasuredLines
 from .judging import judge, judge_again, judge_early
+from .steady_poles import Candidate
 
 _ROUNDS = 4
 _LOOKS = 3
@@ -23,18 +23,18 @@ _ALIKE = 0.9  # assurance of two participation vectors
 
 @dataclass(frozen=True)
 class Selection:
-    """Modes taken and candidates refused.
+    """Modes that were taken, and candidates that were refused.
 
     Parameters
     ----------
     modes
-        In the order in which they were taken.
+        Modes in the order in which they were taken.
     taken
         The candidate that each mode started from.
     refused
-        The others, each with its reason.
+        The other candidates, each with the reason why it was refused.
     lines
-        The lines with their last weights.
+        Lines of the fit with their last weights.
     """
 
     modes: Modes

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .measured_lines import MeasuredLines
+from .whitened_lines import MeasuredLines
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -13,13 +13,14 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Modes:
-    """What stays unknown after the elimination.
+    """The unknowns that remain after the elimination: poles and left vectors.
 
     Parameters
     ----------
     poles : (n_modes,), rad/s
+        Poles in the upper half plane.
     left : (n_modes, n_excitations)
-        The largest entry of each is 1, so that the pair of vectors has one scale.
+        Left vectors. The largest entry of each is 1, so that the pair of vectors has one scale.
     """
 
     poles: Complex
@@ -79,21 +80,22 @@ class Modes:
 
 @dataclass(frozen=True)
 class Elimination:
-    """Least squares over all that is linear.
+    """Least-squares solution of everything that is linear, with poles and left vectors given.
 
     Parameters
     ----------
-    orthogonal : (n_rows, n_columns), triangle : (n_columns, n_columns)
+    orthogonal, triangle : (n_rows, n_columns), (n_columns, n_columns)
         QR factors of the regressors, whose columns were divided by ``scale``. Rows are the real parts of all lines and
         columns of the FRF, then the imaginary parts.
     scale : (n_columns,)
+        Norm by which each column of the regressors was divided.
     solution : (n_columns, n_responses)
         Real and imaginary parts of the right vectors, then the out-of-band coefficients (term by term, excitation by
         excitation), of the whitened responses.
     error : (n_rows, n_responses)
-        What is left of the whitened responses.
+        Residual of the whitened responses.
     n_modes
-        Modes eliminated.
+        Number of modes that were eliminated.
     """
 
     orthogonal: Real

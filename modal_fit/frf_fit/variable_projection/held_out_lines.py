@@ -3,15 +3,15 @@
 import numpy as np
 
 from .elimination import Elimination, Modes, eliminate, predicted
-from .measured_lines import MeasuredLines
 from .refinement import refine
+from .whitened_lines import MeasuredLines
 
 _EVERY = 4  # each fourth line is held out
 _STEPS, _TOLERANCE = 10, 1e-4
 
 
 def holds_on_held_out_lines(start: Modes, refined: Modes, lines: MeasuredLines) -> bool:
-    """Whether refined modes predict held-out lines better than the start does.
+    """Decide whether refined modes predict held-out lines better than the start does.
 
     Every fourth line is left out. Both sets of modes get their linear part, and the refined ones a further refinement,
     from the lines that stay.
@@ -19,9 +19,9 @@ def holds_on_held_out_lines(start: Modes, refined: Modes, lines: MeasuredLines) 
     Parameters
     ----------
     start, refined
-        Modes before and after.
+        Modes before and after the refinement.
     lines
-        All lines.
+        All lines of the fit, of which some are held out.
     """
     left_out = np.arange(len(lines.s)) % _EVERY == _EVERY // 2
     seen, unseen = lines.part(~left_out), lines.part(left_out)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .elimination import Complex, Elimination, Modes, Real, shaped
-from .measured_lines import MeasuredLines
+from .whitened_lines import MeasuredLines
 
 _WIDTH = 6.0  # half widths of the pole's half-power band
 _FEWEST = 24  # lines
@@ -62,16 +62,16 @@ def outside_power(found: Elimination, lines: MeasuredLines) -> Real:
 
 
 def participation(pole: complex, lines: MeasuredLines, found: Elimination) -> Complex:
-    """Left vector of a new pole: the leading one of the residue matrix that what is left asks for.
+    """Give the left vector of a new pole: the leading one of the residue matrix that the residual asks for.
 
     Parameters
     ----------
-    pole
-        rad/s.
+    pole : rad/s
+        The new pole, in the upper half plane.
     lines
-        Where the residue matrix is fitted.
+        Lines on which the residue matrix is fitted.
     found
-        The fit without the pole; what it can explain itself is projected out.
+        Fit without the pole; the part of the lines that it can explain is projected out.
 
     Returns
     -------

@@ -36,12 +36,12 @@ def just_outside(pole: complex, band: tuple[float, float]) -> bool:
 
 
 def with_outer_as_residuals(model: ModalModel) -> ModalModel:
-    """The model with the modes outside its band moved to the residuals.
+    """Move the modes outside the band of a model to its residuals.
 
     Parameters
     ----------
     model
-        With a band, covariance and errors of all modes.
+        Modal model with a band, and with covariance and errors of all modes.
     """
     assert model.band is not None
     frequencies = model.natural_frequencies

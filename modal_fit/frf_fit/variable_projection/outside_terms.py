@@ -5,8 +5,8 @@ from dataclasses import replace
 
 from ...models.out_of_band import basis_with_poles, fixed_poles
 from .elimination import Modes
-from .measured_lines import MeasuredLines
 from .refinement import refine
+from .whitened_lines import MeasuredLines
 
 _FEWER: tuple[tuple[tuple[float, ...], tuple[float, ...]], ...] = (
     ((), (2.0,)),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .elimination import Complex, Elimination, Modes, Real, derivatives, eliminate
-from .measured_lines import MeasuredLines
+from .whitened_lines import MeasuredLines
 
 _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e8
@@ -32,15 +32,16 @@ class Refined:
 
 @dataclass(frozen=True)
 class NormalEquations:
-    """``matrix step = gradient`` of the real unknowns: real parts of poles and free left entries, then imaginary.
+    """Normal equations ``matrix step = gradient`` of the real unknowns: all real parts, then all imaginary parts.
 
     Parameters
     ----------
     matrix : (2 n_unknowns, 2 n_unknowns)
+        Normal matrix of real parts of poles and free left entries, then imaginary parts.
     gradient : (2 n_unknowns, n_responses)
-        One column a response; their sum is the gradient of half the cost, downhill.
+        Downhill gradient, one column a response; the sum of the columns is the gradient of half the cost.
     right : (n_unknowns, n_responses)
-        Right vectors' entry that each unknown is multiplied by.
+        Entries of the right vectors by which each unknown is multiplied.
     pieces : (2 n_unknowns, 2 n_unknowns)
         Products of the projected functions u and v.
     """
@@ -59,11 +60,11 @@ def refine(modes: Modes, lines: MeasuredLines, *, steps: int, tolerance: float) 
     Parameters
     ----------
     modes
-        Start; its poles must be stable and lie in the upper half plane.
+        Modes to start from; their poles must be stable and lie in the upper half plane.
     lines
-        What is fitted.
+        Lines that are fitted.
     steps
-        Most steps.
+        Largest number of steps.
     tolerance
         Relative gain of the cost below which the search ends.
     """

@@ -4,7 +4,7 @@ from estimation import Frf, to_receptance
 from figures import coherent_lines
 from modal_fit import ModalModel
 
-from ...collect import SourceFile
+from ...collection import SourceFile
 
 Band = tuple[float, float]
 
