@@ -10,7 +10,7 @@ from independent_cut import Mill, simulated
 from cutting import MillingProcess
 from millfrf.cut.diagnosis_words import summary
 from mismatch.adapters.cut import CutDiagnosis, CutRecording, SpindleLaw, cut_recording, diagnose_cut
-from mismatch.adapters.cut.recordings.cut_chatter import chatter_of
+from mismatch.adapters.cut.recordings import chatter_of
 
 CUT = MillingProcess(2, 12.7e-3, math.pi / 2, 119e6, 0.17, 0.33, math.pi / 2, math.pi, 0.15e-3)
 HELIX = math.radians(30)
@@ -29,13 +29,13 @@ def stands_together(found: CutDiagnosis) -> None:
     told = found.verdict in ("explained", "partly explained")
     assert told == bool(found.physics)
     assert (found.verdict == "explained") <= (found.leftover <= 0.08)
-    if found.final.freed:
+    if found.details.final.freed:
         assert found.improvement.after < found.improvement.refitted
         assert found.improvement.p_value < 0.01
     else:
         assert found.improvement.after == found.improvement.refitted
     lines = "\n".join(summary(found))
-    assert ("with it" in lines) == bool(found.final.freed)
+    assert ("with it" in lines) == bool(found.details.final.freed)
     assert "explained: at most 8 %" in lines
     assert lines.startswith(f"verdict: {found.verdict}")
 
@@ -45,7 +45,7 @@ def test_a_chattering_helical_cut_is_recognised_and_nothing_is_told() -> None:
     mill = Mill(depth=6e-3, helix=HELIX, offsets=(10e-6, -10e-6))
     found = diagnose_cut(CUT, mill.depth, [recorded(mill)])
     assert (found.verdict, found.physics) == ("unexplained", ())
-    assert found.chatter[0].kind == "hopf"
+    assert found.details.chatter[0].kind == "hopf"
     lines = summary(found)
     assert lines[1].startswith("cannot tell: the recording mill0 chatters")
     assert any("hopf, the line at" in line for line in lines)

@@ -13,7 +13,7 @@ from foundation import DegreeOfFreedom, InputError
 from modal_fit import ModalModel
 
 from ....records.trial import POWERS
-from .cut_recording import TIP, CutRecording, cut_recording
+from .recording import TIP, CutRecording, cut_recording
 from .spindle_law import stated_law
 
 Real = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Force coefficients within what a laboratory is usually off: what is refitted before any physics is blamed."""
+"""`Belief`: force coefficients and what a laboratory is usually off; they are refitted before a cause is named."""
 
 from dataclasses import dataclass, replace
 
@@ -10,7 +10,7 @@ from foundation import InputError
 
 Real = NDArray[np.float64]
 
-NAMES = ("ktc_pa", "krc", "kac", "kte_n_per_m", "kre_n_per_m", "kae_n_per_m")
+COEFFICIENT_NAMES = ("ktc_pa", "krc", "kac", "kte_n_per_m", "kre_n_per_m", "kae_n_per_m")
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,9 @@ class Belief:
     Parameters
     ----------
     process
-        As its file has it.
+        Cutting process as its file states it.
     error
-        e, a share.
+        One standard deviation e of what a coefficient is off, a share.
 
     Raises
     ------
@@ -55,7 +55,12 @@ class Belief:
         return np.concatenate([np.full(3, -40.0), -edges / self.scales[3:] - 1e-9])
 
     def process_at(self, deviations: Real) -> MillingProcess:
-        """The process with its coefficients moved by ``deviations`` (6,).
+        """The process with its coefficients moved.
+
+        Parameters
+        ----------
+        deviations : (6,)
+            Deviations u, in standard deviations.
 
         Examples
         --------
@@ -76,8 +81,18 @@ class Belief:
         )
 
     def told(self, deviations: Real, errors: Real) -> tuple[dict[str, float], dict[str, float]]:
-        """Coefficients and standard errors by the names of the cutting file."""
+        """Coefficients and standard errors by the names of the cutting file, SI.
+
+        Parameters
+        ----------
+        deviations : (6,)
+            Deviations u, in standard deviations.
+        errors : (6,)
+            Standard errors of the deviations.
+        """
         moved = self.process_at(deviations)
         values = (moved.ktc, moved.krc, moved.kac, moved.kte, moved.kre, moved.kae)
         spread = self.scales * errors * np.array([moved.ktc, 1.0, 1.0, 1.0, 1.0, 1.0])
-        return dict(zip(NAMES, values, strict=True)), dict(zip(NAMES, map(float, spread), strict=True))
+        return dict(zip(COEFFICIENT_NAMES, values, strict=True)), dict(
+            zip(COEFFICIENT_NAMES, map(float, spread), strict=True)
+        )

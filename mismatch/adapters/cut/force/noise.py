@@ -1,11 +1,11 @@
-"""Noise of force lines: a smooth floor under the orders, and what a right model is still off."""
+"""Noise of force spectra: a smooth floor under the orders, and what a right model is still off."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .force_lines import ForceLines
+from .spectra import ForceSpectra
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -14,7 +14,7 @@ WIDTH = 1.5
 """Width over which the floor is smooth, in spindle frequencies: orders fill less than half of it."""
 
 ODD = 9.0
-"""Power over the floor beyond which a line tells nothing of how channels' noise goes together."""
+"""Power over the floor beyond which a spectral line says nothing of the correlation between the channels' noise."""
 
 
 @dataclass(frozen=True)
@@ -24,11 +24,11 @@ class ForceNoise:
     Parameters
     ----------
     floor : (n_lines, n_axes)
-        Variance of a line.
+        Variance of each spectral line, N^2.
     together : (n_axes, n_axes)
         Correlation of the channels' noise.
     whitener : (n_blocks, n_lines, n_axes, n_axes)
-        W with ``W V W^H = 1``, V the covariance with the model's own error.
+        Matrix W with ``W V W^H = 1``, where V is the covariance of noise and of the model's usual error, 1/N.
     """
 
     floor: Real
@@ -36,25 +36,25 @@ class ForceNoise:
     whitener: Real
 
 
-def noise_of(lines: ForceLines, residual: Complex, shown: Complex, error: float) -> ForceNoise:
-    """Noise from what a rich fit leaves.
+def noise_of(spectra: ForceSpectra, residual: Complex, predicted: Complex, error: float) -> ForceNoise:
+    """Noise from what a fit with all causes leaves.
 
-    ``V = D R D + B e^2 diag |F|^2``: D^2 the running median of the residual's power over blocks and neighbouring
-    lines, over ln 2; R one correlation of the channels; and the share ``e`` by which each line F of a right computed
-    force is still off, which repeats from block to block: B times its square in each of B blocks tells as much
+    ``V = D R D + B e^2 diag |F|^2``. D^2 is the running median of the residual's power over blocks and neighbouring
+    lines, over ln 2. R is one correlation of the channels. e is the share by which each line F of a right computed
+    force is still off. This error repeats from block to block: B times its square in each of B blocks tells as much
     as once in their mean.
 
     Parameters
     ----------
-    lines
-        Of the recording.
-    residual, shown : (n_blocks, n_lines, n_axes)
-        What the fit leaves, and the force it computes.
+    spectra
+        Spectra of the recording.
+    residual, predicted : (n_blocks, n_lines, n_axes)
+        Spectra that the fit leaves and that it predicts, N.
     error
-        e.
+        Share e by which each line of a right computed force is still off.
     """
     power = np.abs(residual) ** 2
-    floor = _running_median(power, lines) / np.log(2)
+    floor = _running_median(power, spectra) / np.log(2)
     scaled = residual / np.sqrt(floor)
     plain = scaled[(np.abs(scaled) ** 2 < ODD).all(axis=-1)]
     together = np.real(plain.T @ plain.conj()) / max(len(plain), 1)
@@ -63,15 +63,15 @@ def noise_of(lines: ForceLines, residual: Complex, shown: Complex, error: float)
     together = 0.98 * together + 0.02 * np.eye(len(size))
     spread = np.sqrt(floor)
     smooth = spread[:, :, None] * together * spread[:, None, :]
-    own = lines.blocks * error**2 * np.abs(shown) ** 2
+    own = spectra.blocks * error**2 * np.abs(predicted) ** 2
     covariance = smooth[None] + own[..., None] * np.eye(len(size))
     return ForceNoise(floor, together, np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
-def _running_median(power: Real, lines: ForceLines) -> Real:
+def _running_median(power: Real, spectra: ForceSpectra) -> Real:
     """Median over blocks and lines about each line, (n_lines, n_axes)."""
-    spacing = float(lines.frequencies[1] - lines.frequencies[0])
-    rotation = lines.recording.law.speed / (2 * np.pi)
+    spacing = float(spectra.frequencies[1] - spectra.frequencies[0])
+    rotation = spectra.recording.law.speed / (2 * np.pi)
     half = max(4, round(0.5 * WIDTH * rotation / spacing))
     count = power.shape[1]
     centres = np.unique(np.clip(np.arange(0, count + half, max(1, half // 2)), 0, count - 1))
@@ -85,5 +85,13 @@ def _running_median(power: Real, lines: ForceLines) -> Real:
 
 
 def whitened(noise: ForceNoise, residual: Complex) -> Complex:
-    """``W r``, (n_blocks, n_lines, n_axes); of pure noise each has the mean power 1."""
+    """``W r``, (n_blocks, n_lines, n_axes): pure noise has the mean power 1 in each.
+
+    Parameters
+    ----------
+    noise
+        Noise of the recording.
+    residual : (n_blocks, n_lines, n_axes)
+        Measured less predicted spectra r, N.
+    """
     return np.asarray(np.einsum("bkpq,bkq->bkp", noise.whitener, residual))

@@ -1,4 +1,4 @@
-"""Spectral lines of forces in blocks of time: measured and computed are cut alike."""
+"""`ForceSpectra`: windowed spectra of the forces of one recording; measured and computed forces are treated alike."""
 
 from dataclasses import dataclass
 
@@ -7,34 +7,36 @@ from numpy.typing import NDArray
 from scipy.fft import prev_fast_len, rfft
 from scipy.signal.windows import tukey
 
-from ..recordings.cut_recording import MOST_ORDERS, CutRecording
+from ..recordings import MOST_ORDERS, CutRecording
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 TURNS = 16
-"""Revolutions of a block, at least: so many lines between neighbouring orders."""
+"""Least revolutions of a block: so many spectral lines lie between neighbouring orders."""
 
 MOST_BLOCKS = 16
+"""Most blocks of a recording: half of them must still fit a cause."""
 
 
 @dataclass(frozen=True)
-class ForceLines:
-    """One recording in blocks.
+class ForceSpectra:
+    """Spectra of one recording in blocks of time.
 
     Parameters
     ----------
     recording
-        What was cut.
+        The recording.
     first
         Sample at which the first block begins: earlier ones are the run-in.
     size, blocks
-        Samples of a block, and how many there are.
+        Samples of a block, and number of blocks.
     band : (n_lines,)
-        Which lines of a block are compared.
+        Numbers of the spectral lines that are compared.
     frequencies : (n_lines,), Hz
+        Frequencies of these lines.
     measured : (n_blocks, n_lines, n_axes)
-        Scaled so that white noise of variance v has variance v a line.
+        Spectra of the measured forces, scaled so that white noise of variance v has variance v in each line.
     """
 
     recording: CutRecording
@@ -45,8 +47,16 @@ class ForceLines:
     frequencies: Real
     measured: Complex
 
-    def cut(self, force: Real, fine: int = 1) -> Complex:
-        """Lines (n_blocks, n_lines, n) of forces (n_samples * fine, n) along the recording."""
+    def of(self, force: Real, fine: int = 1) -> Complex:
+        """Spectra of other forces along the recording, (n_blocks, n_lines, n).
+
+        Parameters
+        ----------
+        force : (n_samples * fine, n)
+            Forces, N.
+        fine
+            Instants in each sample.
+        """
         window = tukey(self.size * fine, 0.1, sym=False)
         window = window / np.sqrt(np.sum(window[::fine] ** 2)) / fine
         kept = force[self.first * fine : (self.first + self.size * self.blocks) * fine]
@@ -54,13 +64,15 @@ class ForceLines:
         return np.asarray(rfft(parts, axis=1)[:, self.band])
 
 
-def force_lines(recording: CutRecording, teeth: int) -> ForceLines:
-    """Cut a recording: the run-in and the end, where an integral has no future, are left out.
+def force_spectra(recording: CutRecording, teeth: int) -> ForceSpectra:
+    """Spectra of a recording without its run-in, and without its end, where integrated motion is not right.
 
     Parameters
     ----------
     recording
-        Of a cutter with ``teeth``.
+        The recording.
+    teeth
+        Number of teeth of its cutter.
     """
     rotation = recording.law.speed / (2 * np.pi)
     n = len(recording.force)
@@ -72,5 +84,5 @@ def force_lines(recording: CutRecording, teeth: int) -> ForceLines:
     axis = np.arange(size // 2 + 1) * recording.rate / size
     top = min(0.4 * recording.rate, (MOST_ORDERS + 0.5) * teeth * rotation)
     band = np.flatnonzero((axis >= max(2.5 * recording.corner, 3 * recording.rate / size)) & (axis <= top))
-    stub = ForceLines(recording, run_in, size, blocks, band, axis[band], np.zeros((0, 0, 0), dtype=complex))
-    return ForceLines(recording, run_in, size, blocks, band, axis[band], stub.cut(recording.force))
+    stub = ForceSpectra(recording, run_in, size, blocks, band, axis[band], np.zeros((0, 0, 0), dtype=complex))
+    return ForceSpectra(recording, run_in, size, blocks, band, axis[band], stub.of(recording.force))

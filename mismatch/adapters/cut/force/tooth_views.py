@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from cutting import MillingProcess
 
 from ..physics import ToothView
-from ..recordings.cut_recording import FINE, CutRecording
-from ..recordings.spindle_law import SpindleLaw
+from ..recordings import FINE, CutRecording, SpindleLaw
 
 Real = NDArray[np.float64]
 
@@ -25,13 +24,13 @@ class CutView:
     Parameters
     ----------
     count
-        Instants; ``fine`` of them a sample.
+        Number of instants.
     fine
-        Instants a sample.
+        Instants in each sample of the recording.
     teeth
-        One view each.
+        One view for each tooth.
     earlier
-        Tooth passings looked back.
+        Tooth passings that are looked back.
     """
 
     count: int
@@ -41,12 +40,20 @@ class CutView:
 
 
 def fineness(recording: CutRecording, top: float) -> int:
-    """Instants a sample that resolve entry and exit for frequencies up to ``top``, Hz."""
+    """Instants in each sample that resolve entry and exit.
+
+    Parameters
+    ----------
+    recording
+        Gives the sampling rate.
+    top
+        Highest frequency that is compared, Hz.
+    """
     return max(1, math.ceil(FINE * top / recording.rate - 0.25))
 
 
 def view_of(recording: CutRecording, process: MillingProcess, law: SpindleLaw, fine: int) -> CutView:
-    """Place the teeth.
+    """Where every tooth stands under a spindle law.
 
     Tooth j stands at ``phi_j = angle + 2 pi j / N``. Between two instants it enters or leaves: the share of the step
     that lies in the immersion weighs its force, which is taken at the middle of that part.
@@ -54,13 +61,13 @@ def view_of(recording: CutRecording, process: MillingProcess, law: SpindleLaw, f
     Parameters
     ----------
     recording
-        Its motion, if known, is what the teeth feel.
+        Gives instants and, where it is known, the tip's motion.
     process
-        Cutter, immersion.
+        Gives teeth, diameter, edge angle and immersion.
     law
-        Spindle.
+        Angle and speed of the spindle.
     fine
-        Instants a sample.
+        Instants in each sample.
     """
     count = len(recording.force) * fine
     times = np.arange(count) / (recording.rate * fine)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from cutting import MillingProcess
 from stability import classify_cut
 
-from .cut_recording import CutRecording
+from .recording import CutRecording
 
 UNSTABLE = ("hopf", "period-doubling")
 """Verdicts of :func:`stability.classify_cut` of a cut that is not stable."""
@@ -21,15 +21,15 @@ class CutChatter:
     Parameters
     ----------
     name
-        Of the recording.
+        Name of the recording.
     kind
-        As :class:`stability.ChatterVerdict`, or ``not judged``.
+        Kind of :class:`stability.ChatterVerdict`, or ``not judged``.
     frequency
-        Of chatter, Hz; NaN without.
+        Chatter frequency, Hz; NaN without chatter.
     share
-        Of the force's root mean square that chatter has.
+        Share of the force's root mean square that chatter has.
     reason
-        One sentence.
+        What the judgement rests on, in one sentence.
     """
 
     name: str
@@ -50,9 +50,9 @@ def chatter_of(recording: CutRecording, process: MillingProcess) -> CutChatter:
     Parameters
     ----------
     recording
-        Of a cut at constant or swept speed.
+        Recording of a cut at constant or swept speed.
     process
-        Its cutter.
+        Cutting process; it gives the number of teeth.
     """
     law, first = recording.law, min(int(recording.run_in * recording.rate), len(recording.force) // 4)
     seconds = len(recording.force) / recording.rate

@@ -9,7 +9,8 @@ from independent_cut import Mill, simulated
 
 from cutting import MillingProcess
 from foundation import InputError
-from mismatch import AcceptedCause, CutDiagnosis, CutRecording, SpindleLaw, cut_recording, diagnose_cut
+from mismatch.adapters.cut import CutDiagnosis, CutRecording, SpindleLaw, cut_recording, diagnose_cut
+from mismatch.inference import AcceptedCause
 from modal_fit import ModalModel
 from replay_data import (
     LinearSweep,
@@ -82,7 +83,7 @@ def test_runout_and_feedback_of_the_simulated_cell(noise: float) -> None:
     assert found.improvement.after < 1.4 * found.improvement.noise_floor
     assert found.improvement.p_value < 1e-3
     assert found.located["spindle_orders"][0] == 1
-    assert found.improved_process().runout == pytest.approx(15e-6, rel=0.02)
+    assert found.details.improved_process().runout == pytest.approx(15e-6, rel=0.02)
 
 
 def test_process_damping_runout_and_feedback_of_another_simulator() -> None:
@@ -93,7 +94,7 @@ def test_process_damping_runout_and_feedback_of_another_simulator() -> None:
     _holds(named["runout"], "radial_offset_m", 15e-6)
     _holds(named["regenerative_feedback"], "share", 1.0)
     _holds(named["process_damping"], "coefficient_n_per_m", 2e5)
-    assert found.improved_process().process_damping == pytest.approx(2e5, rel=0.06)
+    assert found.details.improved_process().process_damping == pytest.approx(2e5, rel=0.06)
 
 
 def test_process_damping_alone_is_not_taken_for_feedback() -> None:
@@ -121,7 +122,7 @@ def test_coefficients_within_a_labs_error_are_refitted_and_not_blamed() -> None:
     true = Mill(feedback=0.0, ktc=1.12 * 119e6, krc=0.2)
     found = diagnose_cut(CUT, DEPTH, [_of_mill(true)])
     assert found.verdict == "none"
-    improved = found.improved_process()
+    improved = found.details.improved_process()
     assert improved.ktc == pytest.approx(true.ktc, rel=0.01)
     assert improved.krc == pytest.approx(true.krc, abs=0.004)
     assert found.improvement.before > 0.1
@@ -140,7 +141,7 @@ def test_a_wrong_engagement_is_in_no_library_and_left_unexplained() -> None:
     found = diagnose_cut(CUT, DEPTH, [_of_mill(Mill(feedback=0.0, start=math.radians(75)))])
     assert (found.verdict, found.physics) == ("unexplained", ())
     assert found.leftover > 0.5
-    assert found.improved_process().runout == 0
+    assert found.details.improved_process().runout == 0
 
 
 def test_feedback_that_one_block_alone_shows_is_not_named() -> None:
