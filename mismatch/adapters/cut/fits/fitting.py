@@ -16,8 +16,8 @@ Real = NDArray[np.float64]
 DIFFERENCE = 0.05
 """Step of the finite differences, in units of the fit."""
 
-LIMITS = Limits(most=15, tolerance=0.1, idle=1, tries=2, lengthens=False)
-"""When a fit ends. Its units make the cost close to quadratic, so that longer steps are not worth their price."""
+LIMITS = Limits(most=15, tolerance=0.1, idle=1, tries=1, most_damping=10.0, lengthens=False)
+"""When a fit ends. In its units the cost is close to quadratic: a step that does not gain is damped, not shortened."""
 
 ALL = slice(None)
 
