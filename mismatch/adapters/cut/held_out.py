@@ -97,11 +97,13 @@ def improvement(cut: MeasuredCut, nominal: Halves, base: Halves, final: Halves, 
     floor = sum(noise.floor.sum() * spectra.blocks for noise, spectra in zip(cut.noise, cut.spectra, strict=True))
     plain, better = held_out_misfits(base), held_out_misfits(final)
     names = ", ".join(spectra.recording.name for spectra in cut.spectra)
-    errors = [float(np.sqrt(power / total)) for power in (before.sum(), refitted.sum(), after.sum(), floor)]
     return Improvement(
         f"{names}: every other block of time",
-        *errors,
-        p_value=proof.test(plain, better),
-        interval=ratio_interval(before, after),
-        evidence=float(np.sum(plain - better)),
+        float(np.sqrt(before.sum() / total)),
+        float(np.sqrt(refitted.sum() / total)),
+        float(np.sqrt(after.sum() / total)),
+        float(np.sqrt(floor / total)),
+        proof.test(plain, better),
+        ratio_interval(before, after),
+        float(np.sum(plain - better)),
     )

@@ -77,7 +77,7 @@ class FreeNumbers:
         fitted = [one.to_fit(value) for one, value in zip(self.parameters, values, strict=True)]
         spindle = np.zeros(3 * len(self.start.laws))
         parts = [self.start.deviations[: self.coefficients], np.array(fitted), spindle]
-        return np.clip(np.concatenate(parts), *self.bounds)
+        return np.asarray(np.clip(np.concatenate(parts), *self.bounds))
 
     def hypothesis(self, coordinates: Real) -> CutHypothesis:
         """The hypothesis at a point.
