@@ -4,7 +4,7 @@ from .channel import Channel
 from .conversion import ArrayFile, CsvOptions, UffLines, convert, open_arrays, read_uff_lines, read_uff_sets
 from .drivers import ReplaySource
 from .errors import DeviceError, DeviceTimeout, Disconnected, DiskFull, DriverMissing, Overrun
-from .recordings.aligner import Aligner, aligned_blocks, aligned_samples
+from .recordings.aligner import Aligner, aligned_blocks, aligned_samples, rows_left_out
 from .recordings.event_series import EventSeries
 from .recordings.record_source import record
 from .recordings.recording import Recording, Stream
@@ -51,4 +51,5 @@ __all__ = [
     "read_uff_sets",
     "record",
     "recover",
+    "rows_left_out",
 ]

@@ -19,8 +19,9 @@ from scipy.io import loadmat
 from scipy.optimize import least_squares
 from scipy.signal import csd, welch
 
+from estimation import BandRecording, channels_of
 from figures import COLOURS, house_style, new_figure
-from mismatch import Diagnosis, Trial, diagnose, linear_floor, seen_motion
+from mismatch import Diagnosis, diagnose, linear_floor, seen_motion
 from mismatch.models.model_terms import improved_model
 from mismatch.models.prediction import predict
 from modal_fit import ModalModel
@@ -80,10 +81,11 @@ def linear_model(signals: Signals) -> tuple[ModalModel, float]:
     return model, float(force.mean() - response.mean() * omega**2 / gain)
 
 
-def as_trial(name: str, signals: Signals, part: slice, silence: int = 0) -> Trial:
+def as_trial(name: str, signals: Signals, part: slice, silence: int = 0) -> BandRecording:
     """A piece of the record as a trial, with ``silence`` samples of zeros before and after."""
     force, response = (np.pad(one[part], silence)[:, None] for one in (signals.force, signals.response))
-    return Trial(name, RATE, force, response, np.zeros(1, dtype=np.int64), ("input", "output"))
+    channels = channels_of("force", ["TCP:+X"], ["input"]), channels_of("displacement", ["TCP:+X"], ["output"])
+    return BandRecording(name, RATE, force, response, *channels)
 
 
 def free_run(model: ModalModel, signals: Signals, part: slice) -> Real:

@@ -4,7 +4,7 @@ Nothing here knows about signals, models or the command line.
 """
 
 from .atomic_files import writing_whole_file
-from .degrees_of_freedom import DegreeOfFreedom
+from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom
 from .errors import FileFormatError, InputError, MillfrfError, MillfrfWarning
 from .noted_table import WARNING, apart, warning_lines
 from .results import Result, Summary, counted, drawing, listed, optional_library, same_values
@@ -13,7 +13,9 @@ from .units import SI_UNITS, si_factor, unit_factor
 from .valid_band import Band, checked_band, shared_band
 
 __all__ = [
+    "HOUSING",
     "SI_UNITS",
+    "TIP",
     "WARNING",
     "Band",
     "DegreeOfFreedom",

@@ -6,8 +6,7 @@ from .joints.joint_law import JointLaw, JointMotion
 from .models.fitting import Fit, fit, residual
 from .models.hypothesis import Cause, Explanation, predict_lines
 from .models.model_shape import LabError, ModelShape
-from .records.trial import Trial, band_of, read_trial, read_trials
-from .records.windowed_lines import WindowedLines, windowed_lines
+from .records.reading import band_of, read_recording, read_recordings
 from .screening.joint_direction import JointSighting, SeenMotion, find_direction, seen_motion
 from .screening.linear_floor import Floor, linear_floor
 
@@ -27,17 +26,14 @@ __all__ = [
     "ModelShape",
     "SeenMotion",
     "Settings",
-    "Trial",
-    "WindowedLines",
     "band_of",
     "diagnose",
     "find_direction",
     "fit",
     "linear_floor",
     "predict_lines",
-    "read_trial",
-    "read_trials",
+    "read_recording",
+    "read_recordings",
     "residual",
     "seen_motion",
-    "windowed_lines",
 ]

@@ -84,6 +84,11 @@ def relative_delays(stream: StreamDescription, names: Sequence[str]) -> list[flo
     return [known[name] - stream.common_delay for name in names]
 
 
+def rows_left_out(stream: Stream, names: Sequence[str]) -> int:
+    """Rows at the beginning that :func:`aligned_blocks` leaves out; 0 where no delay of named channels differs."""
+    return Aligner(relative_delays(stream.description, names), stream.sample_rate).skipped
+
+
 def aligned_blocks(stream: Stream, names: Sequence[str], block_length: int = 1 << 16) -> Iterator[Real]:
     """Rows of named channels with their known input delays taken out, block by block.
 

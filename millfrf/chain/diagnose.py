@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cutting import MillingProcess
-from mismatch import Diagnosis, Settings, diagnose, read_trials
+from mismatch import Diagnosis, Settings, diagnose, read_recordings
 from mismatch.inference.diagnosis_file import improved_model_of, write_diagnosis
 from mismatch.location.spindle_orders import SpindleSpeed, spindle_speed
-from mismatch.records.trial import measured_part
+from mismatch.records.reading import measured_part
 from modal_fit import read_modal_model, write_modal_model
 
 from ..gate import check_model_and_recordings
@@ -51,7 +51,7 @@ def diagnose_files(
     whole = read_modal_model(model_path)
     model = measured_part(whole, recordings, stream=stream)
     doubts = check_model_and_recordings(model_path, model, recordings, stream, watch)
-    trials = read_trials(recordings, model, stream=stream)
+    trials = read_recordings(recordings, model, stream=stream)
     with watch("diagnosing"):
         diagnosis = diagnose(model, trials, settings)
     diagnosis = replace(diagnosis, doubts=(*doubts, *diagnosis.doubts))

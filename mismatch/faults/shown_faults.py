@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft
 
-from ..records.trial import Trial
+from estimation import BandRecording
+
 from .saturation import saturated
 
 Real = NDArray[np.float64]
@@ -17,7 +18,7 @@ FAULTS = ("unmeasured_excitation", "clipping")
 """Names of causes that are no part of an explanation."""
 
 
-def with_faults(response: Real, trial: Trial, start: int, terms: Sequence[Term]) -> Real:
+def with_faults(response: Real, trial: BandRecording, start: int, terms: Sequence[Term]) -> Real:
     """A predicted response with the plain faults of a recording.
 
     A steady tone has no known phase in another recording: amplitude and phase are read from the recording at that one

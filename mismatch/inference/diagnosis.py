@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import WindowedSpectrum
+
 from ..models.fitting import Fit
 from ..models.hypothesis import Explanation
 from ..records.compared_band import ComparedBand
-from ..records.windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
 
@@ -125,9 +126,9 @@ class Diagnosis:
     leftover: float
     base: Fit
     final: Fit
-    lines: tuple[WindowedLines, ...]
+    lines: tuple[WindowedSpectrum, ...]
     elsewhere: tuple[Explanation, Explanation]
     located: dict[str, Any] = field(default_factory=dict)
     band: ComparedBand | None = None
     doubts: tuple[str, ...] = ()
-    measured: tuple[WindowedLines, ...] = ()
+    measured: tuple[WindowedSpectrum, ...] = ()

@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
+from estimation import BandRecording
+
 from ..inference.diagnosis import Diagnosis
-from ..records.trial import Trial
 from .family_wise import FAMILY_WISE, holm
 from .growth import Growth, growth
 from .residual_view import ResidualView, linear_part, residual_view
@@ -25,7 +26,7 @@ NO_ORDER = "no order of the spindle stands out of the residual beside it"
 
 def locate(
     diagnosis: Diagnosis,
-    trials: Sequence[Trial] | None = None,
+    trials: Sequence[BandRecording] | None = None,
     speeds: Mapping[str, SpindleSpeed] | None = None,
 ) -> dict[str, Any]:
     """Locate the mismatch of a diagnosis; plain content for its file.
@@ -150,7 +151,7 @@ def _named(key: str, names: Sequence[str], tables: Tables, p_value: Real) -> lis
 
 def _levels(view: ResidualView, tables: Tables, p_value: Real) -> list[dict[str, Any]]:
     rows = _named("recording", view.before.recordings, tables, p_value)
-    return [row | {"force_rms_n": _plain(one.trial.level)} for row, one in zip(rows, view.measured, strict=True)]
+    return [row | {"force_rms_n": _plain(one.recording.level)} for row, one in zip(rows, view.measured, strict=True)]
 
 
 def _cells(view: ResidualView, p_value: Real) -> list[list[int]]:

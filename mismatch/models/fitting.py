@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import WindowedSpectrum
+
 from ..noise.noise_model import NoiseModel
-from ..records.windowed_lines import WindowedLines
 from .hypothesis import Explanation, predict_lines
 from .jacobian import jacobian
 from .misfit import Assessed, assess, whitened, with_noise
@@ -53,7 +54,7 @@ class Fit:
 
 
 def fit(
-    lines: list[WindowedLines],
+    lines: list[WindowedSpectrum],
     start: Explanation,
     noises: tuple[NoiseModel, ...] | None = None,
     *,
@@ -108,7 +109,7 @@ def fit(
 
 def _descended(
     pool: ThreadPoolExecutor,
-    lines: list[WindowedLines],
+    lines: list[WindowedSpectrum],
     start: Explanation,
     noises: tuple[NoiseModel, ...] | None,
     limits: tuple[int, float],
@@ -143,7 +144,7 @@ def _descended(
     return explanation, seen, matrix
 
 
-def residual(fitted: Fit, lines: list[WindowedLines]) -> list[Complex]:
+def residual(fitted: Fit, lines: list[WindowedSpectrum]) -> list[Complex]:
     """What a fit leaves of each recording, (n_lines, n_responses)."""
     return [one.measured - predict_lines(fitted.explanation, one).response for one in lines]
 
@@ -155,14 +156,14 @@ def _solved(matrix: Real, gradient: Real) -> Real:
         return np.asarray(np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0], dtype=float)
 
 
-def _normal_of(lines: WindowedLines, explanation: Explanation, seen: Assessed) -> tuple[Real, Real]:
+def _normal_of(lines: WindowedSpectrum, explanation: Explanation, seen: Assessed) -> tuple[Real, Real]:
     slope = whitened(seen.white, jacobian(explanation, lines, seen.predicted))
     small = whitened(seen.white, seen.rest[:, :, None])[:, 0]
     return 2 * (slope.T @ slope), 2 * (slope.T @ small)
 
 
 def _normal_equations(
-    pool: ThreadPoolExecutor, lines: list[WindowedLines], explanation: Explanation, seen: list[Assessed]
+    pool: ThreadPoolExecutor, lines: list[WindowedSpectrum], explanation: Explanation, seen: list[Assessed]
 ) -> tuple[Real, Real]:
     """Normal equations with the lab's belief about u, and a belief so weak that it only keeps them solvable."""
     size, count = explanation.shape.size, explanation.size
@@ -177,7 +178,7 @@ def _normal_equations(
 
 def _downhill(
     pool: ThreadPoolExecutor,
-    lines: list[WindowedLines],
+    lines: list[WindowedSpectrum],
     here: Explanation,
     step: tuple[Real, float],
     seen: list[Assessed],
@@ -202,7 +203,7 @@ def _downhill(
 
 
 def _try(
-    pool: ThreadPoolExecutor, lines: list[WindowedLines], here: Explanation, step: Real, seen: list[Assessed]
+    pool: ThreadPoolExecutor, lines: list[WindowedSpectrum], here: Explanation, step: Real, seen: list[Assessed]
 ) -> tuple[Explanation, list[Assessed]]:
     """The explanation a step away, under the noise so far."""
     trial = _moved(here, step)

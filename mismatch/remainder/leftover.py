@@ -8,8 +8,9 @@ from scipy.fft import irfft
 from scipy.signal import ShortTimeFFT
 from scipy.signal.windows import hann
 
+from estimation import WindowedSpectrum
+
 from ..models.hypothesis import Explanation, predict_lines
-from ..records.windowed_lines import WindowedLines
 from .cell_regression import moving_power
 from .repeated_part import repeated_share
 
@@ -42,7 +43,7 @@ class Leftover:
     power: float
 
 
-def leftover(explanation: Explanation, lines: list[WindowedLines]) -> Leftover:
+def leftover(explanation: Explanation, lines: list[WindowedSpectrum]) -> Leftover:
     """How much of the residual moves with the predicted response.
 
     In cells of time and frequency the residual's power is regressed, with non-negative factors, on a constant (noise of
@@ -71,13 +72,13 @@ def leftover(explanation: Explanation, lines: list[WindowedLines]) -> Leftover:
     return Leftover(float(share), float(power))
 
 
-def _moving(explanation: Explanation, one: WindowedLines) -> Real:
+def _moving(explanation: Explanation, one: WindowedSpectrum) -> Real:
     """Share of the residual's power and of the response's that moves with the signal, (n_responses, 2)."""
     predicted = predict_lines(explanation, one)
-    n = len(one.trial.force)
+    n = len(one.recording.force)
     shown = irfft(predicted.spectrum, n=one.padded, axis=0)[:n]
-    rest = (one.trial.response - shown)[one.start : n - int(one.trial.rate) // 2]
-    shown = shown[one.start : n - int(one.trial.rate) // 2]
+    rest = (one.recording.response - shown)[one.start : n - int(one.recording.rate) // 2]
+    shown = shown[one.start : n - int(one.recording.rate) // 2]
     found = []
     for p in range(rest.shape[1]):
         r, s = _powers(rest[:, p], one), _powers(shown[:, p], one)
@@ -89,7 +90,7 @@ def _moving(explanation: Explanation, one: WindowedLines) -> Real:
     return np.array(found)
 
 
-def _repeating(explanation: Explanation, one: WindowedLines) -> Real:
+def _repeating(explanation: Explanation, one: WindowedSpectrum) -> Real:
     """Share of the residual's power and of the response's that repeats with the forces, (n_responses, 2)."""
     share = repeated_share(explanation, one)
     if not share.any():
@@ -103,10 +104,10 @@ def _shifts(count: int) -> list[int]:
     return sorted({max(1, round(count * share)) for share in np.linspace(0.12, 0.88, SHIFTS)})
 
 
-def _powers(signal: Real, lines: WindowedLines) -> Real:
+def _powers(signal: Real, lines: WindowedSpectrum) -> Real:
     """Power in cells, (n_bins, n_segments), in the band that is compared."""
-    length = int(SEGMENT * lines.trial.rate)
-    transform = ShortTimeFFT(hann(length, sym=False), length // 2, lines.trial.rate)
+    length = int(SEGMENT * lines.recording.rate)
+    transform = ShortTimeFFT(hann(length, sym=False), length // 2, lines.recording.rate)
     power = np.abs(transform.stft(signal, p0=1, p1=len(signal) // (length // 2))) ** 2
     inside = (transform.f >= lines.frequencies[0]) & (transform.f <= lines.frequencies[-1])
     return np.asarray(power[inside])

@@ -5,13 +5,14 @@ from functools import partial
 
 import numpy as np
 
+from estimation import WindowedSpectrum
+
 from ..adapters.structure.acceptance import LEAST_EVIDENCE, Option
 from ..inference.diagnosis import Candidate
 from ..inference.process_pool import side_by_side
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import direction_of
 from ..physics import JointPhysics, answer_name
-from ..records.windowed_lines import WindowedLines
 from .joint_direction import find_direction
 from .joint_screening import Screened, screen_joints
 from .linear_floor import linear_floor
@@ -51,7 +52,7 @@ class SightedLaws:
         return self.screened[0].gain if self.screened else 0.0
 
 
-def sighted_laws(lines: list[WindowedLines], current: Fit, laws: list[JointPhysics]) -> SightedLaws:
+def sighted_laws(lines: list[WindowedSpectrum], current: Fit, laws: list[JointPhysics]) -> SightedLaws:
     """Screen joint laws along the direction that stands out; nothing where none does."""
     taken = {answer_name(cause.physics) for cause in current.explanation.causes}
     laws = [law for law in laws if answer_name(law) not in taken]
@@ -67,7 +68,7 @@ def sighted_laws(lines: list[WindowedLines], current: Fit, laws: list[JointPhysi
 
 
 def joint_options(
-    lines: list[WindowedLines], current: Fit, sighted: SightedLaws, least: float, gained: float = 0.0
+    lines: list[WindowedSpectrum], current: Fit, sighted: SightedLaws, least: float, gained: float = 0.0
 ) -> list[Option]:
     """Fit the laws that promise most.
 
@@ -99,7 +100,7 @@ def joint_options(
     return [option for option in simulated if option is not None]
 
 
-def _driven(lines: list[WindowedLines], current: Fit, screened: Screened) -> Fit:
+def _driven(lines: list[WindowedSpectrum], current: Fit, screened: Screened) -> Fit:
     """A law fitted to the motion seen, from the better of its two best shapes."""
     rough = [one.thinned(FEW) for one in lines]
     starts = [
@@ -109,7 +110,7 @@ def _driven(lines: list[WindowedLines], current: Fit, screened: Screened) -> Fit
     return fit(lines, best.explanation, best.noises, iterations=4)
 
 
-def _simulated(lines: list[WindowedLines], near: Fit) -> Option | None:
+def _simulated(lines: list[WindowedSpectrum], near: Fit) -> Option | None:
     """The law of a driven fit, now free to move as it makes the structure move; None if that runs away."""
     last = near.explanation.causes[-1]
     free = replace(near.explanation, causes=(*near.explanation.causes[:-1], replace(last, seen=None)))

@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from estimation import WindowedSpectrum
+
 from ..adapters.structure.acceptance import Option
 from ..adapters.structure.settling import with_chain
 from ..inference.process_pool import side_by_side
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import Cause, Explanation
 from ..physics import FormedPhysics, answer_name
-from ..records.windowed_lines import WindowedLines
 from .chain_screening import ScreenedChain
 from .missing_mode import SightedMode
 
@@ -27,7 +28,7 @@ RESOLVED = 2.0
 
 
 def linear_options(
-    lines: list[WindowedLines], current: Fit, chains: list[ScreenedChain], mode: SightedMode, least: float
+    lines: list[WindowedSpectrum], current: Fit, chains: list[ScreenedChain], mode: SightedMode, least: float
 ) -> list[Option]:
     """Fit the linear causes that promise most.
 
@@ -56,11 +57,11 @@ def linear_options(
     return [option for option in side_by_side(tasks) if option is not None]
 
 
-def _chain_option(lines: list[WindowedLines], current: Fit, cause: Cause) -> Option:
+def _chain_option(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Option:
     return Option(answer_name(cause.physics), channel_of(cause), with_chain(lines, current, cause))
 
 
-def _mode_option(lines: list[WindowedLines], current: Fit, mode: SightedMode) -> Option | None:
+def _mode_option(lines: list[WindowedSpectrum], current: Fit, mode: SightedMode) -> Option | None:
     before, u = current.explanation.shape, current.explanation.u
     shape = before.with_mode(mode.pole, mode.right, mode.left)
     own, outside = u[: before.modal_size], u[before.modal_size :]
@@ -69,11 +70,11 @@ def _mode_option(lines: list[WindowedLines], current: Fit, mode: SightedMode) ->
     return Option("missing_mode", {}, fitted) if _is_resolved(fitted, lines) else None
 
 
-def _is_resolved(fitted: Fit, lines: list[WindowedLines]) -> bool:
+def _is_resolved(fitted: Fit, lines: list[WindowedSpectrum]) -> bool:
     """Whether the added mode is wider than the lines of a record: else it is a tone, or an accident of some lines."""
     pole = fitted.explanation.model.poles[-1]
     width = -float(pole.real) / np.pi
-    return width > RESOLVED * max(one.trial.rate / len(one.window) for one in lines)
+    return width > RESOLVED * max(one.recording.rate / len(one.window) for one in lines)
 
 
 def channel_of(cause: Cause) -> dict[str, Any]:

@@ -4,12 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from estimation import WindowedSpectrum
+
 from ..adapters.structure.acceptance import NOISE_LIKE, SMALL, Option, evidence_needed, gains, impossible, unexplained
 from ..inference.diagnosis import Candidate
 from ..inference.process_pool import side_by_side
 from ..models.fitting import Fit
 from ..physics import ChainPhysics, JointPhysics, Physics, answer_name
-from ..records.windowed_lines import WindowedLines
 from ..remainder.leftover import Leftover, leftover
 from .chain_screening import ScreenedChain, screen_chains
 from .joint_candidates import SightedLaws, joint_options, sighted_laws
@@ -44,7 +45,11 @@ class Round:
 
 
 def fitted_options(
-    lines: list[WindowedLines], current: Fit, base: Fit, causes: dict[str, Physics], moving: tuple[Leftover, Leftover]
+    lines: list[WindowedSpectrum],
+    current: Fit,
+    base: Fit,
+    causes: dict[str, Physics],
+    moving: tuple[Leftover, Leftover],
 ) -> Round:
     """Screen everything, fit what promises most.
 
@@ -82,7 +87,7 @@ def fitted_options(
 
 
 def _screened(
-    lines: list[WindowedLines], current: Fit, causes: dict[str, Physics], laws: list[JointPhysics]
+    lines: list[WindowedSpectrum], current: Fit, causes: dict[str, Physics], laws: list[JointPhysics]
 ) -> tuple[list[ScreenedChain], SightedMode, SightedLaws]:
     """What every cause promises, without a fit: linear ones not found yet, a further mode, joint laws."""
     own_noise, explanation = noise_floor(current, lines), current.explanation
@@ -109,7 +114,7 @@ def _best(options: list[Option], current: Fit) -> Option | None:
     return best if best is not None and gains(best, current) else None
 
 
-def _explains(best: Option | None, lines: list[WindowedLines], before: Leftover) -> bool:
+def _explains(best: Option | None, lines: list[WindowedSpectrum], before: Leftover) -> bool:
     """Whether an option leaves too little that moves with the signal to look further."""
     if best is None:
         return False
@@ -117,7 +122,7 @@ def _explains(best: Option | None, lines: list[WindowedLines], before: Leftover)
 
 
 def _joints_are_due(
-    best: Option | None, current: Fit, moving: tuple[Leftover, Leftover], lines: list[WindowedLines]
+    best: Option | None, current: Fit, moving: tuple[Leftover, Leftover], lines: list[WindowedSpectrum]
 ) -> bool:
     """Whether joint laws are tried beside linear causes: none was found, a mode may imitate them, or much is left."""
     if best is None and not current.explanation.causes:

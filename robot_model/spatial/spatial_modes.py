@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from estimation import Frf
-from foundation import InputError
+from foundation import TIP, InputError
 from modal_fit import ModalModel
 
 from ..finite_elements.generalised_coordinates import coordinate_basis
@@ -17,7 +17,6 @@ from .spatial_robot import SpatialRobot, structure_at
 
 Real = NDArray[np.float64]
 
-TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 TIP_ROTATIONS = ("TCP:+RX", "TCP:+RY", "TCP:+RZ")
 
 

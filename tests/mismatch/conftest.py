@@ -9,7 +9,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from mismatch import Diagnosis, Explanation, LabError, ModelShape, Trial, band_of, predict_lines, windowed_lines
+from estimation import BandRecording, channels_of, windowed_spectrum
+from mismatch import Diagnosis, Explanation, LabError, ModelShape, band_of, predict_lines
 from mismatch.inference.diagnosis import Improvement
 from mismatch.models.fitting import Fit
 from mismatch.noise.noise_model import KNOTS, NoiseModel
@@ -38,7 +39,7 @@ def model() -> ModalModel:
 
 
 @pytest.fixture(scope="session")
-def linear_trials() -> list[Trial]:
+def linear_trials() -> list[BandRecording]:
     rng = np.random.default_rng(3)
     made = []
     for name, level in (("low", 20.0), ("high", 60.0)):
@@ -48,6 +49,8 @@ def linear_trials() -> list[Trial]:
 
 
 RATE, NOISE = 128.0, 0.02
+FORCES = channels_of("force", ("TCP:+X", "TCP:+Y"), ("fx", "fy"))
+MOTIONS = channels_of("acceleration", ("TCP:+X", "TCP:+Y"), ("ax", "ay"))
 
 
 @pytest.fixture(scope="package")
@@ -69,33 +72,32 @@ def small_model() -> ModalModel:
 
 
 @pytest.fixture(scope="package")
-def trial_of() -> Callable[[ModalModel, str, float, int], Trial]:
+def trial_of() -> Callable[[ModalModel, str, float, int], BandRecording]:
     """Makes trials."""
     return _trial
 
 
 @pytest.fixture(scope="package")
-def hand_made() -> Callable[[ModalModel, list[Trial]], Diagnosis]:
+def hand_made() -> Callable[[ModalModel, list[BandRecording]], Diagnosis]:
     """Makes diagnoses without diagnosing."""
     return _hand_made
 
 
-def _trial(model: ModalModel, name: str, level: float, seed: int) -> Trial:
+def _trial(model: ModalModel, name: str, level: float, seed: int) -> BandRecording:
     """Broadband forces through the model, plus white noise on the accelerations."""
     rng = np.random.default_rng(seed)
     n = int(40 * RATE)
-    channels = ("fx", "fy", "ax", "ay")
     force = level * rng.normal(size=(n, 2))
-    empty = Trial(name, RATE, force, np.zeros((n, 2)), np.array([2, 2]), channels)
-    lines = windowed_lines(empty, band_of(model, RATE), 1.0)
+    empty = BandRecording(name, RATE, force, np.zeros((n, 2)), FORCES, MOTIONS)
+    lines = windowed_spectrum(empty, band_of(model, RATE), 1.0)
     shape = ModelShape(model, LabError())
     response = lines.signal(predict_lines(Explanation(shape, np.zeros(shape.size)), lines).spectrum)
-    return Trial(name, RATE, force, response + NOISE * rng.normal(size=(n, 2)), np.array([2, 2]), channels)
+    return BandRecording(name, RATE, force, response + NOISE * rng.normal(size=(n, 2)), FORCES, MOTIONS)
 
 
-def _hand_made(model: ModalModel, trials: list[Trial]) -> Diagnosis:
+def _hand_made(model: ModalModel, trials: list[BandRecording]) -> Diagnosis:
     """A diagnosis whose two fits are the true linear model with the true noise."""
-    lines = tuple(windowed_lines(trial, band_of(model, RATE), 1.0) for trial in trials)
+    lines = tuple(windowed_spectrum(trial, band_of(model, RATE), 1.0) for trial in trials)
     shape = ModelShape(model, LabError())
     knots = np.log(np.geomspace(lines[0].frequencies[0], lines[0].frequencies[-1], KNOTS))
     noise = NoiseModel(knots, np.full((2, KNOTS), np.log(NOISE**2)), np.full(2, -60.0))

@@ -8,10 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
-from acquisition import Channel, RecordingWriter, StreamDescription
-from foundation import InputError
+from acquisition import RecordingWriter, StreamDescription
+from estimation import BandRecording, channels_of
+from foundation import TIP, InputError
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from mismatch import Trial
 from mismatch.adapters.robot import PosedRecording, RobotDiagnosis, diagnose_robot, posed
 from mismatch.adapters.robot.robot_receptance import RobotModes, predicted_lines, robot_modes
 from mismatch.models.model_shape import LabError
@@ -33,7 +33,6 @@ ROBOT = read_spatial_robot(NAME).robot
 POSTURES = np.array([[0, -10, 100, 0, 90, 0], [20, 25, 70, 40, 60, 0], [-15, 45, 30, 80, -50, 0]])
 BAND = (5.0, 45.0)
 RATE = 160.0
-TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 NOTHING = np.zeros(6)
 
 
@@ -45,7 +44,7 @@ def milled(
     labels: tuple[str, ...] = TIP,
     seconds: float = 12.0,
     noise: float = 0.02,
-) -> Trial:
+) -> BandRecording:
     """Broad forces at the tip and the accelerations they cause, exactly by all modes; noise on both; posture in deg."""
     rng = np.random.default_rng(seed)
     columns = [TIP.index(label) for label in labels]
@@ -58,8 +57,11 @@ def milled(
     force = np.fft.irfft(pushed, n=n, axis=0)[:, columns]
     response = np.fft.irfft(moved * (2j * np.pi * lines[:, None]) ** 2, n=n, axis=0)[:, columns]
     noisy = [part + noise * part.std(axis=0) * rng.normal(size=part.shape) for part in (force, response)]
-    names = tuple(kind + label[-1].lower() for kind in "fa" for label in labels)
-    return Trial(f"posture {seed + 1}", RATE, *noisy, np.full(len(columns), 2), names)
+    channels = [
+        channels_of(quantity, labels, [quantity[0] + label[-1].lower() for label in labels])
+        for quantity in ("force", "acceleration")
+    ]
+    return BandRecording(f"posture {seed + 1}", RATE, noisy[0], noisy[1], *channels)
 
 
 def in_postures(
@@ -96,13 +98,10 @@ def test_a_softer_joint_is_named_with_its_stiffness_from_one_posture() -> None:
     assert modes_at(improved, q + offset).frequencies[:4] == pytest.approx(truth, rel=0.01)
 
 
-def write(path: Path, trial: Trial) -> Path:
+def write(path: Path, trial: BandRecording) -> Path:
     """A trial as a recording's file."""
-    channels = [
-        Channel(name, *(("force", "N") if name[0] == "f" else ("acceleration", "m/s^2")), "TCP", "+" + name[1].upper())
-        for name in trial.channels
-    ]
-    with RecordingWriter(path, [StreamDescription("main", RATE, 0.0, tuple(channels))], dtype="float64") as writer:
+    channels = (*trial.excitations, *trial.responses)
+    with RecordingWriter(path, [StreamDescription("main", RATE, 0.0, channels)], dtype="float64") as writer:
         writer.append("main", np.hstack([trial.force, trial.response]))
     return path
 

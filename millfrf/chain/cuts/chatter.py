@@ -11,7 +11,7 @@ import numpy as np
 
 from acquisition import Channel, Recording
 from cutting import MillingProcess
-from estimation import choose_channels
+from estimation import choose_channels, derivative_orders
 from foundation import DegreeOfFreedom, InputError
 from modal_fit import ModalModel
 from stability import ChatterVerdict, ModelledCut, classify_cut
@@ -65,10 +65,8 @@ class CutOptions:
 
 MOTION = ("displacement", "velocity", "acceleration")
 """Quantities whose size tells by how much the chip changes."""
-TIP = "TCP"
+TIP_NODE = "TCP"
 """Node of the tool's tip."""
-DERIVATIVES = {"acceleration": 2, "velocity": 1}
-"""How often a quantity is the time derivative of displacement; 0 for all others."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +123,7 @@ def judge_recordings(
                     rpm * math.pi / 30,
                     options.teeth,
                     runout=options.runout,
-                    derivatives=[DERIVATIVES.get(channel.quantity, 0) for channel in responses],
+                    derivatives=derivative_orders(responses).tolist(),
                     natural_frequencies=() if options.model is None else options.model.natural_frequencies.tolist(),
                     chip=options.chip if tool else math.nan,
                     tool=tool,
@@ -145,7 +143,7 @@ def tool_channels(channels: Sequence[Channel]) -> tuple[int, ...]:
     nodes = [channel.node for _, channel in across]
     if not nodes:
         return ()
-    chosen = TIP if TIP in nodes else nodes[0]
+    chosen = TIP_NODE if TIP_NODE in nodes else nodes[0]
     return tuple(number for number, channel in across if channel.node == chosen)
 
 
@@ -157,11 +155,11 @@ def modelled_cut(options: CutOptions, channels: Sequence[Channel]) -> ModelledCu
     there = {
         channel.direction[1:]: (number, -1 if channel.direction[:1] == "-" else 1)
         for number, channel in enumerate(channels)
-        if channel.quantity in MOTION and channel.node == TIP
+        if channel.quantity in MOTION and channel.node == TIP_NODE
     }
     for axis in "XY":
         ends = [
-            any((one.node, one.axis) == (TIP, axis) for one in map(DegreeOfFreedom.parse, names))
+            any((one.node, one.axis) == (TIP_NODE, axis) for one in map(DegreeOfFreedom.parse, names))
             for names in (model.responses, model.excitations)
         ]
         if axis not in there or not all(ends):

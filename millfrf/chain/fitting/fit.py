@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import Recording
-from estimation import BandRecord, Frf, band_record, choose_channels, widest_band
+from estimation import BandRecording, Frf, band_of_channels, choose_channels, widest_band
 from foundation import InputError, writing_whole_file
 from modal_fit import (
     ModalFit,
@@ -73,7 +73,7 @@ def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions,
     doubts = check_recordings(
         paths, stream=options.stream, excitations=options.excitations, responses=options.responses, watch=watch
     )
-    records = [_band_record(path, options, watch) for path in paths]
+    records = [_band_recording(path, options, watch) for path in paths]
     doubts += check_records(
         [record for record, _ in records],
         options.band,
@@ -90,13 +90,13 @@ def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions,
     return replace(fit, warnings=(*doubts, *fit.warnings, *fit_doubts(fit.reduced_chi_square, None)))
 
 
-def _band_record(path: str | os.PathLike[str], options: FitOptions, watch: Watch) -> tuple[BandRecord, float]:
+def _band_recording(path: str | os.PathLike[str], options: FitOptions, watch: Watch) -> tuple[BandRecording, float]:
     with Recording(path) as recording:
         stream = recording.stream(options.stream)
         channels = choose_channels(stream, options.excitations or None, options.responses or None)
         with watch(f"reading {Path(path).name}", stream.n_samples) as update:
             highest = max(options.band[1], min(KEPT_ABOVE * options.band[1], widest_band(stream.sample_rate)))
-            made = band_record(recording, highest, *channels, stream=options.stream, progress=update)
+            made = band_of_channels(stream, *channels, highest, update)
     return made, stream.sample_rate
 
 

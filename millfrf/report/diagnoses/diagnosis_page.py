@@ -11,8 +11,9 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from cutting import MillingProcess
+from estimation import BandRecording
 from foundation import writing_whole_file
-from mismatch import Diagnosis, Trial
+from mismatch import Diagnosis
 from mismatch.inference.process_pool import side_by_side
 from mismatch.location.locate import located
 from mismatch.location.residual_view import ResidualView, residual_view
@@ -34,7 +35,7 @@ from .diagnosis_sections import (
 
 
 def with_location(
-    diagnosis: Diagnosis, trials: Sequence[Trial], speeds: Mapping[str, SpindleSpeed]
+    diagnosis: Diagnosis, trials: Sequence[BandRecording], speeds: Mapping[str, SpindleSpeed]
 ) -> tuple[Diagnosis, ResidualView]:
     """Fill in ``located`` of a diagnosis, and make the maps for the page.
 
@@ -96,7 +97,7 @@ def report_text(view: ResidualView, model_name: str = "", process: MillingProces
     """The page as text."""
     diagnosis = view.diagnosis
     sections = (number_section(diagnosis), *_drawn_sections(view, process), candidate_section(diagnosis))
-    names = ", ".join(one.trial.name for one in diagnosis.lines)
+    names = ", ".join(one.recording.name for one in diagnosis.lines)
     environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
     return environment.get_template("diagnosis.html.j2").render(
         title=f"{model_name or 'Nominal model'} against {names}",

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cutting import MillingProcess
-from foundation import InputError
+from foundation import TIP, InputError
 from modal_fit import ModalModel
 from stability import certified_lobes
 
@@ -39,7 +39,7 @@ def depth_limits(models: Sequence[ModalModel], process: MillingProcess, spindle_
         raise InputError(f"spindle speed {spindle_speed!r} rad/s and depth {max_depth!r} m must be positive")
     speed, limits = np.array([spindle_speed]), np.empty(len(models))
     for i, model in enumerate(models):
-        if model.responses != ("TCP:+X", "TCP:+Y", "TCP:+Z") or model.excitations != model.responses:
+        if model.responses != TIP or model.excitations != model.responses:
             raise InputError(f"depth limits need a receptance over TCP:+X, +Y, +Z, not over {model.responses}")
         found = certified_lobes(model, process, speed, max_depth)
         limits[i] = 0.0 if found.status[0] == "unresolved" else found.depth_limits[0]

@@ -7,7 +7,7 @@ import numpy as np
 import typer
 
 from figures import lobes_figure, save_figure
-from foundation import InputError
+from foundation import TIP, InputError
 from modal_fit import ModalModel, Residuals
 from robot_model import in_posture, read_robot
 from stability import with_residual_flexibility, write_lobes
@@ -19,8 +19,6 @@ from ...progress import bar
 from ..postures import Asked, cut_place, posture_of, spatial
 from ..results import RPM, say_doubts
 from .posture_maps import depth_over_redundancy, write_posture_map
-
-TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 
 
 def at_the_tip(model: ModalModel) -> ModalModel:

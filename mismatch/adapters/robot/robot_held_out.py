@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 from scipy.stats import wilcoxon
 
-from ...records.windowed_lines import WindowedLines
+from estimation import WindowedSpectrum
+
 from .posed_recording import halves
 from .robot_receptance import RobotModes, predicted_lines
 from .robot_search import FreeFit, fit_from, free_fit
@@ -102,16 +103,16 @@ def tested(folds: Sequence[Fold], changes: Changes) -> Tested:
     return Tested(np.array(numbers), np.array(errors), np.array([fold.floor for fold in folds]), tuple(blocks))
 
 
-def block_errors(modes: RobotModes, lines: WindowedLines) -> Real:
+def block_errors(modes: RobotModes, lines: WindowedSpectrum) -> Real:
     """Squared error of a prediction in blocks of time, over the mean square response, (n_blocks,)."""
     frequencies = lines.padded_frequencies
     inside = (frequencies >= lines.frequencies[0]) & (frequencies <= lines.frequencies[-1])
-    rest = rfft(lines.trial.response, n=lines.padded, axis=0) * inside[:, None]
+    rest = rfft(lines.recording.response, n=lines.padded, axis=0) * inside[:, None]
     size = irfft(rest, n=lines.padded, axis=0)
     moved = np.einsum("kpq,kq->kp", modes.receptance(frequencies[inside]), lines.force_lines[inside])
     rest[inside] -= moved * lines.padded_kinematic[inside]
     left = irfft(rest, n=lines.padded, axis=0)
-    kept, length = slice(lines.start, lines.start + len(lines.window)), int(BLOCK * lines.trial.rate)
+    kept, length = slice(lines.start, lines.start + len(lines.window)), int(BLOCK * lines.recording.rate)
     count = len(lines.window) // length
     power = np.sum(left[kept][: count * length] ** 2, axis=1).reshape(count, length).mean(axis=1)
     return np.asarray(power / np.mean(np.sum(size[kept] ** 2, axis=1)))

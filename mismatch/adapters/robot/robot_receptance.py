@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from estimation import WindowedSpectrum
+from foundation import HOUSING, TIP
 from robot_model import SpatialRobot, housing_node, modes_at
 from robot_model.spatial.spatial_modes import modal_damping
 
 from ...models.model_shape import LabError
-from ...records.windowed_lines import WindowedLines
-from .posed_recording import HOUSING, TIP, PosedRecording
+from .posed_recording import PosedRecording
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -168,7 +169,7 @@ def robot_modes(robot: SpatialRobot, recording: PosedRecording, offset: Real, se
     )
 
 
-def predicted_lines(modes: RobotModes, lines: WindowedLines) -> Complex:
+def predicted_lines(modes: RobotModes, lines: WindowedSpectrum) -> Complex:
     """Windowed response lines (n_lines, n_responses) that the modes give for the recorded forces.
 
     Lines above 1.5 times the band are left out: they reach into it by leakage alone.
@@ -182,7 +183,7 @@ def predicted_lines(modes: RobotModes, lines: WindowedLines) -> Complex:
     return lines.cut(lines.signal(response))
 
 
-def quick_lines(modes: RobotModes, lines: WindowedLines) -> Complex:
+def quick_lines(modes: RobotModes, lines: WindowedSpectrum) -> Complex:
     """The same from the windowed forces, line by line: for searches and derivatives, no leakage."""
     moved = np.einsum("kpq,kq->kp", modes.receptance(lines.frequencies), lines.force_here)
     return np.asarray(moved * lines.kinematic)

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import WindowedSpectrum
+
 from ...models.fitting import Fit, fit
 from ...models.hypothesis import Cause, Explanation
 from ...physics import ChainPhysics, LimitedPhysics
-from ...records.windowed_lines import WindowedLines
 from ...remainder.leftover import Leftover
 
 Real = NDArray[np.float64]
@@ -117,7 +118,7 @@ def evidence_needed(current: Fit, base: Fit) -> float:
     return max(LEAST_EVIDENCE, share * (base.score - current.score))
 
 
-def worth_it(option: Option, current: Fit, base: Fit, lines: list[WindowedLines]) -> bool:
+def worth_it(option: Option, current: Fit, base: Fit, lines: list[WindowedSpectrum]) -> bool:
     """Enough evidence; and if it lies in the lab's belief alone, most of what the belief found odd.
 
     It must then be more likely, too, than that the lab was wrong in nothing but all dampings, or all frequencies.
@@ -140,7 +141,7 @@ def worth_it(option: Option, current: Fit, base: Fit, lines: list[WindowedLines]
     return gain > _plainer_gain(current, lines)
 
 
-def _plainer_gain(current: Fit, lines: list[WindowedLines]) -> float:
+def _plainer_gain(current: Fit, lines: list[WindowedSpectrum]) -> float:
     """What the score would gain if nothing were believed of the dampings, or of the frequencies."""
     shape = current.explanation.shape
     rows = shape.modal_rows(current.explanation.u)[: len(shape.nominal.poles) - shape.added]
@@ -148,14 +149,14 @@ def _plainer_gain(current: Fit, lines: list[WindowedLines]) -> float:
     return max(float(np.sum(rows[:, k] ** 2 - cost)) for k in (0, 1))
 
 
-def _places_of_a_mode(fitted: Fit, lines: list[WindowedLines]) -> float:
+def _places_of_a_mode(fitted: Fit, lines: list[WindowedSpectrum]) -> float:
     """Evidence that chance finds for the mode added last among all the places where one as narrow might lie."""
     pole = fitted.explanation.model.poles[-1]
     band = max(one.frequencies[-1] for one in lines) - min(one.frequencies[0] for one in lines)
     return 2 * float(np.log(max(band / (-float(pole.real) / np.pi), 1.0)))
 
 
-def _is_missed(option: Option, lines: list[WindowedLines], needed: float) -> bool:
+def _is_missed(option: Option, lines: list[WindowedSpectrum], needed: float) -> bool:
     """Whether modes, from where they are with a cause of the measuring chain, cannot make up for it.
 
     A delay is taken up by real modes to first order: its number has a wide error, and still it is not none.

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from modal_fit import ModalModel
 
 from ...faults.fault_repair import repair_plain_faults, with_tones_settled
@@ -18,9 +19,7 @@ from ...models.linear_part import with_linear_part
 from ...models.model_shape import LabError, ModelShape
 from ...physics import ChainPhysics, JointPhysics, Physics, library
 from ...records.compared_band import compared_band
-from ...records.trial import Trial
 from ...records.true_forces import without_force_noise
-from ...records.windowed_lines import WindowedLines, windowed_lines
 from ...remainder.beyond_model import beyond_model
 from ...remainder.leftover import Leftover, leftover
 from ...screening.search_round import Round, fitted_options
@@ -65,7 +64,7 @@ class Settings:
 
 
 def diagnose(
-    model: ModalModel, trials: Sequence[Trial], settings: Settings | None = None, watch: Progress | None = None
+    model: ModalModel, trials: Sequence[BandRecording], settings: Settings | None = None, watch: Progress | None = None
 ) -> Diagnosis:
     """Find what a model leaves out of recordings.
 
@@ -94,12 +93,12 @@ def diagnose(
         return _diagnosed(model, trials, settings or Settings(), watch or (lambda text: None))
 
 
-def _diagnosed(model: ModalModel, trials: Sequence[Trial], settings: Settings, tell: Progress) -> Diagnosis:
+def _diagnosed(model: ModalModel, trials: Sequence[BandRecording], settings: Settings, tell: Progress) -> Diagnosis:
     """One step after the other."""
     causes = settings.causes if settings.causes is not None else library()
     decay = float((-model.poles.real).min())
     bands = [compared_band(model, trial.rate) for trial in trials]
-    lines = [windowed_lines(trial, band.edges, decay) for trial, band in zip(trials, bands, strict=True)]
+    lines = [windowed_spectrum(trial, band.edges, decay) for trial, band in zip(trials, bands, strict=True)]
     tell("modal parameters")
     nominal = Explanation(ModelShape(model, settings.lab), np.zeros(ModelShape(model, settings.lab).size))
     base = fit(lines, nominal, iterations=FIRST_FIT)
@@ -143,7 +142,7 @@ def _diagnosed(model: ModalModel, trials: Sequence[Trial], settings: Settings, t
     )
 
 
-def _with_true_forces(lines: list[WindowedLines], base: Fit) -> tuple[list[WindowedLines], Fit]:
+def _with_true_forces(lines: list[WindowedSpectrum], base: Fit) -> tuple[list[WindowedSpectrum], Fit]:
     """Forces as measured, with the noise that the first fit found taken out, or with that of their quietest lines.
 
     The likelihood chooses, and must gain as much as a cause: hum on the responses hides how noisy the forces are, and
@@ -159,7 +158,7 @@ def _with_true_forces(lines: list[WindowedLines], base: Fit) -> tuple[list[Windo
     return best if best[1].score < base.score - LEAST_EVIDENCE else found[0]
 
 
-def _mostly_kept(lines: WindowedLines, before: WindowedLines) -> bool:
+def _mostly_kept(lines: WindowedSpectrum, before: WindowedSpectrum) -> bool:
     """Whether most of every force's power is left: else its quietest lines were not those without force."""
     left, had = (np.sum(np.abs(one.force_here) ** 2, axis=0) for one in (lines, before))
     return bool((left > MOSTLY * had).all())
@@ -177,7 +176,7 @@ class _Search:
 
 
 def _search(
-    lines: list[WindowedLines], base: Fit, faults: list[AcceptedCause], causes: dict[str, Physics], tell: Progress
+    lines: list[WindowedSpectrum], base: Fit, faults: list[AcceptedCause], causes: dict[str, Physics], tell: Progress
 ) -> _Search:
     """One cause after the other, while each is worth it."""
     current, accepted, steps = base, list(faults), [base]
@@ -237,7 +236,7 @@ def _laws(causes: dict[str, Physics]) -> dict[str, Physics]:
     return {name: one for name, one in causes.items() if isinstance(one, JointPhysics)}
 
 
-def _deviation(lines: list[WindowedLines], current: Fit) -> AcceptedCause | None:
+def _deviation(lines: list[WindowedSpectrum], current: Fit) -> AcceptedCause | None:
     """Modal parameters that are off by more than a lab's error, and not by the linear part of a joint's law."""
     found = modal_deviation(current)
     causes = current.explanation.causes

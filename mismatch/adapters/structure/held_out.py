@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from scipy.fft import irfft
 from scipy.stats import wilcoxon
 
+from estimation import WindowedSpectrum
+
 from ...faults.shown_faults import FAULTS, with_faults
 from ...inference.diagnosis import AcceptedCause, Improvement
 from ...inference.process_pool import side_by_side
@@ -17,7 +19,6 @@ from ...models.fitting import Fit, fit
 from ...models.hypothesis import Explanation, predict_lines
 from ...models.misfit import least_misfit, through_structure
 from ...noise.noise_model import NoiseModel, whitening
-from ...records.windowed_lines import WindowedLines
 from .acceptance import HELD_OUT
 from .pruning import zero_of
 
@@ -63,15 +64,15 @@ class Recordings:
         As they were measured: what errors are counted on.
     """
 
-    mended: list[WindowedLines]
-    measured: list[WindowedLines]
+    mended: list[WindowedSpectrum]
+    measured: list[WindowedSpectrum]
 
     @property
     def kept(self) -> int:
         """Number of the one that is held out: the middle level, of two the weaker, so that the others bracket it."""
         return (len(self.mended) - 1) // 2
 
-    def others(self, which: list[WindowedLines]) -> list[WindowedLines]:
+    def others(self, which: list[WindowedSpectrum]) -> list[WindowedSpectrum]:
         """All but that one; all where there is only one."""
         return [one for k, one in enumerate(which) if k != self.kept] or which
 
@@ -129,7 +130,7 @@ def scored(
     against = "refitted" if whole and (faults or evidence > HELD_OUT) else "nominal"
     rival = rests[1] if against == "refitted" else rests[0]
     improvement = Improvement(
-        here.trial.name,
+        here.recording.name,
         before,
         refitted,
         after,
@@ -142,16 +143,18 @@ def scored(
     return HeldOut(improvement, linear, improved)
 
 
-def residual_lines(explanation: Explanation, lines: WindowedLines, faults: Sequence[AcceptedCause] = ()) -> Complex:
+def residual_lines(explanation: Explanation, lines: WindowedSpectrum, faults: Sequence[AcceptedCause] = ()) -> Complex:
     """What an explanation, with plain faults, leaves of a recording, (n_lines, n_responses)."""
     predicted = predict_lines(explanation, lines)
     if not faults:
         return lines.measured - predicted.response
-    signal = np.asarray(irfft(predicted.spectrum, n=lines.padded, axis=0)[: len(lines.trial.force)])
-    return lines.measured - lines.cut(with_faults(signal, lines.trial, lines.start, [asdict(one) for one in faults]))
+    signal = np.asarray(irfft(predicted.spectrum, n=lines.padded, axis=0)[: len(lines.recording.force)])
+    return lines.measured - lines.cut(
+        with_faults(signal, lines.recording, lines.start, [asdict(one) for one in faults])
+    )
 
 
-def chance_of_no_gain(lines: WindowedLines, covariance: Complex, rival: Complex, final: Complex) -> float:
+def chance_of_no_gain(lines: WindowedSpectrum, covariance: Complex, rival: Complex, final: Complex) -> float:
     """p-value of a paired test over blocks of time that the final residual is no smaller than a rival's.
 
     Both are whitened by the same noise (V: (n_lines, n_responses, n_responses)), so that a quiet channel counts as much
@@ -163,7 +166,7 @@ def chance_of_no_gain(lines: WindowedLines, covariance: Complex, rival: Complex,
     return float(wilcoxon(difference, alternative="greater").pvalue) if difference.any() else 1.0
 
 
-def block_powers(lines: WindowedLines, rest: Complex) -> Real:
+def block_powers(lines: WindowedSpectrum, rest: Complex) -> Real:
     """Power of residual lines in blocks of time, (n_blocks,): their sum is that of the lines (Parseval)."""
     spectrum = np.zeros((len(lines.window) // 2 + 1, rest.shape[1]), dtype=complex)
     spectrum[lines.band] = rest
@@ -171,9 +174,9 @@ def block_powers(lines: WindowedLines, rest: Complex) -> Real:
     return np.array([np.sum(signal[block] ** 2) for block in block_slices(lines)]) * len(lines.window) / 2
 
 
-def block_slices(lines: WindowedLines) -> list[slice]:
+def block_slices(lines: WindowedSpectrum) -> list[slice]:
     """Blocks of time of the part of a recording that is compared."""
-    count = max(2, round(len(lines.window) / lines.trial.rate / BLOCK))
+    count = max(2, round(len(lines.window) / lines.recording.rate / BLOCK))
     edges = np.linspace(0, len(lines.window), count + 1).astype(int)
     return [slice(int(a), int(b)) for a, b in pairwise(edges)]
 

@@ -4,19 +4,20 @@ from dataclasses import replace
 
 import numpy as np
 
+from estimation import WindowedSpectrum
+
 from ...inference.diagnosis import AcceptedCause, Candidate
 from ...models.fitting import Fit, fit
 from ...models.hypothesis import Explanation
 from ...models.model_shape import ModelShape
 from ...physics import answer_name
-from ...records.windowed_lines import WindowedLines
 from .acceptance import evidence_needed
 
 ITERATIONS = 20
 
 
 def pruned(
-    lines: list[WindowedLines], steps: list[Fit], accepted: list[AcceptedCause]
+    lines: list[WindowedSpectrum], steps: list[Fit], accepted: list[AcceptedCause]
 ) -> tuple[list[Fit], list[AcceptedCause], list[Candidate]]:
     """Try the last explanation without each cause that came before its last; keep what is not worth its evidence out.
 

@@ -2,16 +2,17 @@
 
 from dataclasses import replace
 
+from estimation import WindowedSpectrum
+
 from ...models.fitting import Fit, fit
 from ...models.hypothesis import Cause, Explanation
 from ...physics import ChainPhysics
-from ...records.windowed_lines import WindowedLines
 from .reporting_numbers import modal_deviation
 
 ITERATIONS, FROM_BELIEF = 60, 20
 
 
-def settled(lines: list[WindowedLines], fitted: Fit) -> Fit:
+def settled(lines: list[WindowedSpectrum], fitted: Fit) -> Fit:
     """Fit until it rests; if the lab's model then looks odd, once more from that model, and the better of both.
 
     A cause of changed stiffness and the modes it changes run along one long valley: a search that began beside it may
@@ -31,7 +32,7 @@ def settled(lines: list[WindowedLines], fitted: Fit) -> Fit:
     return min(rested, again, key=lambda one: one.score)
 
 
-def with_chain(lines: list[WindowedLines], current: Fit, cause: Cause) -> Fit:
+def with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Fit:
     """Fit a linear cause together with the modes: from where they are and, if they look odd, from the lab's model.
 
     Modes that have taken up all that a cause does leave it nothing to begin with.
