@@ -26,7 +26,7 @@ from .gate import (
     stored_doubts,
 )
 from .gate.signals import level_table, look
-from .progress import Watch, silent
+from .progress import Progress, silent
 from .provenance import read_provenance
 from .tables.mode_shapes import shape_table
 from .tables.point_words import points_in_words
@@ -59,7 +59,7 @@ class Findings:
     concerns: tuple[str, ...] = ()
 
 
-def inspect_file(path: str | os.PathLike[str], watch: Watch = silent) -> Findings:
+def inspect_file(path: str | os.PathLike[str], progress: Progress = silent) -> Findings:
     """Look at a recording, an FRF, a model, lobes, a cutting file or a geometry.
 
     Raises
@@ -69,7 +69,7 @@ def inspect_file(path: str | os.PathLike[str], watch: Watch = silent) -> Finding
     """
     kind = kind_of(path)
     if kind == RECORDING:
-        return _recording(path, watch)
+        return _recording(path, progress)
     readers: dict[str, Callable[[str | os.PathLike[str]], Findings]] = {
         FRF: _frf,
         MODEL: _model,
@@ -82,7 +82,7 @@ def inspect_file(path: str | os.PathLike[str], watch: Watch = silent) -> Finding
     return readers[kind](path)
 
 
-def _recording(path: str | os.PathLike[str], watch: Watch) -> Findings:
+def _recording(path: str | os.PathLike[str], progress: Progress) -> Findings:
     tables, concerns = [], []
     with Recording(path) as recording:
         if recording.being_written:
@@ -94,7 +94,7 @@ def _recording(path: str | os.PathLike[str], watch: Watch) -> Findings:
             if stream.n_samples == 0:
                 concerns.append(f"stream {stream.name} holds no sample")
                 continue
-            seen = look(stream, watch=watch)
+            seen = look(stream, progress=progress)
             tables.append(level_table(stream, seen.levels))
             concerns += [*seen.concerns(stream.sample_rate), *tap_concerns(stream, seen.levels)]
         title = recording.title or "untitled"

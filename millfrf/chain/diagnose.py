@@ -13,7 +13,7 @@ from mismatch.records.reading import measured_part
 from modal_fit import read_modal_model, write_modal_model
 
 from ..gate import check_model_and_recordings
-from ..progress import Watch, silent
+from ..progress import Progress, silent
 from ..report.diagnoses.diagnosis_page import with_location, write_diagnosis_report
 from ..result_folder import refuse_file
 from .fitting.fit import fit_recordings
@@ -37,7 +37,7 @@ def diagnose_files(
     *,
     stream: str | None = None,
     process: MillingProcess | None = None,
-    watch: Watch = silent,
+    progress: Progress = silent,
 ) -> DiagnosisFiles:
     """Diagnose and write diagnosis, improved model and report into a folder, made if need be.
 
@@ -50,18 +50,18 @@ def diagnose_files(
     refuse_file(folder)
     whole = read_modal_model(model_path)
     model = measured_part(whole, recordings, stream=stream)
-    doubts = check_model_and_recordings(model_path, model, recordings, stream, watch)
+    doubts = check_model_and_recordings(model_path, model, recordings, stream, progress)
     trials = read_recordings(recordings, model, stream=stream)
-    with watch("diagnosing"):
+    with progress("diagnosing"):
         diagnosis = diagnose(model, trials, settings)
     diagnosis = replace(diagnosis, doubts=(*doubts, *diagnosis.doubts))
-    with watch("locating"):
+    with progress("locating"):
         diagnosis, view = with_location(diagnosis, trials, _speeds(recordings))
     folder.mkdir(parents=True, exist_ok=True)
     paths = (folder / "diagnosis.json", folder / "improved_model.json", folder / "report.html")
     write_diagnosis(paths[0], diagnosis)
     write_modal_model(paths[1], improved_model_of(diagnosis))
-    with watch("writing the report"):
+    with progress("writing the report"):
         write_diagnosis_report(paths[2], view, Path(model_path).name, process)
     missing = [label for label in whole.responses if label not in model.responses]
     note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []
@@ -74,7 +74,7 @@ def nominal_from_simulation(
     out: str | os.PathLike[str],
     *,
     stream: str | None = None,
-    watch: Watch = silent,
+    progress: Progress = silent,
 ) -> Path:
     """Fit the nominal model to a simulated recording, by the subspace method; write it as ``nominal.json``.
 
@@ -83,7 +83,7 @@ def nominal_from_simulation(
     InputError
         A recording that cannot be fitted in that band.
     """
-    fitted = fit_recordings([simulated], FitOptions(band, SUBSPACE, stream=stream), watch)
+    fitted = fit_recordings([simulated], FitOptions(band, SUBSPACE, stream=stream), progress)
     Path(out).mkdir(parents=True, exist_ok=True)
     path = Path(out) / "nominal.json"
     write_modal_model(path, fitted.model)

@@ -85,4 +85,4 @@ def _checked(paths: Sequence[Path], process: MillingProcess, asking: Asking) -> 
             judged.append(path)  # what the others lack is said where it is needed
     if not judged:
         return doubts
-    return doubts + check_recordings(judged, stream=asking.stream, watch=bar, remedy=RECORD_AGAIN)
+    return doubts + check_recordings(judged, stream=asking.stream, progress=bar, remedy=RECORD_AGAIN)

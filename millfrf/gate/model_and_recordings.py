@@ -8,7 +8,7 @@ from acquisition import Stream
 from estimation import DERIVATIVE_ORDERS, names_at
 from modal_fit import ModalModel
 
-from ..progress import Watch, silent
+from ..progress import Progress, silent
 from .models import check_model, stored_doubts
 from .recordings import RECORD_AGAIN, check_channels
 
@@ -20,7 +20,7 @@ def check_model_and_recordings(
     model: ModalModel,
     recordings: Sequence[str | os.PathLike[str]],
     stream: str | None = None,
-    watch: Watch = silent,
+    progress: Progress = silent,
 ) -> list[str]:
     """Judge a model, what its file says of its fit, and the channels of recordings at its degrees of freedom.
 
@@ -34,7 +34,7 @@ def check_model_and_recordings(
         Files it is compared with.
     stream
         Sample clock; None: the only one.
-    watch
+    progress
         Shows progress while samples are read.
 
     Returns
@@ -56,4 +56,4 @@ def check_model_and_recordings(
         channels = source.channels
         return names_at(channels, model.excitations, EXCITES), names_at(channels, model.responses, DERIVATIVE_ORDERS)
 
-    return [*doubts, *check_channels(recordings, chosen, stream, watch=watch, remedy=RECORD_AGAIN)]
+    return [*doubts, *check_channels(recordings, chosen, stream, progress=progress, remedy=RECORD_AGAIN)]

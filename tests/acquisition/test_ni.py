@@ -86,7 +86,7 @@ def test_what_modules_delay_is_taken_out_when_data_are_used(with_daqmx: RunWithD
 def test_an_overrun_says_how_many_samples_are_missing(with_daqmx: RunWithDaqmx, tmp_path: Path) -> None:
     program = COMMON + (
         "source = NiSource(inputs(2), 25600.0, buffer_duration=0.5)\n"
-        "attempt(source, watch=lambda block: time.sleep(1.0) if block.first_sample == 2560 else None)"
+        "attempt(source, observer=lambda block: time.sleep(1.0) if block.first_sample == 2560 else None)"
     )
     done = with_daqmx(program)
     assert done.stderr == ""

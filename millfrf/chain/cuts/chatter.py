@@ -17,7 +17,7 @@ from modal_fit import ModalModel
 from stability import ChatterVerdict, ModelledCut, classify_cut
 
 from ...gate import check_one_speed, check_recordings
-from ...progress import Watch, silent
+from ...progress import Progress, silent
 from ...tables.result_tables import Table
 
 OTHERS = "name the other channels with --response"
@@ -100,7 +100,7 @@ class JudgedCut:
 
 
 def judge_recordings(
-    paths: Sequence[str | os.PathLike[str]], options: CutOptions, watch: Watch = silent
+    paths: Sequence[str | os.PathLike[str]], options: CutOptions, progress: Progress = silent
 ) -> tuple[JudgedCut, ...]:
     """The verdict on each recording.
 
@@ -115,7 +115,7 @@ def judge_recordings(
             stream = recording.stream(options.stream)
             _, responses = choose_channels(stream, None, options.responses or None)
             rpm, tool = _speed(recording, options), tool_channels(responses)
-            with watch(f"judging {Path(path).name}"):
+            with progress(f"judging {Path(path).name}"):
                 samples = stream.read(channels=[channel.name for channel in responses])
                 found = classify_cut(
                     samples,
@@ -205,7 +205,7 @@ def tone_table(cuts: Sequence[JudgedCut]) -> Table:
 
 
 def doubts_of_cuts(
-    paths: Sequence[str | os.PathLike[str]], process: MillingProcess, options: CutOptions, watch: Watch = silent
+    paths: Sequence[str | os.PathLike[str]], process: MillingProcess, options: CutOptions, progress: Progress = silent
 ) -> list[str]:
     """Judge recordings before they are classified: their channels, and what they state of speed and teeth.
 
@@ -221,7 +221,7 @@ def doubts_of_cuts(
             _, responses = choose_channels(stream, None, options.responses or None)
             doubts += check_one_speed(recording.path.name, recording.setup, process, options.speed_rpm)
         names = [channel.name for channel in responses]
-        doubts += check_recordings([path], stream=options.stream, responses=names, watch=watch, remedy=OTHERS)
+        doubts += check_recordings([path], stream=options.stream, responses=names, progress=progress, remedy=OTHERS)
     return doubts
 
 

@@ -17,7 +17,7 @@ from estimation import (
 )
 from foundation import Band, InputError
 
-from ...progress import Watch
+from ...progress import Progress
 
 LONGEST = 8.0
 """Longest segment of the spectra by which the inputs are judged, s."""
@@ -28,7 +28,7 @@ def band_records(
     names: tuple[Sequence[str], Sequence[str]],
     stream: str | None,
     highest: float,
-    watch: Watch,
+    progress: Progress,
 ) -> tuple[BandRecording, ...]:
     """Read each recording up to ``highest`` (Hz).
 
@@ -47,7 +47,7 @@ def band_records(
         with Recording(path) as recording:
             source = recording.stream(stream)
             channels = choose_channels(source, names[0] or None, names[1] or None)
-            with watch(f"reading {Path(path).name}", source.n_samples) as update:
+            with progress(f"reading {Path(path).name}", source.n_samples) as update:
                 records.append(band_of_channels(source, *channels, highest, update))
     for path, record in zip(paths, records, strict=True):
         if record.rate != records[0].rate:
@@ -72,7 +72,7 @@ def _spectra(record: BandRecording, seconds: float) -> CrossSpectra:
     return accumulator.finish()
 
 
-def local_frf(records: Sequence[BandRecording], band: Band, watch: Watch) -> Frf:
+def local_frf(records: Sequence[BandRecording], band: Band, progress: Progress) -> Frf:
     """The FRF on every Fourier line of the band."""
-    with watch(f"local polynomials, {band[0]:g} to {band[1]:g} Hz"):
+    with progress(f"local polynomials, {band[0]:g} to {band[1]:g} Hz"):
         return local_polynomial(records, band)

@@ -147,7 +147,7 @@ def acquire(
     tally = Tally({stream.name: stream.sample_rate for stream in opened.source.streams})
     duration = opened.session.duration_s or math.inf
 
-    def watch(taken: Block | Events) -> None:
+    def observe(taken: Block | Events) -> None:
         tally(taken)
         for watcher in watchers:
             watcher(taken)
@@ -157,7 +157,7 @@ def acquire(
             record(
                 opened.source,
                 out,
-                watch=watch,
+                observer=observe,
                 progress=progress,
                 stop=lambda: interrupted() or stop() or tally.seconds() >= duration,
             )

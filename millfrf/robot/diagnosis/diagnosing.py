@@ -89,7 +89,7 @@ def _doubts(paths: Sequence[Path], stream: str | None) -> list[str]:
     return [
         doubt
         for path in paths
-        for doubt in check_channels([path], posed_channels, stream, watch=bar, remedy=RECORD_AGAIN)
+        for doubt in check_channels([path], posed_channels, stream, progress=bar, remedy=RECORD_AGAIN)
     ]
 
 
