@@ -92,7 +92,9 @@ def fit_recordings(
     return replace(fit, warnings=(*doubts, *fit.warnings, *fit_doubts(fit.reduced_chi_square, None)))
 
 
-def _band_recording(path: str | os.PathLike[str], options: FitOptions, progress: Progress) -> tuple[BandRecording, float]:
+def _band_recording(
+    path: str | os.PathLike[str], options: FitOptions, progress: Progress
+) -> tuple[BandRecording, float]:
     with Recording(path) as recording:
         stream = recording.stream(options.stream)
         channels = choose_channels(stream, options.excitations or None, options.responses or None)
