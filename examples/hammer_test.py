@@ -18,8 +18,7 @@ from acquisition import Recording, record
 from estimation import exponential_window, force_window
 from foundation import TIP
 from millfrf.taps import TapOptions, TapResult, tap_recordings
-from replay_data import HammerCell, default_structure, dynamometer, tip_accelerometers
-from replay_data.robot_structure import select
+from replay_data import HammerCell, default_structure, dynamometer, select, tip_accelerometers
 
 RATE, SECONDS = 2048.0, 1.0
 SHOWN = (8.0, 150.0)

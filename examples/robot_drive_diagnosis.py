@@ -25,7 +25,7 @@ from scipy.io import loadmat
 from scipy.optimize import least_squares
 from scipy.signal import butter, filtfilt, resample_poly
 
-from cutting.compilation import compiled
+from cutting import compiled
 from estimation import BandRecording, channels_of
 from figures import COLOURS, house_style, new_figure
 from mismatch import Diagnosis, diagnose

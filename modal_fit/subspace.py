@@ -10,12 +10,9 @@ from estimation import BandRecording
 from foundation import InputError, MillfrfError
 
 from .correlation_blocks import CorrelationBlocks, correlation_blocks
-from .maximum_likelihood.likelihood_result import best_fit, modal_model_from
-from .maximum_likelihood.noise_levels import NoiseLevels
-from .maximum_likelihood.whole_records import record_spectra
-from .models.modal_model import ModalModel
-from .stabilisation.chart import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
-from .stabilisation.matrix_fraction import OrderPoles
+from .maximum_likelihood import NoiseLevels, best_fit, modal_model_from, record_spectra
+from .models import ModalModel
+from .stabilisation import OrderPoles, PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
 
 _BLOCK_ROWS = 25
 _SPARE_ROWS = 1.5  # observability matrix has so many times more rows than the highest order has states

@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 from foundation import TIP, InputError
 from modal_fit import ModalModel
 
-from .laboratory.sensors import Sensor, hammer_sensors
-from .laboratory.setup_notes import setup_text
+from .laboratory import Sensor, hammer_sensors, setup_text
 from .sampled_cell import March, SampledCell
-from .simulation.modal_integrator import discretise, respond
+from .simulation import discretise, respond
 
 LEAD = 0.05
 """Quiet time before the first tap, s."""

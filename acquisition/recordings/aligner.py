@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sources.source import StreamDescription
+from ..sources import StreamDescription
 from .recording import Stream
 
 Real = NDArray[np.float64]

@@ -5,8 +5,7 @@ import os
 from collections.abc import Callable
 from typing import Literal
 
-from ..sources.events import Events, announced_events
-from ..sources.source import Block, Source
+from ..sources import Block, Events, Source, announced_events
 from .recording_writer import RecordingWriter
 
 SPARE_BYTES = 16_000_000

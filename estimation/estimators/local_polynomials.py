@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from ..band_recordings import BandRecording
-from ..frf_matrix.frf import Frf, FrfCovariance
-from ..frf_matrix.quantities import frf_quantity
+from ..frf_matrix import Frf, FrfCovariance, frf_quantity
 
 Complex = NDArray[np.complex128]
 _LINES_AT_ONCE = 2048

@@ -10,7 +10,7 @@ from acquisition import Channel
 from foundation import Band, InputError
 
 from ..band_recordings import before_high_pass
-from ..frf_matrix.quantities import frf_quantity
+from ..frf_matrix import frf_quantity
 from .cutting_out import segments_of
 from .screening import FoundTaps
 from .segments import TapSettings

@@ -35,7 +35,7 @@ def diagnose(
     """Locate where a model and recordings disagree, name the physics left out, model it, show that the fit improves."""
     from mismatch import LabError, Settings
 
-    from ..chain.diagnose import diagnose_files, nominal_from_simulation
+    from ..diagnosing import diagnose_files, nominal_from_simulation
     from ..gate import read_checked_cutting
     from ..progress import bar
 

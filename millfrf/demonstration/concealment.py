@@ -16,16 +16,23 @@ import numpy as np
 from acquisition import record
 from foundation import InputError, MillfrfError
 from modal_fit import ModalModel
-from replay_data import HammerCell, dynamometer, tip_accelerometers
-from replay_data.concealment.concealed_cell import FINE_RATE, LEVELS, ConcealedCell, milling_force
-from replay_data.concealment.concealed_effect import ConcealedEffect, draw_effect, draw_name, joint_scale
-from replay_data.concealment.random_posture import posture_robot
-from replay_data.simulation.joint_march import tip_motion
+from replay_data import (
+    FINE_RATE,
+    LEVELS,
+    ConcealedCell,
+    ConcealedEffect,
+    HammerCell,
+    draw_effect,
+    draw_name,
+    dynamometer,
+    joint_scale,
+    milling_force,
+    posture_robot,
+    tip_accelerometers,
+    tip_motion,
+)
 
-from ..chain.estimating.estimate import estimate_recordings, write_estimate
-from ..chain.estimating.estimate_options import EstimateOptions
-from ..chain.fitting.fit import fit_model, write_fit
-from ..chain.fitting.fit_options import FitOptions
+from ..chain import EstimateOptions, FitOptions, estimate_recordings, fit_model, write_estimate, write_fit
 from ..progress import Progress, silent
 from .seal import open_seal, seal
 

@@ -13,7 +13,7 @@ from stability import StabilityLobes, certified_lobes, write_lobes, zero_order
 
 from ..progress import Progress, silent
 from ..report import ReportOptions, write_report
-from ..tables.result_tables import Table
+from ..tables import Table
 
 RPM = math.pi / 30
 SPEED_RPM, RADIAL_SHARE = 1080.0, 0.1

@@ -25,15 +25,23 @@ from replay_data import (
 )
 from stability import StabilityLobes, certified_lobes, read_lobes, write_lobes
 
-from ..chain.cuts.lobes import compute_lobes, speed_axis
-from ..chain.estimating.estimate import estimate_recordings, write_estimate
-from ..chain.estimating.estimate_options import EstimateOptions
-from ..chain.fitting.calibrate import calibrate_model, write_calibration
-from ..chain.fitting.fit import fit_model, fit_recordings, write_fit
-from ..chain.fitting.fit_options import SUBSPACE, FitOptions
+from ..chain import (
+    SUBSPACE,
+    EstimateOptions,
+    FitOptions,
+    calibrate_model,
+    compute_lobes,
+    estimate_recordings,
+    fit_model,
+    fit_recordings,
+    speed_axis,
+    write_calibration,
+    write_estimate,
+    write_fit,
+)
 from ..progress import Progress, silent
 from ..report import ReportOptions, write_report
-from ..tables.result_tables import Table
+from ..tables import Table
 from .demo_trap import Trap, report_trap, spring_trap, trap_table
 
 RPM = math.pi / 30

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Channel
-from estimation import Frf, Resampler, SpectralAccumulator, h1, settings_for, whole_ratio
-from estimation.spectra.recording_spectra import EXCITING, RESPONDING
+from estimation import EXCITING, RESPONDING, Frf, Resampler, SpectralAccumulator, h1, settings_for, whole_ratio
 from foundation import InputError
 
 Real = NDArray[np.float64]

@@ -24,14 +24,21 @@ from ..gate import (
 from ..progress import Progress, silent
 from ..provenance import sha256, versions
 from .collection import Collected, SourceFile, collect
-from .sections.chatter import chatter_in_brief, chatter_section
-from .sections.comparison import comparison_section
-from .sections.frfs import frf_section
-from .sections.hammer import hammer_section
-from .sections.measurement import channel_section, file_section, settings_section, setup_section
-from .sections.reciprocity import reciprocity_section
-from .sections.results import input_section, mode_section
-from .sections.stability import stability_findings
+from .sections import (
+    channel_section,
+    chatter_in_brief,
+    chatter_section,
+    comparison_section,
+    file_section,
+    frf_section,
+    hammer_section,
+    input_section,
+    mode_section,
+    reciprocity_section,
+    settings_section,
+    setup_section,
+    stability_findings,
+)
 
 
 @dataclass(frozen=True)

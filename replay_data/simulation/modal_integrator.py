@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compilation import compiled
+from cutting import compiled
 from estimation import DERIVATIVE_ORDERS
 from foundation import TIP, InputError
 from modal_fit import ModalModel

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 from estimation import Frf
 from foundation import TIP, InputError
 
-from ..finite_elements.generalised_coordinates import coordinate_basis
-from ..finite_elements.structure import Structure, mass_matrix, rigid_rows, stiffness_matrix
-from ..spatial.spatial_robot import SpatialRobot, structure_at
+from ..finite_elements import Structure, coordinate_basis, mass_matrix, rigid_rows, stiffness_matrix
+from ..spatial import SpatialRobot, structure_at
 from .exact_beam import spatial_dynamic_stiffness
 from .receptance_coupling import couple_along
 

@@ -10,9 +10,7 @@ from estimation import Frf
 from foundation import TIP, InputError
 from modal_fit import ModalModel
 
-from ..finite_elements.generalised_coordinates import coordinate_basis
-from ..finite_elements.modal_reduction import from_real_modes
-from ..finite_elements.structure import Structure, mass_matrix, six_by_six, stiffness_matrix
+from ..finite_elements import Structure, coordinate_basis, from_real_modes, mass_matrix, six_by_six, stiffness_matrix
 from .spatial_robot import SpatialRobot, structure_at
 
 Real = NDArray[np.float64]

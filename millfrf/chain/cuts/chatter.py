@@ -18,7 +18,7 @@ from stability import ChatterVerdict, ModelledCut, classify_cut
 
 from ...gate import check_one_speed, check_recordings
 from ...progress import Progress, silent
-from ...tables.result_tables import Table
+from ...tables import Table
 
 OTHERS = "name the other channels with --response"
 """Remedy of a channel that cannot be used."""

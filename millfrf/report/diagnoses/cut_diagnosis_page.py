@@ -14,7 +14,7 @@ from mismatch.adapters.cut import SIGNIFICANT, CutDiagnosis
 from mismatch.adapters.cut.force.force_coefficients import NAMES
 
 from ...provenance import versions
-from ...tables.result_tables import Table
+from ...tables import Table
 from ..section import Picture, Section
 
 

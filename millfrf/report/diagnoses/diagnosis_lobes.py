@@ -10,7 +10,7 @@ from mismatch.adapters.structure.pruning import zero_of
 from mismatch.models.equivalent_receptance import equivalent_receptance
 from stability import StabilityLobes, zero_order
 
-from ...tables.result_tables import Table
+from ...tables import Table
 from ..section import Picture, Section
 
 ASSUMED = MillingProcess(

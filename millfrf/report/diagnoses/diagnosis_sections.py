@@ -14,7 +14,7 @@ from mismatch.location.locate import significant_cells
 from mismatch.location.recording_errors import recording_errors
 from mismatch.location.residual_view import ResidualView
 
-from ...tables.result_tables import Table
+from ...tables import Table
 from ..section import Picture, Section
 from .diagnosis_answers import number, place, words
 

@@ -14,8 +14,8 @@ from foundation import writing_whole_file
 from mismatch.adapters.robot import NOISE_LIKE, RobotCause, RobotDiagnosis
 
 from ...provenance import versions
-from ...robot.diagnosis.diagnosis_words import UNITS, told_number, what_is_asked
-from ...tables.result_tables import Table
+from ...robot import UNITS, told_number, what_is_asked
+from ...tables import Table
 from ..section import Picture, Section
 
 

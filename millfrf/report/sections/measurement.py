@@ -7,11 +7,11 @@ from typing import Any
 from acquisition import Recording
 from figures import as_data_uri, time_figure
 
-from ...chain.estimating.estimate_options import LOCAL
-from ...gate.signals import level_table, look
+from ...chain import LOCAL
+from ...gate import level_table, look
 from ...progress import Progress
-from ...tables.result_tables import Table
-from ...tap_concerns import tap_concerns
+from ...tables import Table
+from ...taps import tap_concerns
 from ..collection import Collected, SourceFile
 from ..section import Picture, Section
 

@@ -7,11 +7,9 @@ import numpy as np
 from figures import as_data_uri, input_figure, stabilisation_figure
 from modal_fit import ModalModel
 
-from ...chain.estimating.estimate import spectra_of_tests
-from ...chain.estimating.estimate_options import EstimateOptions
-from ...chain.fitting.fit_options import chart_from_json
+from ...chain import EstimateOptions, chart_from_json, spectra_of_tests
 from ...progress import Progress
-from ...tables.result_tables import error_table, mode_table
+from ...tables import error_table, mode_table
 from ..collection import Collected, SourceFile
 from ..section import Fold, Picture, Section
 from .dropped_part import dropped_part

@@ -8,8 +8,7 @@ from scipy.optimize import linear_sum_assignment
 
 from estimation import WindowedSpectrum
 from foundation import HOUSING, TIP
-from robot_model import SpatialRobot, housing_node, modes_at
-from robot_model.spatial.spatial_modes import modal_damping
+from robot_model import SpatialRobot, housing_node, modal_damping, modes_at
 
 from ...models.model_shape import LabError
 from .posed_recording import PosedRecording

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from estimation import FRF_ORDERS, Frf, window_correlation
 
-from ...models.out_of_band import basis_with_poles, fixed_pole, fixed_poles
+from ...models import basis_with_poles, fixed_pole, fixed_poles
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

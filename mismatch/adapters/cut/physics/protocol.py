@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from cutting import MillingProcess
 
-from ....physics.protocol import Parameter
+from ....physics import Parameter
 
 Real = NDArray[np.float64]
 

@@ -12,12 +12,11 @@ from mismatch.location.spindle_orders import SpindleSpeed, spindle_speed
 from mismatch.records.reading import measured_part
 from modal_fit import read_modal_model, write_modal_model
 
-from ..gate import check_model_and_recordings
-from ..progress import Progress, silent
-from ..report.diagnoses.diagnosis_page import with_location, write_diagnosis_report
-from ..result_folder import refuse_file
-from .fitting.fit import fit_recordings
-from .fitting.fit_options import SUBSPACE, FitOptions
+from .chain import SUBSPACE, FitOptions, fit_recordings
+from .gate import check_model_and_recordings
+from .progress import Progress, silent
+from .report import with_location, write_diagnosis_report
+from .result_folder import refuse_file
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,13 @@ from modal_fit import ModalModel, Residuals
 from robot_model import in_posture, read_robot
 from stability import with_residual_flexibility, write_lobes
 
-from ...chain.cuts.lobes import compute_lobes, lobes_summary, speed_axis
-from ...gate import check_depth, check_speed, check_speeds, lowest_frequency, read_checked_cutting
-from ...options import check_output
-from ...progress import bar
-from ..postures import Asked, cut_place, posture_of, spatial
-from ..results import RPM, say_doubts
-from .posture_maps import depth_over_redundancy, write_posture_map
+from ..chain import compute_lobes, lobes_summary, speed_axis
+from ..gate import check_depth, check_speed, check_speeds, lowest_frequency, read_checked_cutting
+from ..options import check_output
+from ..progress import bar
+from .depth_maps import depth_over_redundancy, write_posture_map
+from .postures import Asked, cut_place, posture_of, spatial
+from .results import RPM, say_doubts
 
 
 def at_the_tip(model: ModalModel) -> ModalModel:
@@ -110,7 +110,7 @@ def write_map_over_redundancy(
         stable = found.reached & (found.values > depth)
         typer.echo(f"a cut of {1e3 * depth:g} mm is stable at {stable.sum()} of {found.reached.sum()} angles")
     if picture is not None:
-        from ..posture_figure import draw_posture_map
+        from .posture_figure import draw_posture_map
 
         what = "the robot about the tool" if asked.redundancy == "tool" else "tool and table about the feed"
         draw_posture_map(picture, found, max_depth, depth, what)

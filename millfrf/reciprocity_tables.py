@@ -6,8 +6,8 @@ from estimation import Frf, reciprocity_pairs
 from foundation import Band
 from modal_fit import ModalModel, mode_reciprocity
 
-from ..gate import plainly_different, shown_pairs
-from .result_tables import Table
+from .gate import plainly_different, shown_pairs
+from .tables import Table
 
 MOST = 12
 """Pairs that are listed."""

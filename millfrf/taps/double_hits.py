@@ -7,8 +7,7 @@ import numpy as np
 from acquisition import Stream
 from estimation import find_taps
 
-from .gate import IMPULSIVE, LONGEST
-from .gate.signals import ChannelLevel
+from ..gate import IMPULSIVE, LONGEST, ChannelLevel
 
 
 def tap_concerns(stream: Stream, levels: Sequence[ChannelLevel]) -> list[str]:
