@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from acquisition import Recording, record
 from cutting import MillingProcess
-from estimation import Frf, band_record, choose_channels, cross_spectra, h1, settings_for, sum_tests
+from estimation import Frf, band_of_channels, choose_channels, cross_spectra, h1, settings_for, sum_tests
 from modal_fit import fit_polyreference, fit_subspace
 from replay_data import LinearSweep, MillingCell, default_structure, milling_sensors
 
@@ -64,7 +64,8 @@ def subspace(paths: list[Path], frf: Frf) -> Poles:
     records = []
     for path in paths:
         with Recording(path) as recording:
-            records.append(band_record(recording, 40.0, *choose_channels(recording.stream())))
+            stream = recording.stream()
+            records.append(band_of_channels(stream, *choose_channels(stream), 40.0))
     return fit_subspace(records, (13.0, 25.0)).model.poles
 
 

@@ -17,6 +17,8 @@ from pathlib import Path
 
 import matplotlib as mpl
 
+from foundation import TIP
+
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
@@ -27,7 +29,6 @@ from stability import collocation_limits, trace_boundary
 
 CUT = MillingProcess(2, 0.0127, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 1.5e-4)
 LOWEST, HIGHEST, DEEPEST = 2000 * pi / 30, 8000 * pi / 30, 8e-3
-NAMES = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 PICTURE = Path(__file__).resolve().parent.parent / "docs" / "pictures" / "lobe_cost.png"
 
 
@@ -41,7 +42,7 @@ def structure(modes: int, directions: int, seed: int = 3) -> ModalModel:
     shapes /= np.linalg.norm(shapes, axis=1)[:, None]
     flexibility = 2e-5 / modes
     right = shapes * (flexibility * natural**2 / (2j * poles.imag))[:, None]
-    return ModalModel(poles, right, shapes + 0j, NAMES[:directions], NAMES[:directions])
+    return ModalModel(poles, right, shapes + 0j, TIP[:directions], TIP[:directions])
 
 
 def seconds(job: Callable[[], object]) -> float:

@@ -1,44 +1,5 @@
 """Milling and drilling forces, and directional coefficients: knows nothing of structures."""
 
-from .cutting_file import read_cutting_process
-from .cutting_writer import write_cutting_process
-from .directional import (
-    average_directional_matrix,
-    chip_direction,
-    damping_harmonics,
-    directional_harmonics,
-    directional_matrix,
-    force_direction,
-    turn_harmonics,
-)
-from .drilling_force import Drill, DrillingLoad, SpecificForce, catalogue_load, drilling_load, fitted_to_catalogue
-from .engaged_edge import damping_matrices, edge_matrices
-from .force_fourier import force_harmonics
-from .immersion import IMMERSIONS, immersion_angles
-from .milling_process import MillingProcess
-from .refusal import refuse_varied
+import lazy_loader
 
-__all__ = [
-    "IMMERSIONS",
-    "Drill",
-    "DrillingLoad",
-    "MillingProcess",
-    "SpecificForce",
-    "average_directional_matrix",
-    "catalogue_load",
-    "chip_direction",
-    "damping_harmonics",
-    "damping_matrices",
-    "directional_harmonics",
-    "directional_matrix",
-    "drilling_load",
-    "edge_matrices",
-    "fitted_to_catalogue",
-    "force_direction",
-    "force_harmonics",
-    "immersion_angles",
-    "read_cutting_process",
-    "refuse_varied",
-    "turn_harmonics",
-    "write_cutting_process",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from figures import law_figure, spectra_figure
 from millfrf.demonstration.concealment import ConcealOptions, run_concealed
-from mismatch import diagnose, read_trials
+from mismatch import diagnose, read_recordings
 from mismatch.location.free_form_law import free_form_laws
 from mismatch.location.held_out_spectra import held_out_spectra
 from modal_fit import read_modal_model
@@ -26,7 +26,7 @@ def main(folder: Path, effect: str = "coulomb_friction", seed: int = 4) -> dict[
         print(result.hidden, result.diagnosis["verdict"], result.diagnosis["physics"], sep="\n")
         recordings = Path(scratch) / "recordings"
         model = read_modal_model(Path(scratch) / "nominal.json")
-        trials = read_trials([recordings / f"{level}.h5" for level in ("low", "mid", "high")], model)
+        trials = read_recordings([recordings / f"{level}.h5" for level in ("low", "mid", "high")], model)
         found = diagnose(model, trials)
     law_figure(free_form_laws(found)[0]).savefig(folder / "idle_against_milling_law.png", dpi=150)
     spectra_figure(held_out_spectra(found)).savefig(folder / "idle_against_milling_spectra.png", dpi=150)

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from acquisition import Recording, record
 from estimation import exponential_window, force_window
+from foundation import TIP
 from millfrf.taps import TapOptions, TapResult, tap_recordings
-from replay_data import HammerCell, default_structure, dynamometer, tip_accelerometers
-from replay_data.robot_structure import TOOL_TIP, select
+from replay_data import HammerCell, default_structure, dynamometer, select, tip_accelerometers
 
 RATE, SECONDS = 2048.0, 1.0
 SHOWN = (8.0, 150.0)
@@ -95,7 +95,7 @@ def compare() -> Compared:
 
 def accelerance(s: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Of the simulated tool tip along X, at points of the Laplace plane."""
-    tip = select(default_structure(), TOOL_TIP[:1], TOOL_TIP[:1])
+    tip = select(default_structure(), TIP[:1], TIP[:1])
     residues = tip.right[:, 0] * tip.left[:, 0]
     terms = residues / (s[:, None] - tip.poles) + residues.conj() / (s[:, None] - tip.poles.conj())
     return np.asarray(s**2 * terms.sum(axis=1))

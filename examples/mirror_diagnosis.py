@@ -15,18 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from mismatch import (
-    Hypothesis,
-    LabError,
-    ModelShape,
-    Trial,
-    WindowedLines,
-    find_direction,
-    fit,
-    linear_floor,
-    predict_lines,
-    windowed_lines,
-)
+from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_spectrum
+from mismatch import Hypothesis, LabError, ModelShape, find_direction, fit, linear_floor, predict_lines
 from mismatch.physics import JointPhysics, library
 from mismatch.screening.joint_screening import screen_joints
 from modal_fit import ModalModel, read_modal_model
@@ -86,16 +76,21 @@ def growth(frequencies: list[Real]) -> tuple[float, float, float]:
     return second, third, float(brentq(lambda n: (3**n - 1) / (2**n - 1) - third / second, 0.05, 6))
 
 
-def trial(folder: Path, level: int, delay: float) -> Trial:
+def trial(folder: Path, level: int, delay: float) -> BandRecording:
     """First experiment of the train part, voltages delayed as the model's chain does (exact for periods)."""
     u, y = (np.load(folder / f"{kind}_{level}mV_train.npy")[:, :, 0, :] for kind in ("u", "y"))
     u, y = (np.concatenate([one[..., 0], one[..., 1]]) for one in (u, y))
     turn = np.exp(-2j * np.pi * np.fft.rfftfreq(len(u), 1 / RATE) * delay)[:, None]
     late = np.fft.irfft(np.fft.rfft(u, axis=0) * turn, n=len(u), axis=0)
-    return Trial(f"{level} mV", RATE, late, y, np.zeros(3, dtype=np.int64), ("ux", "uy", "uz", "yx", "yy", "yz"))
+    places = [f"MIRROR:+{axis}" for axis in "XYZ"]
+    channels = (
+        channels_of("voltage", places, ["ux", "uy", "uz"]),
+        channels_of("displacement", places, ["yx", "yy", "yz"]),
+    )
+    return BandRecording(f"{level} mV", RATE, late, y, *channels)
 
 
-def error(hypothesis: Hypothesis, lines: WindowedLines) -> float:
+def error(hypothesis: Hypothesis, lines: WindowedSpectrum) -> float:
     """Of all responses together, relative."""
     rest = lines.measured - predict_lines(hypothesis, lines).response
     return float(np.linalg.norm(rest) / np.linalg.norm(lines.measured))
@@ -105,7 +100,7 @@ def ask_library(folder: Path, fitted: ModalModel) -> None:
     """One refit for all levels; direction of a joint; laws screened along it, the best three simulated freely."""
     model = replace(fitted, delay=0.0, quantity="receptance", covariance=None)
     decay = float((-model.poles.real).min())
-    lines = [windowed_lines(trial(folder, level, fitted.delay), MODEL_BAND, decay) for level in LEVELS]
+    lines = [windowed_spectrum(trial(folder, level, fitted.delay), MODEL_BAND, decay) for level in LEVELS]
     shape = ModelShape(model, LabError())
     nominal = Hypothesis(shape, np.zeros(shape.size))
     own = [fit([each], nominal, iterations=5).hypothesis for each in lines]
@@ -114,7 +109,7 @@ def ask_library(folder: Path, fitted: ModalModel) -> None:
     print(f"modes fall by {100 * second:.2f} % to 200 mV and {100 * third:.2f} % to 300 mV: level^{exponent:.2f}")
     base = fit(lines, nominal, iterations=5)
     for name, one in (("100 mV's model", nominal), ("one refit for all", base.hypothesis)):
-        print(f"{name}: " + ", ".join(f"{error(one, each):.3f} at {each.trial.name}" for each in lines))
+        print(f"{name}: " + ", ".join(f"{error(one, each):.3f} at {each.recording.name}" for each in lines))
     floor = linear_floor(base, lines)
     seen = find_direction(floor, base.hypothesis)
     print(f"one direction {np.round(seen.direction, 2)} holds {seen.share:.2f} of what any force would explain")

@@ -25,9 +25,10 @@ from scipy.io import loadmat
 from scipy.optimize import least_squares
 from scipy.signal import butter, filtfilt, resample_poly
 
-from cutting.compilation import compiled
+from cutting import compiled
+from estimation import BandRecording, channels_of
 from figures import COLOURS, house_style, new_figure
-from mismatch import StructureDiagnosis, Trial, diagnose, predict
+from mismatch import StructureDiagnosis, diagnose, predict
 from mismatch.models.model_terms import improved_model
 from modal_fit import ModalModel
 
@@ -124,20 +125,25 @@ def modal_model(drive: Drive, mode: tuple[float, float] = VIRTUAL) -> ModalModel
     return ModalModel(np.array([pole]), np.ones((1, 1), dtype=complex), left, ("TCP:+X",), ("TCP:+X",))
 
 
-def as_trial(name: str, record: Record, loop: tuple[float, float]) -> Trial:
+def as_trial(name: str, record: Record, loop: tuple[float, float]) -> BandRecording:
     """Outer force ``F + k q + d q'`` and position of a record, brought down to 50 Hz."""
     position = record.position - record.position[0]
     outer = record.force + loop[0] * position + loop[1] * motion(record)[0]
     both = resample_poly(np.column_stack([outer, position]), 1, KEPT, axis=0)
-    return Trial(name, 1 / STEP / KEPT, both[:, :1], both[:, 1:], np.zeros(1, dtype=np.int64), ("force", "position"))
+    return BandRecording(
+        name,
+        1 / STEP / KEPT,
+        both[:, :1],
+        both[:, 1:],
+        channels_of("force", ["TCP:+X"], ["force"]),
+        channels_of("displacement", ["TCP:+X"], ["position"]),
+    )
 
 
-def halves(trial: Trial) -> list[Trial]:
+def halves(trial: BandRecording) -> list[BandRecording]:
     """First and second half, so that one can be held out."""
     n = len(trial.force) // 2
-    cuts = {"first half": slice(0, n), "second half": slice(n, 2 * n)}
-    rest = (trial.powers, trial.channels)
-    return [Trial(name, trial.rate, trial.force[cut], trial.response[cut], *rest) for name, cut in cuts.items()]
+    return [trial.part("first half", 0, n), trial.part("second half", n, 2 * n)]
 
 
 def named_friction(found: StructureDiagnosis) -> tuple[float, float]:

@@ -18,10 +18,10 @@ from robot_model import (
     inverse_kinematics,
     named_posture,
     read_spatial_robot,
+    rotation_vector,
     structure_at,
     tip_compliance,
 )
-from robot_model.kinematics.mechanism import rotation_vector
 
 CASE = read_spatial_robot("fanuc_s420if")
 

@@ -19,8 +19,9 @@ from scipy.io import loadmat
 from scipy.optimize import least_squares
 from scipy.signal import csd, welch
 
+from estimation import BandRecording, channels_of
 from figures import COLOURS, house_style, new_figure
-from mismatch import StructureDiagnosis, Trial, diagnose, linear_floor, predict, seen_motion
+from mismatch import StructureDiagnosis, diagnose, linear_floor, predict, seen_motion
 from mismatch.models.model_terms import improved_model
 from modal_fit import ModalModel
 
@@ -79,10 +80,11 @@ def linear_model(signals: Signals) -> tuple[ModalModel, float]:
     return model, float(force.mean() - response.mean() * omega**2 / gain)
 
 
-def as_trial(name: str, signals: Signals, part: slice, silence: int = 0) -> Trial:
+def as_trial(name: str, signals: Signals, part: slice, silence: int = 0) -> BandRecording:
     """A piece of the record as a trial, with ``silence`` samples of zeros before and after."""
     force, response = (np.pad(one[part], silence)[:, None] for one in (signals.force, signals.response))
-    return Trial(name, RATE, force, response, np.zeros(1, dtype=np.int64), ("input", "output"))
+    channels = channels_of("force", ["TCP:+X"], ["input"]), channels_of("displacement", ["TCP:+X"], ["output"])
+    return BandRecording(name, RATE, force, response, *channels)
 
 
 def free_run(model: ModalModel, signals: Signals, part: slice) -> Real:
@@ -126,8 +128,7 @@ def picture(signals: Signals, nominal: ModalModel, found: StructureDiagnosis) ->
         cause for cause in found.details.final.hypothesis.causes if cause.physics.name == "stiffness_hardening"
     )
     assert cause.direction is not None
-    final = found.details.final
-    linear = replace(final, hypothesis=replace(final.hypothesis, causes=()))
+    linear = replace(found.details.final, hypothesis=replace(found.details.final.hypothesis, causes=()))
     floor = linear_floor(linear, list(found.details.recordings))
     seen = [seen_motion(record, linear.hypothesis, cause.direction) for record in floor.records]
     kept = slice(found.details.recordings[0].start, -int(2 * RATE))

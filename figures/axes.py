@@ -18,7 +18,7 @@ def given_or_new(axes: Axes | None, height_mm: float = HEIGHT_MM) -> Iterator[Ax
     Parameters
     ----------
     axes
-        Of a user, or None.
+        Axes that a user gives, or None for new ones.
     height_mm
         Height of a new figure, mm.
     """

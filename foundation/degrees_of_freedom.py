@@ -5,6 +5,12 @@ from dataclasses import dataclass
 
 from .errors import InputError
 
+TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
+"""Translations of the tool's tip."""
+
+HOUSING = ("HOUSING:+X", "HOUSING:+Y", "HOUSING:+Z")
+"""Translations of the spindle's housing."""
+
 _PATTERN = re.compile(r"^(?P<node>[^:]+):(?P<sign>[+-])(?P<axis>R?[XYZ]|S)$")
 
 

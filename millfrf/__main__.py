@@ -11,8 +11,8 @@ import typer
 from foundation import InputError, MillfrfError
 
 from .commands import COMMANDS
-from .cut.commands import cut_app
-from .robot.commands import robot_app
+from .cut import cut_app
+from .robot import robot_app
 from .usage_words import usage_in_words
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2

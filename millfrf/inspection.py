@@ -13,8 +13,7 @@ from estimation import Frf, Geometry, read_frf, read_geometry
 from modal_fit import read_modal_model
 from stability import STATUSES, read_lobes
 
-from .chain.cuts.chatter import tone_table, verdict_table
-from .chain.cuts.chatter_file import read_cuts
+from .chain import read_cuts, tone_table, verdict_table
 from .file_kinds import CHATTER, CUTTING, FRF, GEOMETRY, LOBES, MODEL, POLES, RECORDING, kind_of
 from .gate import (
     check_frf,
@@ -22,18 +21,16 @@ from .gate import (
     check_model_reciprocity,
     check_reciprocity,
     doubts_of,
+    level_table,
+    look,
     read_checked_cutting,
     stored_doubts,
 )
-from .gate.signals import level_table, look
-from .progress import Watch, silent
+from .progress import Progress, silent
 from .provenance import read_provenance
-from .tables.mode_shapes import shape_table
-from .tables.point_words import points_in_words
-from .tables.poles_table import poles_in_words
-from .tables.reciprocity_tables import pair_table, vector_table
-from .tables.result_tables import Table, error_table, mode_table
-from .tap_concerns import tap_concerns
+from .reciprocity_tables import pair_table, vector_table
+from .tables import Table, error_table, mode_table, points_in_words, poles_in_words, shape_table
+from .taps import tap_concerns
 
 LARGEST = 100.0
 """m; a structure of some hundred millimetres spans more where they are taken for metres."""
@@ -59,7 +56,7 @@ class Findings:
     concerns: tuple[str, ...] = ()
 
 
-def inspect_file(path: str | os.PathLike[str], watch: Watch = silent) -> Findings:
+def inspect_file(path: str | os.PathLike[str], progress: Progress = silent) -> Findings:
     """Look at a recording, an FRF, a model, lobes, a cutting file or a geometry.
 
     Raises
@@ -69,7 +66,7 @@ def inspect_file(path: str | os.PathLike[str], watch: Watch = silent) -> Finding
     """
     kind = kind_of(path)
     if kind == RECORDING:
-        return _recording(path, watch)
+        return _recording(path, progress)
     readers: dict[str, Callable[[str | os.PathLike[str]], Findings]] = {
         FRF: _frf,
         MODEL: _model,
@@ -82,7 +79,7 @@ def inspect_file(path: str | os.PathLike[str], watch: Watch = silent) -> Finding
     return readers[kind](path)
 
 
-def _recording(path: str | os.PathLike[str], watch: Watch) -> Findings:
+def _recording(path: str | os.PathLike[str], progress: Progress) -> Findings:
     tables, concerns = [], []
     with Recording(path) as recording:
         if recording.being_written:
@@ -94,7 +91,7 @@ def _recording(path: str | os.PathLike[str], watch: Watch) -> Findings:
             if stream.n_samples == 0:
                 concerns.append(f"stream {stream.name} holds no sample")
                 continue
-            seen = look(stream, watch=watch)
+            seen = look(stream, progress=progress)
             tables.append(level_table(stream, seen.levels))
             concerns += [*seen.concerns(stream.sample_rate), *tap_concerns(stream, seen.levels)]
         title = recording.title or "untitled"

@@ -1,4 +1,4 @@
-"""Progress bars on standard error for whatever takes over two seconds; silent where nobody watches."""
+"""Progress bars on standard error for work that takes over two seconds; none where nobody watches."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -11,16 +11,16 @@ QUIET_FOR = 1.0
 Update = Callable[[int], None]
 
 
-class Watch(Protocol):
-    """Opens a bar: ``with watch("estimating", total) as update: update(done)``."""
+class Progress(Protocol):
+    """Callable that opens a bar: ``with progress("estimating", total) as update: update(done)``."""
 
     def __call__(self, description: str, total: int | None = None) -> AbstractContextManager[Update]:
-        """A bar for one job; total None: one that only shows that work goes on."""
+        """Open a bar for one job; with total None it only shows that work goes on."""
 
 
 @contextmanager
 def silent(description: str, total: int | None = None) -> Iterator[Update]:
-    """No bar at all: for libraries and tests."""
+    """Show no bar: for libraries and tests."""
     del description, total
     yield _ignore
 
@@ -31,30 +31,31 @@ def _ignore(done: int) -> None:
 
 @contextmanager
 def bar(description: str, total: int | None = None) -> Iterator[Update]:
-    """A bar that appears after a second and vanishes when the job is done."""
+    """Show a bar that appears after a second and vanishes when the job is done."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as RichProgress
 
     console = Console(stderr=True)
     if not console.is_terminal:
         yield _ignore
         return
     columns = (TextColumn("{task.description:<28}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    progress = Progress(*columns, console=console, transient=True)
-    task = progress.add_task(description, total=total)
+    shown_bar = RichProgress(*columns, console=console, transient=True)
+    task = shown_bar.add_task(description, total=total)
     started, shown = time.monotonic(), total is None
     if shown:
-        progress.start()
+        shown_bar.start()
 
     def update(done: int) -> None:
         nonlocal shown
         if not shown and time.monotonic() - started > QUIET_FOR:
             shown = True
-            progress.start()
-        progress.update(task, completed=done)
+            shown_bar.start()
+        shown_bar.update(task, completed=done)
 
     try:
         yield update
     finally:
         if shown:
-            progress.stop()
+            shown_bar.stop()

@@ -1,5 +1,7 @@
 """Where a model and recordings disagree: locate it, name the physics, model it, show the fit improve."""
 
+from estimation import WindowedSpectrum, windowed_spectrum
+
 from .adapters.structure import Prediction, diagnose, improved_model_of, predict
 from .inference import (
     AcceptedCause,
@@ -16,13 +18,13 @@ from .location.structure_details import StructureDetails, StructureDiagnosis
 from .models.fitting import Fit, fit, residual
 from .models.hypothesis import Cause, Hypothesis, predict_lines
 from .models.model_shape import ModelShape
-from .records.trial import Trial, band_of, read_trial, read_trials
-from .records.windowed_lines import WindowedLines, windowed_lines
+from .records.reading import band_of, read_recording, read_recordings
 from .screening.joint_direction import JointSighting, SeenMotion, find_direction, seen_motion
 from .screening.linear_floor import Floor, linear_floor
 
 __all__ = [
     "AcceptedCause",
+    "BandRecording",
     "Candidate",
     "Cause",
     "Diagnosis",
@@ -40,8 +42,7 @@ __all__ = [
     "Settings",
     "StructureDetails",
     "StructureDiagnosis",
-    "Trial",
-    "WindowedLines",
+    "WindowedSpectrum",
     "band_of",
     "diagnose",
     "find_direction",
@@ -51,10 +52,10 @@ __all__ = [
     "predict",
     "predict_lines",
     "read_diagnosis",
-    "read_trial",
-    "read_trials",
+    "read_recording",
+    "read_recordings",
     "residual",
     "seen_motion",
-    "windowed_lines",
+    "windowed_spectrum",
     "write_diagnosis",
 ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import BandRecord
+from estimation import BandRecording
 from foundation import InputError
 
 _CHUNK = 4096
@@ -41,34 +41,34 @@ class CorrelationBlocks:
     n_samples: int
 
 
-def correlation_blocks(records: Sequence[BandRecord], block_rows: int) -> CorrelationBlocks:
+def correlation_blocks(recordings: Sequence[BandRecording], block_rows: int) -> CorrelationBlocks:
     """Sum the correlation blocks of all tests; no test's samples meet another's.
 
     Raises
     ------
     InputError
-        No record, records of different rates or channels, or too few samples for ``block_rows``.
+        No recording, recordings of different rates or channels, or too few samples for ``block_rows``.
     """
-    if not records:
-        raise InputError("no record to fit; give at least one recording")
-    first = records[0]
-    for number, record in enumerate(records[1:], start=2):
-        if record.sample_rate != first.sample_rate:
+    if not recordings:
+        raise InputError("no recording to fit; give at least one recording")
+    first = recordings[0]
+    for number, recording in enumerate(recordings[1:], start=2):
+        if recording.rate != first.rate:
             raise InputError(
-                f"test {number} has {record.sample_rate:g} Hz after decimation, test 1 has {first.sample_rate:g} Hz; "
+                f"test {number} has {recording.rate:g} Hz after decimation, test 1 has {first.rate:g} Hz; "
                 "stack tests of one sample rate"
             )
-        if (record.excitations, record.responses) != (first.excitations, first.responses):
+        if (recording.excitations, recording.responses) != (first.excitations, first.responses):
             raise InputError(f"test {number} has other channels than test 1; stack tests of one set-up only")
-    excitation_scale = _root_mean_square([r.excitation_samples for r in records])
-    response_scale = _root_mean_square([r.response_samples for r in records])
+    excitation_scale = _root_mean_square([r.force for r in recordings])
+    response_scale = _root_mean_square([r.response for r in recordings])
     n_in, n_out = len(excitation_scale), len(response_scale)
     size = 2 * block_rows * (n_in + n_out)
     matrix = np.zeros((size, size))
     n_samples = 0
-    for record in records:
-        force = (record.excitation_samples - record.excitation_samples.mean(axis=0)) / excitation_scale
-        motion = (record.response_samples - record.response_samples.mean(axis=0)) / response_scale
+    for recording in recordings:
+        force = (recording.force - recording.force.mean(axis=0)) / excitation_scale
+        motion = (recording.response - recording.response.mean(axis=0)) / response_scale
         count = len(force) - 2 * block_rows + 1
         for start in range(0, max(count, 0), _CHUNK):
             stop = min(start + _CHUNK, count)
@@ -80,7 +80,7 @@ def correlation_blocks(records: Sequence[BandRecord], block_rows: int) -> Correl
             f"{n_samples} samples after decimation are too few for {size} correlation rows; "
             "record longer or use fewer block rows"
         )
-    return CorrelationBlocks(matrix, block_rows, n_in, n_out, response_scale, first.sample_rate, n_samples)
+    return CorrelationBlocks(matrix, block_rows, n_in, n_out, response_scale, first.rate, n_samples)
 
 
 def _root_mean_square(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:

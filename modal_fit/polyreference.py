@@ -9,10 +9,9 @@ from estimation import Frf
 from foundation import InputError, MillfrfError
 
 from .frf_fit import NOT_REFINED, REFINED, MatrixFit, default_order, fit_matrix
-from .maximum_likelihood.whole_records import RecordSpectra
-from .models.modal_model import ModalModel
-from .stabilisation.chart import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
-from .stabilisation.matrix_fraction import matrix_fraction_poles
+from .maximum_likelihood import RecordSpectra
+from .models import ModalModel
+from .stabilisation import PoleGroup, StabilisationChart, choose_poles, matrix_fraction_poles, stabilisation_chart
 from .transfer_delay import transfer_delay
 
 Complex = NDArray[np.complex128]

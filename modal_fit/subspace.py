@@ -6,16 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimation import BandRecord
+from estimation import BandRecording
 from foundation import InputError, MillfrfError
 
 from .correlation_blocks import CorrelationBlocks, correlation_blocks
-from .maximum_likelihood.likelihood_result import best_fit, modal_model_from
-from .maximum_likelihood.noise_levels import NoiseLevels
-from .maximum_likelihood.whole_records import record_spectra
-from .models.modal_model import ModalModel
-from .stabilisation.chart import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
-from .stabilisation.matrix_fraction import OrderPoles
+from .maximum_likelihood import NoiseLevels, best_fit, modal_model_from, record_spectra
+from .models import ModalModel
+from .stabilisation import OrderPoles, PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
 
 _BLOCK_ROWS = 25
 _SPARE_ROWS = 1.5  # observability matrix has so many times more rows than the highest order has states
@@ -55,7 +52,7 @@ class SubspaceFit:
 
 
 def fit_subspace(
-    records: Sequence[BandRecord],
+    recordings: Sequence[BandRecording],
     band: tuple[float, float],
     *,
     max_order: int = 30,
@@ -66,13 +63,13 @@ def fit_subspace(
 
     Input-output subspace identification (past outputs and inputs as instruments; Van Overschee & De Moor, Subspace
     Identification for Linear Systems, 1996, chapter 4; Verhaegen 1994) on correlation blocks summed over the tests
-    gives poles over model order; the chosen ones start a maximum-likelihood fit of the whole-record spectra in the
+    gives poles over model order; the chosen ones start a maximum-likelihood fit of the whole-recording spectra in the
     band, with left and right vectors, out-of-band terms, transients, and noise on forces as well as responses.
 
     Parameters
     ----------
-    records
-        One a test, from :func:`estimation.band_record`; all of one sample rate and channel layout.
+    recordings
+        One a test, from :func:`estimation.band_recording`; all of one sample rate and channel layout.
     band
         Hz; the modes to be found lie inside.
     max_order
@@ -90,9 +87,9 @@ def fit_subspace(
     MillfrfError
         No pole is stable over the orders, or the refinement does not converge.
     """
-    spectra = record_spectra(records, band)
-    block_rows = _enough_rows(max_order, len(records[0].responses)) if block_rows is None else block_rows
-    blocks = correlation_blocks(records, block_rows)
+    spectra = record_spectra(recordings, band)
+    block_rows = _enough_rows(max_order, len(recordings[0].responses)) if block_rows is None else block_rows
+    blocks = correlation_blocks(recordings, block_rows)
     if not 2 <= max_order < block_rows * blocks.n_responses:
         raise InputError(
             f"highest order {max_order} does not fit {block_rows} block rows of {blocks.n_responses} responses; "
@@ -108,9 +105,9 @@ def fit_subspace(
             "widen the band or record longer"
         )
     fit = best_fit(np.array([group.pole for group in kept]), spectra, band, n_smooth=_SMOOTH)
-    responses = [channel.degree_of_freedom for channel in records[0].responses]
-    excitations = [channel.degree_of_freedom for channel in records[0].excitations]
-    unit = "m/N" if records[0].excitations[0].unit == "N" else f"m/{records[0].excitations[0].unit}"
+    responses = [channel.degree_of_freedom for channel in recordings[0].responses]
+    excitations = [channel.degree_of_freedom for channel in recordings[0].excitations]
+    unit = "m/N" if recordings[0].excitations[0].unit == "N" else f"m/{recordings[0].excitations[0].unit}"
     model = modal_model_from(fit, band, responses, excitations, unit)
     warnings = (
         () if fit.converged else ("the refinement stopped before it converged; treat the error bars as lower bounds",)

@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 from estimation import Frf, FrfCovariance, to_receptance
 from foundation import InputError, MillfrfError, shared_band
 
-from .models.modal_model import ModalModel, Residuals
-from .models.shape_measures import modal_assurance
-from .models.uncertainty import derived_covariance
+from .models import ModalModel, Residuals, derived_covariance, modal_assurance
 from .polyreference import ModalFit, fit_polyreference
 
 Complex = NDArray[np.complex128]

@@ -4,10 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from .maximum_likelihood.likelihood_model import Setting
-from .maximum_likelihood.linear_start import regressors
-from .maximum_likelihood.whole_records import RecordSpectra
-from .models.out_of_band import out_of_band_basis
+from .maximum_likelihood import RecordSpectra, Setting, regressors
+from .models import out_of_band_basis
 
 Complex = NDArray[np.complex128]
 _LONGEST = 4.0  # periods of the band's upper end

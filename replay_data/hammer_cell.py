@@ -6,14 +6,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
+from foundation import TIP, InputError
 from modal_fit import ModalModel
 
-from .laboratory.sensors import Sensor, hammer_sensors
-from .laboratory.setup_notes import setup_text
-from .robot_structure import TOOL_TIP
+from .laboratory import Sensor, hammer_sensors, setup_text
 from .sampled_cell import March, SampledCell
-from .simulation.modal_integrator import discretise, respond
+from .simulation import discretise, respond
 
 LEAD = 0.05
 """Quiet time before the first tap, s."""
@@ -62,7 +60,7 @@ class HammerCell(SampledCell):
         self,
         structure: ModalModel,
         *,
-        directions: Sequence[str] = TOOL_TIP,
+        directions: Sequence[str] = TIP,
         taps: int = 5,
         spacing: float = 4.0,
         peak: float = 200.0,
@@ -108,7 +106,7 @@ class _HammerMarch:
         jitter = generator.uniform(0, 1 / cell.sample_rate, n_taps)
         self._times = LEAD + cell.spacing * np.arange(n_taps) + jitter
         self._peaks = cell.peak * np.clip(generator.normal(1, 0.15, n_taps), 0.3, 1.7)
-        self._columns = [TOOL_TIP.index(direction) for direction in cell.directions for _ in range(cell.taps)]
+        self._columns = [TIP.index(direction) for direction in cell.directions for _ in range(cell.taps)]
         self._width, self._step = cell.width, cell.step
         self._modes = discretise(cell.structure, cell.step).modes
         self._modal = np.zeros(2 * len(cell.structure.poles))
@@ -129,9 +127,9 @@ class _HammerMarch:
 
 
 def _require_taps(directions: Sequence[str], taps: int, spacing: float, peak: float, width: float) -> None:
-    unknown = [direction for direction in directions if direction not in TOOL_TIP]
+    unknown = [direction for direction in directions if direction not in TIP]
     if unknown or not directions:
-        raise InputError(f"taps at {', '.join(unknown) or 'nowhere'}; give one or more of {', '.join(TOOL_TIP)}")
+        raise InputError(f"taps at {', '.join(unknown) or 'nowhere'}; give one or more of {', '.join(TIP)}")
     if not (isinstance(taps, int) and taps >= 1):
         raise InputError(f"{taps!r} taps per direction; give a whole number, 1 or more")
     for name, value, unit in (("spacing", spacing, "s"), ("peak", peak, "N"), ("width", width, "s")):

@@ -6,17 +6,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess, refuse_varied
-from cutting.one_tooth import tooth_offsets
+from cutting import MillingProcess, refuse_varied, tooth_offsets
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .laboratory.sensors import Sensor, milling_sensors
-from .laboratory.setup_notes import cutting_table, setup_text
+from .laboratory import Sensor, cutting_table, milling_sensors, setup_text
 from .sampled_cell import March, SampledCell
-from .simulation.material import Material, material_named
-from .simulation.milling_loop import empty_memory, mill, prepare_cut
-from .simulation.modal_integrator import discretise
+from .simulation import Material, discretise, empty_memory, material_named, mill, prepare_cut
 from .speed_profiles import ConstantSpeed, SpeedProfile
 
 REHEARSAL = 5.0

@@ -5,11 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
+from foundation import HOUSING, TIP, InputError
 from modal_fit import ModalModel
-
-TOOL_TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
-HOUSING = ("HOUSING:+X", "HOUSING:+Y", "HOUSING:+Z")
 
 _TABLE_ONE_FREQUENCIES = (16.99, 18.48)
 _TABLE_ONE_DAMPING = (0.0285, 0.0996)
@@ -56,7 +53,7 @@ def table_one_model() -> ModalModel:
     [16.99, 18.48]
     """
     poles = _poles(_TABLE_ONE_FREQUENCIES, _TABLE_ONE_DAMPING)
-    return ModalModel(poles, np.array(_TABLE_ONE_RIGHT), np.array(_TABLE_ONE_LEFT), TOOL_TIP, TOOL_TIP)
+    return ModalModel(poles, np.array(_TABLE_ONE_RIGHT), np.array(_TABLE_ONE_LEFT), TIP, TIP)
 
 
 def default_structure() -> ModalModel:
@@ -99,8 +96,8 @@ def default_structure() -> ModalModel:
         np.concatenate([inner.poles, outer_poles]),
         np.hstack([motion[:, :3], housing]),
         np.vstack([inner.left, directions.astype(complex)]),
-        TOOL_TIP + HOUSING,
-        TOOL_TIP,
+        TIP + HOUSING,
+        TIP,
     )
 
 
@@ -118,7 +115,7 @@ def tip_model(structure: ModalModel) -> ModalModel:
     InputError
         The structure has no motion or no force at the tool tip in one of the directions.
     """
-    return select(structure, TOOL_TIP, TOOL_TIP)
+    return select(structure, TIP, TIP)
 
 
 def select(structure: ModalModel, responses: Sequence[str], excitations: Sequence[str]) -> ModalModel:

@@ -7,19 +7,22 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from foundation import InputError
+from foundation import TIP, InputError
 from modal_fit import ModalModel
 
-from .files.planar_file import PlanarCase, read_planar_robot
-from .files.robot_files import read_table
-from .files.spatial_file import SpatialCase, read_spatial_robot
-from .kinematics.loop_closure import close_loops, posture_warnings
-from .planar.flexible_links import flexible_chain
-from .planar.planar_robot import TIP_IN_PLANE
-from .planar.rigid_links import planar_compliance, planar_sag, rigid_matrices, rigid_model
-from .spatial.spatial_modes import TIP, TIP_ROTATIONS, damping_warnings, model_of_modes, modes_at
-from .spatial.spatial_robot import rigid_arms, structure_at
-from .spatial.weight import NO_MASSES, static_response
+from .files import PlanarCase, SpatialCase, read_planar_robot, read_spatial_robot, read_table
+from .kinematics import close_loops, posture_warnings
+from .planar import TIP_IN_PLANE, flexible_chain, planar_compliance, planar_sag, rigid_matrices, rigid_model
+from .spatial import (
+    NO_MASSES,
+    TIP_ROTATIONS,
+    damping_warnings,
+    model_of_modes,
+    modes_at,
+    rigid_arms,
+    static_response,
+    structure_at,
+)
 
 Real = NDArray[np.float64]
 

@@ -13,10 +13,9 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .certification.certified import certified_lobes
-from .limit_uncertainty.first_order import depth_errors, speeds_within, usable_limits
-from .limit_uncertainty.limit_samples import sampled_limits
-from .lobes.stability_lobes import StabilityLobes
+from .certification import certified_lobes
+from .limit_uncertainty import depth_errors, sampled_limits, speeds_within, usable_limits
+from .lobes import StabilityLobes
 
 Real = NDArray[np.float64]
 

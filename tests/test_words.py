@@ -129,3 +129,19 @@ def test_lines_of_the_docs_fit_a_window(page: str) -> None:
     lines = (ROOT / page).read_text(encoding="utf-8").splitlines()
     long = [n for n, line in enumerate(lines, 1) if len(line) > LONGEST and not line.lstrip().startswith("|")]
     assert not long, f"{page}: lines {long} have more than {LONGEST} characters; wrap them"
+
+
+@pytest.mark.parametrize("page", _pages())
+def test_links_of_the_docs_lead_to_files(page: str) -> None:
+    path = ROOT / page
+    links = re.findall(r"\]\((?!https?:|#|mailto:)([^)#\s]+)", path.read_text(encoding="utf-8"))
+    lost = [link for link in links if not (path.parent / link).exists()]
+    assert not lost, f"{page}: links to {lost} lead nowhere; correct the path"
+
+
+def test_terms_of_the_glossary_stand_in_order_and_lead_to_a_page() -> None:
+    entries = (ROOT / "docs/glossary.md").read_text(encoding="utf-8").split("\n\n**")[1:]
+    terms = [entry.split("**")[0].rstrip(".").lower() for entry in entries]
+    assert terms == sorted(terms)
+    assert len(terms) == len(set(terms))
+    assert all(".md)" in entry or "See *" in entry for entry in entries)

@@ -1,21 +1,5 @@
 """Conversion between recordings and the files other programs read and write."""
 
-from .array_file import ArrayFile, open_arrays
-from .convert_file import convert
-from .mapping import ArrayMapping, ChannelMapping, CsvOptions, Mapping, load_mapping
-from .uff.lines import UffLines, read_uff_lines
-from .uff.sets import read_uff_sets
+import lazy_loader
 
-__all__ = [
-    "ArrayFile",
-    "ArrayMapping",
-    "ChannelMapping",
-    "CsvOptions",
-    "Mapping",
-    "UffLines",
-    "convert",
-    "load_mapping",
-    "open_arrays",
-    "read_uff_lines",
-    "read_uff_sets",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

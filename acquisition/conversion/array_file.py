@@ -13,7 +13,7 @@ from scipy.io import loadmat
 
 from foundation import FileFormatError, InputError
 
-from ..file_safety.guarded_reading import read_guarded
+from ..file_safety import read_guarded
 from .csv_file import read_csv
 from .flat_fields import numbers
 from .mat_check import is_plain_mat

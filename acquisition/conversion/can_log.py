@@ -14,9 +14,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from foundation import FileFormatError, InputError, mistake_in_words, writing_whole_file
 
-from ..drivers.can_bus import CanSignal, DbcDecoder
+from ..drivers import CanSignal, DbcDecoder
 from ..errors import DriverMissing
-from ..recordings.recording import Recording
+from ..recordings import Recording
 from .content import recording_content
 from .writers import require_writable, write_content
 

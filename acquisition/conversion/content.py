@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError
 
-from ..recordings.recording import Recording
-from ..sources.source import StreamDescription
+from ..recordings import Recording
+from ..sources import StreamDescription
 
 Pairs = tuple[NDArray[np.float64], NDArray[np.float64]]
 

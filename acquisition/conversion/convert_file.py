@@ -7,7 +7,7 @@ from pathlib import Path
 
 from foundation import FileFormatError, InputError, writing_whole_file
 
-from ..recordings.recording import Recording
+from ..recordings import Recording
 from .array_file import open_arrays
 from .assemble import contents
 from .content import Content, recording_content

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError
 
-from ..recordings.recording_format import check_format, stream_from_attributes
+from ..recordings import check_format, stream_from_attributes
 from .content import ArraySamples, Content
 from .flat_fields import event_texts
 

@@ -12,9 +12,8 @@ from scipy.io import savemat
 
 from foundation import InputError
 
-from ..recordings.recording_format import FORMAT, FORMAT_VERSION
-from ..recordings.recording_writer import RecordingWriter
-from ..sources.events import EventAxis, Events
+from ..recordings import FORMAT, FORMAT_VERSION, RecordingWriter
+from ..sources import EventAxis, Events
 from .content import Content, row_blocks
 from .flat_fields import to_fields
 

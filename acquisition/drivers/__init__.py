@@ -1,5 +1,5 @@
 """One driver a file; each is a `Source`."""
 
-from .replay import ReplaySource
+import lazy_loader
 
-__all__ = ["ReplaySource"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,7 +9,7 @@ from typing import Any
 from foundation import InputError
 
 from ..errors import DeviceError, DeviceTimeout
-from ..sources.events import EventAxis, Events
+from ..sources import EventAxis, Events
 from .serial_line import on_line, open_line
 
 

@@ -13,9 +13,7 @@ import numpy as np
 from foundation import FileFormatError, InputError
 
 from ..errors import DeviceTimeout, Disconnected, DriverMissing
-from ..sources.events import EventAxis, Events
-from ..sources.receiver import Put
-from ..sources.threaded_feed import ThreadedFeed
+from ..sources import EventAxis, Events, Put, ThreadedFeed
 from .serial_line import LINE_FAILURES
 
 _POLL = 0.1

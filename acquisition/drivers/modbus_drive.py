@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import DeviceTimeout, Disconnected, DriverMissing
-from ..sources.events import HOST_AXIS, Events
-from ..sources.receiver import Put
-from ..sources.threaded_feed import ThreadedFeed
+from ..sources import HOST_AXIS, Events, Put, ThreadedFeed
 from .serial_line import BITS_A_BYTE, LINE_FAILURES
 
 _REPLY_BYTES = 7  # address, function, length, two data bytes, two of the checksum

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from ..errors import DeviceError, Overrun
-from ..sources.source import Block, StreamDescription
+from ..sources import Block, StreamDescription
 from .ni_channels import NiInput, input_delay
 from .ni_errors import speaking_to
 

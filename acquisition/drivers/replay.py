@@ -7,10 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recordings.recording import Recording
-from ..sources.events import EventAxis, Events
-from ..sources.pacing import Pace
-from ..sources.source import Block, StreamDescription
+from ..recordings import Recording
+from ..sources import Block, EventAxis, Events, Pace, StreamDescription
 
 
 class ReplaySource:

@@ -10,9 +10,7 @@ import numpy as np
 from foundation import InputError
 
 from ..errors import DeviceTimeout
-from ..sources.events import HOST_AXIS, EventAxis, Events
-from ..sources.receiver import Put
-from ..sources.threaded_feed import ThreadedFeed
+from ..sources import HOST_AXIS, EventAxis, Events, Put, ThreadedFeed
 from .serial_line import BITS_A_BYTE, on_line, open_line
 
 _NUMBER = r"([-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)"

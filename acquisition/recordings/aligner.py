@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..sources.source import StreamDescription
+from ..sources import StreamDescription
 from .recording import Stream
 
 Real = NDArray[np.float64]
@@ -82,6 +82,11 @@ def relative_delays(stream: StreamDescription, names: Sequence[str]) -> list[flo
     """Delay of each named channel behind the stream's least delayed one, s."""
     known = {channel.name: channel.input_delay_s or 0.0 for channel in stream.channels}
     return [known[name] - stream.common_delay for name in names]
+
+
+def rows_left_out(stream: Stream, names: Sequence[str]) -> int:
+    """Rows at the beginning that :func:`aligned_blocks` leaves out; 0 where no delay of named channels differs."""
+    return Aligner(relative_delays(stream.description, names), stream.sample_rate).skipped
 
 
 def aligned_blocks(stream: Stream, names: Sequence[str], block_length: int = 1 << 16) -> Iterator[Real]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from foundation import FileFormatError, InputError
 
 from ..clock import ClockFit, fit_clock
-from ..sources.source import StreamDescription
+from ..sources import StreamDescription
 from .event_series import EventSeries
 
 

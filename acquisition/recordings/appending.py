@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DiskFull
-from ..file_safety.durability import SpareSpace, is_disk_full
+from ..file_safety import SpareSpace, is_disk_full
 
 Rows = Sequence[tuple[h5py.Dataset, NDArray[np.generic]]]
 

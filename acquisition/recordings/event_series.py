@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError, InputError
 
-from ..sources.events import EventAxis
+from ..sources import EventAxis
 from .recording_format import text_attribute
 
 Pair = tuple[NDArray[np.float64], NDArray[np.float64]]

@@ -5,8 +5,7 @@ import os
 from collections.abc import Callable
 from typing import Literal
 
-from ..sources.events import Events, announced_events
-from ..sources.source import Block, Source
+from ..sources import Block, Events, Source, announced_events
 from .recording_writer import RecordingWriter
 
 SPARE_BYTES = 16_000_000
@@ -20,7 +19,7 @@ def record(
     dtype: Literal["float32", "float64"] = "float32",
     progress: Callable[[int], None] | None = None,
     stop: Callable[[], bool] | None = None,
-    watch: Callable[[Block | Events], None] | None = None,
+    observer: Callable[[Block | Events], None] | None = None,
     spare_bytes: int = SPARE_BYTES,
 ) -> None:
     """Write ``source`` to a new recording until it ends or ``stop`` says so.
@@ -40,7 +39,7 @@ def record(
         Called with the number of samples written so far, over all streams.
     stop
         Function that is asked before each block; True ends the recording in order.
-    watch
+    observer
         Shown every block and event after it was written; it must return quickly.
     spare_bytes
         Disk space kept aside, in bytes.
@@ -68,8 +67,8 @@ def record(
             written = 0
             while not (stop is not None and stop()) and (taken := source.read()) is not None:
                 written += _write(writer, taken)
-                if watch is not None:
-                    watch(taken)
+                if observer is not None:
+                    observer(taken)
                 if progress is not None:
                     progress(written)
         finally:

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from foundation import FileFormatError, InputError
 
 from ..channel import Channel
-from ..file_safety.damage import open_for_reading, reporting_damage, require_stored, whole_rows
-from ..file_safety.durability import is_being_written
-from ..sources.source import StreamDescription
+from ..file_safety import is_being_written, open_for_reading, reporting_damage, require_stored, whole_rows
+from ..sources import StreamDescription
 from .alignment import Alignment
 from .event_series import EventSeries
 from .recording_format import check_format, stream_from_attributes, text_attribute

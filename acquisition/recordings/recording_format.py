@@ -8,7 +8,7 @@ import numpy as np
 from foundation import FileFormatError, InputError
 
 from ..channel import Channel
-from ..sources.source import StreamDescription
+from ..sources import StreamDescription
 
 FORMAT = "millfrf.recording"
 FORMAT_VERSION = 1

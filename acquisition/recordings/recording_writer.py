@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from ..errors import DiskFull
-from ..file_safety.durability import SpareSpace, Syncer, is_being_written, is_disk_full
-from ..sources.events import SAMPLES_AXIS, TEXT_BYTES, EventAxis, Events, stored_texts
-from ..sources.source import StreamDescription
+from ..file_safety import SpareSpace, Syncer, is_being_written, is_disk_full
+from ..sources import SAMPLES_AXIS, TEXT_BYTES, EventAxis, Events, StreamDescription, stored_texts
 from .appending import append_rows
 from .recording_format import ENDING_BYTES, FORMAT, FORMAT_VERSION
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from foundation import InputError, writing_whole_file
 
-from ..file_safety.durability import is_being_written
-from ..sources.events import Events
+from ..file_safety import is_being_written
+from ..sources import Events
 from .recording import Recording, Stream
 from .recording_writer import RecordingWriter
 

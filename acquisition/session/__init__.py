@@ -1,7 +1,5 @@
 """Sessions: a TOML file that says what is wired where, checked where it enters, and the source it describes."""
 
-from .build import build_source
-from .read import read_session
-from .tables import Session
+import lazy_loader
 
-__all__ = ["Session", "build_source", "read_session"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -4,10 +4,8 @@ from pathlib import Path
 
 from foundation import InputError
 
-from ..drivers.ni import NiSource
-from ..drivers.replay import ReplaySource
-from ..sources.feeds import WithFeeds
-from ..sources.source import Source
+from ..drivers import NiSource, ReplaySource
+from ..sources import Source, WithFeeds
 from .tables import NiDevice, ReplayDevice, Session
 
 

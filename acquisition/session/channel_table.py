@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from foundation import SI_UNITS, InputError, si_factor
 
 from ..channel import Channel
-from ..drivers.ni_channels import NiInput
+from ..drivers import NiInput
 
 STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
 Positive = Annotated[float, Field(gt=0)]

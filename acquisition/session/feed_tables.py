@@ -5,10 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, Field
 
-from ..drivers.amplifier import Amplifier, Command
-from ..drivers.can_bus import CanFeed, CanSignal
-from ..drivers.modbus_drive import ModbusFeed, Register
-from ..drivers.tachometer_line import TachometerFeed
+from ..drivers import Amplifier, CanFeed, CanSignal, Command, ModbusFeed, Register, TachometerFeed
 from .channel_table import STRICT, Name, Positive
 
 Baud = Annotated[int, Field(ge=50, le=10_000_000)]

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from foundation import TIP
 from modal_fit import ModalModel
 
-TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 HEAD = ("HEAD:+X", "HEAD:+Y", "HEAD:+Z")
 
 LAB_FREQUENCY, LAB_DAMPING, LAB_SHAPE = 0.01, 0.12, 0.03

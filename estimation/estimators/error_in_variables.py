@@ -8,11 +8,8 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..frf_matrix.frf import Frf, FrfCovariance
-from ..frf_matrix.quantities import frf_quantity
-from ..spectra.coherence import multiple_coherence
-from ..spectra.independence import RANK_TOLERANCE, input_independence
-from ..spectra.spectral_matrix import CrossSpectra
+from ..frf_matrix import Frf, FrfCovariance, frf_quantity
+from ..spectra import RANK_TOLERANCE, CrossSpectra, input_independence, multiple_coherence
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -7,12 +7,8 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..frf_matrix.frf import Frf, FrfCovariance
-from ..frf_matrix.quantities import frf_quantity
-from ..spectra.coherence import multiple_coherence
-from ..spectra.independence import independent_lines
-from ..spectra.spectral_matrix import CrossSpectra, lines_of
-from ..spectra.stacking import check_stackable, sum_tests
+from ..frf_matrix import Frf, FrfCovariance, frf_quantity
+from ..spectra import CrossSpectra, check_stackable, independent_lines, lines_of, multiple_coherence, sum_tests
 
 
 def h1(spectra: CrossSpectra) -> Frf:

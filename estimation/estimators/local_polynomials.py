@@ -1,4 +1,4 @@
-"""FRF of short records without leakage: local polynomials in frequency for the FRF and for the transient."""
+"""FRF of short recordings without leakage: local polynomials in frequency for the FRF and for the transient."""
 
 from collections.abc import Sequence
 
@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..band_records import BandRecord
-from ..frf_matrix.frf import Frf, FrfCovariance
-from ..frf_matrix.quantities import frf_quantity
+from ..band_recordings import BandRecording
+from ..frf_matrix import Frf, FrfCovariance, frf_quantity
 
 Complex = NDArray[np.complex128]
 _LINES_AT_ONCE = 2048
@@ -30,19 +29,19 @@ def local_half_width(n_tests: int, n_excitations: int, degree: int = 2) -> int:
 
 
 def local_polynomial(
-    records: Sequence[BandRecord], band: tuple[float, float], *, degree: int = 2, half_width: int | None = None
+    recordings: Sequence[BandRecording], band: tuple[float, float], *, degree: int = 2, half_width: int | None = None
 ) -> Frf:
-    """Estimate the FRF matrix on every Fourier line of the records inside ``band`` (Hz).
+    """Estimate the FRF matrix on every Fourier line of the recordings inside ``band`` (Hz).
 
     Around line k, ``X(k+r) = (H_k + sum_s h_s r^s) F(k+r) + T_k + sum_s t_s r^s``: leakage is the transient T, as
-    smooth in frequency as H, one for each record. 2 n + 1 neighbouring lines of all records give H_k, T_k and the
+    smooth in frequency as H, one for each recording. 2 n + 1 neighbouring lines of all recordings give H_k, T_k and the
     coefficients by least squares; the misfit gives the noise (Pintelon & Schoukens, System Identification, 2nd ed.,
     section 7.2). Forces must be rough in frequency: random, or steps and bursts, not a slow sweep alone.
 
     Parameters
     ----------
-    records
-        One record for each test; all are cut to the shortest.
+    recordings
+        One recording for each test; all are cut to the shortest.
     band : Hz
         Lowest and highest frequency of the lines.
     degree
@@ -58,31 +57,31 @@ def local_polynomial(
     Raises
     ------
     InputError
-        No record, unlike channels, a band outside the records, or fewer lines than the window needs.
+        No recording, unlike channels, a band outside the recordings, or fewer lines than the window needs.
     """
-    _check(records, band, degree)
-    n_samples = min(len(record.excitation_samples) for record in records)
-    frequencies = np.fft.rfftfreq(n_samples, 1 / records[0].sample_rate)
-    forces = np.array([_lines(record.excitation_samples, n_samples) for record in records])
-    motions = np.array([_lines(record.response_samples, n_samples) for record in records])
+    _check(recordings, band, degree)
+    n_samples = min(len(recording.force) for recording in recordings)
+    frequencies = np.fft.rfftfreq(n_samples, 1 / recordings[0].rate)
+    forces = np.array([_lines(recording.force, n_samples) for recording in recordings])
+    motions = np.array([_lines(recording.response, n_samples) for recording in recordings])
     n_tests, _, n_excitations = forces.shape
     unknowns = (degree + 1) * (n_excitations + n_tests)
     n = half_width or local_half_width(n_tests, n_excitations, degree)
     inside = np.flatnonzero((frequencies >= band[0]) & (frequencies <= band[1]))
     if len(inside) == 0 or len(frequencies) < 2 * n + 1:
         raise InputError(
-            f"{len(inside)} lines between {band[0]:g} and {band[1]:g} Hz in records of "
-            f"{n_samples / records[0].sample_rate:.3g} s; the window needs {2 * n + 1}. Record longer"
+            f"{len(inside)} lines between {band[0]:g} and {band[1]:g} Hz in recordings of "
+            f"{n_samples / recordings[0].rate:.3g} s; the window needs {2 * n + 1}. Record longer"
         )
     if (2 * n + 1) * n_tests <= unknowns:
         raise InputError(f"half width {n} gives fewer equations than the {unknowns} unknowns; raise it")
     values, noise, excitation, valid = _in_pieces(forces, motions, inside, n, degree)
-    quantity, unit = frf_quantity(records[0].responses, records[0].excitations)
+    quantity, unit = frf_quantity(recordings[0].responses, recordings[0].excitations)
     return Frf(
         np.asarray(frequencies[inside]),
         values,
-        tuple(channel.degree_of_freedom for channel in records[0].responses),
-        tuple(channel.degree_of_freedom for channel in records[0].excitations),
+        tuple(channel.degree_of_freedom for channel in recordings[0].responses),
+        tuple(channel.degree_of_freedom for channel in recordings[0].excitations),
         quantity,
         unit,
         valid,
@@ -108,17 +107,17 @@ def _in_pieces(
     return values, noise, excitation, valid
 
 
-def _check(records: Sequence[BandRecord], band: tuple[float, float], degree: int) -> None:
-    if not records:
-        raise InputError("no record; give at least one")
-    first = records[0]
-    for record in records:
-        if (record.sample_rate, record.excitations, record.responses) != (
-            first.sample_rate,
+def _check(recordings: Sequence[BandRecording], band: tuple[float, float], degree: int) -> None:
+    if not recordings:
+        raise InputError("no recording; give at least one")
+    first = recordings[0]
+    for recording in recordings:
+        if (recording.rate, recording.excitations, recording.responses) != (
+            first.rate,
             first.excitations,
             first.responses,
         ):
-            raise InputError("records of different channels or sample rates cannot be stacked; prepare them alike")
+            raise InputError("recordings of different channels or sample rates cannot be stacked; prepare them alike")
     if not 0 <= band[0] < band[1] <= first.usable_band:
         raise InputError(f"band {band[0]:g} to {band[1]:g} Hz is not within 0 to {first.usable_band:g} Hz")
     if degree < 0:

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from foundation import Band
 
 from .frf import Frf
-from .quantities import DERIVATIVES
+from .quantities import FRF_ORDERS
 
 COHERENT = 0.5
 """Multiple coherence of the best response from which a line says something of the structure."""
@@ -48,7 +48,7 @@ def known_band(frf: Frf, driven: NDArray[np.bool_]) -> Band | None:
     if len(lines) < 2:
         return None
     energy = np.sum(np.abs(frf.values) ** 2, axis=(1, 2)) * np.where(f > 0, f, 1.0) ** (
-        2.0 - 2.0 * DERIVATIVES.get(frf.quantity, 1)
+        2.0 - 2.0 * FRF_ORDERS.get(frf.quantity, 1)
     )
     stretches = [part for part in np.split(lines, np.flatnonzero(np.diff(lines) > BRIDGED) + 1) if len(part) > 1]
     if not stretches:

@@ -8,10 +8,12 @@ import numpy as np
 from acquisition import Channel
 from foundation import InputError
 
+from ..band_recordings import DERIVATIVE_ORDERS, before_high_pass
 from .frf import Frf, FrfCovariance
 
 _NAMES = {"displacement": "receptance", "velocity": "mobility", "acceleration": "accelerance"}
-DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2}
+FRF_ORDERS = {name: DERIVATIVE_ORDERS[motion] for motion, name in _NAMES.items()}
+"""Times that a receptance is differentiated to give the FRF."""
 
 
 def frf_quantity(responses: Sequence[Channel], excitations: Sequence[Channel]) -> tuple[str, str]:
@@ -45,10 +47,10 @@ def to_receptance(frf: Frf) -> Frf:
     """
     if frf.quantity in ("receptance", "transfer"):
         return frf
-    if frf.quantity not in DERIVATIVES:
+    if frf.quantity not in FRF_ORDERS:
         raise InputError(f"cannot turn {frf.quantity!r} into receptance; use receptance, mobility or accelerance")
     s, moving = frf.laplace, frf.frequencies > 0
-    factor = np.divide(1.0, s ** DERIVATIVES[frf.quantity], out=np.zeros_like(s), where=moving)
+    factor = np.divide(1.0, s ** FRF_ORDERS[frf.quantity], out=np.zeros_like(s), where=moving)
     covariance = frf.covariance
     if covariance is not None:
         covariance = FrfCovariance(covariance.response * (np.abs(factor) ** 2)[:, None, None], covariance.excitation)
@@ -81,9 +83,7 @@ def correct_high_pass(frf: Frf, corners: Sequence[float | None]) -> Frf:
         raise InputError(f"{len(corners)} high-pass corners for {len(frf.responses)} responses; give one for each")
     if not any(corners):
         return frf
-    s, moving = frf.laplace[:, None], frf.frequencies[:, None] > 0
-    corner = 2 * np.pi * np.array([value or 0.0 for value in corners])
-    factor = np.divide(s + corner, s, out=np.ones((len(s), len(corner)), dtype=complex), where=moving)
+    factor = before_high_pass(frf.laplace, [corner or 0.0 for corner in corners])
     covariance = frf.covariance
     if covariance is not None:
         scaled = covariance.response * factor[:, :, None] * factor.conj()[:, None, :]

@@ -1,6 +1,5 @@
 """Where the points of a measurement lie and along which directions they are measured: what mode shapes are drawn on."""
 
-from .geometry import Geometry
-from .geometry_file import import_geometry, is_geometry_table, read_geometry, write_geometry
+import lazy_loader
 
-__all__ = ["Geometry", "import_geometry", "is_geometry_table", "read_geometry", "write_geometry"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,36 +1,5 @@
 """Hammer tests: taps found and judged, windowed, averaged, and merged to one FRF matrix by points hit and measured."""
 
-from .agreement import Disagreement
-from .cutting_out import screened
-from .decay import Decay, answer_decay, window_for
-from .merging import MergedTaps, merge_taps
-from .screening import FoundTaps, JudgedTap, TapTest, found_taps
-from .segments import TapSettings, choose_segments, placed
-from .sums import TapSums, tap_sums
-from .taps import Tap, find_taps
-from .windows import exponential_window, force_window, window_correlation, without_added_damping
+import lazy_loader
 
-__all__ = [
-    "Decay",
-    "Disagreement",
-    "FoundTaps",
-    "JudgedTap",
-    "MergedTaps",
-    "Tap",
-    "TapSettings",
-    "TapSums",
-    "TapTest",
-    "answer_decay",
-    "choose_segments",
-    "exponential_window",
-    "find_taps",
-    "force_window",
-    "found_taps",
-    "merge_taps",
-    "placed",
-    "screened",
-    "tap_sums",
-    "window_correlation",
-    "window_for",
-    "without_added_damping",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

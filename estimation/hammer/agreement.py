@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..frf_matrix.frf import Frf
+from ..frf_matrix import Frf
 from .sums import TapSums
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from foundation import Band, InputError
 
-from ..frf_matrix.frf import Frf
+from ..frf_matrix import Frf
 from .agreement import Disagreement, disagreements_of
 from .entries import Entries, solve_entries
 from .places import blocks, check_whole, labels_of, turned

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition import Channel, Recording
 
-from ..spectra.trusted_samples import OVERLOAD
+from ..spectra import OVERLOAD
 from .taps import SETTLE, Tap, at_rest, find_taps, noise_of
 
 Real = NDArray[np.float64]

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from acquisition import Channel
 from foundation import Band, InputError
 
-from ..frf_matrix.quantities import frf_quantity
+from ..band_recordings import before_high_pass
+from ..frf_matrix import frf_quantity
 from .cutting_out import segments_of
 from .screening import FoundTaps
 from .segments import TapSettings
@@ -147,9 +148,8 @@ def _windows(settings: TapSettings, n_forces: int, n_responses: int) -> Real:
 def _correction(channel: Channel, s: Complex) -> Complex:
     """What a channel's lines are multiplied by: its delay undone, and a response's first-order high-pass."""
     factor = np.exp(s * (channel.input_delay_s or 0.0))
-    corner = 2 * np.pi * (channel.high_pass_hz or 0.0)
-    if corner and channel.quantity != "force":
-        factor = factor * np.divide(s + corner, s, out=np.ones_like(s), where=s.imag > 0)
+    if channel.high_pass_hz and channel.quantity != "force":
+        factor = factor * before_high_pass(s, [channel.high_pass_hz])[:, 0]
     return np.asarray(factor)
 
 

@@ -14,7 +14,7 @@ from .matrix import matrix_entries
 from .single_frfs import single_frfs
 from .sources import ArraySource, FrfSource, open_source
 from .text_table import SUFFIXES as TEXT_SUFFIXES
-from .uff.frfs import UffChoice, import_uffs
+from .uff import UffChoice, import_uffs
 
 UFF_SUFFIXES = (".uff", ".unv")
 _TELLING = (*TEXT_SUFFIXES, ".npz", ".mat")

@@ -15,7 +15,7 @@ from .frf_mapping import PARTS, FrfMapping, FrfTable
 from .numbers import complex_values, hertz, stated_frequency_unit, stated_phase_unit
 from .single_frfs import OneFrf, single_frfs
 from .sources import FrfSource
-from .uff.uff_units import StatedUnit, given_unit
+from .uff import StatedUnit, given_unit
 from .units import frf_unit
 
 _VALUES = ("values", "real", "imaginary", "magnitude", "phase")

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from foundation import DegreeOfFreedom, FileFormatError
 
-from ..frf_matrix.frf import Frf
+from ..frf_matrix import Frf
 from .units import SI
 
 Real = NDArray[np.float64]

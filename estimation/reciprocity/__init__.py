@@ -1,6 +1,5 @@
 """Reciprocity: does a force at q move p as a force at p moves q?"""
 
-from .drive_pairs import SharedPoint, shared_points
-from .frf_reciprocity import ReciprocityPair, reciprocity_pairs
+import lazy_loader
 
-__all__ = ["ReciprocityPair", "SharedPoint", "reciprocity_pairs", "shared_points"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from foundation import Band
 
-from ..frf_matrix.frf import Frf
+from ..frf_matrix import Frf
 from .drive_pairs import SharedPoint, shared_points
 
 Complex = NDArray[np.complex128]

@@ -16,7 +16,7 @@ def draw_lobes(lobes: StabilityLobes, axes: Axes | None = None, *, label: str | 
     Parameters
     ----------
     lobes
-        Of one method.
+        Depth limits found by one method.
     axes
         To draw into, such as those of other lobes; None: new ones, in which the unstable side is shaded.
     label

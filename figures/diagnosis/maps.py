@@ -46,7 +46,7 @@ def channel_map_figure(view: ResidualView, significant: NDArray[np.bool_]) -> Fi
             panels[row, 0].set_ylabel(STAGES[row].replace(", ", ",\n"))
         for k, name in enumerate(view.before.recordings):
             _dots(panels[0, k], view.before, view.before.ratio[k], significant[k], shades)
-            panels[0, k].set_title(f"{name} ({view.measured[k].trial.level:.3g} N rms)", pad=3)
+            panels[0, k].set_title(f"{name} ({view.measured[k].recording.level:.3g} N rms)", pad=3)
             _frequency_axis(panels[1, k].xaxis, view.before.edges)
             panels[1, k].set_xlabel("Frequency (Hz)")
         _bar(figure, shades, side)
@@ -65,7 +65,7 @@ def time_map_figure(view: ResidualView) -> Figure:
                 _draw_blocks(panels[row, k], blocks, edges, shades)
             panels[row, 0].set_ylabel(f"{STAGES[row]}\nfrequency (Hz)")
         for k, one in enumerate(view.measured):
-            panels[0, k].set_title(f"{one.trial.name} ({one.trial.level:.3g} N rms)", pad=3)
+            panels[0, k].set_title(f"{one.recording.name} ({one.recording.level:.3g} N rms)", pad=3)
             panels[1, k].set_xlabel("Time (s)")
         _bar(figure, shades, side)
     return figure

@@ -39,7 +39,7 @@ def draw_frf(
     Parameters
     ----------
     frf
-        Any quantity.
+        FRF matrix of any quantity.
     axes
         To draw into; None: new ones.
     response, excitation

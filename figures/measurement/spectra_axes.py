@@ -18,7 +18,7 @@ def draw_spectra(spectra: CrossSpectra, axes: Axes | None = None, *, side: str =
     Parameters
     ----------
     spectra
-        Of one test or of several.
+        Spectra of one test or of several.
     axes
         To draw into; None: new ones.
     side

@@ -31,7 +31,7 @@ def draw_model(
     Parameters
     ----------
     model
-        Of any quantity.
+        Modal model of any quantity.
     axes
         To draw into, such as those of a measured FRF; None: new ones.
     frequencies : (n_frequencies,), Hz

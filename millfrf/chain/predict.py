@@ -3,9 +3,9 @@
 import os
 from pathlib import Path
 
-from acquisition import Channel, Recording, RecordingWriter, StreamDescription
+from acquisition import Recording, RecordingWriter, StreamDescription
+from mismatch import read_recording
 from mismatch.models.prediction import predict
-from mismatch.records.trial import read_trial
 from modal_fit import read_modal_model
 
 from ..gate import check_model_and_recordings, check_scales
@@ -28,18 +28,16 @@ def predict_file(
     """
     model = read_modal_model(model_path)
     doubts = check_model_and_recordings(model_path, model, [recording_path], stream)
-    trial = read_trial(recording_path, model, stream=stream)
-    result = predict(model, trial)
+    recorded = read_recording(recording_path, model, stream=stream)
+    result = predict(model, recorded)
     with Recording(recording_path) as recording:
         source = recording.stream(stream)
-        known: dict[str, Channel] = {channel.name: channel for channel in source.channels}
         start_time, name, setup = source.start_time, source.name, recording.setup
-    names = trial.channels[trial.force.shape[1] :]
-    channels = tuple(known[one] for one in names)
-    description = StreamDescription(name, trial.rate, start_time, channels)
+    names = tuple(channel.name for channel in recorded.responses)
+    description = StreamDescription(name, recorded.rate, start_time + recorded.start, recorded.responses)
     title = f"responses predicted for {Path(recording_path).name} by {Path(model_path).name}"
     kept = slice(result.run_in, None)
-    doubts += check_scales(names, trial.response[kept], result.response[kept])
+    doubts += check_scales(names, recorded.response[kept], result.response[kept])
     setup = with_warnings(setup, doubts)
     with RecordingWriter(out, (description,), title=title, setup=setup) as writer:
         writer.append(name, result.response)
@@ -52,6 +50,6 @@ def predict_file(
     return [
         *lines,
         f"all responses: {100 * result.total_error:.3g} % ({low:.3g} to {high:.3g} Hz, after "
-        f"{result.run_in / trial.rate:.3g} s of run-in)",
+        f"{result.run_in / recorded.rate:.3g} s of run-in)",
         f"wrote {out}",
     ]

@@ -25,7 +25,7 @@ def acquire(
     """Record from the devices of a session until its duration is over, Stop is pressed or Ctrl-C."""
     from foundation import InputError
 
-    from ..chain.measuring.record_session import open_session
+    from ..chain import open_session
     from ..options import check_output
 
     if (out is None) == (not check):
@@ -40,7 +40,7 @@ def acquire(
     if out is None:
         _check(opened.source, seconds)
     elif live:
-        from ..chain.measuring.live_session import acquire_live
+        from ..chain import acquire_live
 
         tally = acquire_live(opened, out, address=live_address, port=live_port, at_once=at_once, say=_say)
         _report(tally, out)
@@ -52,8 +52,8 @@ def _check(source: object, seconds: float) -> None:
     from acquisition import Source
     from foundation import MillfrfError
 
-    from ..chain.measuring.signal_check import listen, preflight
-    from ..tables.result_tables import show
+    from ..chain import listen, preflight
+    from ..tables import show
 
     assert isinstance(source, Source)
     found = preflight(listen(source, seconds))
@@ -69,7 +69,7 @@ def _check(source: object, seconds: float) -> None:
 
 
 def _record(opened: object, out: Path) -> None:
-    from ..chain.measuring.record_session import OpenedSession, acquire
+    from ..chain import OpenedSession, acquire
     from ..progress import bar
 
     assert isinstance(opened, OpenedSession)
@@ -84,7 +84,7 @@ def _say(line: str) -> None:
 
 
 def _report(tally: object, out: Path) -> None:
-    from ..chain.measuring.record_session import Tally
+    from ..chain import Tally
 
     if not isinstance(tally, Tally):
         typer.echo("stopped before Start; nothing was recorded")

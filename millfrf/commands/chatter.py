@@ -38,20 +38,20 @@ def chatter(
 
     from modal_fit import read_modal_model
 
-    from ..chain.cuts.chatter import (
+    from ..chain import (
         CutOptions,
         doubts_of_cuts,
         judge_recordings,
+        keep_spectra,
         stated_runout,
         tone_table,
         verdict_table,
+        write_cuts,
     )
-    from ..chain.cuts.chatter_file import write_cuts
-    from ..chain.cuts.chatter_spectra import keep_spectra
     from ..gate import read_checked_cutting
     from ..progress import bar
     from ..provenance import of_chatter
-    from ..tables.result_tables import show
+    from ..tables import show
 
     if out is not None:
         check_output(out, (".json",), [*recordings, cutting, *([] if model is None else [model])])

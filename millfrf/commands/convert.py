@@ -21,12 +21,11 @@ def convert(
     .mat .npz .csv .txt .gz (several files make one matrix) into .h5 .uff; modal models .json into .uff and back;
     geometries .uff .unv .csv into .toml; CAN logs .blf .asc into the events of a recording.
     """
-    from acquisition.conversion.can_log import SUFFIXES as CAN_LOGS
-    from acquisition.conversion.can_log import add_can_log
+    from acquisition import SUFFIXES as CAN_LOGS
+    from acquisition import add_can_log
     from foundation import InputError
 
-    from ..chain.converting.conversions import FRF_SUFFIXES, convert_files, is_frf_conversion
-    from ..chain.converting.convert_uff import is_uff_conversion
+    from ..chain import FRF_SUFFIXES, convert_files, is_frf_conversion, is_uff_conversion
     from ..progress import bar
 
     if len(files) < 2:

@@ -35,7 +35,7 @@ def diagnose(
     """Locate where a model and recordings disagree, name the physics left out, model it, show that the fit improves."""
     from mismatch import LabError, Settings
 
-    from ..chain.diagnose import diagnose_files, nominal_from_simulation
+    from ..diagnosing import diagnose_files, nominal_from_simulation
     from ..gate import read_checked_cutting
     from ..progress import bar
 
@@ -46,12 +46,12 @@ def diagnose(
     if simulated is not None:
         if band is None:
             raise InputError("--simulated needs --band LO HI, the band in which the nominal model is fitted")
-        model = nominal_from_simulation(simulated, band, out, stream=stream, watch=bar)
+        model = nominal_from_simulation(simulated, band, out, stream=stream, progress=bar)
     process, doubts = read_checked_cutting(cutting) if cutting is not None else (None, [])
     for doubt in doubts:
         typer.echo(f"warning: {doubt}", err=True)
     settings = Settings(LabError(*lab_error))
-    result = diagnose_files(model, recordings, out, settings, stream=stream, process=process, watch=bar)
+    result = diagnose_files(model, recordings, out, settings, stream=stream, process=process, progress=bar)
     for line in result.summary:
         typer.echo(line)
     typer.echo(f"wrote {', '.join(str(path) for path in result.written)}")

@@ -43,8 +43,7 @@ def estimate(
     and, by feedback, the force; --instrument names what it does not reach. local-polynomial: whole records instead of
     segments, without leakage, for short records and forces that are rough in frequency.
     """
-    from ..chain.estimating.estimate import estimate_recordings, write_estimate
-    from ..chain.estimating.estimate_options import EstimateOptions
+    from ..chain import EstimateOptions, estimate_recordings, write_estimate
     from ..progress import bar
 
     check_output(out, (".h5", ".hdf5"), recordings)

@@ -41,12 +41,9 @@ def fit(
     """
     from modal_fit import ModalFit
 
-    from ..chain.fitting.choice_of_fit import fit_files
-    from ..chain.fitting.fit import write_fit
-    from ..chain.fitting.fit_options import FitOptions
-    from ..chain.fitting.pole_picking import check_candidates, picked_in_words, write_candidates
+    from ..chain import FitOptions, check_candidates, fit_files, picked_in_words, write_candidates, write_fit
     from ..progress import bar
-    from ..tables.result_tables import error_table, mode_table, show
+    from ..tables import error_table, mode_table, show
 
     check_output(out, (".json",), [*files, *([poles] if poles else [])])
     if candidates is not None:

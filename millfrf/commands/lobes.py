@@ -33,7 +33,7 @@ def lobes(
     from modal_fit import ModalModel, read_modal_model
     from stability import write_lobes
 
-    from ..chain.cuts.lobes import compute_lobes, lobes_summary, mode_coupling_line, speed_axis
+    from ..chain import compute_lobes, lobes_summary, mode_coupling_line, speed_axis
     from ..file_kinds import FRF, MODEL, kind_of
     from ..gate import (
         check_depth,

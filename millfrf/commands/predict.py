@@ -15,7 +15,7 @@ def predict(
     stream: Annotated[str | None, typer.Option("--stream", help="Sample clock.")] = None,
 ) -> None:
     """Simulate a recording's forces through a model; print how far measured responses are off."""
-    from ..chain.predict import predict_file
+    from ..chain import predict_file
 
     check_output(out, (".h5",), [recording])
     for line in predict_file(model, recording, out, stream=stream):

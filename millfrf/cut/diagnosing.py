@@ -18,7 +18,7 @@ from modal_fit import read_modal_model
 
 from ..gate import RECORD_AGAIN, check_depth, check_one_speed, check_recordings, read_checked_cutting
 from ..progress import bar
-from ..report.diagnoses.cut_diagnosis_page import write_cut_report
+from ..report import write_cut_report
 from ..result_folder import refuse_file
 from .diagnosis_words import summary
 
@@ -85,4 +85,4 @@ def _checked(paths: Sequence[Path], process: MillingProcess, asking: Asking) -> 
             judged.append(path)  # what the others lack is said where it is needed
     if not judged:
         return doubts
-    return doubts + check_recordings(judged, stream=asking.stream, watch=bar, remedy=RECORD_AGAIN)
+    return doubts + check_recordings(judged, stream=asking.stream, progress=bar, remedy=RECORD_AGAIN)

@@ -16,17 +16,24 @@ import numpy as np
 from acquisition import record
 from foundation import InputError, MillfrfError
 from modal_fit import ModalModel
-from replay_data import HammerCell, dynamometer, tip_accelerometers
-from replay_data.concealment.concealed_cell import FINE_RATE, LEVELS, ConcealedCell, milling_force
-from replay_data.concealment.concealed_effect import ConcealedEffect, draw_effect, draw_name, joint_scale
-from replay_data.concealment.random_posture import posture_robot
-from replay_data.simulation.joint_march import tip_motion
+from replay_data import (
+    FINE_RATE,
+    LEVELS,
+    ConcealedCell,
+    ConcealedEffect,
+    HammerCell,
+    draw_effect,
+    draw_name,
+    dynamometer,
+    joint_scale,
+    milling_force,
+    posture_robot,
+    tip_accelerometers,
+    tip_motion,
+)
 
-from ..chain.estimating.estimate import estimate_recordings, write_estimate
-from ..chain.estimating.estimate_options import EstimateOptions
-from ..chain.fitting.fit import fit_model, write_fit
-from ..chain.fitting.fit_options import FitOptions
-from ..progress import Watch, silent
+from ..chain import EstimateOptions, FitOptions, estimate_recordings, fit_model, write_estimate, write_fit
+from ..progress import Progress, silent
 from .seal import open_seal, seal
 
 SECONDS = 48.0
@@ -82,7 +89,9 @@ class ConcealResult:
     seconds: float
 
 
-def run_concealed(options: ConcealOptions, watch: Watch = silent, say: Callable[[str], object] = str) -> ConcealResult:
+def run_concealed(
+    options: ConcealOptions, progress: Progress = silent, say: Callable[[str], object] = str
+) -> ConcealResult:
     """Hide, seal, tap, mill, diagnose in a process of its own, open.
 
     Raises
@@ -98,7 +107,7 @@ def run_concealed(options: ConcealOptions, watch: Watch = silent, say: Callable[
     robot_seed, effect_seed, *noise_seeds = (int(one.generate_state(1)[0]) for one in seeds.spawn(10))
     robot = posture_robot(np.random.default_rng(robot_seed))
     say("tapping a robot at rest, and fitting its nominal model ...")
-    nominal = _tap(robot, recordings / "taps.h5", options, noise_seeds.pop(), watch)
+    nominal = _tap(robot, recordings / "taps.h5", options, noise_seeds.pop(), progress)
     say("hiding one effect ...")
     forces = {level: milling_force(robot, level, options.seconds, noise_seeds.pop()) for level in LEVELS}
     effect = _draw(robot, forces["mid"], options, np.random.default_rng(effect_seed))
@@ -108,7 +117,7 @@ def run_concealed(options: ConcealOptions, watch: Watch = silent, say: Callable[
     milled = []
     for level, force in forces.items():
         cell = ConcealedCell(robot, force, effect, options.noise, noise_seeds.pop())
-        milled.append(_record(cell, recordings / f"{level}.h5", watch))
+        milled.append(_record(cell, recordings / f"{level}.h5", progress))
     del effect
     say("diagnosing, in a process that is given the nominal model and the recordings ...")
     diagnosis = _diagnose(nominal, milled, options.out / "diagnosis", say)
@@ -129,18 +138,18 @@ def _folder(options: ConcealOptions) -> Path:
     return recordings
 
 
-def _tap(robot: ModalModel, path: Path, options: ConcealOptions, seed: int, watch: Watch) -> Path:
+def _tap(robot: ModalModel, path: Path, options: ConcealOptions, seed: int, progress: Progress) -> Path:
     """The nominal model file: hammer taps at the tip, H1, poly-reference fit.
 
     Its residual terms are dropped: a robot stands on a floor, so that what they add near 0 Hz, where forces of milling
     have their mean and taps have little power, would only be noise.
     """
     sensors = dynamometer(options.noise, 2000.0) + tip_accelerometers(options.noise, high_pass_hz=None)
-    taps = _record(HammerCell(robot, sample_rate=TAP_RATE, sensors=sensors, seed=seed), path, watch)
-    estimate = estimate_recordings([taps], TAPS, watch)
+    taps = _record(HammerCell(robot, sample_rate=TAP_RATE, sensors=sensors, seed=seed), path, progress)
+    estimate = estimate_recordings([taps], TAPS, progress)
     write_estimate(options.out / "frf_taps.h5", estimate, [taps], TAPS)
     nominal = options.out / "nominal.json"
-    fit = fit_model(estimate.frf, TAP_FIT, watch)
+    fit = fit_model(estimate.frf, TAP_FIT, progress)
     fit = replace(fit, model=replace(fit.model, residuals=None))
     write_fit(nominal, fit, [options.out / "frf_taps.h5"], TAP_FIT)
     return nominal
@@ -156,9 +165,9 @@ def _draw(
     return draw_effect(options.effect or drawn, generator, scale)
 
 
-def _record(source: HammerCell | ConcealedCell, path: Path, watch: Watch) -> Path:
+def _record(source: HammerCell | ConcealedCell, path: Path, progress: Progress) -> Path:
     path.unlink(missing_ok=True)  # of an earlier demonstration in the same folder
-    with watch(f"recording {path.stem}", source.n_samples) as update:
+    with progress(f"recording {path.stem}", source.n_samples) as update:
         record(source, path, progress=update)
     return path
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from replay_data.concealment.concealed_effect import FOREIGN, ConcealedEffect
+from replay_data import FOREIGN, ConcealedEffect
 
-from ..tables.result_tables import Table
+from ..tables import Table
 from .concealment import ConcealResult
 
 

@@ -11,9 +11,9 @@ from modal_fit import ModalModel
 from replay_data import Settling, settle
 from stability import StabilityLobes, certified_lobes, write_lobes, zero_order
 
-from ..progress import Watch, silent
+from ..progress import Progress, silent
 from ..report import ReportOptions, write_report
-from ..tables.result_tables import Table
+from ..tables import Table
 
 RPM = math.pi / 30
 SPEED_RPM, RADIAL_SHARE = 1080.0, 0.1
@@ -66,14 +66,14 @@ def spring_trap(identified: ModalModel, true: ModalModel, cutter: MillingProcess
     return Trap(averaged, certified, certified_lobes(true, cut, speed, MAX_DEPTH), below, between, runs[0], runs[1])
 
 
-def report_trap(folder: Path, identified: ModalModel, cutter: MillingProcess, watch: Watch = silent) -> Path:
+def report_trap(folder: Path, identified: ModalModel, cutter: MillingProcess, progress: Progress = silent) -> Path:
     """Zero-order lobes of the cut as somebody may hand them in, and the report that is not taken in by them."""
     cut, report = low_immersion(cutter), folder / "report_low_immersion.html"
     write_cutting_process(folder / "cut_low_immersion.toml", cut)
     lobes = folder / "lobes_low_immersion_zero_order.csv"
     write_lobes(lobes, zero_order(identified, cut, AXIS_RPM * RPM, MAX_DEPTH))
     files = [folder / "model_tip.json", folder / "cut_low_immersion.toml", lobes]
-    write_report(report, files, ReportOptions("A cut for which averaged coefficients are unsafe"), watch)
+    write_report(report, files, ReportOptions("A cut for which averaged coefficients are unsafe"), progress)
     return report
 
 

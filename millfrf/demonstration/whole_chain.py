@@ -25,15 +25,23 @@ from replay_data import (
 )
 from stability import StabilityLobes, certified_lobes, read_lobes, write_lobes
 
-from ..chain.cuts.lobes import compute_lobes, speed_axis
-from ..chain.estimating.estimate import estimate_recordings, write_estimate
-from ..chain.estimating.estimate_options import EstimateOptions
-from ..chain.fitting.calibrate import calibrate_model, write_calibration
-from ..chain.fitting.fit import fit_model, fit_recordings, write_fit
-from ..chain.fitting.fit_options import SUBSPACE, FitOptions
-from ..progress import Watch, silent
+from ..chain import (
+    SUBSPACE,
+    EstimateOptions,
+    FitOptions,
+    calibrate_model,
+    compute_lobes,
+    estimate_recordings,
+    fit_model,
+    fit_recordings,
+    speed_axis,
+    write_calibration,
+    write_estimate,
+    write_fit,
+)
+from ..progress import Progress, silent
 from ..report import ReportOptions, write_report
-from ..tables.result_tables import Table
+from ..tables import Table
 from .demo_trap import Trap, report_trap, spring_trap, trap_table
 
 RPM = math.pi / 30
@@ -118,7 +126,7 @@ class DemoResult:
     seconds: float
 
 
-def run_demo(options: DemoOptions, watch: Watch = silent, say: Callable[[str], object] = str) -> DemoResult:
+def run_demo(options: DemoOptions, progress: Progress = silent, say: Callable[[str], object] = str) -> DemoResult:
     """Run the whole chain; ``say`` is told what is going on.
 
     Raises
@@ -131,30 +139,30 @@ def run_demo(options: DemoOptions, watch: Watch = silent, say: Callable[[str], o
     started = time.perf_counter()
     folder = _folder(options.out)
     say(f"milling three {options.seconds:g} s speed sweeps, {SWEEP_RPM[0]:g} to {SWEEP_RPM[1]:g} rpm, and tapping ...")
-    sweeps, hammer = _record_all(folder, options, watch)
+    sweeps, hammer = _record_all(folder, options, progress)
     say("estimating frequency response functions ...")
-    frf = _estimate(folder / "frf_in_process.h5", sweeps, EstimateOptions(band=KEPT_BAND), watch)
+    frf = _estimate(folder / "frf_in_process.h5", sweeps, EstimateOptions(band=KEPT_BAND), progress)
     taps = EstimateOptions(segment=4.0, overlap=0.0, window="boxcar", band=(1.0, 200.0))
     tip = _estimate(
-        folder / "frf_hammer_tip.h5", hammer, replace(taps, responses=("tip_ax", "tip_ay", "tip_az")), watch
+        folder / "frf_hammer_tip.h5", hammer, replace(taps, responses=("tip_ax", "tip_ay", "tip_az")), progress
     )
-    sensor = _estimate(folder / "frf_hammer_housing.h5", hammer, replace(taps, responses=("ax", "ay", "az")), watch)
+    sensor = _estimate(folder / "frf_hammer_housing.h5", hammer, replace(taps, responses=("ax", "ay", "az")), progress)
     say("fitting, and calibrating to the tool tip ...")
-    identified = _identify(folder, sweeps, frf, tip, sensor, watch)
+    identified = _identify(folder, sweeps, frf, tip, sensor, progress)
     true = tip_model(default_structure())
     write_modal_model(folder / "true_model_tip.json", true)
     say("drawing lobes and report ...")
     structures: dict[str, Frf | ModalModel] = {"identified": identified, "hammer": tip, "true": true}
     for name, structure in structures.items():
-        lobes = compute_lobes(structure, CUTTER, speed_axis(*AXIS_RPM[name]), MAX_DEPTH, watch=watch, name=name)
+        lobes = compute_lobes(structure, CUTTER, speed_axis(*AXIS_RPM[name]), MAX_DEPTH, progress=progress, name=name)
         write_lobes(folder / f"lobes_{name}.csv", lobes)
     compared = np.array(COMPARED_RPM) * RPM
     limits = {name: certified_lobes(structure, CUTTER, compared, MAX_DEPTH) for name, structure in structures.items()}
     _draw_lobes(folder)
-    report = _report(folder, sweeps, watch)
+    report = _report(folder, sweeps, progress)
     say("trying a cut that averaged coefficients call stable ...")
     trap = spring_trap(identified, true, CUTTER)
-    report_trap(folder, identified, CUTTER, watch)
+    report_trap(folder, identified, CUTTER, progress)
     return DemoResult(identified, true, limits, trap, report, time.perf_counter() - started)
 
 
@@ -220,7 +228,7 @@ def _folder(out: Path) -> Path:
     return out
 
 
-def _record_all(folder: Path, options: DemoOptions, watch: Watch) -> tuple[list[Path], list[Path]]:
+def _record_all(folder: Path, options: DemoOptions, progress: Progress) -> tuple[list[Path], list[Path]]:
     structure, noise = default_structure(), options.noise
     sweep = LinearSweep(SWEEP_RPM[0] * RPM, SWEEP_RPM[1] * RPM, options.seconds)
     sweeps = []
@@ -235,36 +243,36 @@ def _record_all(folder: Path, options: DemoOptions, watch: Watch) -> tuple[list[
             sensors=milling_sensors(noise, noise),
             seed=10 * options.seed + number,
         )
-        sweeps.append(_record(cell, folder / "recordings" / f"sweep_{name}.h5", watch))
+        sweeps.append(_record(cell, folder / "recordings" / f"sweep_{name}.h5", progress))
     cell_of_taps = HammerCell(structure, sensors=hammer_sensors(noise, noise), seed=10 * options.seed + 9)
-    return sweeps, [_record(cell_of_taps, folder / "recordings" / "hammer.h5", watch)]
+    return sweeps, [_record(cell_of_taps, folder / "recordings" / "hammer.h5", progress)]
 
 
-def _record(source: Source, path: Path, watch: Watch) -> Path:
+def _record(source: Source, path: Path, progress: Progress) -> Path:
     path.unlink(missing_ok=True)  # of an earlier demonstration in the same folder
-    with watch(f"recording {path.stem}", source.n_samples) as update:
+    with progress(f"recording {path.stem}", source.n_samples) as update:
         record(source, path, progress=update)
     return path
 
 
-def _estimate(path: Path, recordings: list[Path], options: EstimateOptions, watch: Watch) -> Frf:
-    estimate = estimate_recordings(recordings, options, watch)
+def _estimate(path: Path, recordings: list[Path], options: EstimateOptions, progress: Progress) -> Frf:
+    estimate = estimate_recordings(recordings, options, progress)
     write_estimate(path, estimate, recordings, options)
     return estimate.frf
 
 
-def _identify(folder: Path, sweeps: list[Path], frf: Frf, tip: Frf, sensor: Frf, watch: Watch) -> ModalModel:
+def _identify(folder: Path, sweeps: list[Path], frf: Frf, tip: Frf, sensor: Frf, progress: Progress) -> ModalModel:
     options = FitOptions(FIT_BAND)
     write_fit(
         folder / "model_housing_polyreference.json",
-        fit_model(frf, options, watch),
+        fit_model(frf, options, progress),
         [folder / "frf_in_process.h5"],
         options,
     )
     options = FitOptions(SUBSPACE_BAND, SUBSPACE)
-    fit = fit_recordings(sweeps, options, watch)
+    fit = fit_recordings(sweeps, options, progress)
     write_fit(folder / "model_housing.json", fit, sweeps, options)
-    calibration = calibrate_model(fit.model, tip, sensor, watch)
+    calibration = calibrate_model(fit.model, tip, sensor, progress)
     inputs = [folder / name for name in ("model_housing.json", "frf_hammer_tip.h5", "frf_hammer_housing.h5")]
     write_calibration(folder / "model_tip.json", calibration, inputs)
     return calibration.model
@@ -278,7 +286,7 @@ def _draw_lobes(folder: Path) -> None:
         figure.savefig(temporary, dpi=130, format="png")
 
 
-def _report(folder: Path, sweeps: list[Path], watch: Watch) -> Path:
+def _report(folder: Path, sweeps: list[Path], progress: Progress) -> Path:
     with writing_whole_file(folder / "cut.toml") as temporary:
         temporary.write_text(cutting_text(CUTTER), encoding="utf-8")
     names = (
@@ -293,7 +301,7 @@ def _report(folder: Path, sweeps: list[Path], watch: Watch) -> Path:
     options = ReportOptions(
         "Simulated robot cell: in-process FRF and modal fit", reference=folder / "true_model_tip.json"
     )
-    write_report(report, [*sweeps, *(folder / name for name in (*names, *tables))], options, watch)
+    write_report(report, [*sweeps, *(folder / name for name in (*names, *tables))], options, progress)
     return report
 
 

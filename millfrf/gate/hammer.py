@@ -11,7 +11,7 @@ from acquisition import Stream
 from estimation import Decay, FoundTaps, Frf, MergedTaps, TapSettings, TapTest
 from foundation import InputError
 
-from ..progress import Watch, silent
+from ..progress import Progress, silent
 from .frfs import check_frf
 from .looking import doubts_of
 from .recordings import check_channels
@@ -36,7 +36,7 @@ NARROW = 0.5
 
 
 def check_tap_recordings(
-    paths: Sequence[str | os.PathLike[str]], tests: Sequence[TapTest], watch: Watch = silent
+    paths: Sequence[str | os.PathLike[str]], tests: Sequence[TapTest], progress: Progress = silent
 ) -> list[str]:
     """Judge the channels that hammer tests take from their recordings, as :func:`check_recordings` does.
 
@@ -50,7 +50,7 @@ def check_tap_recordings(
     def chosen(source: Stream) -> tuple[list[str], list[str]]:
         return names[str(source.path)]
 
-    return check_channels(paths, chosen, tests[0].stream, True, watch)
+    return check_channels(paths, chosen, tests[0].stream, True, progress)
 
 
 def check_taps_found(found: Sequence[FoundTaps]) -> None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from estimation import (
     RANK_TOLERANCE,
-    BandRecord,
+    BandRecording,
     CrossSpectra,
     SpectralAccumulator,
     bands_text,
@@ -81,7 +81,9 @@ def check_inputs(total: CrossSpectra, band: Band | None = None, least_share: flo
     return list(judged.warnings)
 
 
-def check_records(records: Sequence[BandRecord], band: Band, names: Sequence[str], rates: Sequence[float]) -> list[str]:
+def check_records(
+    records: Sequence[BandRecording], band: Band, names: Sequence[str], rates: Sequence[float]
+) -> list[str]:
     """Judge the inputs and the sample rates of records that are fitted together.
 
     Segments last 8 s, or less where the records are short: so long that each input can have its own segment.
@@ -101,17 +103,17 @@ def check_records(records: Sequence[BandRecord], band: Band, names: Sequence[str
         As :func:`check_inputs` and :func:`millfrf.gate.sample_rates.check_sample_rates`.
     """
     n_inputs = len(records[0].excitations)
-    shortest = min(len(record.excitation_samples) / record.sample_rate for record in records)
+    shortest = min(len(record.force) / record.rate for record in records)
     seconds = min(LONGEST_SEGMENT, shortest, shortest * len(records) / (2 * n_inputs))
     tests = [_spectra(record, seconds) for record in records]
     doubts = check_sample_rates([gain_of(*each) for each in zip(tests, names, rates, strict=True)])
     return doubts + check_inputs(sum_tests(tests), band, LEAST_SHARE)
 
 
-def _spectra(record: BandRecord, seconds: float) -> CrossSpectra:
-    settings = settings_for(record.sample_rate, max(seconds, 8 / record.sample_rate), window="hann")
-    accumulator = SpectralAccumulator(record.excitations, record.responses, record.sample_rate, settings)
-    accumulator.add(record.excitation_samples, record.response_samples)
+def _spectra(record: BandRecording, seconds: float) -> CrossSpectra:
+    settings = settings_for(record.rate, max(seconds, 8 / record.rate), window="hann")
+    accumulator = SpectralAccumulator(record.excitations, record.responses, record.rate, settings)
+    accumulator.add(record.force, record.response)
     return accumulator.finish()
 
 

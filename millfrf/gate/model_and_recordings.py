@@ -5,15 +5,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from acquisition import Stream
-from foundation import DegreeOfFreedom
+from estimation import DERIVATIVE_ORDERS, names_at
 from modal_fit import ModalModel
 
-from ..progress import Watch, silent
+from ..progress import Progress, silent
 from .models import check_model, stored_doubts
 from .recordings import RECORD_AGAIN, check_channels
 
 EXCITES = ("force", "voltage")
-MOVES = ("displacement", "velocity", "acceleration")
 
 
 def check_model_and_recordings(
@@ -21,7 +20,7 @@ def check_model_and_recordings(
     model: ModalModel,
     recordings: Sequence[str | os.PathLike[str]],
     stream: str | None = None,
-    watch: Watch = silent,
+    progress: Progress = silent,
 ) -> list[str]:
     """Judge a model, what its file says of its fit, and the channels of recordings at its degrees of freedom.
 
@@ -35,7 +34,7 @@ def check_model_and_recordings(
         Files it is compared with.
     stream
         Sample clock; None: the only one.
-    watch
+    progress
         Shows progress while samples are read.
 
     Returns
@@ -52,19 +51,9 @@ def check_model_and_recordings(
     if not recordings:
         return doubts
 
-    def chosen(source: Stream) -> tuple[list[str], list[str]]:
-        return _at(source, model.excitations, EXCITES), _at(source, model.responses, MOVES)
+    def chosen(source: Stream) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        # those that are missing are the reader's to refuse
+        channels = source.channels
+        return names_at(channels, model.excitations, EXCITES), names_at(channels, model.responses, DERIVATIVE_ORDERS)
 
-    return [*doubts, *check_channels(recordings, chosen, stream, watch=watch, remedy=RECORD_AGAIN)]
-
-
-def _at(stream: Stream, labels: Sequence[str], quantities: tuple[str, ...]) -> list[str]:
-    """Names of the channels at some degrees of freedom; those that are missing are the reader's to refuse."""
-    wanted = {(dof.node, dof.axis) for dof in (DegreeOfFreedom.parse(label) for label in labels if ":" in label)}
-    return [
-        channel.name
-        for channel in stream.channels
-        if channel.quantity in quantities
-        and channel.node
-        and (channel.node, DegreeOfFreedom(channel.node, channel.direction).axis) in wanted
-    ]
+    return [*doubts, *check_channels(recordings, chosen, stream, progress=progress, remedy=RECORD_AGAIN)]

@@ -8,7 +8,7 @@ from acquisition import Recording, Stream
 from estimation import choose_channels
 from foundation import InputError
 
-from ..progress import Watch, silent
+from ..progress import Progress, silent
 from .several import check_several
 from .signals import ChannelLevel, Look, look, rate_concerns
 from .taps_in_segments import Segmentation, refuse_taps
@@ -41,7 +41,7 @@ def check_recordings(
     responses: Sequence[str] = (),
     excluding: bool = False,
     segments: Segmentation | None = None,
-    watch: Watch = silent,
+    progress: Progress = silent,
     remedy: str = NAME_OTHERS,
 ) -> list[str]:
     """Judge the channels that a job takes from its recordings, file by file.
@@ -58,7 +58,7 @@ def check_recordings(
         The job leaves out segments with missing, clipped or repeated samples: they are neither refused nor doubted.
     segments
         Segments over which the job averages; None: it does not.
-    watch
+    progress
         Shows progress while samples are read.
     remedy
         What to do about a channel that is dead or copies another, besides checking its cable.
@@ -80,7 +80,7 @@ def check_recordings(
         exciting, responding = choose_channels(source, excitations or None, responses or None)
         return [channel.name for channel in exciting], [channel.name for channel in responding]
 
-    return check_channels(paths, chosen, stream, excluding, watch, segments, remedy)
+    return check_channels(paths, chosen, stream, excluding, progress, segments, remedy)
 
 
 def check_channels(
@@ -88,7 +88,7 @@ def check_channels(
     chosen: Callable[[Stream], tuple[Sequence[str], Sequence[str]]],
     stream: str | None = None,
     excluding: bool = False,
-    watch: Watch = silent,
+    progress: Progress = silent,
     segments: Segmentation | None = None,
     remedy: str = NAME_OTHERS,
 ) -> list[str]:
@@ -105,7 +105,7 @@ def check_channels(
         with Recording(path) as recording:
             source = recording.stream(stream)
             exciting, responding = chosen(source)
-            seen = _look(source, [*exciting, *responding], watch)
+            seen = _look(source, [*exciting, *responding], progress)
             idle = [level.channel.name for level in seen.levels[: len(exciting)] if level.n_samples and not level.peak]
             silent_in.update({name: Path(path).name for name in idle})
             alive |= set(exciting) - set(idle)
@@ -134,10 +134,10 @@ def doubts_of_rate(path: str | os.PathLike[str]) -> list[str]:
         ]
 
 
-def _look(stream: Stream, names: Sequence[str], watch: Watch) -> Look:
+def _look(stream: Stream, names: Sequence[str], progress: Progress) -> Look:
     if stream.n_samples == 0:
         raise InputError(f"{stream.path.name}: stream {stream.name} holds no sample; record again")
-    return look(stream, names, watch)
+    return look(stream, names, progress)
 
 
 def _check_stream(stream: Stream, seen: Look, idle: set[str], excluding: bool, remedy: str) -> list[str]:

@@ -1,7 +1,5 @@
 """The live page: a recording drawn in a browser while it grows. What is drawn is thinned out, the file is not."""
 
-from .control import LiveControl
-from .monitor import LiveMonitor, LiveSettings
-from .server import LiveServer
+import lazy_loader
 
-__all__ = ["LiveControl", "LiveMonitor", "LiveServer", "LiveSettings"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,9 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Channel
-from estimation import Frf, SpectralAccumulator, h1, settings_for
-from estimation.band_records import BandDecimator
-from estimation.spectra.recording_spectra import EXCITING, RESPONDING
+from estimation import EXCITING, RESPONDING, Frf, Resampler, SpectralAccumulator, h1, settings_for, whole_ratio
 from foundation import InputError
 
 Real = NDArray[np.float64]
@@ -67,8 +65,8 @@ class LiveSpectra:
         self._responding = [k for k, channel in enumerate(channels) if channel.quantity in RESPONDING]
         if not self._exciting or not self._responding:
             raise InputError("no force or no motion with a place among the channels; there is no FRF to grow")
-        self._decimator = BandDecimator(sample_rate, highest_frequency)
-        rate = self._decimator.sample_rate
+        self._resampler = Resampler(sample_rate, whole_ratio(sample_rate, highest_frequency))
+        rate = self._resampler.rate
         self._highest = highest_frequency
         settings = settings_for(rate, max(segment, 16 / rate), window="hann")
         exciting, responding = ([channels[k] for k in chosen] for chosen in (self._exciting, self._responding))
@@ -77,7 +75,7 @@ class LiveSpectra:
 
     def add(self, samples: Real) -> None:
         """Take the next samples (n, n_channels)."""
-        low = self._decimator.add(samples[:, [*self._exciting, *self._responding]])
+        low = self._resampler.add(samples[:, [*self._exciting, *self._responding]])
         if len(low):
             n = len(self._exciting)
             self._accumulator.add(low[:, :n], low[:, n:])

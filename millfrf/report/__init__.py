@@ -1,6 +1,5 @@
 """The modal-fitting report: one self-contained page that a laboratory attaches to its test sheet."""
 
-from .collection import Collected, collect
-from .page import ReportOptions, write_report
+import lazy_loader
 
-__all__ = ["Collected", "ReportOptions", "collect", "write_report"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

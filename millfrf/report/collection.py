@@ -13,7 +13,7 @@ from foundation import InputError
 from modal_fit import ModalModel, read_modal_model
 from stability import StabilityLobes, read_lobes
 
-from ..chain.cuts.chatter_file import KeptCut, read_cuts
+from ..chain import KeptCut, read_cuts
 from ..file_kinds import CHATTER, CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
 from ..gate import Given, check_belonging, read_checked_cutting
 from ..provenance import read_provenance, sha256

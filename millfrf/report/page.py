@@ -21,17 +21,24 @@ from ..gate import (
     doubts_of,
     stored_doubts,
 )
-from ..progress import Watch, silent
+from ..progress import Progress, silent
 from ..provenance import sha256, versions
 from .collection import Collected, SourceFile, collect
-from .sections.chatter import chatter_in_brief, chatter_section
-from .sections.comparison import comparison_section
-from .sections.frfs import frf_section
-from .sections.hammer import hammer_section
-from .sections.measurement import channel_section, file_section, settings_section, setup_section
-from .sections.reciprocity import reciprocity_section
-from .sections.results import input_section, mode_section
-from .sections.stability import stability_findings
+from .sections import (
+    channel_section,
+    chatter_in_brief,
+    chatter_section,
+    comparison_section,
+    file_section,
+    frf_section,
+    hammer_section,
+    input_section,
+    mode_section,
+    reciprocity_section,
+    settings_section,
+    setup_section,
+    stability_findings,
+)
 
 
 @dataclass(frozen=True)
@@ -57,7 +64,7 @@ def write_report(
     path: str | os.PathLike[str],
     paths: Sequence[str | os.PathLike[str]],
     options: ReportOptions | None = None,
-    watch: Watch = silent,
+    progress: Progress = silent,
 ) -> list[str]:
     """Write one HTML page, figures inside, that needs no other file and no network.
 
@@ -72,17 +79,17 @@ def write_report(
         A file that cannot be used; nothing is written.
     """
     collected = collect(paths)
-    text = report_text(collected, options or ReportOptions(), watch)
+    text = report_text(collected, options or ReportOptions(), progress)
     with writing_whole_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
     return list(collected.doubts)
 
 
-def report_text(collected: Collected, options: ReportOptions, watch: Watch = silent) -> str:
+def report_text(collected: Collected, options: ReportOptions, progress: Progress = silent) -> str:
     """The page as text."""
     reference = None if options.reference is None else read_modal_model(options.reference)
-    channels, concerns = channel_section(collected, watch)
-    with watch("stability"):
+    channels, concerns = channel_section(collected, progress)
+    with progress("stability"):
         stability = stability_findings(_with_reference(collected, options, reference))
     sections = (
         mode_section(collected),
@@ -91,7 +98,7 @@ def report_text(collected: Collected, options: ReportOptions, watch: Watch = sil
         chatter_section(collected),
         frf_section(collected, options.band, reference),
         reciprocity_section(collected),
-        input_section(collected, options.band, watch),
+        input_section(collected, options.band, progress),
         settings_section(collected),
         hammer_section(collected),
         setup_section(collected),

@@ -7,7 +7,7 @@ import numpy as np
 
 from cutting import MillingProcess
 from estimation import Frf
-from foundation import InputError
+from foundation import TIP, InputError
 from modal_fit import ModalModel, Residuals
 from replay_data import Settling, settle
 from stability import (
@@ -29,8 +29,6 @@ CONFIDENCE, DRIFT = 0.95, 0.02
 
 LESS, TIMES = 0.9, 4
 """Share to which a cut that does not settle is lowered, and how often."""
-
-TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from ..tables.result_tables import Table
+from ..tables import Table
 
 
 @dataclass(frozen=True)

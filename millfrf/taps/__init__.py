@@ -1,8 +1,5 @@
 """From recordings of hammer tests to one FRF file: which point was hit where, taps judged, windows, averages."""
 
-from .options import TapOptions
-from .run import TapResult, tap_recordings
-from .summary import tap_tables
-from .writing import write_taps
+import lazy_loader
 
-__all__ = ["TapOptions", "TapResult", "tap_recordings", "tap_tables", "write_taps"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -23,7 +23,7 @@ from estimation import (
 from foundation import Band, InputError
 
 from ..gate import check_tap_recordings, check_taps_found, check_taps_used, doubts_of_taps
-from ..progress import Watch, silent
+from ..progress import Progress, silent
 from .options import TapOptions
 from .points_of_files import tests_of
 
@@ -53,7 +53,9 @@ class TapResult:
     warnings: tuple[str, ...]
 
 
-def tap_recordings(paths: Sequence[str | os.PathLike[str]], options: TapOptions, watch: Watch = silent) -> TapResult:
+def tap_recordings(
+    paths: Sequence[str | os.PathLike[str]], options: TapOptions, progress: Progress = silent
+) -> TapResult:
     """FRF of the taps in one or many recordings.
 
     Raises
@@ -65,27 +67,27 @@ def tap_recordings(paths: Sequence[str | os.PathLike[str]], options: TapOptions,
     if not paths:
         raise InputError("no recording given; name at least one")
     tests = tests_of(paths, options)
-    doubts = check_tap_recordings(paths, tests, watch)
-    found = _found(tests, watch)
+    doubts = check_tap_recordings(paths, tests, progress)
+    found = _found(tests, progress)
     settings = choose_segments(
         found,
         segment=options.segment,
         pre_trigger=options.pre_trigger,
         force_window=options.force_window_seconds,
     )
-    found = _screened(found, settings, watch)
-    with watch("how long the answers ring"):
+    found = _screened(found, settings, progress)
+    with progress("how long the answers ring"):
         decay = answer_decay(found, settings)
     asked = options.time_constant
     settings = replace(settings, time_constant=window_for(decay.left, settings) if asked is None else asked or None)
-    merged = merge_taps(_sums(found, settings, options.band, watch), settings.time_constant)
+    merged = merge_taps(_sums(found, settings, options.band, progress), settings.time_constant)
     doubts += doubts_of_taps(merged, found, settings, decay)
     return TapResult(merged, tuple(found), settings, decay, tuple(dict.fromkeys(doubts)))
 
 
-def _found(tests: Sequence[TapTest], watch: Watch) -> list[FoundTaps]:
+def _found(tests: Sequence[TapTest], progress: Progress) -> list[FoundTaps]:
     found = []
-    with watch("finding taps", len(tests)) as update:
+    with progress("finding taps", len(tests)) as update:
         for number, test in enumerate(tests):
             found.append(found_taps(test))
             update(number + 1)
@@ -93,9 +95,9 @@ def _found(tests: Sequence[TapTest], watch: Watch) -> list[FoundTaps]:
     return found
 
 
-def _screened(found: Sequence[FoundTaps], settings: TapSettings, watch: Watch) -> list[FoundTaps]:
+def _screened(found: Sequence[FoundTaps], settings: TapSettings, progress: Progress) -> list[FoundTaps]:
     judged = []
-    with watch("judging taps", len(found)) as update:
+    with progress("judging taps", len(found)) as update:
         for number, each in enumerate(found):
             judged.append(screened(placed(each, settings), settings))
             update(number + 1)
@@ -103,10 +105,10 @@ def _screened(found: Sequence[FoundTaps], settings: TapSettings, watch: Watch) -
     return judged
 
 
-def _sums(found: Sequence[FoundTaps], settings: TapSettings, band: Band | None, watch: Watch) -> list[TapSums]:
+def _sums(found: Sequence[FoundTaps], settings: TapSettings, band: Band | None, progress: Progress) -> list[TapSums]:
     places = {each.test.excitations[one.tap.channel].degree_of_freedom for each in found for one in each.used}
     sums = []
-    with watch("spectra of the taps", len(found)) as update:
+    with progress("spectra of the taps", len(found)) as update:
         for number, each in enumerate(found):
             sums.append(tap_sums(each, settings, band, places))
             update(number + 1)

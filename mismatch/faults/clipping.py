@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import WindowedSpectrum
+
 from ..inference import FAULTS, FaultSettings
 from ..joints.saturation import Saturation, rounded, saturated
 from ..models.fitting import Fit, fit
-from ..records.windowed_lines import WindowedLines
 from .tones import shown_signal
 
 Real = NDArray[np.float64]
@@ -49,7 +50,7 @@ class Clipping:
         return saturated(signal, self.saturation.limit, self.saturation.sharpness)
 
 
-def find_clipping(fitted: Fit, lines: list[WindowedLines], settings: FaultSettings = FAULTS) -> Clipping | None:
+def find_clipping(fitted: Fit, lines: list[WindowedSpectrum], settings: FaultSettings = FAULTS) -> Clipping | None:
     """The response, if any, that follows its prediction only up to a limit.
 
     Parameters
@@ -64,7 +65,7 @@ def find_clipping(fitted: Fit, lines: list[WindowedLines], settings: FaultSettin
     return _found([shown_signal(fitted, one) for one in lines], lines, settings)
 
 
-def _found(predicted: list[Real], lines: list[WindowedLines], settings: FaultSettings) -> Clipping | None:
+def _found(predicted: list[Real], lines: list[WindowedSpectrum], settings: FaultSettings) -> Clipping | None:
     """The clearest limit of any response, its prediction in time known."""
     best: Clipping | None = None
     for p in range(lines[0].measured.shape[1]):
@@ -97,8 +98,8 @@ def _held(measured: Real, shown: Real, limit: float, settings: FaultSettings) ->
 
 
 def mended(
-    fitted: Fit, lines: list[WindowedLines], clipping: Clipping, settings: FaultSettings = FAULTS
-) -> tuple[Fit, list[WindowedLines], Clipping]:
+    fitted: Fit, lines: list[WindowedSpectrum], clipping: Clipping, settings: FaultSettings = FAULTS
+) -> tuple[Fit, list[WindowedSpectrum], Clipping]:
     """Put back what the limit cut off, and refit, until both agree.
 
     Each round takes the cut part from the prediction of the last; as that was fitted to too little, rounds approach
@@ -150,24 +151,26 @@ def _extrapolated(tried: list[Real], reached: list[Real]) -> Real:
     return np.asarray(ends[-1] + weights @ (ends[:-1] - ends[-1]))
 
 
-def _error(predicted: list[Real], lines: list[WindowedLines], clipping: Clipping) -> float:
+def _error(predicted: list[Real], lines: list[WindowedSpectrum], clipping: Clipping) -> float:
     """Power of what the clipped prediction leaves of the response as measured."""
     measured, shown = _channel(predicted, lines, clipping.response)
     return float(np.sum((measured - clipping.of(shown)) ** 2))
 
 
-def _repaired(predicted: list[Real], lines: list[WindowedLines], clipping: Clipping) -> list[WindowedLines]:
+def _repaired(predicted: list[Real], lines: list[WindowedSpectrum], clipping: Clipping) -> list[WindowedSpectrum]:
     """Recordings with what the limit cut off taken from the prediction."""
     p = clipping.response
     whole = []
     for one, signal in zip(lines, predicted, strict=True):
-        response = one.trial.response.copy()
+        response = one.recording.response.copy()
         response[:, p] += signal[:, p] - clipping.of(signal[:, p])
-        whole.append(replace(one, trial=replace(one.trial, response=response), measured=one.cut(response)))
+        whole.append(replace(one, recording=replace(one.recording, response=response), measured=one.cut(response)))
     return whole
 
 
-def _again(predicted: list[Real], lines: list[WindowedLines], clipping: Clipping, settings: FaultSettings) -> Clipping:
+def _again(
+    predicted: list[Real], lines: list[WindowedSpectrum], clipping: Clipping, settings: FaultSettings
+) -> Clipping:
     """The same channel's limit as the better prediction shows it."""
     again = _found(predicted, lines, settings)
     found = again if again is not None and again.response == clipping.response else clipping
@@ -175,7 +178,7 @@ def _again(predicted: list[Real], lines: list[WindowedLines], clipping: Clipping
     return replace(found, saturation=rounded(*_channel(predicted, lines, found.response), sharp))
 
 
-def _channel(predicted: list[Real], lines: list[WindowedLines], p: int) -> tuple[Real, Real]:
+def _channel(predicted: list[Real], lines: list[WindowedSpectrum], p: int) -> tuple[Real, Real]:
     """One response as measured and as predicted, all recordings, run-in left out."""
-    measured = np.concatenate([one.trial.response[one.start :, p] for one in lines])
+    measured = np.concatenate([one.recording.response[one.start :, p] for one in lines])
     return measured, np.concatenate([signal[one.start :, p] for one, signal in zip(lines, predicted, strict=True)])

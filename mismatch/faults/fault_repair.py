@@ -2,19 +2,20 @@
 
 import numpy as np
 
+from estimation import WindowedSpectrum
+
 from ..inference import AcceptedCause, FaultSettings, Settings
 from ..models.fitting import Fit, fit
 from ..physics.clipping import PHYSICS as CLIPPING
 from ..physics.unmeasured_excitation import PHYSICS as TONE
-from ..records.windowed_lines import WindowedLines
 from .clipping import Clipping, find_clipping, mended
 from .tones import Tone, find_tone, stands_out, without_tone
 from .tones_beyond import tones_beyond
 
 
 def repair_faults(
-    lines: list[WindowedLines], base: Fit, settings: Settings
-) -> tuple[list[WindowedLines], Fit, list[AcceptedCause]]:
+    lines: list[WindowedSpectrum], base: Fit, settings: Settings
+) -> tuple[list[WindowedSpectrum], Fit, list[AcceptedCause]]:
     """Take out tones and mend clipping, refitting each time.
 
     Parameters
@@ -47,7 +48,7 @@ def repair_faults(
 
 
 def with_tones_settled(
-    fitted: Fit, lines: list[WindowedLines], accepted: list[AcceptedCause], decay: float, settings: FaultSettings
+    fitted: Fit, lines: list[WindowedSpectrum], accepted: list[AcceptedCause], decay: float, settings: FaultSettings
 ) -> list[AcceptedCause]:
     """Accepted causes without tones that stood out only until the others were known, and with those above the band.
 
@@ -71,19 +72,19 @@ def with_tones_settled(
     return [cause for cause in accepted if cause not in gone] + [_tone_cause(tone, lines[0]) for tone in beyond]
 
 
-def _tone_cause(tone: Tone, lines: WindowedLines) -> AcceptedCause:
-    names = lines.trial.channels[-len(tone.amplitudes) :]
+def _tone_cause(tone: Tone, lines: WindowedSpectrum) -> AcceptedCause:
+    names = lines.recording.channels[-len(tone.amplitudes) :]
     parameters = {"frequency_hz": tone.frequency}
     parameters |= {f"amplitude_{name}": float(value) for name, value in zip(names, tone.amplitudes, strict=True)}
-    width = lines.trial.rate / len(lines.window)
+    width = lines.recording.rate / len(lines.window)
     errors = {"frequency_hz": width * float(np.sqrt(6 / tone.gain)) / np.pi}
     known = [(name, float(one)) for name, one in zip(names, tone.spread, strict=True) if np.isfinite(one)]
     errors |= {f"amplitude_{name}": one for name, one in known}
     return AcceptedCause(TONE.name, {"channels": list(names)}, parameters, errors, tone.gain)
 
 
-def _clipping_cause(clipping: Clipping, lines: WindowedLines) -> AcceptedCause:
-    name = lines.trial.channels[clipping.response - lines.measured.shape[1]]
+def _clipping_cause(clipping: Clipping, lines: WindowedSpectrum) -> AcceptedCause:
+    name = lines.recording.channels[clipping.response - lines.measured.shape[1]]
     found = clipping.saturation
     parameters, errors = {"limit": found.limit}, {"limit": found.error}
     if np.isfinite(found.sharpness):

@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft
 
+from estimation import BandRecording, WindowedSpectrum
+
 from ..inference import AcceptedCause
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..physics import FaultPhysics, library
-from ..records.trial import Trial
-from ..records.windowed_lines import WindowedLines
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 
-def with_faults(response: Real, recording: Trial, start: int, terms: Sequence[Mapping[str, Any]]) -> Real:
+def with_faults(response: Real, recording: BandRecording, start: int, terms: Sequence[Mapping[str, Any]]) -> Real:
     """A predicted response with the faults of a recording: tones first, then limits.
 
     Parameters
@@ -39,7 +39,7 @@ def with_faults(response: Real, recording: Trial, start: int, terms: Sequence[Ma
     return response
 
 
-def residual_lines(hypothesis: Hypothesis, lines: WindowedLines, faults: Sequence[AcceptedCause] = ()) -> Complex:
+def residual_lines(hypothesis: Hypothesis, lines: WindowedSpectrum, faults: Sequence[AcceptedCause] = ()) -> Complex:
     """What a hypothesis, with the faults of a recording, leaves of it, (n_lines, n_responses).
 
     Parameters
@@ -54,5 +54,7 @@ def residual_lines(hypothesis: Hypothesis, lines: WindowedLines, faults: Sequenc
     predicted = predict_lines(hypothesis, lines)
     if not faults:
         return lines.measured - predicted.response
-    signal = np.asarray(irfft(predicted.spectrum, n=lines.padded, axis=0)[: len(lines.trial.force)])
-    return lines.measured - lines.cut(with_faults(signal, lines.trial, lines.start, [asdict(one) for one in faults]))
+    signal = np.asarray(irfft(predicted.spectrum, n=lines.padded, axis=0)[: len(lines.recording.force)])
+    return lines.measured - lines.cut(
+        with_faults(signal, lines.recording, lines.start, [asdict(one) for one in faults])
+    )

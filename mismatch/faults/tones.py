@@ -8,12 +8,13 @@ from scipy.fft import irfft
 from scipy.ndimage import maximum_filter, median_filter
 from scipy.stats import t as student
 
+from estimation import WindowedSpectrum
+
 from ..inference import FAULTS, FaultSettings
 from ..models.fitting import Fit
 from ..models.hypothesis import predict_lines
 from ..models.misfit import levels, through_structure
 from ..noise.noise_model import NoiseModel, whitening
-from ..records.windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
 
@@ -67,7 +68,7 @@ def mean_and_error(sizes: list[Real]) -> tuple[Real, Real]:
     return mean, np.asarray(np.std(sizes, axis=0, ddof=1) * student.ppf(0.975, len(sizes) - 1) / 1.96)
 
 
-def find_tone(fitted: Fit, lines: list[WindowedLines], settings: FaultSettings = FAULTS) -> Tone | None:
+def find_tone(fitted: Fit, lines: list[WindowedSpectrum], settings: FaultSettings = FAULTS) -> Tone | None:
     """The strongest residual line that stands out of the recordings at one frequency, and of no force.
 
     A tone from elsewhere is the weaker beside the noise the harder is cut, as noise grows with the signal: it must be
@@ -95,7 +96,7 @@ def find_tone(fitted: Fit, lines: list[WindowedLines], settings: FaultSettings =
         frequency = float(axis[k])
         if _too_few_left(lines, frequency):
             continue
-        exact = sharp_frequency(_rests(fitted, lines), [one.trial.rate for one in lines], frequency)
+        exact = sharp_frequency(_rests(fitted, lines), [one.recording.rate for one in lines], frequency)
         # the lines beside it seemed to stand out as much; how strong it is does not depend on how far it leaks
         shown = [_at(above_neighbours(power, NEAR), one, exact) for one, power in zip(lines, powers, strict=True)]
         sizes, spread = mean_and_error(_amplitudes(fitted, lines, exact))
@@ -104,7 +105,7 @@ def find_tone(fitted: Fit, lines: list[WindowedLines], settings: FaultSettings =
 
 
 def seen_together(
-    contrasts: list[Real], lines: list[WindowedLines], forced: float, settings: FaultSettings = FAULTS
+    contrasts: list[Real], lines: list[WindowedSpectrum], forced: float, settings: FaultSettings = FAULTS
 ) -> Real:
     """Contrast of each line of the first recording (n_lines,), summed over recordings; 0 where it is no tone's.
 
@@ -148,7 +149,7 @@ def is_comb(contrast: Real, settings: FaultSettings = FAULTS) -> bool:
     return int(np.sum(np.diff(lines, prepend=-REACH) > 2)) > settings.most_lines
 
 
-def stands_out(fitted: Fit, lines: list[WindowedLines], frequency: float, settings: FaultSettings = FAULTS) -> bool:
+def stands_out(fitted: Fit, lines: list[WindowedSpectrum], frequency: float, settings: FaultSettings = FAULTS) -> bool:
     """Whether a line of recordings that still hold it is a tone beside what a fit leaves.
 
     Parameters
@@ -169,14 +170,14 @@ def stands_out(fitted: Fit, lines: list[WindowedLines], frequency: float, settin
     return total > settings.contrast
 
 
-def _at(contrast: Real, lines: WindowedLines, frequency: float) -> float:
+def _at(contrast: Real, lines: WindowedSpectrum, frequency: float) -> float:
     """The largest of the lines (n_lines,) about a frequency, Hz."""
     return float(contrast[np.abs(lines.frequencies - frequency) < 1.5 * _step(lines)].max(initial=0.0))
 
 
-def _rests(fitted: Fit, lines: list[WindowedLines]) -> list[Real]:
+def _rests(fitted: Fit, lines: list[WindowedSpectrum]) -> list[Real]:
     """Windowed residuals in time, (n_kept, n_responses) each."""
-    rests = [one.trial.response - shown_signal(fitted, one) for one in lines]
+    rests = [one.recording.response - shown_signal(fitted, one) for one in lines]
     return [
         rest[one.start : one.start + len(one.window)] * one.window[:, None]
         for rest, one in zip(rests, lines, strict=True)
@@ -203,20 +204,20 @@ def sharp_frequency(windowed: list[Real], rates: list[float], near: float) -> fl
     return float(tries[np.argmax(power)])
 
 
-def without_tone(fitted: Fit, lines: WindowedLines, tone: Tone) -> WindowedLines:
+def without_tone(fitted: Fit, lines: WindowedSpectrum, tone: Tone) -> WindowedSpectrum:
     """The same recording without the tone, and without the lines about it.
 
     The sinusoid that fits the residual best is subtracted, or a strong tone's leakage through the window would stand
     out far from it; what is left of one that wavers is left out.
     """
-    rest = lines.trial.response - shown_signal(fitted, lines)
-    turn = 2 * np.pi * tone.frequency * np.arange(len(rest)) / lines.trial.rate
+    rest = lines.recording.response - shown_signal(fitted, lines)
+    turn = 2 * np.pi * tone.frequency * np.arange(len(rest)) / lines.recording.rate
     waves = np.column_stack([np.cos(turn), np.sin(turn)])
-    response = lines.trial.response - waves @ np.linalg.lstsq(waves, rest, rcond=None)[0]
+    response = lines.recording.response - waves @ np.linalg.lstsq(waves, rest, rcond=None)[0]
     kept = np.abs(lines.frequencies - tone.frequency) > REACH * _step(lines)
     return replace(
         lines,
-        trial=replace(lines.trial, response=response),
+        recording=replace(lines.recording, response=response),
         band=lines.band[kept],
         frequencies=lines.frequencies[kept],
         force_here=lines.force_here[kept],
@@ -225,17 +226,17 @@ def without_tone(fitted: Fit, lines: WindowedLines, tone: Tone) -> WindowedLines
     )
 
 
-def shown_signal(fitted: Fit, lines: WindowedLines) -> Real:
+def shown_signal(fitted: Fit, lines: WindowedSpectrum) -> Real:
     """Predicted responses in time, (n_samples, n_responses)."""
     spectrum = predict_lines(fitted.hypothesis, lines).spectrum
-    return np.asarray(irfft(spectrum, n=lines.padded, axis=0)[: len(lines.trial.force)])
+    return np.asarray(irfft(spectrum, n=lines.padded, axis=0)[: len(lines.recording.force)])
 
 
-def _step(lines: WindowedLines) -> float:
-    return lines.trial.rate / len(lines.window)
+def _step(lines: WindowedSpectrum) -> float:
+    return lines.recording.rate / len(lines.window)
 
 
-def _whitened_power(fitted: Fit, lines: WindowedLines, noise: NoiseModel) -> Real:
+def _whitened_power(fitted: Fit, lines: WindowedSpectrum, noise: NoiseModel) -> Real:
     """Power of each residual line in units of its noise, mean over channels."""
     rest = lines.measured - predict_lines(fitted.hypothesis, lines).response
     own = noise.covariance(lines.frequencies, through_structure(fitted.hypothesis, lines))
@@ -254,19 +255,19 @@ def above_neighbours(power: Real, footprint: NDArray[np.bool_]) -> Real:
     return np.asarray(power / np.maximum(around, 1e-3 * power.mean() + 1e-300))
 
 
-def _too_few_left(lines: list[WindowedLines], frequency: float) -> bool:
+def _too_few_left(lines: list[WindowedSpectrum], frequency: float) -> bool:
     """Whether taking the tone out would leave less than three quarters of any recording's lines."""
     reach = [np.abs(one.frequencies - frequency) <= REACH * _step(one) for one in lines]
     return any(near.sum() > 0.25 * len(near) for near in reach)
 
 
-def force_contrast(lines: WindowedLines) -> Real:
+def force_contrast(lines: WindowedSpectrum) -> Real:
     """Power of the forces at each line or beside it against the median of its neighbourhood, (n_lines,)."""
     power = np.sum(np.abs(lines.force_here / levels(lines)[1]) ** 2, axis=1)
     return np.asarray(maximum_filter(above_neighbours(power, NEAR), 3))
 
 
-def _amplitudes(fitted: Fit, lines: list[WindowedLines], frequency: float) -> list[Real]:
+def _amplitudes(fitted: Fit, lines: list[WindowedSpectrum], frequency: float) -> list[Real]:
     found = []
     for one in lines:
         rest = one.measured - predict_lines(fitted.hypothesis, one).response

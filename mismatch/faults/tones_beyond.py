@@ -3,9 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import WindowedSpectrum, windowed_spectrum
+
 from ..inference import FAULTS, FaultSettings
 from ..models.hypothesis import Hypothesis, predict_lines
-from ..records.windowed_lines import WindowedLines, windowed_lines
 from .tones import (
     NEAR,
     REACH,
@@ -25,7 +26,7 @@ HIGHEST = 0.45
 
 
 def tones_beyond(
-    hypothesis: Hypothesis, lines: list[WindowedLines], decay: float, most: int, settings: FaultSettings = FAULTS
+    hypothesis: Hypothesis, lines: list[WindowedSpectrum], decay: float, most: int, settings: FaultSettings = FAULTS
 ) -> list[Tone]:
     """Lines above the compared band that stand out of the residual in two recordings, and in no force.
 
@@ -67,16 +68,16 @@ def tones_beyond(
     return found
 
 
-def _above(lines: WindowedLines, decay: float) -> WindowedLines:
-    rate = lines.trial.rate
-    return windowed_lines(
-        lines.trial, (float(lines.frequencies[-1]) + REACH / lines.trial.duration, HIGHEST * rate), decay
+def _above(lines: WindowedSpectrum, decay: float) -> WindowedSpectrum:
+    rate = lines.recording.rate
+    return windowed_spectrum(
+        lines.recording, (float(lines.frequencies[-1]) + REACH / lines.recording.duration, HIGHEST * rate), decay
     )
 
 
-def _tone(above: list[WindowedLines], rests: list[Complex], near: float, contrast: float) -> Tone:
-    kept = [one.trial.response[one.start : one.start + len(one.window)] * one.window[:, None] for one in above]
-    frequency = sharp_frequency(kept, [one.trial.rate for one in above], near)
+def _tone(above: list[WindowedSpectrum], rests: list[Complex], near: float, contrast: float) -> Tone:
+    kept = [one.recording.response[one.start : one.start + len(one.window)] * one.window[:, None] for one in above]
+    frequency = sharp_frequency(kept, [one.recording.rate for one in above], near)
     sizes = []
     for one, rest in zip(above, rests, strict=True):
         k = int(np.argmin(np.abs(one.frequencies - frequency)))

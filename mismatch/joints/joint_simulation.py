@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
+from estimation import WindowedSpectrum
 from foundation import DegreeOfFreedom, InputError
 from modal_fit import ModalModel
 
-from ..records.windowed_lines import WindowedLines, displacement_at
 from .joint_law import JointLaw
 from .joint_loop import driven_run, free_run
 
@@ -68,7 +68,7 @@ def substeps(model: ModalModel, rate: float, fine: int) -> int:
 
 
 def joint_response(
-    model: ModalModel, lines: WindowedLines, force: Complex, direction: Real, law: JointLaw
+    model: ModalModel, lines: WindowedSpectrum, free: Complex, direction: Real, law: JointLaw
 ) -> JointResponse:
     """Force and motion of a joint, the structure simulated freely under the outer force and the joint's.
 
@@ -78,21 +78,19 @@ def joint_response(
         Linear structure.
     lines
         Of the recording.
-    force : (n_padded_lines, n_excitations)
-        Spectrum of the outer force.
+    free : (n_padded_lines,), m
+        Spectrum of the joint's deflection under the outer force alone.
     direction : (n_axes,)
         Of the joint over the common axes, of unit length.
     law
         Of the joint.
     """
-    rows, _ = common_axes(model)
     frequencies = lines.padded_frequencies
-    displacement = displacement_at(model, frequencies, force)[:, rows] @ direction
-    fine = fineness(model, lines.trial.rate)
+    fine = fineness(model, lines.recording.rate)
     n = fine * lines.padded
-    deflection = fine * irfft(displacement, n=n)
-    velocity = fine * irfft(2j * np.pi * frequencies * displacement, n=n)
-    step = 1.0 / (fine * lines.trial.rate)
+    deflection = fine * irfft(free, n=n)
+    velocity = fine * irfft(2j * np.pi * frequencies * free, n=n)
+    step = 1.0 / (fine * lines.recording.rate)
     written = (np.empty(n), np.empty(n), np.empty(n))
     free_run(
         deflection,
@@ -100,19 +98,19 @@ def joint_response(
         joint_dynamics(model, direction, step),
         law.tables(),
         (law.reach, law.speed),
-        stiffness_ramp(law, n, step, lines.trial.duration),
+        stiffness_ramp(law, n, step, lines.recording.duration),
         (law.springs, law.yields),
         written,
     )
     force_lines = np.asarray(rfft(written[0])[: len(frequencies)] / fine)
-    every = fine // substeps(model, lines.trial.rate, fine)
+    every = fine // substeps(model, lines.recording.rate, fine)
     return JointResponse(force_lines, written[1][::every].copy(), written[2][::every].copy())
 
 
-def driven_force(lines: WindowedLines, deflection: Real, velocity: Real, law: JointLaw, *, often: int = 1) -> Real:
-    """The joint's force (n,), N, for a motion sampled at the trial's rate, or ``often`` times it."""
+def driven_force(lines: WindowedSpectrum, deflection: Real, velocity: Real, law: JointLaw, *, often: int = 1) -> Real:
+    """The joint's force (n,), N, for a motion sampled at the recording's rate, or ``often`` times it."""
     result = np.empty(len(deflection))
-    ramp = stiffness_ramp(law, len(deflection), 1 / (often * lines.trial.rate), lines.trial.duration)
+    ramp = stiffness_ramp(law, len(deflection), 1 / (often * lines.recording.rate), lines.recording.duration)
     driven_run(deflection, velocity, law.tables(), (law.reach, law.speed), ramp, (law.springs, law.yields), result)
     return result
 

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
+from estimation import WindowedSpectrum
+
 from ..joints.joint_simulation import driven_force
 from ..models.fitting import Fit
 from ..models.hypothesis import Cause, Hypothesis, predict_lines
 from ..models.misfit import through_structure
 from ..noise.noise_model import whitening
 from ..physics import answer_name
-from ..records.windowed_lines import WindowedLines
 from ..screening.joint_direction import SeenMotion, seen_motion
 from ..screening.linear_floor import FloorRecord
 from .structure_details import StructureDiagnosis
@@ -112,7 +113,7 @@ def _measured(diagnosis: StructureDiagnosis, cause: Cause) -> FreeFormLaw:
     )
 
 
-def _seen(final: Fit, bare: Hypothesis, cause: Cause, number: int, lines: WindowedLines) -> _Sample:
+def _seen(final: Fit, bare: Hypothesis, cause: Cause, number: int, lines: WindowedSpectrum) -> _Sample:
     """Motion and force along the joint in one recording, and the law's force for that motion."""
     assert cause.direction is not None
     through = through_structure(bare, lines)
@@ -121,14 +122,14 @@ def _seen(final: Fit, bare: Hypothesis, cause: Cause, number: int, lines: Window
     record = FloorRecord(lines, rest, through, whitening(covariance), np.zeros((0, 0)), np.zeros(0))
     seen: SeenMotion = seen_motion(record, bare, cause.direction)
     law = driven_force(lines, seen.deflection, seen.velocity, cause.law())
-    kept = slice(lines.start, len(law) - max(int(lines.trial.rate), 1))
+    kept = slice(lines.start, len(law) - max(int(lines.recording.rate), 1))
     force, given = _in_band(seen.force, lines)[kept], _in_band(law, lines)[kept]
-    piece = np.arange(len(force)) // max(int(BLOCK * lines.trial.rate), 1)
+    piece = np.arange(len(force)) // max(int(BLOCK * lines.recording.rate), 1)
     return _Sample(seen.deflection[kept], seen.velocity[kept], force, given, piece)
 
 
-def _in_band(signal: Real, lines: WindowedLines) -> Real:
-    axis = np.arange(len(signal) // 2 + 1) * lines.trial.rate / len(signal)
+def _in_band(signal: Real, lines: WindowedSpectrum) -> Real:
+    axis = np.arange(len(signal) // 2 + 1) * lines.recording.rate / len(signal)
     inside = (axis >= lines.frequencies[0]) & (axis <= lines.frequencies[-1])
     return np.asarray(irfft(rfft(signal) * inside, n=len(signal)))
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import WindowedSpectrum
+
 from ..models.fitting import Fit
 from ..models.hypothesis import Hypothesis
-from ..records.windowed_lines import WindowedLines
 from .residual_maps import normalised, overlap
 
 Real = NDArray[np.float64]
@@ -45,7 +46,7 @@ class Growth:
 def growth(
     hypothesis: Hypothesis,
     reference: Fit,
-    lines: Sequence[WindowedLines],
+    lines: Sequence[WindowedSpectrum],
     bands: Sequence[tuple[float, float]],
     spread: float,
 ) -> Growth:
@@ -76,7 +77,7 @@ def growth(
         excess = float(power.sum() - floor.sum())
         chance = 0.5 * float(np.sum(power**2)) * overlap(one.window)
         error = float(np.sqrt(chance + (spread * float(floor.sum())) ** 2))
-        rows.append((one.trial.level, excess / power.size, error / power.size, float(floor.mean())))
+        rows.append((one.recording.level, excess / power.size, error / power.size, float(floor.mean())))
     force, excess_, error_, noise = np.array(rows).T
     amplitude = np.sqrt(np.maximum(excess_, 0.0))
     spreads = error_ / (2 * np.maximum(amplitude, np.sqrt(error_)))

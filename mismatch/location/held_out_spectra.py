@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import WindowedSpectrum
+
 from ..faults.shown_faults import residual_lines
 from ..models.misfit import through_structure
 from ..physics import is_fault
-from ..records.windowed_lines import WindowedLines
 from .residual_maps import band_edges
 from .structure_details import StructureDiagnosis
 
@@ -50,7 +51,7 @@ def held_out_spectra(diagnosis: StructureDiagnosis) -> HeldOutSpectra:
     """Spectra of the recording named by the diagnosis' improvement, both models fitted to the others only."""
     details = diagnosis.details
     lines = list(details.measured)
-    names = [one.trial.name for one in lines]
+    names = [one.recording.name for one in lines]
     kept = names.index(diagnosis.improvement.held_out)
     here, final = lines[kept], details.final
     before, after = details.elsewhere
@@ -66,15 +67,15 @@ def held_out_spectra(diagnosis: StructureDiagnosis) -> HeldOutSpectra:
         np.real(np.einsum("kii->ki", covariance)),
     ]
     densities = [_density(one, here, edges) for one in power]
-    channels = here.trial.channels[-here.measured.shape[1] :]
+    channels = here.recording.channels[-here.measured.shape[1] :]
     middle = np.sqrt(edges[1:] * edges[:-1])
-    return HeldOutSpectra(here.trial.name, middle, channels, here.trial.powers, *densities)
+    return HeldOutSpectra(here.recording.name, middle, channels, here.recording.orders, *densities)
 
 
-def _density(power: Real, lines: WindowedLines, edges: Real) -> Real:
+def _density(power: Real, lines: WindowedSpectrum, edges: Real) -> Real:
     """Root of the mean one-sided density in bands; nan where a band holds no line."""
     place = np.digitize(lines.frequencies, edges[1:-1])
     held = np.bincount(place, minlength=len(edges) - 1)
     sums = np.array([np.bincount(place, power[:, p], len(held)) for p in range(power.shape[1])]).T
     mean = np.where(held[:, None] > 0, sums / np.maximum(held, 1)[:, None], np.nan)
-    return np.asarray(np.sqrt(2 * mean / lines.trial.rate))
+    return np.asarray(np.sqrt(2 * mean / lines.recording.rate))

@@ -136,7 +136,7 @@ def _named(key: str, names: Sequence[str], tables: Tables, p_value: Real) -> lis
 
 def _levels(view: ResidualView, tables: Tables, p_value: Real) -> list[dict[str, Any]]:
     rows = _named("recording", view.before.recordings, tables, p_value)
-    return [row | {"force_rms_n": _plain(one.trial.level)} for row, one in zip(rows, view.measured, strict=True)]
+    return [row | {"force_rms_n": _plain(one.recording.level)} for row, one in zip(rows, view.measured, strict=True)]
 
 
 def _cells(view: ResidualView, p_value: Real) -> list[list[int]]:

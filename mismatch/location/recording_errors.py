@@ -53,6 +53,6 @@ def recording_errors(diagnosis: StructureDiagnosis) -> tuple[RecordingError, ...
         covariance = noise.covariance(one.frequencies, through_structure(improved, one))
         nominal, refitted, final = (float(np.sqrt(np.sum(np.abs(rest) ** 2) / power)) for rest in rests)
         floor = float(np.sqrt(np.sum(np.trace(covariance, axis1=1, axis2=2).real) / power))
-        held = one.trial.name == diagnosis.improvement.held_out and len(details.recordings) > 1
-        found.append(RecordingError(one.trial.name, held, one.trial.level, nominal, refitted, final, floor))
+        held = one.recording.name == diagnosis.improvement.held_out and len(details.recordings) > 1
+        found.append(RecordingError(one.recording.name, held, one.recording.level, nominal, refitted, final, floor))
     return tuple(found)

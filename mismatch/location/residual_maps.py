@@ -6,11 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import WindowedSpectrum
+
 from ..models.fitting import Fit
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..models.misfit import through_structure
 from ..noise.noise_model import whitening
-from ..records.windowed_lines import WindowedLines
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -64,12 +65,12 @@ def overlap(window: Real) -> float:
     return float(len(window) * np.sum(window**4) / np.sum(window**2) ** 2)
 
 
-def band_edges(lines: Sequence[WindowedLines], per_octave: int = BANDS_PER_OCTAVE, least: int = LEAST_LINES) -> Real:
+def band_edges(lines: Sequence[WindowedSpectrum], per_octave: int = BANDS_PER_OCTAVE, least: int = LEAST_LINES) -> Real:
     """Edges (Hz) of bands evenly wide on a logarithmic axis, each with ``least`` lines in every recording."""
     low = max(float(one.frequencies[0]) for one in lines)
     high = min(float(one.frequencies[-1]) for one in lines)
     fine = np.geomspace(low, high, max(2, round(per_octave * np.log2(high / low)) + 1))
-    step = max(one.trial.rate / len(one.window) for one in lines)
+    step = max(one.recording.rate / len(one.window) for one in lines)
     edges = [fine[0]]
     for edge in fine[1:]:
         if edge - edges[-1] >= least * step:
@@ -81,7 +82,7 @@ def band_edges(lines: Sequence[WindowedLines], per_octave: int = BANDS_PER_OCTAV
 
 
 def normalised(
-    hypothesis: Hypothesis, reference: Fit, number: int, lines: WindowedLines
+    hypothesis: Hypothesis, reference: Fit, number: int, lines: WindowedSpectrum
 ) -> tuple[Complex, Complex, Real]:
     """Residual lines in units of the noise.
 
@@ -110,7 +111,7 @@ def normalised(
     return rest / np.sqrt(variance), np.einsum("kij,kj->ki", whitening(covariance), rest), variance
 
 
-def residual_map(hypothesis: Hypothesis, reference: Fit, lines: Sequence[WindowedLines], edges: Real) -> ResidualMap:
+def residual_map(hypothesis: Hypothesis, reference: Fit, lines: Sequence[WindowedSpectrum], edges: Real) -> ResidualMap:
     """Map of one hypothesis's residual over all recordings, noise from ``reference``."""
     ratio, joint, count = [], [], []
     for number, one in enumerate(lines):
@@ -121,9 +122,9 @@ def residual_map(hypothesis: Hypothesis, reference: Fit, lines: Sequence[Windowe
         joint.append(_means(np.abs(white) ** 2, place, held).mean(axis=1))
         count.append(held / overlap(one.window))
     first = lines[0]
-    names = first.trial.channels[-first.measured.shape[1] :]
+    names = first.recording.channels[-first.measured.shape[1] :]
     return ResidualMap(
-        edges, names, tuple(one.trial.name for one in lines), np.array(ratio), np.array(joint), np.array(count)
+        edges, names, tuple(one.recording.name for one in lines), np.array(ratio), np.array(joint), np.array(count)
     )
 
 

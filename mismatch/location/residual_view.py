@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
+
 from ..models.fitting import Fit
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..noise.noise_model import NoiseModel
-from ..records.trial import Trial
-from ..records.windowed_lines import WindowedLines, windowed_lines
 from .family_wise import NoiseSpread, noise_spread
 from .residual_maps import ResidualMap, band_edges, residual_map
 from .structure_details import StructureDetails
@@ -41,7 +41,7 @@ class ResidualView:
     """
 
     details: StructureDetails
-    measured: tuple[WindowedLines, ...]
+    measured: tuple[WindowedSpectrum, ...]
     before: ResidualMap
     after: ResidualMap
     blocks_before: tuple[BlockResidual, ...]
@@ -50,7 +50,9 @@ class ResidualView:
     noise: NoiseSpread
 
 
-def residual_view(details: StructureDetails, unexplained: bool, trials: Sequence[Trial] | None = None) -> ResidualView:
+def residual_view(
+    details: StructureDetails, unexplained: bool, trials: Sequence[BandRecording] | None = None
+) -> ResidualView:
     """Maps of a diagnosis.
 
     Parameters
@@ -83,7 +85,7 @@ def residual_view(details: StructureDetails, unexplained: bool, trials: Sequence
     )
 
 
-def _quiet(final: Fit, number: int, lines: WindowedLines) -> NoiseModel:
+def _quiet(final: Fit, number: int, lines: WindowedSpectrum) -> NoiseModel:
     """Noise at the level that a fifth of all narrow bands stays below, no part of it from forces."""
     rest = lines.measured - predict_lines(final.hypothesis, lines).response
     bands = np.array_split(np.abs(rest) ** 2, min(150, max(4, len(rest) // 12)))
@@ -99,11 +101,11 @@ def linear_part(details: StructureDetails) -> Hypothesis | None:
     return replace(final, causes=kept) if len(kept) < len(final.causes) else None
 
 
-def _as_measured(lines: WindowedLines, trials: Sequence[Trial]) -> WindowedLines:
+def _as_measured(lines: WindowedSpectrum, trials: Sequence[BandRecording]) -> WindowedSpectrum:
     """The recording before anything was mended; the run-in is that of the diagnosis."""
     for trial in trials:
-        if trial.name == lines.trial.name and trial.response.shape == lines.trial.response.shape:
+        if trial.name == lines.recording.name and trial.response.shape == lines.recording.response.shape:
             decay = 7.0 * trial.rate / max(lines.start, 1)
             band = (float(lines.frequencies[0]), float(lines.frequencies[-1]))
-            return windowed_lines(trial, band, decay)
+            return windowed_spectrum(trial, band, decay)
     return lines

@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from estimation import WindowedSpectrum
+
 from ..inference import Diagnosis
 from ..models.fitting import Fit
 from ..models.hypothesis import Hypothesis
 from ..records.compared_band import ComparedBand
-from ..records.windowed_lines import WindowedLines
 
 if TYPE_CHECKING:
     from .residual_view import ResidualView
@@ -35,8 +36,8 @@ class StructureDetails:
 
     base: Fit
     final: Fit
-    recordings: tuple[WindowedLines, ...]
-    measured: tuple[WindowedLines, ...]
+    recordings: tuple[WindowedSpectrum, ...]
+    measured: tuple[WindowedSpectrum, ...]
     elsewhere: tuple[Hypothesis, Hypothesis]
     band: ComparedBand
     view: "ResidualView | None" = None

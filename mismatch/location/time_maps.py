@@ -7,11 +7,12 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 from scipy.signal.windows import hann
 
+from estimation import WindowedSpectrum
+
 from ..models.fitting import Fit
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..models.misfit import through_structure
 from ..noise.noise_model import whitening
-from ..records.windowed_lines import WindowedLines
 from .residual_maps import overlap
 
 Complex = NDArray[np.complex128]
@@ -59,7 +60,7 @@ class BlockResidual:
         return np.asarray(means), np.asarray(held * self.channels / self.overlap)
 
 
-def block_residual(hypothesis: Hypothesis, reference: Fit, number: int, lines: WindowedLines) -> BlockResidual:
+def block_residual(hypothesis: Hypothesis, reference: Fit, number: int, lines: WindowedSpectrum) -> BlockResidual:
     """Residual of a hypothesis block by block; lines that a mended tone took out are left out here too.
 
     Parameters
@@ -73,8 +74,8 @@ def block_residual(hypothesis: Hypothesis, reference: Fit, number: int, lines: W
     lines
         The recording.
     """
-    rate, n = lines.trial.rate, len(lines.trial.force)
-    rest = _kept(lines, lines.trial.response - lines.signal(predict_lines(hypothesis, lines).spectrum))
+    rate, n = lines.recording.rate, len(lines.recording.force)
+    rest = _kept(lines, lines.recording.response - lines.signal(predict_lines(hypothesis, lines).spectrum))
     rest = rest[lines.start : n - max(int(rate) // 2, 1)]
     length = int(rate * max(len(rest) / rate / BLOCKS, LEAST_PERIODS / lines.frequencies[0]))
     length = max(16, min(length, len(rest)))
@@ -89,22 +90,22 @@ def block_residual(hypothesis: Hypothesis, reference: Fit, number: int, lines: W
     small = np.einsum("kij,bkj->bki", white, spectra)
     times = (lines.start + length * np.arange(count + 1)) / rate
     power = np.mean(np.abs(small) ** 2, axis=2)
-    return BlockResidual(lines.trial.name, times, axis[inside], power, rest.shape[1], overlap(window))
+    return BlockResidual(lines.recording.name, times, axis[inside], power, rest.shape[1], overlap(window))
 
 
-def _kept(lines: WindowedLines, rest: Real) -> Real:
+def _kept(lines: WindowedSpectrum, rest: Real) -> Real:
     """Residual without the frequencies between the lines that are compared."""
-    step = lines.trial.rate / len(lines.window)
+    step = lines.recording.rate / len(lines.window)
     if not (np.diff(lines.frequencies) > 1.5 * step).any():
         return rest
-    axis = np.arange(len(rest) // 2 + 1) * lines.trial.rate / len(rest)
+    axis = np.arange(len(rest) // 2 + 1) * lines.recording.rate / len(rest)
     right = np.clip(np.searchsorted(lines.frequencies, axis), 1, len(lines.frequencies) - 1)
     gap = lines.frequencies[right] - lines.frequencies[right - 1]
     between = (gap > 1.5 * step) & (axis > lines.frequencies[right - 1]) & (axis < lines.frequencies[right])
     return np.asarray(irfft(rfft(rest, axis=0) * ~between[:, None], n=len(rest), axis=0))
 
 
-def _whitening_at(reference: Fit, number: int, lines: WindowedLines, axis: Real) -> Complex:
+def _whitening_at(reference: Fit, number: int, lines: WindowedSpectrum, axis: Real) -> Complex:
     """Whitening at other frequencies: the structure's part interpolated as a mean over the coarser lines."""
     through = through_structure(reference.hypothesis, lines)
     covariance = reference.noises[number].covariance(lines.frequencies, through)

@@ -3,16 +3,15 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import Frf
+from estimation import Frf, WindowedSpectrum
 
 from ..joints.joint_simulation import common_axes, driven_force
-from ..records.windowed_lines import WindowedLines
 from .hypothesis import Hypothesis, predict_lines, surround
 
 Real = NDArray[np.float64]
 
 
-def equivalent_receptance(hypothesis: Hypothesis, lines: WindowedLines, frequencies: Real) -> Frf:
+def equivalent_receptance(hypothesis: Hypothesis, lines: WindowedSpectrum, frequencies: Real) -> Frf:
     """Receptance with the causes that belong to the structure, joints linearised for the motion of one recording.
 
     A joint's law counts as the spring and damper that come closest to its force, ``k = <g x> / <x^2>`` and

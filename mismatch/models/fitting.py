@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import WindowedSpectrum
+
 from ..inference import Descended, Limits, descend, plain_step
 from ..noise.noise_model import NoiseModel
 from ..physics.modal_parameters import PHYSICS as BELIEF
-from ..records.windowed_lines import WindowedLines
 from .hypothesis import Hypothesis, predict_lines
 from .jacobian import jacobian
 from .misfit import Misfit, misfit_under, whitened, with_noise
@@ -52,7 +53,7 @@ class Fit:
 
 
 def fit(
-    lines: list[WindowedLines],
+    lines: list[WindowedSpectrum],
     start: Hypothesis,
     noises: tuple[NoiseModel, ...] | None = None,
     *,
@@ -118,7 +119,7 @@ class _Problem:
     """Misfit and deviation of a hypothesis as the descent sees them; the recordings are worked on in threads."""
 
     pool: ThreadPoolExecutor
-    lines: list[WindowedLines]
+    lines: list[WindowedSpectrum]
 
     def cost(self, state: _State) -> float:
         """``misfit + |u|^2``."""
@@ -155,7 +156,7 @@ class _Problem:
 
 def _descended(
     pool: ThreadPoolExecutor,
-    lines: list[WindowedLines],
+    lines: list[WindowedSpectrum],
     start: Hypothesis,
     noises: tuple[NoiseModel, ...] | None,
     limits: Limits,
@@ -166,12 +167,12 @@ def _descended(
     return descend(_Problem(pool, lines), _State(start, seen), limits)
 
 
-def residual(fitted: Fit, lines: list[WindowedLines]) -> list[Complex]:
+def residual(fitted: Fit, lines: list[WindowedSpectrum]) -> list[Complex]:
     """What a fit leaves of each recording, (n_lines, n_responses)."""
     return [one.measured - predict_lines(fitted.hypothesis, one).response for one in lines]
 
 
-def _normal_of(lines: WindowedLines, hypothesis: Hypothesis, seen: Misfit) -> tuple[Real, Real]:
+def _normal_of(lines: WindowedSpectrum, hypothesis: Hypothesis, seen: Misfit) -> tuple[Real, Real]:
     slope = whitened(seen.white, jacobian(hypothesis, lines, seen.predicted))
     small = whitened(seen.white, seen.rest[:, :, None])[:, 0]
     return 2 * (slope.T @ slope), 2 * (slope.T @ small)

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft
 
+from estimation import WindowedSpectrum
 from modal_fit import ModalModel
 
 from ..joints.joint_law import JointLaw, JointMotion
 from ..joints.joint_simulation import JointResponse, common_axes, driven_force, joint_response
 from ..physics import Chain, ChainPhysics, JointPhysics, LimitedPhysics, ModePhysics, Physics
-from ..records.windowed_lines import WindowedLines, displacement_at, receptance_at
+from .modal_lines import displacement_at, receptance_at
 from .model_shape import ModelShape
 
 Complex = NDArray[np.complex128]
@@ -245,7 +246,7 @@ class Predicted:
     joints: tuple[JointResponse, ...]
 
 
-def predict_lines(hypothesis: Hypothesis, lines: WindowedLines) -> Predicted:
+def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Predicted:
     """Response of the whole hypothesis to a recording's forces, cut and windowed like the measurement."""
     model, frequencies = hypothesis.model, lines.padded_frequencies
     around = surround(hypothesis, frequencies)
@@ -254,12 +255,13 @@ def predict_lines(hypothesis: Hypothesis, lines: WindowedLines) -> Predicted:
     joints = []
     for cause in hypothesis.causes:
         if cause.direction is not None:
-            _, columns = common_axes(model)
+            rows, columns = common_axes(model)
             if cause.seen is not None:
-                x, v = cause.seen[lines.trial.name]
+                x, v = cause.seen[lines.recording.name]
                 answer = JointResponse(rfft(driven_force(lines, x, v, cause.law()), n=lines.padded), x, v)
             else:
-                answer = joint_response(model, lines, pushed - joint, cause.direction, cause.law())
+                free = displacement_at(model, frequencies, pushed - joint)[:, rows] @ cause.direction
+                answer = joint_response(model, lines, free, cause.direction, cause.law())
             joints.append(answer)
             g = answer.force
             joint[:, columns] += g[:, None] * cause.direction
@@ -271,7 +273,7 @@ def predict_lines(hypothesis: Hypothesis, lines: WindowedLines) -> Predicted:
     return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint, tuple(joints))
 
 
-def line_response(hypothesis: Hypothesis, lines: WindowedLines, joint: Complex | None = None) -> Complex:
+def line_response(hypothesis: Hypothesis, lines: WindowedSpectrum, joint: Complex | None = None) -> Complex:
     """Response lines (n_lines, n_responses) of the linear part to the windowed forces: for derivatives, no leakage.
 
     Parameters

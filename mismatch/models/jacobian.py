@@ -3,14 +3,15 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..records.windowed_lines import WindowedLines
+from estimation import WindowedSpectrum
+
 from .hypothesis import Hypothesis, Predicted, line_response, surround
 from .joint_tangents import joint_changes
 
 Complex = NDArray[np.complex128]
 
 
-def jacobian(hypothesis: Hypothesis, lines: WindowedLines, predicted: Predicted) -> Complex:
+def jacobian(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted) -> Complex:
     """Derivative of the response lines by u and the causes' coordinates, (n_lines, n_responses, size)."""
     around = surround(hypothesis, lines.frequencies)
     force: Complex = around.pushed(lines.force_here)

@@ -4,10 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
+from estimation import WindowedSpectrum
+
 from ..joints.joint_simulation import JointResponse, common_axes, driven_force, joint_dynamics, stiffness_ramp
 from ..joints.tangent_loop import tangent_run
-from ..records.windowed_lines import WindowedLines, displacement_at, receptance_at
 from .hypothesis import TURN_STEP, Cause, Hypothesis, Predicted, across, surround
+from .modal_lines import displacement_at, receptance_at
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -19,7 +21,7 @@ ASIDE = 0.02
 """Step of a cause's coordinates for a difference quotient at given motion."""
 
 
-def joint_changes(hypothesis: Hypothesis, lines: WindowedLines, predicted: Predicted) -> Complex:
+def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted) -> Complex:
     """Derivative of the windowed lines of the joints' force on the structure, (n_lines, n_excitations, size).
 
     A change of the modal parameters, of the outer force or of an earlier joint changes a joint's driven motion; its
@@ -59,7 +61,7 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedLines, predicted: Predi
     return result
 
 
-def _outer_change(hypothesis: Hypothesis, lines: WindowedLines, count: int) -> tuple[Complex, Complex]:
+def _outer_change(hypothesis: Hypothesis, lines: WindowedSpectrum, count: int) -> tuple[Complex, Complex]:
     """Outer force at padded lines, and its derivative by the numbers of linear causes."""
     frequencies = lines.padded_frequencies[:count]
     force = lines.force_lines[:count]
@@ -79,15 +81,15 @@ def _outer_change(hypothesis: Hypothesis, lines: WindowedLines, count: int) -> t
 
 def _force_change(
     hypothesis: Hypothesis,
-    lines: WindowedLines,
+    lines: WindowedSpectrum,
     joint: tuple[Cause, slice, JointResponse],
     force: Complex,
     change: Complex,
 ) -> NDArray[np.float32]:
     """Derivative of g at the samples, (n, size)."""
     cause, own, answer = joint
-    often = len(answer.deflection) // (len(lines.trial.force) if cause.seen is not None else lines.padded)
-    n = often * len(lines.trial.force)
+    often = len(answer.deflection) // (len(lines.recording.force) if cause.seen is not None else lines.padded)
+    n = often * len(lines.recording.force)
     # a derivative need not be known to more than six digits
     dg = np.zeros((n, hypothesis.size), dtype=np.float32)
     dg[:, own] = _law_change(cause, lines, answer, often)
@@ -96,7 +98,7 @@ def _force_change(
     driven = _driven_change(hypothesis, lines, joint, force, change)
     spectrum = np.zeros((often * lines.padded // 2 + 1, hypothesis.size), dtype=np.complex64)
     spectrum[: len(driven)] = often * driven
-    law, step = cause.law(), 1 / (often * lines.trial.rate)
+    law, step = cause.law(), 1 / (often * lines.recording.rate)
     s = 2j * np.pi * np.arange(len(spectrum), dtype=np.float32)[:, None] / np.float32(lines.padded * step * often)
     assert cause.direction is not None
     tangent_run(
@@ -104,7 +106,7 @@ def _force_change(
         joint_dynamics(hypothesis.model, cause.direction, step),
         law.tables(),
         (law.reach, law.speed),
-        stiffness_ramp(law, n, step, lines.trial.duration),
+        stiffness_ramp(law, n, step, lines.recording.duration),
         (law.springs, law.yields),
         (
             irfft(spectrum, n=often * lines.padded, axis=0)[:n],
@@ -127,9 +129,9 @@ def at_samples(signal: NDArray[np.float32], often: int) -> NDArray[np.float32]:
     )
 
 
-def _law_change(cause: Cause, lines: WindowedLines, answer: JointResponse, often: int) -> Real:
+def _law_change(cause: Cause, lines: WindowedSpectrum, answer: JointResponse, often: int) -> Real:
     """Derivative of g at given motion by the cause's own numbers, (n, cause.size); none by angles."""
-    n = often * len(lines.trial.force)
+    n = often * len(lines.recording.force)
     x, v = answer.deflection[:n], answer.velocity[:n]
     result = np.zeros((n, cause.size))
     here = cause.coordinates()
@@ -143,7 +145,7 @@ def _law_change(cause: Cause, lines: WindowedLines, answer: JointResponse, often
 
 def _driven_change(
     hypothesis: Hypothesis,
-    lines: WindowedLines,
+    lines: WindowedSpectrum,
     joint: tuple[Cause, slice, JointResponse],
     force: Complex,
     change: Complex,

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import WindowedSpectrum
+
 from ..noise.line_loops import whitened_columns
 from ..noise.noise_model import NoiseModel, fit_noise, whitening_and_determinant
-from ..records.windowed_lines import WindowedLines
 from .hypothesis import Hypothesis, Predicted, predict_lines, surround
 
 Complex = NDArray[np.complex128]
@@ -39,7 +40,7 @@ class Misfit:
     noise: NoiseModel
 
 
-def misfit_under(lines: WindowedLines, hypothesis: Hypothesis, noise: NoiseModel) -> Misfit:
+def misfit_under(lines: WindowedSpectrum, hypothesis: Hypothesis, noise: NoiseModel) -> Misfit:
     """Misfit under a given noise; infinite where a prediction is not finite or cannot be made."""
     try:
         predicted = predict_lines(hypothesis, lines)
@@ -51,7 +52,7 @@ def misfit_under(lines: WindowedLines, hypothesis: Hypothesis, noise: NoiseModel
 
 
 def with_noise(
-    lines: WindowedLines, hypothesis: Hypothesis, noise: NoiseModel | None, seen: Misfit | None = None
+    lines: WindowedSpectrum, hypothesis: Hypothesis, noise: NoiseModel | None, seen: Misfit | None = None
 ) -> Misfit:
     """Misfit under the noise that fits the residual best.
 
@@ -63,13 +64,13 @@ def with_noise(
     predicted = seen.predicted if seen is not None else predict_lines(hypothesis, lines)
     rest = lines.measured - predicted.response
     if not np.isfinite(rest).all():
-        raise np.linalg.LinAlgError(f"the response predicted for {lines.trial.name} is not finite")
+        raise np.linalg.LinAlgError(f"the response predicted for {lines.recording.name} is not finite")
     through = through_structure(hypothesis, lines)
     found = fit_noise(lines.frequencies, rest, through, levels(lines), noise)
     return misfit_of(lines, predicted, rest, through, found)
 
 
-def least_misfit(hypothesis: Hypothesis, lines: WindowedLines) -> float:
+def least_misfit(hypothesis: Hypothesis, lines: WindowedSpectrum) -> float:
     """Misfit of a hypothesis to one recording under its likeliest noise; infinite where it runs away."""
     try:
         return with_noise(lines, hypothesis, None).misfit
@@ -77,7 +78,7 @@ def least_misfit(hypothesis: Hypothesis, lines: WindowedLines) -> float:
         return np.inf
 
 
-def through_structure(hypothesis: Hypothesis, lines: WindowedLines) -> Complex:
+def through_structure(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Complex:
     """From forces to measured responses at the lines, (n_lines, n_responses, n_excitations)."""
     around = surround(hypothesis, lines.frequencies)
     closed = around.closed(hypothesis.model.receptance(lines.frequencies))
@@ -86,7 +87,7 @@ def through_structure(hypothesis: Hypothesis, lines: WindowedLines) -> Complex:
     return np.asarray(around.shown(closed * lines.kinematic[:, :, None]) @ lines.trust)
 
 
-def levels(lines: WindowedLines) -> tuple[Real, Real]:
+def levels(lines: WindowedSpectrum) -> tuple[Real, Real]:
     """Root mean square a line of responses and of forces."""
     return (
         np.sqrt(np.mean(np.abs(lines.measured) ** 2, axis=0)),
@@ -101,7 +102,9 @@ def whitened(white: Complex, lines: Complex) -> Real:
     return out.reshape(-1, lines.shape[2])
 
 
-def misfit_of(lines: WindowedLines, predicted: Predicted, rest: Complex, through: Complex, noise: NoiseModel) -> Misfit:
+def misfit_of(
+    lines: WindowedSpectrum, predicted: Predicted, rest: Complex, through: Complex, noise: NoiseModel
+) -> Misfit:
     """Misfit of a residual under a given noise; infinite where it is not finite."""
     if not np.isfinite(rest).all():
         return Misfit(predicted, rest, rest, np.inf, noise)

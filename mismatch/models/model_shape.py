@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from modal_fit import ModalModel
 
 from ..inference import LabError
-from ..noise.line_loops import modal_slopes
+from .modal_loops import modal_slopes
 from .outside_band import OutsideBand, outside_band
 
 Complex = NDArray[np.complex128]

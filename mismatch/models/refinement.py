@@ -2,15 +2,16 @@
 
 from dataclasses import replace
 
+from estimation import WindowedSpectrum
+
 from ..physics import ChainPhysics
-from ..records.windowed_lines import WindowedLines
 from .fitting import Fit, fit, modes_are_odd
 from .hypothesis import Cause, Hypothesis
 
 ITERATIONS, FROM_BELIEF = 60, 20
 
 
-def settled(lines: list[WindowedLines], fitted: Fit) -> Fit:
+def settled(lines: list[WindowedSpectrum], fitted: Fit) -> Fit:
     """Fit until it rests; if the lab's model then looks odd, once more from that model, and the better of both.
 
     A cause of changed stiffness and the modes it changes run along one long valley: a search that began beside it may
@@ -30,7 +31,7 @@ def settled(lines: list[WindowedLines], fitted: Fit) -> Fit:
     return min(rested, again, key=lambda one: one.score)
 
 
-def with_chain(lines: list[WindowedLines], current: Fit, cause: Cause) -> Fit:
+def with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Fit:
     """Fit a linear cause together with the modes: from where they are and, if they look odd, from the lab's model.
 
     Modes that have taken up all that a cause does leave it nothing to begin with.

@@ -1,9 +1,9 @@
-"""Loops over lines with small matrices: whitening, and modal models with their derivatives. Compiled."""
+"""Loops over lines with small matrices: whitening. Compiled."""
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compilation import compiled
+from cutting import compiled
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -86,80 +86,3 @@ def whitened_columns(white: Complex, lines: Complex, out: Real) -> None:
                     value += white[k, i, j] * lines[k, j, c]
                 out[0, k, i, c] = value.real
                 out[1, k, i, c] = value.imag
-
-
-@compiled
-def modal_displacement(s: Complex, poles: Complex, right: Complex, left: Complex, force: Complex, out: Complex) -> None:
-    """Write ``sum_r right_r (left_r . F) / (s - p_r)`` and its conjugate half.
-
-    Parameters
-    ----------
-    s : (n,), 1/s
-    poles : (n_modes,), 1/s
-    right : (n_modes, n_responses)
-    left : (n_modes, n_excitations)
-    force : (n, n_excitations)
-    out : (n, n_responses)
-    """
-    for k in range(len(s)):
-        out[k] = 0.0
-        for r in range(len(poles)):
-            push, pull = 0.0 + 0.0j, 0.0 + 0.0j
-            for q in range(left.shape[1]):
-                push += left[r, q] * force[k, q]
-                pull += left[r, q].conjugate() * force[k, q]
-            push /= s[k] - poles[r]
-            pull /= s[k] - poles[r].conjugate()
-            for p in range(right.shape[1]):
-                out[k, p] += right[r, p] * push + right[r, p].conjugate() * pull
-
-
-@compiled
-def modal_slopes(
-    s: Complex,
-    force: Complex,
-    modes: tuple[Complex, Complex, Complex],
-    units: tuple[Complex, Complex, Real, Real],
-    factor: Complex,
-    out: Complex,
-) -> None:
-    """Write the derivative of ``factor * (H F)`` by every number of every mode, as `ModelShape` orders them.
-
-    Parameters
-    ----------
-    s : (n,), 1/s
-    force : (n, n_excitations)
-    modes
-        Poles (n_modes,), right (n_modes, n_responses) and left vectors (n_modes, n_excitations).
-    units
-        Change of each pole by a unit of frequency and of damping, units of right and of left entries, each (n_modes,).
-    factor : (n, n_responses)
-    out : (n, n_responses, n_columns)
-        Columns after the modes' are left alone.
-    """
-    poles, right, left = modes
-    by_frequency, by_damping, right_unit, left_unit = units
-    n, m = right.shape[1], left.shape[1]
-    size = 2 + 2 * n + 2 * m
-    for k in range(len(s)):
-        for r in range(len(poles)):
-            first = r * size
-            up, down = 1.0 / (s[k] - poles[r]), 1.0 / (s[k] - poles[r].conjugate())
-            push, pull = 0.0 + 0.0j, 0.0 + 0.0j
-            for q in range(m):
-                push += left[r, q] * force[k, q]
-                pull += left[r, q].conjugate() * force[k, q]
-            push *= up
-            pull *= down
-            for p in range(n):
-                one, other = factor[k, p] * right[r, p], factor[k, p] * right[r, p].conjugate()
-                row = out[k, p]
-                row[first] = one * up * push * by_frequency[r] + other * down * pull * by_frequency[r].conjugate()
-                row[first + 1] = one * up * push * by_damping[r] + other * down * pull * by_damping[r].conjugate()
-                row[first + 2 : first + 2 + 2 * n] = 0.0
-                row[first + 2 + p] = factor[k, p] * right_unit[r] * (push + pull)
-                row[first + 2 + n + p] = 1j * factor[k, p] * right_unit[r] * (push - pull)
-                for q in range(m):
-                    a, b = one * up * force[k, q], other * down * force[k, q]
-                    row[first + 2 + 2 * n + q] = left_unit[r] * (a + b)
-                    row[first + 2 + 2 * n + m + q] = 1j * left_unit[r] * (a - b)

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import BandRecording
+
 from ..joints.saturation import saturated
-from ..records.trial import Trial
 from .protocol import Parameter
 
 Real = NDArray[np.float64]
@@ -23,7 +24,7 @@ class Clipping:
     parameters: tuple[Parameter, ...] = (Parameter("limit", "unit of the channel", 0.01, 0.0),)
     confusable_with = ("stiffness_hardening",)
 
-    def shown(self, response: Real, recording: Trial, start: int, term: Mapping[str, Any]) -> Real:
+    def shown(self, response: Real, recording: BandRecording, start: int, term: Mapping[str, Any]) -> Real:
         """A predicted response with its channel held below the limit."""
         response = response.copy()
         column = recording.channels.index(term["location"]["channel"]) - recording.force.shape[1]

@@ -7,11 +7,11 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import BandRecording
 from foundation import DegreeOfFreedom
 from modal_fit import ModalModel
 
 from ..joints.joint_law import JointLaw, JointMotion
-from ..records.trial import Trial
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -155,7 +155,7 @@ class FaultPhysics(Protocol):
     parameters: tuple[Parameter, ...]
     confusable_with: tuple[str, ...]
 
-    def shown(self, response: Real, recording: Trial, start: int, term: Mapping[str, Any]) -> Real:
+    def shown(self, response: Real, recording: BandRecording, start: int, term: Mapping[str, Any]) -> Real:
         """A predicted response (n_samples, n_responses) with the fault of a term ``{name, location, parameters}``.
 
         ``start`` is the first sample after the run-in.

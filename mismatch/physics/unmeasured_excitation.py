@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft
 
-from ..records.trial import Trial
+from estimation import BandRecording
+
 from .protocol import Parameter
 
 Real = NDArray[np.float64]
@@ -23,7 +24,7 @@ class UnmeasuredExcitation:
     parameters: tuple[Parameter, ...] = (Parameter("frequency_hz", "Hz", 0.01, 0.0),)
     confusable_with = ("missing_mode",)
 
-    def shown(self, response: Real, recording: Trial, start: int, term: Mapping[str, Any]) -> Real:
+    def shown(self, response: Real, recording: BandRecording, start: int, term: Mapping[str, Any]) -> Real:
         """A predicted response with the tone.
 
         A steady tone has no known phase in another recording: amplitude and phase are read from the recording at that

@@ -8,7 +8,7 @@ from scipy.fft import rfft
 from scipy.signal import convolve
 from scipy.signal.windows import hann
 
-from .windowed_lines import WindowedLines, padded_force
+from estimation import WindowedSpectrum, padded_force
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -23,8 +23,8 @@ WIDELY, QUIETEST = 201, 0.05
 """Lines so many that chance hardly counts, and the share of them whose power bounds the forces' noise."""
 
 
-def without_force_noise(lines: WindowedLines, variance: Real) -> WindowedLines:
-    """Replace a trial's measured forces by what they say of the true ones, ``F_hat = W F``, ``W = (P - S) P^-1``.
+def without_force_noise(spectrum: WindowedSpectrum, variance: Real) -> WindowedSpectrum:
+    """Replace a recording's measured forces by what they say of the true ones, ``F_hat = W F``, ``W = (P - S) P^-1``.
 
     P is the measured forces' spectral matrix around a line and S the variance of their noise (Wiener, 1949). Where a
     spectrum holds little but noise, as between the harmonics of a steady cut or above the band of the cutting force,
@@ -34,14 +34,14 @@ def without_force_noise(lines: WindowedLines, variance: Real) -> WindowedLines:
 
     Parameters
     ----------
-    lines
-        Prepared trial, its forces replaced already or not.
+    spectrum
+        Its forces replaced already or not.
     variance : (n_excitations,)
         Of the forces' noise a line; no more of it is believed than what the quietest lines hold.
     """
-    n = lines.start + len(lines.window)
-    spectrum = rfft(lines.trial.force[lines.start : n] * lines.window[:, None], axis=0)
-    products = spectrum[:, :, None] * spectrum[:, None, :].conj()
+    n = spectrum.start + len(spectrum.window)
+    forces = rfft(spectrum.recording.force[spectrum.start : n] * spectrum.window[:, None], axis=0)
+    products = forces[:, :, None] * forces[:, None, :].conj()
     own = np.einsum("kqq->kq", products).real
     wide = min(WIDELY, len(own) // 5)
     quiet = np.quantile(_around(own, wide)[wide:-wide], QUIETEST, axis=0)
@@ -56,15 +56,15 @@ def without_force_noise(lines: WindowedLines, variance: Real) -> WindowedLines:
         deviation[:, None] * (vectors * weight[:, None, :]) @ vectors.conj().swapaxes(1, 2) / deviation
         for weight in (share, np.sqrt(unsure))
     )
-    place = lines.padded_frequencies * len(lines.window) / lines.trial.rate
+    place = spectrum.padded_frequencies * len(spectrum.window) / spectrum.recording.rate
     low = np.minimum(place.astype(int), len(whole) - 2)
     high = (place - low)[:, None, None]
     padded = (1 - high) * whole[low] + high * whole[low + 1]
     return replace(
-        lines,
-        force_lines=np.einsum("kij,kj->ki", padded, padded_force(lines)),
-        force_here=np.einsum("kij,kj->ki", whole[lines.band], spectrum[lines.band]),
-        trust=root[lines.band],
+        spectrum,
+        force_lines=np.einsum("kij,kj->ki", padded, padded_force(spectrum)),
+        force_here=np.einsum("kij,kj->ki", whole[spectrum.band], forces[spectrum.band]),
+        trust=root[spectrum.band],
     )
 
 

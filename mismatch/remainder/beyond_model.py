@@ -3,8 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import WindowedSpectrum
+
 from ..models.hypothesis import Hypothesis, predict_lines
-from ..records.windowed_lines import WindowedLines
 
 Complex = NDArray[np.complex128]
 
@@ -21,7 +22,7 @@ NOT_SMALL = 1e-3
 """Least share of a channel's whole power that this must be."""
 
 
-def beyond_model(hypothesis: Hypothesis, lines: list[WindowedLines]) -> tuple[str, ...]:
+def beyond_model(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> tuple[str, ...]:
     """One doubt for each side of the modes where recordings show response that the model does not give.
 
     In windows of neighbouring lines the residual is regressed on the forces; what the forces explain beyond chance is
@@ -45,7 +46,7 @@ def beyond_model(hypothesis: Hypothesis, lines: list[WindowedLines]) -> tuple[st
     return tuple(said for low, high, place in sides if (said := _doubt(hypothesis, lines, (low, high), place)))
 
 
-def _doubt(hypothesis: Hypothesis, lines: list[WindowedLines], edges: tuple[float, float], place: str) -> str:
+def _doubt(hypothesis: Hypothesis, lines: list[WindowedSpectrum], edges: tuple[float, float], place: str) -> str:
     """The sentence for one side; empty where nothing is missed there in half of the recordings."""
     lacking = []
     for one in lines:

@@ -6,9 +6,10 @@ from scipy.fft import irfft
 from scipy.signal import ShortTimeFFT
 from scipy.signal.windows import hann
 
+from estimation import WindowedSpectrum
+
 from ..inference import Remainder
 from ..models.hypothesis import Hypothesis, predict_lines
-from ..records.windowed_lines import WindowedLines
 from .cell_regression import moving_power
 from .repeated_part import repeated_share
 
@@ -25,7 +26,7 @@ SHIFTS, CHANCE = 14, 0.8
 force rings in lightly damped modes, and so few independent swells are easily matched by chance."""
 
 
-def leftover(hypothesis: Hypothesis, lines: list[WindowedLines]) -> Remainder:
+def leftover(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Remainder:
     """How much of the residual moves with the predicted response.
 
     In cells of time and frequency the residual's power is regressed, with non-negative factors, on a constant (noise of
@@ -60,13 +61,13 @@ def leftover(hypothesis: Hypothesis, lines: list[WindowedLines]) -> Remainder:
     return Remainder(float(share), float(power))
 
 
-def _moving(hypothesis: Hypothesis, one: WindowedLines) -> Real:
+def _moving(hypothesis: Hypothesis, one: WindowedSpectrum) -> Real:
     """Share of the residual's power and of the response's that moves with the signal, (n_responses, 2)."""
     predicted = predict_lines(hypothesis, one)
-    n = len(one.trial.force)
+    n = len(one.recording.force)
     shown = irfft(predicted.spectrum, n=one.padded, axis=0)[:n]
-    rest = (one.trial.response - shown)[one.start : n - int(one.trial.rate) // 2]
-    shown = shown[one.start : n - int(one.trial.rate) // 2]
+    rest = (one.recording.response - shown)[one.start : n - int(one.recording.rate) // 2]
+    shown = shown[one.start : n - int(one.recording.rate) // 2]
     found = []
     for p in range(rest.shape[1]):
         r, s = _powers(rest[:, p], one), _powers(shown[:, p], one)
@@ -78,7 +79,7 @@ def _moving(hypothesis: Hypothesis, one: WindowedLines) -> Real:
     return np.array(found)
 
 
-def _repeating(hypothesis: Hypothesis, one: WindowedLines) -> Real:
+def _repeating(hypothesis: Hypothesis, one: WindowedSpectrum) -> Real:
     """Share of the residual's power and of the response's that repeats with the forces, (n_responses, 2)."""
     share = repeated_share(hypothesis, one)
     if not share.any():
@@ -92,10 +93,10 @@ def _shifts(count: int) -> list[int]:
     return sorted({max(1, round(count * share)) for share in np.linspace(0.12, 0.88, SHIFTS)})
 
 
-def _powers(signal: Real, lines: WindowedLines) -> Real:
+def _powers(signal: Real, lines: WindowedSpectrum) -> Real:
     """Power in cells, (n_bins, n_segments), in the band that is compared."""
-    length = int(SEGMENT * lines.trial.rate)
-    transform = ShortTimeFFT(hann(length, sym=False), length // 2, lines.trial.rate)
+    length = int(SEGMENT * lines.recording.rate)
+    transform = ShortTimeFFT(hann(length, sym=False), length // 2, lines.recording.rate)
     power = np.abs(transform.stft(signal, p0=1, p1=len(signal) // (length // 2))) ** 2
     inside = (transform.f >= lines.frequencies[0]) & (transform.f <= lines.frequencies[-1])
     return np.asarray(power[inside])

@@ -4,8 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
+from estimation import WindowedSpectrum
+
 from ..models.hypothesis import Hypothesis, predict_lines
-from ..records.windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
 
@@ -19,7 +20,7 @@ MOST = 0.25
 """Share of a residual's power that must repeat before it counts: a small error of a refit repeats too."""
 
 
-def repeated_share(hypothesis: Hypothesis, lines: WindowedLines) -> Real:
+def repeated_share(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Real:
     """Share of each response's residual power that repeats with the forces, (n_responses,); 0 below :data:`MOST`.
 
     The residual r of the compared band is multiplied with itself one period T of the forces later:
@@ -34,7 +35,7 @@ def repeated_share(hypothesis: Hypothesis, lines: WindowedLines) -> Real:
     """
     nothing = np.zeros(lines.measured.shape[1])
     decay = float((-hypothesis.model.poles.real).min())
-    lag = repeat_of(lines.trial.force, int(RUNG_OUT / decay * lines.trial.rate), len(lines.window) // 2)
+    lag = repeat_of(lines.recording.force, int(RUNG_OUT / decay * lines.recording.rate), len(lines.window) // 2)
     if lag is None:
         return nothing
     spectrum = np.zeros((len(lines.window) // 2 + 1, len(nothing)), dtype=complex)

@@ -5,11 +5,12 @@ from functools import partial
 
 import numpy as np
 
+from estimation import WindowedSpectrum
+
 from ..inference import Candidate, Proposal, Settings, in_processes
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import direction_of
 from ..physics import JointPhysics, answer_name
-from ..records.windowed_lines import WindowedLines
 from .joint_direction import find_direction
 from .joint_screening import Screened, screen_joints
 from .linear_floor import linear_floor
@@ -31,7 +32,9 @@ class SightedLaws:
         return self.screened[0].gain if self.screened else 0.0
 
 
-def sighted_laws(lines: list[WindowedLines], current: Fit, laws: list[JointPhysics], settings: Settings) -> SightedLaws:
+def sighted_laws(
+    lines: list[WindowedSpectrum], current: Fit, laws: list[JointPhysics], settings: Settings
+) -> SightedLaws:
     """Screen joint laws along the direction that stands out; nothing where none does.
 
     Parameters
@@ -59,7 +62,7 @@ def sighted_laws(lines: list[WindowedLines], current: Fit, laws: list[JointPhysi
 
 
 def joint_candidates(
-    lines: list[WindowedLines],
+    lines: list[WindowedSpectrum],
     current: Fit,
     sighted: SightedLaws,
     settings: Settings,
@@ -101,7 +104,7 @@ def joint_candidates(
     return [one for one in simulated if one is not None]
 
 
-def _driven(lines: list[WindowedLines], current: Fit, screened: Screened) -> Fit:
+def _driven(lines: list[WindowedSpectrum], current: Fit, screened: Screened) -> Fit:
     """A law fitted to the motion seen, from the better of its two best shapes."""
     rough = [one.thinned(FEW) for one in lines]
     starts = [
@@ -111,7 +114,7 @@ def _driven(lines: list[WindowedLines], current: Fit, screened: Screened) -> Fit
     return fit(lines, best.hypothesis, best.noises, iterations=4)
 
 
-def _simulated(lines: list[WindowedLines], current: Fit, near: Fit) -> Proposal[Fit] | None:
+def _simulated(lines: list[WindowedSpectrum], current: Fit, near: Fit) -> Proposal[Fit] | None:
     """The law of a driven fit, now free to move as it makes the structure move; None if that runs away."""
     last = near.hypothesis.causes[-1]
     free = replace(near.hypothesis, causes=(*near.hypothesis.causes[:-1], replace(last, seen=None)))

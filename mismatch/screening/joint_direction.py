@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from ..joints.joint_law import JointMotion
 from ..joints.joint_simulation import common_axes
 from ..models.hypothesis import Hypothesis, columns_of, predict_lines
-from ..records.windowed_lines import receptance_at
+from ..models.modal_lines import receptance_at
 from .linear_floor import Floor, FloorRecord
 
 Complex = NDArray[np.complex128]
@@ -135,10 +135,10 @@ def seen_motion(record: FloorRecord, hypothesis: Hypothesis, direction: Real) ->
     lines = record.lines
     rows, columns = common_axes(hypothesis.model)
     predicted = predict_lines(hypothesis, lines)
-    n = len(lines.trial.force)
+    n = len(lines.recording.force)
     frequencies = lines.padded_frequencies
     whole = np.zeros((lines.padded, lines.measured.shape[1]))
-    whole[:n] = lines.trial.response - irfft(predicted.spectrum, n=lines.padded, axis=0)[:n]
+    whole[:n] = lines.recording.response - irfft(predicted.spectrum, n=lines.padded, axis=0)[:n]
     run_in = np.ones(n)
     run_in[: lines.start] = np.linspace(0, 1, lines.start) ** 4
     whole[:n] *= run_in[:, None]

@@ -8,8 +8,8 @@ from scipy.fft import rfft
 
 from ..joints.joint_simulation import driven_force
 from ..models.hypothesis import Cause, Hypothesis, columns_of
+from ..models.modal_lines import receptance_at
 from ..physics import JointPhysics
-from ..records.windowed_lines import receptance_at
 from .joint_direction import SeenMotion, motion_of, seen_motion
 from .linear_floor import Floor, FloorRecord
 
@@ -52,7 +52,8 @@ def screen_joints(floor: Floor, hypothesis: Hypothesis, direction: Real, laws: l
     stiffness = 1 / abs(direction @ static[np.ix_(range(len(columns)), columns)] @ direction)
     motion = motion_of(seen, float(stiffness))
     by_name = {
-        record.lines.trial.name: (one.deflection, one.velocity) for record, one in zip(floor.records, seen, strict=True)
+        record.lines.recording.name: (one.deflection, one.velocity)
+        for record, one in zip(floor.records, seen, strict=True)
     }
     found = []
     for law in laws:

@@ -6,18 +6,19 @@ from typing import Any
 
 import numpy as np
 
+from estimation import WindowedSpectrum
+
 from ..inference import Proposal, ScreeningSettings, in_processes
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import Cause
 from ..models.refinement import with_chain
 from ..physics import FormedPhysics, answer_name
-from ..records.windowed_lines import WindowedLines
 from .chain_screening import ScreenedChain
 from .missing_mode import SightedMode
 
 
 def linear_candidates(
-    lines: list[WindowedLines],
+    lines: list[WindowedSpectrum],
     current: Fit,
     chains: list[ScreenedChain],
     mode: SightedMode | None,
@@ -54,16 +55,16 @@ def linear_candidates(
     return [one for one in in_processes(tasks) if one is not None]
 
 
-def _with_chain(lines: list[WindowedLines], current: Fit, cause: Cause) -> Proposal[Fit]:
+def _with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Proposal[Fit]:
     fitted = with_chain(lines, current, cause)
     return Proposal(answer_name(cause.physics), channel_of(cause), fitted, current.score - fitted.score)
 
 
-def _with_mode(lines: list[WindowedLines], current: Fit, mode: SightedMode, resolved: float) -> Proposal[Fit] | None:
+def _with_mode(lines: list[WindowedSpectrum], current: Fit, mode: SightedMode, resolved: float) -> Proposal[Fit] | None:
     """The mode fitted; None where it is no wider than the lines of a record."""
     start = current.hypothesis.with_mode(mode.pole, mode.right, mode.left, mode.physics)
     fitted = fit(lines, start, current.noises, iterations=12)
-    spacing = max(one.trial.rate / len(one.window) for one in lines)
+    spacing = max(one.recording.rate / len(one.window) for one in lines)
     if not mode.physics.resolved(complex(fitted.hypothesis.model.poles[-1]), spacing, resolved):
         return None
     return Proposal(mode.physics.name, {}, fitted, current.score - fitted.score)

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import gamma
 
+from estimation import WindowedSpectrum
+
 from ..models.fitting import ENOUGH, Fit
 from ..models.hypothesis import predict_lines
 from ..models.jacobian import jacobian
 from ..models.misfit import levels, through_structure, whitened
 from ..noise.noise_model import whitening
-from ..records.windowed_lines import WindowedLines
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -41,7 +42,7 @@ class FloorRecord:
         Whitened residual.
     """
 
-    lines: WindowedLines
+    lines: WindowedSpectrum
     residual: Complex
     through: Complex
     white: Complex
@@ -96,24 +97,24 @@ class Floor:
         return np.array(gains), np.array(factors)
 
 
-def linear_floor(fitted: Fit, lines: list[WindowedLines]) -> Floor:
+def linear_floor(fitted: Fit, lines: list[WindowedSpectrum]) -> Floor:
     """Put a fit's residual on a cautious floor.
 
     The floor of a response is the level below which its residual lies in a fifth of all narrow bands: an omission that
     shows at resonances does not raise it, while the fitted noise model may have taken such an omission for noise.
     """
 
-    def covariance(k: int, rest: Complex, through: Complex, few: WindowedLines) -> Complex:
+    def covariance(k: int, rest: Complex, through: Complex, few: WindowedSpectrum) -> Complex:
         del few
         return _floor_covariance(rest, through, levels(lines[k]))
 
     return _floor(fitted, lines, covariance)
 
 
-def noise_floor(fitted: Fit, lines: list[WindowedLines]) -> Floor:
+def noise_floor(fitted: Fit, lines: list[WindowedSpectrum]) -> Floor:
     """Put a fit's residual on its own fitted noise: there the fit is at its optimum, and gains are a score test's."""
 
-    def covariance(k: int, rest: Complex, through: Complex, few: WindowedLines) -> Complex:
+    def covariance(k: int, rest: Complex, through: Complex, few: WindowedSpectrum) -> Complex:
         del rest
         return fitted.noises[k].covariance(few.frequencies, through)
 
@@ -121,7 +122,7 @@ def noise_floor(fitted: Fit, lines: list[WindowedLines]) -> Floor:
 
 
 def _floor(
-    fitted: Fit, lines: list[WindowedLines], covariance: Callable[[int, Complex, Complex, WindowedLines], Complex]
+    fitted: Fit, lines: list[WindowedSpectrum], covariance: Callable[[int, Complex, Complex, WindowedSpectrum], Complex]
 ) -> Floor:
     """Of many lines every few count, each for as many as it stands for."""
     records = []

@@ -1,6 +1,5 @@
 """Modal models of FRF matrices by variable projection: selection, refinement and error bars."""
 
-from .fit import NOT_REFINED, REFINED, MatrixFit, fit_matrix
-from .mode_selection.steady_poles import default_order
+import lazy_loader
 
-__all__ = ["NOT_REFINED", "REFINED", "MatrixFit", "default_order", "fit_matrix"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,11 +7,8 @@ from numpy.typing import NDArray
 
 from estimation import Frf
 
-from ..models.modal_model import ModalModel
-from ..models.mode_errors import ModeErrors
-from ..models.out_of_band import residuals_with_poles
-from .variable_projection.elimination import Elimination, Modes, Real, derivatives
-from .variable_projection.whitened_lines import MeasuredLines
+from ..models import ModalModel, ModeErrors, residuals_with_poles
+from .variable_projection import Elimination, MeasuredLines, Modes, Real, derivatives
 
 _MOST_PARAMETERS = 700  # with a covariance matrix: its file would pass 10 MB
 

@@ -9,21 +9,26 @@ from threadpoolctl import threadpool_limits
 from estimation import Frf, FrfCovariance
 from foundation import MillfrfError
 
-from ..models.modal_model import ModalModel
-from ..stabilisation.chart import PoleGroup, StabilisationChart
+from ..models import ModalModel
+from ..stabilisation import PoleGroup, StabilisationChart
 from .assembly import modal_model, transposed
-from .mode_selection.hidden_modes import hidden_candidates
-from .mode_selection.selection import Reweigh, Selection, select_modes
-from .mode_selection.steady_poles import Candidate, candidates
+from .mode_selection import Candidate, Reweigh, Selection, candidates, hidden_candidates, select_modes
 from .spread import mode_errors, unknowns_covariance
-from .variable_projection.elimination import Elimination, Modes, Real, eliminate
-from .variable_projection.held_out_lines import holds_on_held_out_lines
-from .variable_projection.noise_of_entries import entry_noise
-from .variable_projection.outer_modes import inside as inside_band
-from .variable_projection.outer_modes import with_outer_as_residuals
-from .variable_projection.outside_terms import with_fewest_terms
-from .variable_projection.refinement import refine
-from .variable_projection.whitened_lines import MeasuredLines, correlated_lines, measured_lines
+from .variable_projection import (
+    Elimination,
+    MeasuredLines,
+    Modes,
+    Real,
+    correlated_lines,
+    eliminate,
+    entry_noise,
+    holds_on_held_out_lines,
+    measured_lines,
+    refine,
+    with_fewest_terms,
+    with_outer_as_residuals,
+)
+from .variable_projection import inside as inside_band
 
 _STEPS, _TOLERANCE = 40, 1e-7
 

@@ -8,17 +8,14 @@ from threadpoolctl import threadpool_limits
 
 from estimation import Frf
 
-from ..models.mode_errors import ModeErrors
-from ..stabilisation.chart import StabilisationChart
+from ..models import ModeErrors
+from ..stabilisation import StabilisationChart
 from .assembly import modal_model, transposed
 from .fit import _STEPS, _TOLERANCE, REFINED, MatrixFit, _exchanged, _line_weights, _weighted
-from .mode_selection.steady_poles import candidates
+from .mode_selection import candidates
 from .spread import mode_errors, unknowns_covariance
-from .variable_projection.elimination import Complex, Elimination, Modes, eliminate
-from .variable_projection.neighbourhood import participations
-from .variable_projection.refinement import Refined
-from .variable_projection.refinement import refine as refine_modes
-from .variable_projection.whitened_lines import MeasuredLines
+from .variable_projection import Complex, Elimination, MeasuredLines, Modes, Refined, eliminate, participations
+from .variable_projection import refine as refine_modes
 
 KEPT = "picked poles"
 

@@ -4,12 +4,19 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ..models.mode_errors import ModeErrors
-from .variable_projection.elimination import Elimination, Modes, Real
-from .variable_projection.neighbourhood import half_power_lines
-from .variable_projection.outside_terms import with_fixed_poles
-from .variable_projection.refinement import normal_equations, refine, weighted_matrix, without_response
-from .variable_projection.whitened_lines import MeasuredLines
+from ..models import ModeErrors
+from .variable_projection import (
+    Elimination,
+    MeasuredLines,
+    Modes,
+    Real,
+    half_power_lines,
+    normal_equations,
+    refine,
+    weighted_matrix,
+    with_fixed_poles,
+    without_response,
+)
 
 _EDGE = 0.05  # of the band
 _OTHER_POLES = (((0.5,), (1.6, 4.0)), ((0.85,), (1.15, 2.0)))  # of the band's lower and upper end

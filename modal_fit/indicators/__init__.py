@@ -1,12 +1,5 @@
 """Mode indicators: where an FRF matrix shows modes, before and beside any fit."""
 
-from .complex_indicator import ComplexModeIndicator, IndicatorPeak, complex_mode_indicator
-from .multivariate_indicator import MultivariateModeIndicator, multivariate_mode_indicator
+import lazy_loader
 
-__all__ = [
-    "ComplexModeIndicator",
-    "IndicatorPeak",
-    "MultivariateModeIndicator",
-    "complex_mode_indicator",
-    "multivariate_mode_indicator",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

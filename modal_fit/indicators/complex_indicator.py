@@ -9,7 +9,7 @@ from scipy.signal import find_peaks
 from estimation import Frf
 from foundation import Band
 
-from ..models.shape_measures import modal_assurance
+from ..models import modal_assurance
 from .reference_side import indicated_lines, references_last
 
 _SAME_VECTOR = 0.8  # assurance of a curve's vectors on both sides of a peak; below, two curves may cross there

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from foundation import MillfrfError
 
-from ..models.modal_model import ModalModel
-from ..models.out_of_band import ABOVE, out_of_band_basis, residuals_from
+from ..models import ABOVE, ModalModel, out_of_band_basis, residuals_from
 from .likelihood_fit import LikelihoodFit, maximise_likelihood
 from .likelihood_model import LikelihoodModel, Setting
 from .linear_start import linear_start

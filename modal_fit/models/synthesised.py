@@ -5,12 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import Frf
+from estimation import FRF_ORDERS, Frf
 from foundation import Band, InputError
 
 from .modal_model import ModalModel
-
-_DERIVATIVES = {"receptance": 0, "mobility": 1, "accelerance": 2}
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ def synthesis(frf: Frf, model: ModalModel, band: Band | None = None) -> Synthesi
     InputError
         A model of another unit, or no valid line in the band.
     """
-    power = _DERIVATIVES.get(frf.quantity, 0) if model.quantity == "receptance" else 0
+    power = FRF_ORDERS.get(frf.quantity, 0) if model.quantity == "receptance" else 0
     if (model.quantity == "transfer") != (frf.quantity == "transfer") or (
         model.quantity == "transfer" and model.unit != frf.unit
     ):

@@ -1,14 +1,5 @@
 """Poles that somebody picks: the file that offers candidates, the file that names the choice, and the fit of it."""
 
-from .offered_groups import CandidateGroup, candidate_groups
-from .picked_fit import fit_picked_poles
-from .poles_file import read_picked_poles, read_pole_groups, write_pole_candidates
+import lazy_loader
 
-__all__ = [
-    "CandidateGroup",
-    "candidate_groups",
-    "fit_picked_poles",
-    "read_picked_poles",
-    "read_pole_groups",
-    "write_pole_candidates",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

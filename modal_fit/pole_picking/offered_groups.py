@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..polyreference import ModalFit
-from ..stabilisation.chart import StabilisationChart
+from ..stabilisation import StabilisationChart
 
 _SAME = 0.003  # relative distance in the complex plane within which a pole of an order belongs to a group
 

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from estimation import Frf
 from foundation import Band, InputError
 
-from ..frf_fit import default_order
-from ..frf_fit.picked import fit_picked
+from ..frf_fit import default_order, fit_picked
 from ..polyreference import (
     ModalFit,
     fit_warnings,

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..models.modal_model import ModalModel
-from ..models.shape_measures import modal_assurance, phase_collinearity, phase_deviation
+from ..models import ModalModel, modal_assurance, phase_collinearity, phase_deviation
 from .complexity import mode_complexity
 
 Real = NDArray[np.float64]

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from estimation import shared_points
 
-from ..models.modal_model import ModalModel
-from ..models.shape_measures import modal_assurance, reciprocity_residual
+from ..models import ModalModel, modal_assurance, reciprocity_residual
 
 
 @dataclass(frozen=True)

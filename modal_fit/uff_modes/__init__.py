@@ -1,6 +1,5 @@
 """Mode shapes in the Universal File Format, data set 55, with any number of points."""
 
-from .reading import import_modes_uff, read_modes_uff
-from .writing import write_modes_uff
+import lazy_loader
 
-__all__ = ["import_modes_uff", "read_modes_uff", "write_modes_uff"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from acquisition import read_uff_sets
 from foundation import FileFormatError
 
-from ..models.modal_model import ModalModel
+from ..models import ModalModel
 from .mode_sets import NORMAL, ModeSet
 from .shapes import poles_of, shapes_of
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from estimation import is_uff_number, uff_node_numbers
 from foundation import DegreeOfFreedom, InputError, writing_whole_file
 
-from ..models.modal_model import ModalModel
+from ..models import ModalModel
 from .groups import group_set
 from .mode_sets import COMPLEX_FIRST
 from .reading import SEPARATOR, SIDES

@@ -10,12 +10,10 @@ from acquisition import Block, StreamDescription
 from cutting import MillingProcess
 from modal_fit import ModalModel
 
-from ..laboratory.sensors import Sensor, dynamometer, tip_accelerometers
-from ..laboratory.setup_notes import setup_text
-from ..laboratory.signal_chain import Decimator
+from ..laboratory import Decimator, Sensor, dynamometer, setup_text, tip_accelerometers
 from ..milling_cell import MillingCell
 from ..sampled_cell import STREAM
-from ..simulation.joint_march import tip_motion
+from ..simulation import tip_motion
 from ..speed_profiles import LinearSweep
 from .concealed_chain import in_converter, through_chain
 from .concealed_effect import ConcealedEffect

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
-from ..simulation.joint_march import LINEAR, JointLaw
+from ..simulation import LINEAR, JointLaw
 from .concealed_effect import JOINT_EFFECTS, ConcealedEffect
 from .random_posture import real_modes
 

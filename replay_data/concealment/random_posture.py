@@ -4,9 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from foundation import TIP
 from modal_fit import ModalModel
-
-from ..robot_structure import TOOL_TIP
 
 FREQUENCIES = ((10.0, 12.0), (15.0, 18.0), (22.0, 26.0))
 """Ranges of the natural frequencies, Hz: those of heavy articulated robots (Mohammadi & Ahmadi: 17 and 18 Hz)."""
@@ -58,4 +57,4 @@ def real_modes(natural: NDArray[np.float64], zeta: NDArray[np.float64], shapes: 
     """
     damped = natural * np.sqrt(1 - zeta**2)
     poles = -zeta * natural + 1j * damped
-    return ModalModel(poles, shapes / (2j * damped[:, None]), shapes.astype(complex), TOOL_TIP, TOOL_TIP)
+    return ModalModel(poles, shapes / (2j * damped[:, None]), shapes.astype(complex), TIP, TIP)

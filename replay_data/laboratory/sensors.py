@@ -4,9 +4,7 @@ import math
 from dataclasses import dataclass
 
 from acquisition import Channel
-from foundation import SI_UNITS, DegreeOfFreedom, InputError
-
-from ..robot_structure import HOUSING, TOOL_TIP
+from foundation import HOUSING, SI_UNITS, TIP, DegreeOfFreedom, InputError
 
 
 @dataclass(frozen=True)
@@ -79,8 +77,7 @@ class Sensor:
 def dynamometer(noise: float = 0.01, full_scale: float = 500.0) -> tuple[Sensor, ...]:
     """Three forces on the tool, ``fx fy fz`` at ``TCP``; range in N, down to 0 Hz."""
     return tuple(
-        Sensor(name, "force", place, noise, full_scale)
-        for name, place in zip(("fx", "fy", "fz"), TOOL_TIP, strict=True)
+        Sensor(name, "force", place, noise, full_scale) for name, place in zip(("fx", "fy", "fz"), TIP, strict=True)
     )
 
 
@@ -95,7 +92,7 @@ def tip_accelerometers(
     noise: float = 0.01, full_scale: float = 490.0, high_pass_hz: float | None = 0.1
 ) -> tuple[Sensor, ...]:
     """Three IEPE accelerometers at the tool tip, ``tip_ax tip_ay tip_az``: for hammer tests, the spindle at rest."""
-    return _accelerometers(("tip_ax", "tip_ay", "tip_az"), TOOL_TIP, noise, full_scale, high_pass_hz)
+    return _accelerometers(("tip_ax", "tip_ay", "tip_az"), TIP, noise, full_scale, high_pass_hz)
 
 
 def milling_sensors(force_noise: float = 0.01, acceleration_noise: float = 0.01) -> tuple[Sensor, ...]:

@@ -5,10 +5,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compilation import compiled
+from cutting import compiled
+from foundation import TIP
 from modal_fit import ModalModel
 
-from ..robot_structure import TOOL_TIP, select
+from ..robot_structure import select
 from .joint_laws import JOINT_LAWS, joint_force, stretched
 from .modal_integrator import require_simulable
 
@@ -65,7 +66,7 @@ def tip_motion(
         A structure that cannot be simulated.
     """
     require_simulable(structure)
-    tip = select(structure, TOOL_TIP, TOOL_TIP)
+    tip = select(structure, TIP, TIP)
     z = tip.poles * step
     growth = np.exp(z)
     first = np.expm1(z) / z

@@ -6,9 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
-from cutting.compilation import compiled
-from cutting.one_tooth import engaged_share, specific_forces, tooth_force, wrapped_immersion
+from cutting import MillingProcess, compiled, engaged_share, specific_forces, tooth_force, wrapped_immersion
 
 from .material import Material
 from .modal_integrator import Dynamics, coast, take_force

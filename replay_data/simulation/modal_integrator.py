@@ -6,13 +6,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compilation import compiled
-from foundation import InputError
+from cutting import compiled
+from estimation import DERIVATIVE_ORDERS
+from foundation import TIP, InputError
 from modal_fit import ModalModel
 
-from ..robot_structure import TOOL_TIP, select
-
-_DERIVATIVES = {"displacement": 0, "velocity": 1, "acceleration": 2}
+from ..robot_structure import select
 
 
 class Dynamics(NamedTuple):
@@ -38,7 +37,7 @@ def discretise(structure: ModalModel, step: float) -> Dynamics:
         Not a receptance, no tool tip, residuals, added physics, or a mode that grows without cutting.
     """
     require_simulable(structure)
-    tip = select(structure, TOOL_TIP, TOOL_TIP)
+    tip = select(structure, TIP, TIP)
     z = tip.poles * step
     growth = np.exp(z)
     first = np.expm1(z) / z
@@ -158,10 +157,12 @@ class ResponseMap:
             if quantity == "force":
                 self._direct[row] = _force_direction(place)
                 continue
-            if quantity not in _DERIVATIVES:
-                raise InputError(f"a sensor of {quantity} cannot be simulated; use force, {', '.join(_DERIVATIVES)}")
-            point = select(structure, (place,), TOOL_TIP)
-            order = _DERIVATIVES[quantity]
+            if quantity not in DERIVATIVE_ORDERS:
+                raise InputError(
+                    f"a sensor of {quantity} cannot be simulated; use force, {', '.join(DERIVATIVE_ORDERS)}"
+                )
+            point = select(structure, (place,), TIP)
+            order = DERIVATIVE_ORDERS[quantity]
             motion[row] = point.right[:, 0] * point.poles**order
             terms = [
                 2 * np.real(np.einsum("r,r,rq->q", point.right[:, 0], point.poles**k, point.left)) for k in range(order)
@@ -191,6 +192,6 @@ def _as_real(complex_rows: NDArray[np.complex128]) -> NDArray[np.float64]:
 
 
 def _force_direction(place: str) -> NDArray[np.float64]:
-    if place not in TOOL_TIP:
-        raise InputError(f"force at {place} cannot be simulated; forces act at {', '.join(TOOL_TIP)}")
-    return np.asarray(np.eye(3)[TOOL_TIP.index(place)])
+    if place not in TIP:
+        raise InputError(f"force at {place} cannot be simulated; forces act at {', '.join(TIP)}")
+    return np.asarray(np.eye(3)[TIP.index(place)])

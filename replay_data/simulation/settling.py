@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cutting import MillingProcess, refuse_varied
-from foundation import InputError
+from foundation import TIP, InputError
 from modal_fit import ModalModel
 
-from ..robot_structure import TOOL_TIP
 from .material import material_named
 from .milling_loop import Memory, empty_memory, mill, prepare_cut
 from .modal_integrator import Dynamics, discretise
@@ -76,7 +75,7 @@ def settle(structure: ModalModel, process: MillingProcess, depth: float, spindle
     if structure.residuals is not None:
         dynamics = dynamics._replace(immediate=dynamics.immediate + structure.residuals.upper)
     memory = empty_memory(len(structure.poles), process.teeth, steps)
-    tip = [structure.responses.index(label) for label in TOOL_TIP]
+    tip = [structure.responses.index(label) for label in TIP]
     output = 2 * np.stack([structure.right.real, -structure.right.imag], axis=1)[:, :, tip].reshape(-1, len(tip))
     run = _Run(process, depth, steps, dynamics, memory, output)
     return _watched(run, process.teeth, min(LONGEST[0] * process.teeth, LONGEST[1] // steps))

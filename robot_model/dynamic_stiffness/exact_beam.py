@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from ..finite_elements.section import Section
+from ..finite_elements import Section
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

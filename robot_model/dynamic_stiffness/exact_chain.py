@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from estimation import Frf
 from foundation import InputError
 
-from ..planar.planar_robot import TIP_IN_PLANE, PlanarRobot
+from ..planar import TIP_IN_PLANE, PlanarRobot
 from .exact_beam import planar_dynamic_stiffness
 from .receptance_coupling import block_diagonal, couple_receptances
 

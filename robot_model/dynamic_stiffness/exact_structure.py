@@ -6,12 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf
-from foundation import InputError
+from foundation import TIP, InputError
 
-from ..finite_elements.generalised_coordinates import coordinate_basis
-from ..finite_elements.structure import Structure, mass_matrix, rigid_rows, stiffness_matrix
-from ..spatial.spatial_modes import TIP
-from ..spatial.spatial_robot import SpatialRobot, structure_at
+from ..finite_elements import Structure, coordinate_basis, mass_matrix, rigid_rows, stiffness_matrix
+from ..spatial import SpatialRobot, structure_at
 from .exact_beam import spatial_dynamic_stiffness
 from .receptance_coupling import couple_along
 

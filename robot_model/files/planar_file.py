@@ -9,10 +9,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from foundation import InputError
 
-from ..finite_elements.section import Section
-from ..kinematics.joint_values import named_values
-from ..kinematics.mechanism import Frame, Mechanism
-from ..planar.planar_robot import PlanarRobot
+from ..finite_elements import Section
+from ..kinematics import Frame, Mechanism, named_values
+from ..planar import PlanarRobot
 from .robot_files import Table, read_as
 
 

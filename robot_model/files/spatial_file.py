@@ -10,12 +10,9 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from foundation import InputError
 
-from ..finite_elements.modal_damping import rayleigh_constants
-from ..finite_elements.section import Material, Section, hollow_circle
-from ..kinematics.joint_values import LARGEST_TRAVEL, named_values
-from ..kinematics.mechanism import Frame, Mechanism
-from ..spatial.robot_check import check_tip
-from ..spatial.spatial_robot import ElasticJoint, Link, LumpedBody, SpatialRobot
+from ..finite_elements import Material, Section, hollow_circle, rayleigh_constants
+from ..kinematics import LARGEST_TRAVEL, Frame, Mechanism, named_values
+from ..spatial import ElasticJoint, Link, LumpedBody, SpatialRobot, check_tip
 from .robot_files import Table, read_as
 
 

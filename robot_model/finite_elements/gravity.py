@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..kinematics.mechanism import drive_direction
+from ..kinematics import drive_direction
 from .structure import Structure
 
 if TYPE_CHECKING:
-    from ..spatial.spatial_robot import SpatialRobot
+    from ..spatial import SpatialRobot
 
 Real = NDArray[np.float64]
 

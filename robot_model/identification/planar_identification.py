@@ -11,8 +11,7 @@ from scipy.linalg import eigh, eigvalsh
 from estimation import Frf
 from foundation import InputError
 
-from ..planar.planar_robot import TIP_IN_PLANE, PlanarRobot
-from ..planar.rigid_links import rigid_matrices, tip_jacobian
+from ..planar import TIP_IN_PLANE, PlanarRobot, rigid_matrices, tip_jacobian
 from .parameter_search import Identification, identify
 
 Real = NDArray[np.float64]

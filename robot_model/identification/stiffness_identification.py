@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..finite_elements.constrained_statics import constrained_system
-from ..finite_elements.structure import Spring
-from ..spatial.spatial_robot import SpatialRobot, structure_at
+from ..finite_elements import Spring, constrained_system
+from ..spatial import SpatialRobot, structure_at
 from .parameter_search import Identification, identify
 
 Real = NDArray[np.float64]

@@ -8,12 +8,19 @@ from numpy.typing import NDArray
 from cutting import DrillingLoad
 from foundation import InputError
 
-from ..finite_elements.constrained_statics import tip_compliance
-from ..finite_elements.gravity import gravity_torques
-from ..kinematics.loop_closure import tool_jacobian
-from ..kinematics.spherical_wrist import wrist_solutions
-from ..spatial.spatial_robot import SpatialRobot, drive_stiffness, structure_at
-from ..spatial.weight import Payload, acceleration, payload_wrench, sag_at, static_response, tool_attitude
+from ..finite_elements import gravity_torques, tip_compliance
+from ..kinematics import tool_jacobian, wrist_solutions
+from ..spatial import (
+    Payload,
+    SpatialRobot,
+    acceleration,
+    drive_stiffness,
+    payload_wrench,
+    sag_at,
+    static_response,
+    structure_at,
+    tool_attitude,
+)
 from .redundancy import CutPlace, target_of
 
 Real = NDArray[np.float64]

@@ -8,10 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from foundation import InputError
 
-from ..kinematics.damped_least_squares import inverse_kinematics
-from ..kinematics.loop_closure import posture_warnings
-from ..spatial.spatial_robot import SpatialRobot, structure_at
-from ..spatial.weight import NO_MASSES, Payload, counted_weight, sag_at, static_response
+from ..kinematics import inverse_kinematics, posture_warnings
+from ..spatial import NO_MASSES, Payload, SpatialRobot, counted_weight, sag_at, static_response, structure_at
 
 Real = NDArray[np.float64]
 

@@ -10,9 +10,8 @@ from scipy.spatial.transform import Rotation
 from foundation import InputError
 from modal_fit import ModalModel
 
-from ..kinematics.spherical_wrist import wrist_solutions
-from ..spatial.spatial_modes import model_of_modes, modes_at
-from ..spatial.spatial_robot import SpatialRobot
+from ..kinematics import wrist_solutions
+from ..spatial import SpatialRobot, model_of_modes, modes_at
 
 Real = NDArray[np.float64]
 

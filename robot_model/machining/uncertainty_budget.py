@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..kinematics.loop_closure import tool_jacobian
-from ..spatial.spatial_robot import SpatialRobot, drive_stiffness
+from ..kinematics import tool_jacobian
+from ..spatial import SpatialRobot, drive_stiffness
 from .drilling_deviation import joint_deviation
 
 Real = NDArray[np.float64]

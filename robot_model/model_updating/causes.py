@@ -10,8 +10,7 @@ from scipy.optimize import least_squares
 
 from foundation import InputError
 
-from ..spatial.spatial_modes import modes_at
-from ..spatial.spatial_robot import SpatialRobot
+from ..spatial import SpatialRobot, modes_at
 from .change import Change
 from .changes import possible_changes
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..spatial.spatial_robot import SpatialRobot
+from ..spatial import SpatialRobot
 
 Real = NDArray[np.float64]
 

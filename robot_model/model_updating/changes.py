@@ -7,9 +7,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ..finite_elements.gravity import with_gravity
-from ..spatial.compliant_tool import tool_spring, with_tool_spring
-from ..spatial.spatial_robot import SpatialRobot
+from ..finite_elements import with_gravity
+from ..spatial import SpatialRobot, tool_spring, with_tool_spring
 from .change import Change, Changed, Companion, Numbered
 from .variations import (
     end_bodies,

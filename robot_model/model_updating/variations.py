@@ -7,9 +7,8 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..finite_elements.section import Section
-from ..spatial.compliant_tool import housing_node
-from ..spatial.spatial_robot import LumpedBody, SpatialRobot, structure_at
+from ..finite_elements import Section
+from ..spatial import LumpedBody, SpatialRobot, housing_node, structure_at
 
 Real = NDArray[np.float64]
 

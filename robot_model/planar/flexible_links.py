@@ -8,11 +8,7 @@ from scipy.linalg import eigh
 
 from modal_fit import ModalModel
 
-from ..finite_elements.beam_element import beam_mass, beam_stiffness
-from ..finite_elements.gravity import STANDARD_GRAVITY
-from ..finite_elements.modal_damping import modal_damping_matrix
-from ..finite_elements.modal_reduction import modal_model
-from ..finite_elements.section import Section
+from ..finite_elements import STANDARD_GRAVITY, Section, beam_mass, beam_stiffness, modal_damping_matrix, modal_model
 from .planar_robot import TIP_IN_PLANE, PlanarRobot
 
 Real = NDArray[np.float64]

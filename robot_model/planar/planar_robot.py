@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..finite_elements.section import Section
+from ..finite_elements import Section
 
 Real = NDArray[np.float64]
 

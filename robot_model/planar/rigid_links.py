@@ -5,9 +5,7 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
-from ..finite_elements.gravity import STANDARD_GRAVITY
-from ..finite_elements.modal_damping import modal_damping_matrix
-from ..finite_elements.modal_reduction import modal_model
+from ..finite_elements import STANDARD_GRAVITY, modal_damping_matrix, modal_model
 from .planar_robot import TIP_IN_PLANE, PlanarRobot
 
 Real = NDArray[np.float64]

@@ -3,16 +3,14 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
+from foundation import HOUSING, TIP, InputError
 from modal_fit import ModalModel
 
 from .compliant_tool import housing_node
-from .spatial_modes import TIP, modal_damping, modes_at
+from .spatial_modes import modal_damping, modes_at
 from .spatial_robot import SpatialRobot
 
 Real = NDArray[np.float64]
-
-HOUSING = ("HOUSING:+X", "HOUSING:+Y", "HOUSING:+Z")
 
 
 def cell_structure_at(

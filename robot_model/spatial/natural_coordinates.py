@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..kinematics.mechanism import Mechanism
+from ..kinematics import Mechanism
 
 Real = NDArray[np.float64]
 

@@ -7,17 +7,14 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from estimation import Frf
-from foundation import InputError
+from foundation import TIP, InputError
 from modal_fit import ModalModel
 
-from ..finite_elements.generalised_coordinates import coordinate_basis
-from ..finite_elements.modal_reduction import from_real_modes
-from ..finite_elements.structure import Structure, mass_matrix, six_by_six, stiffness_matrix
+from ..finite_elements import Structure, coordinate_basis, from_real_modes, mass_matrix, six_by_six, stiffness_matrix
 from .spatial_robot import SpatialRobot, structure_at
 
 Real = NDArray[np.float64]
 
-TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 TIP_ROTATIONS = ("TCP:+RX", "TCP:+RY", "TCP:+RZ")
 
 

@@ -8,10 +8,8 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..finite_elements.gravity import gravity_stiffness
-from ..finite_elements.section import Section
-from ..finite_elements.structure import Beam, Body, Spring, Structure, cross_matrix
-from ..kinematics.mechanism import Mechanism, drive_direction
+from ..finite_elements import Beam, Body, Section, Spring, Structure, cross_matrix, gravity_stiffness
+from ..kinematics import Mechanism, drive_direction
 from .robot_check import check_robot
 
 Real = NDArray[np.float64]

@@ -7,10 +7,8 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..finite_elements.constrained_statics import constrained_system
-from ..finite_elements.gravity import STANDARD_GRAVITY
-from ..finite_elements.structure import Structure, mass_matrix
-from ..kinematics.mechanism import Mechanism
+from ..finite_elements import STANDARD_GRAVITY, Structure, constrained_system, mass_matrix
+from ..kinematics import Mechanism
 from .spatial_robot import SpatialRobot
 
 Real = NDArray[np.float64]

@@ -7,12 +7,10 @@ from cutting import MillingProcess
 from estimation import Frf
 from modal_fit import ModalModel
 
-from ..characteristic_roots.depth_stages import safe_depth
-from ..lobes.stability_lobes import StabilityLobes
-from ..milling_loop.delayed_state import DelaySystem, delay_system
-from ..solvers.collocation_solver import lowest_limits
-from ..solvers.multi_frequency_solver import multi_frequency, multi_frequency_limits, slowest_speed
-from ..solvers.zero_order_solver import checked_speeds
+from ..characteristic_roots import safe_depth
+from ..lobes import StabilityLobes
+from ..milling_loop import DelaySystem, delay_system
+from ..solvers import checked_speeds, lowest_limits, multi_frequency, multi_frequency_limits, slowest_speed
 from .second_look import CLIMB, SecondLook, second_look
 from .verification import verify
 

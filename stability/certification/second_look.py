@@ -7,13 +7,10 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..characteristic_roots.chatter_frequency import strongest_line
-from ..floquet.collocated_period import period_operator
-from ..floquet.floquet_multipliers import kind_of, monodromies
-from ..floquet.growing_cuts import unstable_cuts
-from ..milling_loop.delayed_state import DelaySystem
-from ..solvers.semi_discretisation_solver import semi_discretised
-from ..solvers.varied_limits import critical_motion
+from ..characteristic_roots import strongest_line
+from ..floquet import kind_of, monodromies, period_operator, unstable_cuts
+from ..milling_loop import DelaySystem
+from ..solvers import critical_motion, semi_discretised
 from .verification import JUST, ladder
 
 Real = NDArray[np.float64]

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..floquet.growing_cuts import unstable_cuts
-from ..milling_loop.delayed_state import DelaySystem
+from ..floquet import unstable_cuts
+from ..milling_loop import DelaySystem
 
 Real = NDArray[np.float64]
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..floquet.collocated_period import PeriodOperator, period_operator
-from ..milling_loop.delayed_state import DelaySystem
+from ..floquet import PeriodOperator, period_operator
+from ..milling_loop import DelaySystem
 from .crossings import Crossings
 
 Real = NDArray[np.float64]

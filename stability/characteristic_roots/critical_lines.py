@@ -5,10 +5,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compilation import compiled
+from cutting import compiled
 
-from ..floquet.depth_series import TransitionSeries
-from ..milling_loop.delayed_state import DelaySystem
+from ..floquet import TransitionSeries
+from ..milling_loop import DelaySystem
 from .characteristic import eliminate, transition
 from .crossings import Crossings
 

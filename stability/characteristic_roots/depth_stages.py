@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..milling_loop.delayed_state import DelaySystem
+from ..milling_loop import DelaySystem
 
 Real = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compilation import compiled
+from cutting import compiled
 
 from .characteristic import newton, values, workspace
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..floquet.collocated_period import PeriodOperator
+from ..floquet import PeriodOperator
 from .crossings import Crossings
 
 Complex = NDArray[np.complex128]

@@ -7,10 +7,8 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..floquet.collocated_period import period_operator, piece_nodes
-from ..floquet.depth_series import Windows, series_windows, transition_series
-from ..floquet.loop_gain import LoopGain
-from ..milling_loop.delayed_state import DelaySystem
+from ..floquet import LoopGain, Windows, period_operator, piece_nodes, series_windows, transition_series
+from ..milling_loop import DelaySystem
 from .chatter_frequency import strongest_lines
 from .critical_lines import critical_lines
 from .crossings import Crossings, find_crossings

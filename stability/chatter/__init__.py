@@ -1,18 +1,5 @@
 """Was a recorded cut stable?"""
 
-from .classify import classify_cut
-from .fitted_depth import ModelledCut
-from .judged_spectrum import CutSpectrum, cut_spectrum
-from .motion import Evidence, gather_evidence
-from .verdict import ChatterVerdict, ForeignTone
+import lazy_loader
 
-__all__ = [
-    "ChatterVerdict",
-    "CutSpectrum",
-    "Evidence",
-    "ForeignTone",
-    "ModelledCut",
-    "classify_cut",
-    "cut_spectrum",
-    "gather_evidence",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

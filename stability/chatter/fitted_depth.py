@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from cutting import MillingProcess
 from modal_fit import ModalModel
 
-from ..milling_loop.tip_receptance import tool_receptance
+from ..milling_loop import tool_receptance
 from .motion import Evidence
 from .swept_force import angles_of, swept_force
 

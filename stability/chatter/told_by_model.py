@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..floquet.floquet_multipliers import multipliers
+from ..floquet import multipliers
 from .fitted_depth import ModelledCut, fitted_depth
 from .motion import Evidence
 from .verdict import STABLE, ChatterVerdict

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from cutting import chip_direction, force_direction
 from foundation import InputError
 
-from ..milling_loop.delayed_state import DelaySystem
-from ..milling_loop.engagement import Piece, engagement_pieces
+from ..milling_loop import DelaySystem, Piece, engagement_pieces
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

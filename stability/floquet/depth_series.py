@@ -6,12 +6,10 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import chip_direction, force_direction
-from cutting.compilation import compiled
+from cutting import chip_direction, compiled, force_direction
 from foundation import InputError
 
-from ..milling_loop.delayed_state import DelaySystem
-from ..milling_loop.engagement import Piece, engagement_pieces
+from ..milling_loop import DelaySystem, Piece, engagement_pieces
 from .collocated_period import radau_nodes
 
 Complex = NDArray[np.complex128]

@@ -10,7 +10,7 @@ from cutting import MillingProcess
 from foundation import InputError
 from modal_fit import ModalModel
 
-from ..milling_loop.delayed_state import delay_system
+from ..milling_loop import delay_system
 from .collocated_period import PeriodOperator, period_operator
 from .varied_edges import varied_cut
 

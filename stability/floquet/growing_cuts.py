@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import ArpackError, eigs
 
-from ..milling_loop.delayed_state import DelaySystem
+from ..milling_loop import DelaySystem
 from .collocated_period import period_operator
 from .floquet_multipliers import monodromies
 from .varied_edges import varied_cut

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from cutting import MillingProcess, damping_matrices, edge_matrices
 from foundation import InputError
 
-from ..milling_loop.delayed_state import DelaySystem
+from ..milling_loop import DelaySystem
 from .collocated_period import radau_nodes
 
 Complex = NDArray[np.complex128]

@@ -11,8 +11,8 @@ from estimation import Frf, to_receptance
 from foundation import InputError
 from modal_fit import ModalModel
 
-from ..lobes.stability_lobes import StabilityLobes
-from ..milling_loop.tip_receptance import tool_directions
+from ..lobes import StabilityLobes
+from ..milling_loop import tool_directions
 from .limit_sensitivity import LimitSensitivity, limit_sensitivities
 
 Complex = NDArray[np.complex128]

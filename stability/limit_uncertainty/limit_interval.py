@@ -10,7 +10,7 @@ from cutting import MillingProcess
 from estimation import Frf
 from modal_fit import ModalModel
 
-from ..lobes.stability_lobes import StabilityLobes
+from ..lobes import StabilityLobes
 from .first_order import depth_errors
 from .limit_samples import sampled_limits
 

@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from cutting import MillingProcess
 from foundation import InputError
-from modal_fit import ModalModel
-from modal_fit.models.uncertainty import pack_parameters, unpack_parameters
+from modal_fit import ModalModel, pack_parameters, unpack_parameters
 
-from ..floquet.floquet_multipliers import multipliers
-from ..solvers.collocation_solver import lowest_limits
+from ..floquet import multipliers
+from ..solvers import lowest_limits
 
 Real = NDArray[np.float64]
 

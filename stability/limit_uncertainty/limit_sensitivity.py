@@ -10,9 +10,8 @@ from cutting import MillingProcess, directional_harmonics, refuse_varied
 from estimation import Frf
 from modal_fit import ModalModel
 
-from ..lobes.stability_lobes import StabilityLobes
-from ..milling_loop.delayed_state import delay_system
-from ..milling_loop.tip_receptance import tool_receptance
+from ..lobes import StabilityLobes
+from ..milling_loop import delay_system, tool_receptance
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -12,8 +12,7 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from ..lobes.stability_limits import StabilityLimits
-from ..lobes.stability_lobes import StabilityLobes
+from ..lobes import StabilityLimits, StabilityLobes
 from .collocation_solver import collocation_limits, lowest_limits
 from .zero_order_solver import checked_speeds
 

@@ -10,10 +10,9 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from ..characteristic_roots.unit_circle import CircleCrossings, circle_crossings
-from ..lobes.stability_limits import StabilityLimits
-from ..lobes.stability_lobes import StabilityLobes
-from ..milling_loop.delayed_state import DelaySystem, delay_system
+from ..characteristic_roots import CircleCrossings, circle_crossings
+from ..lobes import StabilityLimits, StabilityLobes
+from ..milling_loop import DelaySystem, delay_system
 from .varied_limits import varied_limits
 from .zero_order_solver import checked_speeds
 

@@ -9,7 +9,7 @@ from cutting import MillingProcess, average_directional_matrix
 from foundation import InputError
 from modal_fit import ModalModel
 
-from ..milling_loop.delayed_state import DelaySystem, delay_system
+from ..milling_loop import DelaySystem, delay_system
 
 Real = NDArray[np.float64]
 

@@ -17,11 +17,10 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from ..characteristic_roots.crossings import Crossings, find_crossings, followed, moved_depths
-from ..floquet.varied_edges import period_angle
-from ..lobes.stability_limits import StabilityLimits
-from ..lobes.stability_lobes import StabilityLobes
-from ..milling_loop.tip_receptance import ToolReceptance, tool_receptance
+from ..characteristic_roots import Crossings, find_crossings, followed, moved_depths
+from ..floquet import period_angle
+from ..lobes import StabilityLimits, StabilityLobes
+from ..milling_loop import ToolReceptance, tool_receptance
 from .zero_order_solver import checked_speeds
 
 Complex = NDArray[np.complex128]

@@ -7,8 +7,8 @@ from cutting import MillingProcess, average_directional_matrix, damping_harmonic
 from estimation import Frf
 from modal_fit import ModalModel
 
-from ..lobes.stability_lobes import StabilityLobes
-from ..milling_loop.tip_receptance import ToolReceptance, reaching, tool_receptance
+from ..lobes import StabilityLobes
+from ..milling_loop import ToolReceptance, reaching, tool_receptance
 from .zero_order_solver import averaged, checked_speeds
 
 Complex = NDArray[np.complex128]

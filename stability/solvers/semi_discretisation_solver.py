@@ -11,11 +11,10 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from ..characteristic_roots.chatter_frequency import strongest_line
-from ..floquet.floquet_multipliers import Multipliers
-from ..lobes.stability_lobes import StabilityLobes
-from ..milling_loop.delayed_state import DelaySystem, delay_system
-from ..milling_loop.engagement import Piece, engagement_pieces
+from ..characteristic_roots import strongest_line
+from ..floquet import Multipliers
+from ..lobes import StabilityLobes
+from ..milling_loop import DelaySystem, Piece, delay_system, engagement_pieces
 from .zero_order_solver import checked_speeds
 
 Complex = NDArray[np.complex128]

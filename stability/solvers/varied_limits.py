@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..floquet.varied_edges import VariedCut, varied_cut
-from ..lobes.stability_limits import StabilityLimits
-from ..milling_loop.delayed_state import DelaySystem
+from ..floquet import VariedCut, varied_cut
+from ..lobes import StabilityLimits
+from ..milling_loop import DelaySystem
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

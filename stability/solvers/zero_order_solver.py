@@ -10,8 +10,8 @@ from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
-from ..lobes.stability_lobes import StabilityLobes
-from ..milling_loop.tip_receptance import ToolReceptance, reaching, tool_receptance
+from ..lobes import StabilityLobes
+from ..milling_loop import ToolReceptance, reaching, tool_receptance
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -151,7 +151,7 @@ def test_an_slcan_adapter_is_read_and_its_unplugging_noticed(dbc: Path, tmp_path
             os.close(master)
 
     with pytest.raises(Disconnected, match=r"CAN bus slcan .* is gone .*check its plug"):
-        record(WithFeeds(Clockwork(20), [feed]), tmp_path / "a.h5", watch=play)
+        record(WithFeeds(Clockwork(20), [feed]), tmp_path / "a.h5", observer=play)
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.events["spindle_speed_rpm"].read()[1].tolist() == [7000.0] * 5
         assert recording.ending.startswith("Disconnected: CAN bus slcan")

@@ -9,7 +9,7 @@ import pytest
 
 from acquisition import Recording, aligned_samples
 from acquisition.drivers.ni import ni_9234_rate
-from estimation import band_record, cross_spectra, h1, settings_for
+from estimation import band_of_channels, cross_spectra, h1, settings_for
 
 RunWithDaqmx = Callable[..., subprocess.CompletedProcess[str]]
 COMMON = """
@@ -78,15 +78,15 @@ def test_what_modules_delay_is_taken_out_when_data_are_used(with_daqmx: RunWithD
         found = h1(cross_spectra(recording, settings_for(25600.0, 0.125, overlap=0.0, window="boxcar")))
         lines = np.arange(8, 480, 8)  # 64 Hz apart, each a whole number of periods in a segment
         np.testing.assert_allclose(found.values[lines, :, 0], 0.5, atol=2e-3)
-        low = band_record(recording, 2000.0, stream.channels[:1], stream.channels[1:])
-        assert np.abs(low.response_samples - 0.5 * low.excitation_samples).max() < 1e-3 * raw[:, 2].std()
+        low = band_of_channels(stream, stream.channels[:1], stream.channels[1:], 2000.0)
+        assert np.abs(low.response - 0.5 * low.force).max() < 1e-3 * raw[:, 2].std()
         assert low.responses[0].input_delay_s is None
 
 
 def test_an_overrun_says_how_many_samples_are_missing(with_daqmx: RunWithDaqmx, tmp_path: Path) -> None:
     program = COMMON + (
         "source = NiSource(inputs(2), 25600.0, buffer_duration=0.5)\n"
-        "attempt(source, watch=lambda block: time.sleep(1.0) if block.first_sample == 2560 else None)"
+        "attempt(source, observer=lambda block: time.sleep(1.0) if block.first_sample == 2560 else None)"
     )
     done = with_daqmx(program)
     assert done.stderr == ""

@@ -169,7 +169,7 @@ def test_a_pulled_plug_ends_the_recording_in_order(far_end: MakeEnd, tmp_path: P
             end.unplug()
 
     with pytest.raises(Disconnected, match=f"{end.port} is gone .*check its plug"):
-        record(WithFeeds(source, [feed]), tmp_path / "a.h5", watch=pull)
+        record(WithFeeds(source, [feed]), tmp_path / "a.h5", observer=pull)
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.complete is False
         assert recording.ending.startswith("Disconnected: serial line")

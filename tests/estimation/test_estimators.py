@@ -8,7 +8,7 @@ from scipy import signal
 
 from acquisition import Channel
 from estimation import (
-    BandRecord,
+    BandRecording,
     CrossSpectra,
     Frf,
     SpectralAccumulator,
@@ -164,7 +164,7 @@ def modes() -> ModalModel:
     )
 
 
-def short_records(seed: int, noise: float, seconds: float = 8.0) -> list[BandRecord]:
+def short_records(seed: int, noise: float, seconds: float = 8.0) -> list[BandRecording]:
     """Random forces through the modes, started long before the record: full leakage."""
     rng = np.random.default_rng(seed)
     rate, before = 100.0, 1000
@@ -177,7 +177,7 @@ def short_records(seed: int, noise: float, seconds: float = 8.0) -> list[BandRec
         x = np.fft.irfft(np.einsum("kpq,kq->kp", response, np.fft.rfft(force, axis=0)), len(force), axis=0)
         x = x + noise * x.std(axis=0) * rng.standard_normal(x.shape)
         part = slice(before, before + n)
-        records.append(BandRecord(rate, 40.0, force[part], x[part], FORCES, MOTIONS))
+        records.append(BandRecording("test", rate, force[part], x[part], FORCES, MOTIONS))
     return records
 
 
@@ -197,7 +197,7 @@ def test_local_polynomial_beats_welch_of_any_segment_on_short_records() -> None:
         for length in (200, 400, 800):
             accumulated = SpectralAccumulator(FORCES, MOTIONS, 100.0, SpectralSettings(length, 0.5, "hann"))
             for record in records:
-                accumulated.add(record.excitation_samples, record.response_samples)
+                accumulated.add(record.force, record.response)
             row.append(root_mean_square(h1(accumulated.result()), band))
         welch.append(row)
     assert np.mean(local) < 0.2 * np.mean(welch, axis=0).min()
@@ -214,10 +214,7 @@ def test_local_polynomial_error_bars() -> None:
 
 
 def test_local_polynomial_of_dependent_forces_gives_no_frf() -> None:
-    records = [
-        replace(record, excitation_samples=np.repeat(record.excitation_samples[:, :1], 2, axis=1))
-        for record in short_records(0, 0.0)
-    ]
+    records = [replace(record, force=np.repeat(record.force[:, :1], 2, axis=1)) for record in short_records(0, 0.0)]
     assert not local_polynomial(records, (15.0, 22.0)).valid.any()
     with pytest.raises(InputError, match="equations"):
         local_polynomial(short_records(0, 0.0), (15.0, 22.0), half_width=1)

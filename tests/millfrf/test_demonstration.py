@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from estimation import read_frf
-from millfrf.chain.diagnose import diagnose_files
 from millfrf.demonstration.whole_chain import (
     FIT_BAND,
     SUBSPACE_BAND,
@@ -20,6 +19,7 @@ from millfrf.demonstration.whole_chain import (
     nearest_modes,
     run_demo,
 )
+from millfrf.diagnosing import diagnose_files
 from modal_fit import read_modal_model
 from replay_data import default_structure, table_one_model, tip_model
 

@@ -7,11 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from mismatch import Trial
+from estimation import BandRecording, channels_of
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
 LABELS = ("TCP:+X", "TCP:+Y")
+FORCES = channels_of("force", LABELS, ("fx", "fy"))
+MOTIONS = channels_of("acceleration", LABELS, ("ax", "ay"))
 RATE = 256.0
 
 
@@ -74,11 +76,11 @@ class Concealed:
         return np.asarray(2 * np.real((states * model.poles**2 + (outer @ model.left.T) * model.poles) @ model.right))
 
 
-def trial(name: str, force: Real, acceleration: Real, rng: np.random.Generator, noise: float = 0.02) -> Trial:
+def trial(name: str, force: Real, acceleration: Real, rng: np.random.Generator, noise: float = 0.02) -> BandRecording:
     """A recording with white noise: a share of each response, half of it on forces."""
     noisy_force = force + rng.normal(size=force.shape) * force.std(axis=0) * noise / 2
     noisy = acceleration + rng.normal(size=acceleration.shape) * acceleration.std(axis=0) * noise
-    return Trial(name, RATE, noisy_force, noisy, np.array([2, 2]), ("fx", "fy", "ax", "ay"))
+    return BandRecording(name, RATE, noisy_force, noisy, FORCES, MOTIONS)
 
 
 def linear_acceleration(model: ModalModel, force: Real) -> Real:

@@ -9,16 +9,17 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from estimation import channels_of
 from mismatch import (
+    BandRecording,
     Hypothesis,
     LabError,
     ModelShape,
     StructureDetails,
     StructureDiagnosis,
-    Trial,
     band_of,
     predict_lines,
-    windowed_lines,
+    windowed_spectrum,
 )
 from mismatch.inference import Diagnosis, Improvement, Remainder
 from mismatch.models.fitting import Fit
@@ -47,16 +48,18 @@ def model() -> ModalModel:
 
 
 @pytest.fixture(scope="session")
-def linear_trials() -> list[Trial]:
+def linear_trials() -> list[BandRecording]:
     rng = np.random.default_rng(3)
     made = []
     for name, level in (("low", 20.0), ("high", 60.0)):
         force = _MODULE.forces(rng, level, 24.0)
-        made.append(_MODULE.trial(name, force, _MODULE.linear_acceleration(_MODULE.structure(), force), rng))
+        made.append(_MODULE.recording(name, force, _MODULE.linear_acceleration(_MODULE.structure(), force), rng))
     return made
 
 
 RATE, NOISE = 128.0, 0.02
+FORCES = channels_of("force", ("TCP:+X", "TCP:+Y"), ("fx", "fy"))
+MOTIONS = channels_of("acceleration", ("TCP:+X", "TCP:+Y"), ("ax", "ay"))
 
 
 @pytest.fixture(scope="package")
@@ -78,33 +81,32 @@ def small_model() -> ModalModel:
 
 
 @pytest.fixture(scope="package")
-def trial_of() -> Callable[[ModalModel, str, float, int], Trial]:
+def trial_of() -> Callable[[ModalModel, str, float, int], BandRecording]:
     """Makes trials."""
     return _trial
 
 
 @pytest.fixture(scope="package")
-def hand_made() -> Callable[[ModalModel, list[Trial]], StructureDiagnosis]:
+def hand_made() -> Callable[[ModalModel, list[BandRecording]], StructureDiagnosis]:
     """Makes diagnoses without diagnosing."""
     return _hand_made
 
 
-def _trial(model: ModalModel, name: str, level: float, seed: int) -> Trial:
+def _trial(model: ModalModel, name: str, level: float, seed: int) -> BandRecording:
     """Broadband forces through the model, plus white noise on the accelerations."""
     rng = np.random.default_rng(seed)
     n = int(40 * RATE)
-    channels = ("fx", "fy", "ax", "ay")
     force = level * rng.normal(size=(n, 2))
-    empty = Trial(name, RATE, force, np.zeros((n, 2)), np.array([2, 2]), channels)
-    lines = windowed_lines(empty, band_of(model, RATE), 1.0)
+    empty = BandRecording(name, RATE, force, np.zeros((n, 2)), FORCES, MOTIONS)
+    lines = windowed_spectrum(empty, band_of(model, RATE), 1.0)
     shape = ModelShape(model, LabError())
     response = lines.signal(predict_lines(Hypothesis(shape, np.zeros(shape.size)), lines).spectrum)
-    return Trial(name, RATE, force, response + NOISE * rng.normal(size=(n, 2)), np.array([2, 2]), channels)
+    return BandRecording(name, RATE, force, response + NOISE * rng.normal(size=(n, 2)), FORCES, MOTIONS)
 
 
-def _hand_made(model: ModalModel, trials: list[Trial]) -> StructureDiagnosis:
+def _hand_made(model: ModalModel, trials: list[BandRecording]) -> StructureDiagnosis:
     """A diagnosis whose two fits are the true linear model with the true noise."""
-    lines = tuple(windowed_lines(trial, band_of(model, RATE), 1.0) for trial in trials)
+    lines = tuple(windowed_spectrum(trial, band_of(model, RATE), 1.0) for trial in trials)
     shape = ModelShape(model, LabError())
     knots = np.log(np.geomspace(lines[0].frequencies[0], lines[0].frequencies[-1], KNOTS))
     noise = NoiseModel(knots, np.full((2, KNOTS), np.log(NOISE**2)), np.full(2, -60.0))

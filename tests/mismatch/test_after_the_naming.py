@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from acquisition import Channel, RecordingWriter, StreamDescription
+from estimation import BandRecording, windowed_spectrum
 from foundation import InputError
-from mismatch import Hypothesis, LabError, ModelShape, Trial, band_of, windowed_lines
+from mismatch import Hypothesis, LabError, ModelShape, band_of
 from mismatch.joints.joint_law import JointLaw, JointMotion
 from mismatch.models.equivalent_receptance import equivalent_receptance
 from mismatch.models.hypothesis import Cause
 from mismatch.models.linear_part import with_linear_part
 from mismatch.physics import JointPhysics, Parameter, library
-from mismatch.records.trial import measured_part
+from mismatch.records.reading import measured_part
 from modal_fit import ModalModel
 
 DIRECTION = np.array([0.6, 0.8])
@@ -45,10 +46,10 @@ class _Spring:
 
 
 def test_a_linear_joint_is_the_structure_with_its_spring_and_damper(
-    small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], Trial]
+    small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], BandRecording]
 ) -> None:
     """Exactly ``(I + H K)^-1 H``."""
-    lines = windowed_lines(trial_of(small_model, "mid", 50.0, 4), band_of(small_model, 128.0), 1.0)
+    lines = windowed_spectrum(trial_of(small_model, "mid", 50.0, 4), band_of(small_model, 128.0), 1.0)
     shape = ModelShape(small_model, LabError())
     k, c = 2e4, 100.0
     cause = Cause(_Spring(), np.array([k, c]), "", DIRECTION, MOTION)
@@ -62,9 +63,9 @@ def test_a_linear_joint_is_the_structure_with_its_spring_and_damper(
 
 
 def test_faults_of_the_chain_are_no_part_of_the_structure(
-    small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], Trial]
+    small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], BandRecording]
 ) -> None:
-    lines = windowed_lines(trial_of(small_model, "mid", 50.0, 4), band_of(small_model, 128.0), 1.0)
+    lines = windowed_spectrum(trial_of(small_model, "mid", 50.0, 4), band_of(small_model, 128.0), 1.0)
     shape = ModelShape(small_model, LabError())
     gain = library()["gain_error"]
     cause = Cause(gain, np.array([0.5]), gain.places(small_model)[0])

@@ -7,8 +7,16 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, Concealed, forces, linear_acceleration, trial
 
+from estimation import BandRecording, windowed_spectrum
 from millfrf.report.diagnoses.diagnosis_answers import named, verdict_sentence
-from mismatch import Hypothesis, LabError, ModelShape, StructureDiagnosis, Trial, band_of, diagnose, windowed_lines
+from mismatch import (
+    Hypothesis,
+    LabError,
+    ModelShape,
+    StructureDiagnosis,
+    band_of,
+    diagnose,
+)
 from mismatch.adapters.structure.confirmation import helps
 from mismatch.adapters.structure.held_out import block_powers
 from mismatch.adapters.structure.structure_verdict import verdict_of_structure
@@ -126,8 +134,8 @@ def test_what_an_answer_may_leave() -> None:
 
 def test_a_quarter_of_the_response_left_is_not_none(
     small_model: ModalModel,
-    trial_of: Callable[[ModalModel, str, float, int], Trial],
-    hand_made: Callable[[ModalModel, list[Trial]], StructureDiagnosis],
+    trial_of: Callable[[ModalModel, str, float, int], BandRecording],
+    hand_made: Callable[[ModalModel, list[BandRecording]], StructureDiagnosis],
 ) -> None:
     known = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1)])
     left = leftover(known.details.final.hypothesis, list(known.details.recordings))
@@ -173,7 +181,7 @@ def test_a_table_of_negative_mass_is_not_told(model: ModalModel) -> None:
     assert any("a table cannot have a mass of -" in reason for reason in reasons)
 
 
-def _periodic(model: ModalModel, law: bool) -> Trial:
+def _periodic(model: ModalModel, law: bool) -> BandRecording:
     """Four periods of 8 s."""
     rng = np.random.default_rng(41)
     force = np.tile(forces(rng, 40.0, 8.0), (4, 1))
@@ -190,14 +198,16 @@ def _periodic(model: ModalModel, law: bool) -> Trial:
 def test_what_repeats_with_the_force_is_no_noise(model: ModalModel, law: bool) -> None:
     """A steady periodic test has no times of more and of less signal; a missing law repeats, noise does not."""
     one = _periodic(model, law)
-    lines = [windowed_lines(one, band_of(model, RATE), float((-model.poles.real).min()))]
+    lines = [windowed_spectrum(one, band_of(model, RATE), float((-model.poles.real).min()))]
     shape = ModelShape(model, LabError())
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)))
     share = leftover(base.hypothesis, lines).share
     assert share > 0.7 if law else share < 0.05
 
 
-def test_accepted_numbers_are_those_of_the_improved_model(model: ModalModel, linear_trials: list[Trial]) -> None:
+def test_accepted_numbers_are_those_of_the_improved_model(
+    model: ModalModel, linear_trials: list[BandRecording]
+) -> None:
     """A gain error found in a model that is off too: told numbers and final hypothesis are one."""
     wrong = [replace(one, response=one.response * np.array([1.0, 1.25])) for one in linear_trials]
     found = diagnose(model, wrong)

@@ -4,24 +4,24 @@ import numpy as np
 import pytest
 from concealed_recordings import Concealed, forces, linear_acceleration, structure, trial
 
+from estimation import WindowedSpectrum, windowed_spectrum
 from mismatch import Hypothesis, LabError, ModelShape, band_of
 from mismatch.faults.clipping import find_clipping, mended
 from mismatch.models.fitting import Fit, fit
-from mismatch.records.windowed_lines import WindowedLines, windowed_lines
 from modal_fit import ModalModel
 
 OFF = np.array([1.01, 0.99])
 DECAY = 1.7
 
 
-def fitted_to(lines: list[WindowedLines], model: ModalModel) -> Fit:
+def fitted_to(lines: list[WindowedSpectrum], model: ModalModel) -> Fit:
     shape = ModelShape(model, LabError())
     return fit(lines, Hypothesis(shape, np.zeros(shape.size)))
 
 
 def cuts(
     limit: float, seed: int, law: Concealed | None = None, *, before: bool = False, duration: float = 40.0
-) -> list[WindowedLines]:
+) -> list[WindowedSpectrum]:
     """Two cuts; the second response saturates, with the noise on it or before it."""
     rng, model = np.random.default_rng(seed), structure()
     found = []
@@ -34,12 +34,12 @@ def cuts(
         one = trial(f"{level:g} N", force, held, rng)
         if before:
             one.response[:, 1] = np.clip(one.response[:, 1], -limit, limit)
-        found.append(windowed_lines(one, band_of(model, one.rate), DECAY))
+        found.append(windowed_spectrum(one, band_of(model, one.rate), DECAY))
     return found
 
 
 def level_of(seed: int) -> float:
-    return float(cuts(np.inf, seed)[1].trial.response[:, 1].std())
+    return float(cuts(np.inf, seed)[1].recording.response[:, 1].std())
 
 
 @pytest.mark.parametrize("before", [False, True])
@@ -59,8 +59,8 @@ def test_found_and_mended(share: float, before: bool) -> None:
     found, true = settled.hypothesis.model, structure()
     assert found.natural_frequencies == pytest.approx(true.natural_frequencies, rel=1e-3)
     assert found.damping_ratios == pytest.approx(true.damping_ratios, rel=0.02)
-    whole = cuts(np.inf, 8)[1].trial.response[:, 1]
-    off = repaired[1].trial.response[:, 1] - whole
+    whole = cuts(np.inf, 8)[1].recording.response[:, 1]
+    off = repaired[1].recording.response[:, 1] - whole
     assert off.std() < 0.04 * whole.std()
 
 

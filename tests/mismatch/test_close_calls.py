@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, Concealed, forces, late, trial
 
-from mismatch import StructureDiagnosis, Trial, diagnose
+from mismatch import BandRecording, StructureDiagnosis, diagnose
 from mismatch.adapters.structure.acceptance import worth_it
 from mismatch.faults.tones import find_tone
 from mismatch.inference import EvidenceSettings, Proposal
@@ -17,7 +17,7 @@ from modal_fit import ModalModel
 
 
 def test_a_delay_that_modes_nearly_take_up_is_named(
-    small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], Trial]
+    small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], BandRecording]
 ) -> None:
     """Real modes follow a delay of 0.3 ms to first order: its number has a wide error, and yet it is not none."""
     levels = ("low", 20.0), ("mid", 40.0), ("high", 80.0)
@@ -45,8 +45,8 @@ def test_laws_tried_in_vain_are_tried_again_behind_a_delay(model: ModalModel) ->
 @pytest.mark.parametrize(("half_power_bandwidth", "named"), [(0.1, False), (6.0, True)])
 def test_a_narrow_mode_must_outdo_chance_in_all_its_places(
     small_model: ModalModel,
-    trial_of: Callable[[ModalModel, str, float, int], Trial],
-    hand_made: Callable[[ModalModel, list[Trial]], StructureDiagnosis],
+    trial_of: Callable[[ModalModel, str, float, int], BandRecording],
+    hand_made: Callable[[ModalModel, list[BandRecording]], StructureDiagnosis],
     half_power_bandwidth: float,
     named: bool,
 ) -> None:
@@ -63,8 +63,8 @@ def test_a_narrow_mode_must_outdo_chance_in_all_its_places(
 
 def test_the_gain_of_a_tone_is_that_of_its_own_line(
     small_model: ModalModel,
-    trial_of: Callable[[ModalModel, str, float, int], Trial],
-    hand_made: Callable[[ModalModel, list[Trial]], StructureDiagnosis],
+    trial_of: Callable[[ModalModel, str, float, int], BandRecording],
+    hand_made: Callable[[ModalModel, list[BandRecording]], StructureDiagnosis],
 ) -> None:
     """A tone in the middle of a line leaves nothing on the lines beside it, which look as if they stood out as much."""
     made = [trial_of(small_model, "low", 20.0, 1), trial_of(small_model, "high", 60.0, 2)]

@@ -10,8 +10,9 @@ from concealed_recordings import RATE, forces, linear_acceleration, structure, t
 from scipy.signal import bilinear, lfilter
 
 from acquisition import Channel, RecordingWriter, StreamDescription
+from estimation import BandRecording
 from foundation import InputError
-from mismatch import LabError, ModelShape, Trial, diagnose, read_trial
+from mismatch import LabError, ModelShape, diagnose, read_recording
 from mismatch.inference.diagnosis_file import write_diagnosis
 from mismatch.records.compared_band import compared_band
 from modal_fit import ModalModel, Residuals
@@ -39,7 +40,7 @@ def fitted_to_band() -> ModalModel:
     return replace(low, residuals=Residuals(np.zeros((2, 2)), np.zeros((2, 2)), third.poles, residue), band=BAND)
 
 
-def recorded(truth: ModalModel) -> list[Trial]:
+def recorded(truth: ModalModel) -> list[BandRecording]:
     rng = np.random.default_rng(11)
     made = []
     for name, level in (("low", 20.0), ("high", 60.0)):
@@ -49,11 +50,11 @@ def recorded(truth: ModalModel) -> list[Trial]:
 
 
 @pytest.fixture(scope="module")
-def shaken() -> list[Trial]:
+def shaken() -> list[BandRecording]:
     return recorded(with_high_mode())
 
 
-def test_a_model_is_compared_in_its_band(shaken: list[Trial], tmp_path: Path) -> None:
+def test_a_model_is_compared_in_its_band(shaken: list[BandRecording], tmp_path: Path) -> None:
     """A textbook residual instead of the third mode: outside the band it is wrong, inside nothing is missing."""
     model, at = fitted_to_band(), np.array([12.0])
     upper = (with_high_mode().receptance(at) - structure().receptance(at))[0].real
@@ -85,13 +86,13 @@ def test_derivative_by_what_lies_outside_the_band() -> None:
         np.testing.assert_allclose(slopes[:, :, k], numeric, atol=1e-6 * np.abs(numeric).max())
 
 
-def test_a_model_without_a_band_is_doubted_where_it_knows_nothing(shaken: list[Trial]) -> None:
+def test_a_model_without_a_band_is_doubted_where_it_knows_nothing(shaken: list[BandRecording]) -> None:
     found = diagnose(replace(fitted_to_band(), band=None, residuals=None), shaken)
     assert found.verdict != "none"
     assert any("above the highest mode" in doubt and "band" in doubt for doubt in found.doubts)
 
 
-def test_a_model_that_knows_all_is_not_doubted(model: ModalModel, linear_trials: list[Trial]) -> None:
+def test_a_model_that_knows_all_is_not_doubted(model: ModalModel, linear_trials: list[BandRecording]) -> None:
     assert diagnose(model, linear_trials).doubts == ()
 
 
@@ -113,7 +114,7 @@ def test_a_stated_high_pass_is_no_mismatch(tmp_path: Path) -> None:
     channels += [Channel(f"a{a}", "acceleration", "m/s^2", "TCP", f"+{a}", high_pass_hz=0.5) for a in "XY"]
     with RecordingWriter(tmp_path / "cut.h5", [StreamDescription("main", RATE, 0.0, tuple(channels))]) as writer:
         writer.append("main", np.hstack(shown))
-    read = read_trial(tmp_path / "cut.h5", model)
+    read = read_recording(tmp_path / "cut.h5", model)
     n = 2 * len(force)
     axis = np.fft.rfftfreq(n, 1 / RATE)
     spectrum = np.einsum("kpq,kq->kp", model.receptance(axis), np.fft.rfft(read.force, n=n, axis=0))

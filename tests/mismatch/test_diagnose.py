@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, Concealed, Law, forces, late, linear_acceleration, trial
 
-from mismatch import Settings, StructureDiagnosis, Trial, diagnose, improved_model_of, predict, write_diagnosis
+from mismatch import BandRecording, Settings, StructureDiagnosis, diagnose, improved_model_of, predict, write_diagnosis
 from mismatch.physics import library
 from modal_fit import ModalModel, read_modal_model, write_modal_model
 
 DIRECTION = np.array([0.8, -0.6])
 
 
-def _trials(model: ModalModel, law: Law, seed: int = 5) -> list[Trial]:
+def _trials(model: ModalModel, law: Law, seed: int = 5) -> list[BandRecording]:
     rng = np.random.default_rng(seed)
     made = []
     for name, level in (("low", 20.0), ("high", 60.0)):
@@ -24,7 +24,7 @@ def _trials(model: ModalModel, law: Law, seed: int = 5) -> list[Trial]:
     return made
 
 
-def test_nothing_is_found_where_nothing_is(model: ModalModel, linear_trials: list[Trial]) -> None:
+def test_nothing_is_found_where_nothing_is(model: ModalModel, linear_trials: list[BandRecording]) -> None:
     found = diagnose(model, linear_trials)
     assert found.verdict == "none"
     assert found.physics == ()
@@ -65,7 +65,7 @@ def test_a_delay_is_found_and_ends_in_files(model: ModalModel, tmp_path: Path) -
     _round_trip(found, made[1], model, tmp_path)
 
 
-def _round_trip(found: StructureDiagnosis, recording: Trial, model: ModalModel, folder: Path) -> None:
+def _round_trip(found: StructureDiagnosis, recording: BandRecording, model: ModalModel, folder: Path) -> None:
     write_diagnosis(folder / "diagnosis.json", found)
     content = json.loads((folder / "diagnosis.json").read_text())
     assert content["format"] == "millfrf.diagnosis"
@@ -88,7 +88,7 @@ def test_what_the_library_does_not_have_is_not_named(model: ModalModel) -> None:
     assert found.physics == ()
 
 
-def test_a_wrong_nominal_model_is_modal_parameters(model: ModalModel, linear_trials: list[Trial]) -> None:
+def test_a_wrong_nominal_model_is_modal_parameters(model: ModalModel, linear_trials: list[BandRecording]) -> None:
     off = replace(model, poles=model.poles * np.array([1.06, 0.94]))
     found = diagnose(off, linear_trials)
     assert [cause.name for cause in found.physics] == ["modal_parameters"]

@@ -10,7 +10,16 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 
-from mismatch import Hypothesis, JointMotion, LabError, ModelShape, Trial, WindowedLines, band_of, windowed_lines
+from mismatch import (
+    BandRecording,
+    Hypothesis,
+    JointMotion,
+    LabError,
+    ModelShape,
+    WindowedSpectrum,
+    band_of,
+    windowed_spectrum,
+)
 from mismatch.adapters.structure.form_errors import with_form_spread
 from mismatch.models.fitting import Fit, fit
 from mismatch.models.hypothesis import Cause
@@ -31,14 +40,14 @@ def _independent() -> ModuleType:
     return module
 
 
-def _cut(seed: int, family: str) -> tuple[list[WindowedLines], JointMotion, float]:
+def _cut(seed: int, family: str) -> tuple[list[WindowedSpectrum], JointMotion, float]:
     """Recordings at three levels, how the joint moves, and the force at which the law saturates."""
     model, friction = structure(), _independent()
     rng = np.random.default_rng([seed, 77])
     saturation, share = rng.uniform(6, 14), rng.uniform(0.03, 0.08)
     velocity, deflection = _typical(linear_acceleration(model, forces(rng, LEVELS[1], 24.0)) @ DIRECTION)
     scale = share * (velocity if family in ("root", "arctangent") else deflection)
-    made: list[Trial] = []
+    made: list[BandRecording] = []
     for level in LEVELS:
         force = forces(rng, level, 24.0)
         moved = friction.response_with_friction(model, force, RATE, DIRECTION, family, saturation, scale)
@@ -46,7 +55,7 @@ def _cut(seed: int, family: str) -> tuple[list[WindowedLines], JointMotion, floa
     more = LEVELS[-1] / LEVELS[1]
     motion = JointMotion(more * deflection, more * velocity, 20 * deflection, 20 * velocity, 1e6)
     decay = float((-model.poles.real).min())
-    return [windowed_lines(one, band_of(model, RATE), decay) for one in made], motion, saturation
+    return [windowed_spectrum(one, band_of(model, RATE), decay) for one in made], motion, saturation
 
 
 def _typical(acceleration: np.ndarray) -> tuple[float, float]:
@@ -57,7 +66,7 @@ def _typical(acceleration: np.ndarray) -> tuple[float, float]:
     return float(velocity), float(np.fft.irfft(lines / np.where(axis > 2, 2j * np.pi * axis, 1)).std())
 
 
-def _named(lines: list[WindowedLines], motion: JointMotion) -> Fit:
+def _named(lines: list[WindowedSpectrum], motion: JointMotion) -> Fit:
     """The likelier of the library's two forms of dry friction, fitted freely."""
     shape = ModelShape(structure(), LabError())
     fits = []
@@ -93,12 +102,12 @@ def test_coverage_with_laws_of_other_families(family: str) -> None:
     assert len(outside) <= 3, outside
 
 
-def test_noise_alone_leaves_an_error_as_it_is(linear_trials: list[Trial]) -> None:
+def test_noise_alone_leaves_an_error_as_it_is(linear_trials: list[BandRecording]) -> None:
     """A linear cause that is exactly what was done: parts of the recordings agree, and nothing is added."""
     model = structure()
     late = [replace(one, response=one.response * np.array([1.2, 1.0])) for one in linear_trials]
     decay = float((-model.poles.real).min())
-    lines = [windowed_lines(one, band_of(model, RATE), decay) for one in late]
+    lines = [windowed_spectrum(one, band_of(model, RATE), decay) for one in late]
     shape = ModelShape(model, LabError())
     cause = Cause(library()["gain_error"], np.array([0.15]), f"response {model.responses[0]}")
     found = fit(lines, Hypothesis(shape, np.zeros(shape.size), (cause,)), iterations=20)

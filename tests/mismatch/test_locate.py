@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from mismatch import StructureDiagnosis, Trial
+from mismatch import BandRecording, StructureDiagnosis
 from mismatch.location.family_wise import holm
 from mismatch.location.locate import located
 from mismatch.location.residual_view import residual_view
@@ -19,32 +19,32 @@ from modal_fit import ModalModel
 RATE, NOISE = 128.0, 0.02
 LEVELS = (1.0, 2.0, 4.0)
 
-MakeTrial = Callable[[ModalModel, str, float, int], Trial]
-MakeDiagnosis = Callable[[ModalModel, list[Trial]], StructureDiagnosis]
+MakeTrial = Callable[[ModalModel, str, float, int], BandRecording]
+MakeDiagnosis = Callable[[ModalModel, list[BandRecording]], StructureDiagnosis]
 
 
 def locate(diagnosis: StructureDiagnosis, speeds: dict[str, SpindleSpeed] | None = None) -> dict[str, Any]:
     return located(residual_view(diagnosis.details, diagnosis.verdict == "unexplained"), speeds or {})
 
 
-def with_residual(trial: Trial, channel: int, extra: np.ndarray) -> Trial:
+def with_residual(trial: BandRecording, channel: int, extra: np.ndarray) -> BandRecording:
     response = trial.response.copy()
     response[:, channel] += extra
     return replace(trial, response=response)
 
 
 @pytest.fixture(scope="module")
-def quiet(small_model: ModalModel, trial_of: MakeTrial) -> list[Trial]:
+def quiet(small_model: ModalModel, trial_of: MakeTrial) -> list[BandRecording]:
     return [trial_of(small_model, f"level{k}", level, k) for k, level in enumerate(LEVELS)]
 
 
-def band_noise(trial: Trial, seed: int, low: float = 9.0, high: float = 11.0) -> np.ndarray:
+def band_noise(trial: BandRecording, seed: int, low: float = 9.0, high: float = 11.0) -> np.ndarray:
     white = np.random.default_rng(seed).normal(size=len(trial.force))
     shaped = sosfilt(butter(4, (low, high), "bandpass", fs=RATE, output="sos"), white)
     return np.asarray(shaped / np.std(shaped))
 
 
-def grown(quiet: list[Trial], exponent: float) -> list[Trial]:
+def grown(quiet: list[BandRecording], exponent: float) -> list[BandRecording]:
     sizes = [NOISE * (trial.level / quiet[0].level) ** exponent for trial in quiet]
     return [
         with_residual(trial, 1, size * band_noise(trial, 50 + k))
@@ -54,7 +54,7 @@ def grown(quiet: list[Trial], exponent: float) -> list[Trial]:
 
 @pytest.mark.parametrize("exponent", [0.0, 1.0, 3.0])
 def test_band_channel_and_growth(
-    small_model: ModalModel, quiet: list[Trial], hand_made: MakeDiagnosis, exponent: float
+    small_model: ModalModel, quiet: list[BandRecording], hand_made: MakeDiagnosis, exponent: float
 ) -> None:
     found = locate(hand_made(small_model, grown(quiet, exponent)))
     first = found["frequency_bands"][0]
@@ -69,7 +69,9 @@ def test_band_channel_and_growth(
     json.dumps(found, allow_nan=False)
 
 
-def test_nothing_is_located_in_noise(small_model: ModalModel, quiet: list[Trial], hand_made: MakeDiagnosis) -> None:
+def test_nothing_is_located_in_noise(
+    small_model: ModalModel, quiet: list[BandRecording], hand_made: MakeDiagnosis
+) -> None:
     found = locate(hand_made(small_model, quiet))
     assert found["frequency_bands"] == []
     assert found["times"] == []
@@ -78,7 +80,7 @@ def test_nothing_is_located_in_noise(small_model: ModalModel, quiet: list[Trial]
     assert "note" in found["growth"]
 
 
-def test_time_of_a_burst(small_model: ModalModel, quiet: list[Trial], hand_made: MakeDiagnosis) -> None:
+def test_time_of_a_burst(small_model: ModalModel, quiet: list[BandRecording], hand_made: MakeDiagnosis) -> None:
     time = np.arange(len(quiet[0].force)) / RATE
     burst = 4 * NOISE * band_noise(quiet[0], 7) * ((time > 20) & (time < 26))
     found = locate(hand_made(small_model, [with_residual(quiet[0], 0, burst), *quiet[1:]]))
@@ -88,7 +90,7 @@ def test_time_of_a_burst(small_model: ModalModel, quiet: list[Trial], hand_made:
     assert 25 < stretch["end_s"] < 29
 
 
-def test_order_of_the_spindle(small_model: ModalModel, quiet: list[Trial], hand_made: MakeDiagnosis) -> None:
+def test_order_of_the_spindle(small_model: ModalModel, quiet: list[BandRecording], hand_made: MakeDiagnosis) -> None:
     time = np.arange(len(quiet[0].force)) / RATE
     runout = 2 * NOISE * np.sin(2 * np.pi * 3 * 4.0 * time)
     diagnosis = hand_made(small_model, [with_residual(trial, 0, runout) for trial in quiet])
@@ -105,7 +107,7 @@ def test_holm_is_monotone_and_no_smaller() -> None:
 
 
 def test_noise_is_not_believed_where_something_stayed_unexplained(
-    small_model: ModalModel, quiet: list[Trial], hand_made: MakeDiagnosis
+    small_model: ModalModel, quiet: list[BandRecording], hand_made: MakeDiagnosis
 ) -> None:
     honest = hand_made(small_model, grown(quiet, 1.0))
     noises = tuple(replace(one, responses=one.responses + np.log(100.0)) for one in honest.details.final.noises)

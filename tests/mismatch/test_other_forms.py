@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 
-from mismatch import Hypothesis, LabError, ModelShape, WindowedLines, band_of, windowed_lines
+from mismatch import Hypothesis, LabError, ModelShape, WindowedSpectrum, band_of, windowed_spectrum
 from mismatch.adapters.structure.form_errors import with_form_spread
 from mismatch.models.fitting import Fit, fit
 from mismatch.models.hypothesis import Cause
@@ -12,7 +12,7 @@ from mismatch.physics import library
 from mismatch.physics.ac_coupling import TWO_STAGES
 
 
-def recorded(corner: float, stages: int, seed: int) -> list[WindowedLines]:
+def recorded(corner: float, stages: int, seed: int) -> list[WindowedSpectrum]:
     """Two recordings behind ``(s / (s + w))^stages``, 2 % noise."""
     model, rng, made = structure(), np.random.default_rng(seed), []
     for level in (20.0, 60.0):
@@ -23,10 +23,10 @@ def recorded(corner: float, stages: int, seed: int) -> list[WindowedLines]:
         high = np.fft.irfft(np.fft.rfft(moved, axis=0) * passed[:, None], n=len(moved), axis=0)
         made.append(trial(f"{level:g} N", force, high, rng))
     decay = float((-model.poles.real).min())
-    return [windowed_lines(one, band_of(model, RATE), decay) for one in made]
+    return [windowed_spectrum(one, band_of(model, RATE), decay) for one in made]
 
 
-def named(lines: list[WindowedLines], corner: float, place: str) -> Fit:
+def named(lines: list[WindowedSpectrum], corner: float, place: str) -> Fit:
     """The high-pass fitted with one form."""
     cause = Cause(library()["ac_coupling"], np.array([corner]), place)
     shape = ModelShape(structure(), LabError(), 0)

@@ -6,21 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mismatch import Hypothesis, JointLaw, LabError, ModelShape, Trial, band_of, windowed_lines
+from estimation import WindowedSpectrum
+from mismatch import BandRecording, Hypothesis, JointLaw, LabError, ModelShape, band_of, windowed_spectrum
 from mismatch import physics as physics_folder
 from mismatch.adapters.structure.told_causes import accepted_cause
 from mismatch.joints.joint_law import POINTS
 from mismatch.joints.joint_simulation import driven_force, joint_response
 from mismatch.models.fitting import Fit
 from mismatch.models.hypothesis import Cause
+from mismatch.models.modal_lines import receptance_at
 from mismatch.noise.noise_model import fit_noise, whitening
-from mismatch.records.windowed_lines import WindowedLines, receptance_at
 from modal_fit import ModalModel, Residuals
 
 
 @pytest.fixture(scope="module")
-def lines(model: ModalModel, linear_trials: list[Trial]) -> WindowedLines:
-    return windowed_lines(linear_trials[1], band_of(model, 256.0), float((-model.poles.real).min()))
+def lines(model: ModalModel, linear_trials: list[BandRecording]) -> WindowedSpectrum:
+    return windowed_spectrum(linear_trials[1], band_of(model, 256.0), float((-model.poles.real).min()))
 
 
 def test_derivatives_of_the_modal_model_are_those_of_finite_differences(model: ModalModel) -> None:
@@ -37,14 +38,14 @@ def test_derivatives_of_the_modal_model_are_those_of_finite_differences(model: M
         np.testing.assert_allclose(slope[:, :, k], expected, atol=1e-6 * np.abs(expected).max() + 1e-14)
 
 
-def test_a_linear_recording_is_predicted_down_to_its_noise(model: ModalModel, lines: WindowedLines) -> None:
+def test_a_linear_recording_is_predicted_down_to_its_noise(model: ModalModel, lines: WindowedSpectrum) -> None:
     rest = lines.measured - lines.from_force(receptance_at(model, lines.padded_frequencies), lines.force_lines)
     share = np.sqrt(np.sum(np.abs(rest) ** 2) / np.sum(np.abs(lines.measured) ** 2))
     assert share < 0.02
 
 
 @pytest.mark.parametrize("colour", [0.0, 1.0])
-def test_noise_of_responses_and_forces_is_told_apart(model: ModalModel, lines: WindowedLines, colour: float) -> None:
+def test_noise_of_responses_and_forces_is_told_apart(model: ModalModel, lines: WindowedSpectrum, colour: float) -> None:
     """Variances known, coloured as 1 / f^colour: recovered within a fifth where they matter."""
     rng = np.random.default_rng(1)
     frequencies = np.linspace(3, 40, 4000)
@@ -67,7 +68,7 @@ def test_noise_of_responses_and_forces_is_told_apart(model: ModalModel, lines: W
 
 @pytest.mark.parametrize("kind", ["spring", "damper", "elements"])
 def test_free_simulation_of_a_linear_joint_is_its_closed_form(
-    model: ModalModel, lines: WindowedLines, kind: str
+    model: ModalModel, lines: WindowedSpectrum, kind: str
 ) -> None:
     """A spring, a damper, and elastic elements that never yield: ``g = k x_free / (1 + k h)``."""
     s = 2j * np.pi * lines.padded_frequencies
@@ -78,16 +79,16 @@ def test_free_simulation_of_a_linear_joint_is_its_closed_form(
         "damper": JointLaw(speed=5.0, damping=400 * np.linspace(-5, 5, POINTS)),
         "elements": JointLaw(springs=np.array([k / 4, 3 * k / 4]), yields=np.array([1.0, 2.0])),
     }[kind]
-    found = joint_response(model, lines, lines.force_lines, direction, law).force
     receptance = receptance_at(model, lines.padded_frequencies)
     free = np.einsum("p,kpq,kq->k", direction, receptance, lines.force_lines)
+    found = joint_response(model, lines, free, direction, law).force
     own = np.einsum("p,kpq,q->k", direction, receptance, direction)
     factor = 400 * s if kind == "damper" else k
     expected = factor * free / (1 + factor * own)
     assert np.abs(found - expected).max() < 2e-3 * np.abs(expected).max()
 
 
-def test_an_elastic_plastic_element_follows_its_loop(lines: WindowedLines) -> None:
+def test_an_elastic_plastic_element_follows_its_loop(lines: WindowedSpectrum) -> None:
     """Up to the yield, down to the other: the corners of Iwan's parallelogram."""
     x = np.concatenate([np.linspace(0, 3, 60), np.linspace(3, -3, 120), np.linspace(-3, 0, 60)])
     force = driven_force(lines, x, 0 * x, JointLaw(springs=np.array([10.0]), yields=np.array([1.0])))

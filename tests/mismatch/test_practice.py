@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mismatch import diagnose, improved_model_of, predict, read_trial, read_trials
+from mismatch import diagnose, improved_model_of, predict, read_recording, read_recordings
 from modal_fit import read_modal_model
 
 
@@ -16,7 +16,7 @@ def test_practice_case(shared_data: Path, number: int) -> None:
     """Truth is opened after the diagnosis; the improved model must lower the error wherever there is an effect."""
     folder = shared_data.parent / "practice" / f"case_{number:02d}"
     model = read_modal_model(folder / "nominal.json")
-    found = diagnose(model, read_trials([folder / f"{level}.h5" for level in ("low", "mid", "high")], model))
+    found = diagnose(model, read_recordings([folder / f"{level}.h5" for level in ("low", "mid", "high")], model))
     truth = json.loads((folder.parent / "truth.json").read_text())[folder.name]["effect"]
     if truth in ("none", "unexplained"):
         assert found.verdict == truth
@@ -24,6 +24,6 @@ def test_practice_case(shared_data: Path, number: int) -> None:
         return
     assert found.verdict == "explained"
     assert [cause.name for cause in found.physics] == [truth]
-    unseen = read_trial(folder / "unseen.h5", model)
+    unseen = read_recording(folder / "unseen.h5", model)
     before, after = predict(model, unseen), predict(improved_model_of(found), unseen)
     assert after.total_error < before.total_error

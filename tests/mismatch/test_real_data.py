@@ -10,7 +10,7 @@ import pytest
 
 from millfrf.chain.fitting.fit import fit_recordings
 from millfrf.chain.fitting.fit_options import FitOptions
-from mismatch import diagnose, read_trials
+from mismatch import diagnose, read_recordings
 
 pytestmark = pytest.mark.shared_data
 
@@ -85,7 +85,7 @@ def test_no_confident_wrong_answer_on_an_aircraft(shared_data: Path, band: tuple
     what is left is no noise. A table's mass, a gain or a resonating force cell are no answer."""
     files = [shared_data / "f16-ground-vibration" / f"level_{level}.h5" for level in (1, 3)]
     model = fit_recordings(files[:1], FitOptions(band, "subspace")).model
-    found = diagnose(model, read_trials(files, model))
+    found = diagnose(model, read_recordings(files, model))
     assert found.verdict == "unexplained"
     assert found.physics == ()
     assert found.leftover > 0.9

@@ -6,25 +6,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mismatch import Hypothesis, LabError, ModelShape, Trial, band_of, predict_lines, windowed_lines
+from estimation import WindowedSpectrum
+from mismatch import BandRecording, Hypothesis, LabError, ModelShape, band_of, predict_lines, windowed_spectrum
 from mismatch.joints.joint_law import JointMotion
 from mismatch.joints.joint_simulation import driven_force
 from mismatch.models.hypothesis import Cause
 from mismatch.models.jacobian import jacobian
+from mismatch.models.modal_lines import displacement_at
 from mismatch.noise.line_loops import whiten_lines
 from mismatch.physics import JointPhysics, library
-from mismatch.records.windowed_lines import WindowedLines, displacement_at
 from modal_fit import ModalModel
 
 DIRECTION = np.array([0.8, 0.6])
 
 
-def _explanation(model: ModalModel, lines: WindowedLines, name: str) -> Hypothesis:
+def _explanation(model: ModalModel, lines: WindowedSpectrum, name: str) -> Hypothesis:
     """A joint whose force is a third of the elastic one, rms."""
     physics = library()[name]
     assert isinstance(physics, JointPhysics)
     x = lines.signal(displacement_at(model, lines.padded_frequencies, lines.force_lines)) @ DIRECTION
-    v = np.gradient(x) * lines.trial.rate
+    v = np.gradient(x) * lines.recording.rate
     stiffness = 1 / float(DIRECTION @ model.receptance(np.array([0.2]))[0].real @ DIRECTION)
     motion = JointMotion(float(x.std()), float(v.std()), 3 * np.abs(x).max(), 3 * np.abs(v).max(), stiffness)
     values = physics.starts(motion)[0].copy()
@@ -38,7 +39,7 @@ def _explanation(model: ModalModel, lines: WindowedLines, name: str) -> Hypothes
     ["stiffness_hardening", "coulomb_friction", "presliding_friction", "hysteresis", "quadratic_damping", "pose_drift"],
 )
 def test_the_tangent_is_that_of_whole_simulations(
-    small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], Trial], name: str
+    small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], BandRecording], name: str
 ) -> None:
     """By frequency, damping, shapes, the law's own numbers and the angle.
 
@@ -47,7 +48,7 @@ def test_the_tangent_is_that_of_whole_simulations(
     """
     omega = np.abs(small_model.poles)
     damped = replace(small_model, poles=omega * (-0.1 + 1j * np.sqrt(1 - 0.01)))
-    lines = windowed_lines(trial_of(damped, "mid", 50.0, 4), band_of(damped, 128.0), 4.0)
+    lines = windowed_spectrum(trial_of(damped, "mid", 50.0, 4), band_of(damped, 128.0), 4.0)
     hypothesis = _explanation(damped, lines, name)
     slope = jacobian(hypothesis, lines, predict_lines(hypothesis, lines))
     size, h = hypothesis.shape.size, 0.03

@@ -9,8 +9,8 @@ from mismatch import Hypothesis, LabError, ModelShape
 from mismatch.faults.tones import NEAR, Tone, above_neighbours
 from mismatch.faults.tones_beyond import tones_beyond
 from mismatch.inference import FAULTS
-from mismatch.records.trial import Trial, band_of
-from mismatch.records.windowed_lines import WindowedLines, windowed_lines
+from mismatch.records.reading import BandRecording, band_of
+from mismatch.records.windowed_spectrum import WindowedSpectrum, windowed_spectrum
 
 TONE = 83.217
 LEVELS = (20.0, 40.0, 80.0)
@@ -19,7 +19,7 @@ DECAY = 1.7
 
 def recordings(
     seed: int, tones: tuple[float, float, float] = (0.0, 0.0, 0.0), forced: float = 0.0
-) -> list[WindowedLines]:
+) -> list[WindowedSpectrum]:
     """Three linear cuts; amplitude of the tone in each, and of the same line in the force."""
     rng = np.random.default_rng(seed)
     found = []
@@ -32,18 +32,18 @@ def recordings(
     return found
 
 
-def prepared(one: Trial) -> WindowedLines:
-    return windowed_lines(one, band_of(structure(), one.rate), DECAY)
+def prepared(one: BandRecording) -> WindowedSpectrum:
+    return windowed_spectrum(one, band_of(structure(), one.rate), DECAY)
 
 
-def found_in(lines: list[WindowedLines]) -> list[Tone]:
+def found_in(lines: list[WindowedSpectrum]) -> list[Tone]:
     shape = ModelShape(structure(), LabError())
     return tones_beyond(Hypothesis(shape, np.zeros(shape.size)), lines, DECAY, 4)
 
 
-def noise_of(lines: list[WindowedLines]) -> NDArray[np.float64]:
+def noise_of(lines: list[WindowedSpectrum]) -> NDArray[np.float64]:
     """About what 2 % noise is, a response, of the middle recording."""
-    return np.asarray(0.02 * lines[1].trial.response.std(axis=0))
+    return np.asarray(0.02 * lines[1].recording.response.std(axis=0))
 
 
 def test_a_tone_below_the_noise_is_found_with_frequency_and_size() -> None:

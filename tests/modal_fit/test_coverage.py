@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cutting import MillingProcess
-from estimation import BandDecimator, BandRecord, Frf, FrfCovariance
+from estimation import BandRecording, Frf, FrfCovariance, Resampler, whole_ratio
 from modal_fit import ModalModel, derived_covariance, fit_polyreference, fit_subspace
 from replay_data import LinearSweep, MillingCell, default_structure, milling_sensors, tip_model
 
@@ -52,7 +52,7 @@ def test_intervals_of_the_polyreference_fit() -> None:
     check(held)
 
 
-def clean_sweeps() -> list[BandRecord]:
+def clean_sweeps() -> list[BandRecording]:
     """Three noise-free simulated sweeps reduced to 0-40 Hz."""
     records = []
     for k, (start, stop) in enumerate(IMMERSIONS):
@@ -62,18 +62,16 @@ def clean_sweeps() -> list[BandRecord]:
         sensors = milling_sensors(0.0, 0.0)
         speed = LinearSweep(450 * RPM, 690 * RPM, 60.0)
         cell = MillingCell(default_structure(), process, 2e-3, speed, 60.0, sensors=sensors, seed=k)
-        decimator = BandDecimator(10240.0, 40.0)
-        samples = decimator.add(cell.samples())
+        resampler = Resampler(10240.0, whole_ratio(10240.0, 40.0))
+        samples = resampler.add(cell.samples())
         channels = cell.streams[0].channels
         records.append(
-            BandRecord(
-                decimator.sample_rate, decimator.usable_band, samples[:, :3], samples[:, 3:], channels[:3], channels[3:]
-            )
+            BandRecording(f"test {k + 1}", resampler.rate, samples[:, :3], samples[:, 3:], channels[:3], channels[3:])
         )
     return records
 
 
-def with_noise(record: BandRecord, share: float, rng: np.random.Generator) -> BandRecord:
+def with_noise(record: BandRecording, share: float, rng: np.random.Generator) -> BandRecording:
     """White noise on every channel, a share of its standard deviation in the band."""
 
     def add(samples: np.ndarray) -> np.ndarray:
@@ -81,8 +79,8 @@ def with_noise(record: BandRecord, share: float, rng: np.random.Generator) -> Ba
 
     return replace(
         record,
-        excitation_samples=add(record.excitation_samples),
-        response_samples=add(record.response_samples),
+        force=add(record.force),
+        response=add(record.response),
     )
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from acquisition import Channel
 from cutting import MillingProcess
-from estimation import BandDecimator, BandRecord
+from estimation import BandRecording, Resampler, whole_ratio
 from foundation import InputError
 from modal_fit import SubspaceFit, fit_subspace, frequency_and_damping_errors
 from modal_fit.maximum_likelihood.likelihood_model import Setting, gauge_directions, jacobian, prediction, transfer
@@ -18,7 +18,7 @@ RPM = 2 * np.pi / 60
 IMMERSIONS = ((0.38, 0.61), (0.77, 1.0), (0.0, 0.23))  # central, down, up milling, in units of pi
 
 
-def sweeps(noise: float, seed: int, duration: float = 60.0) -> list[BandRecord]:
+def sweeps(noise: float, seed: int, duration: float = 60.0) -> list[BandRecording]:
     """Three simulated speed sweeps reduced to 0-40 Hz."""
     records = []
     for k, (start, stop) in enumerate(IMMERSIONS):
@@ -28,13 +28,11 @@ def sweeps(noise: float, seed: int, duration: float = 60.0) -> list[BandRecord]:
         speed = LinearSweep(450 * RPM, 690 * RPM, duration)
         sensors = milling_sensors(noise, noise)
         cell = MillingCell(default_structure(), process, 2e-3, speed, duration, sensors=sensors, seed=10 * seed + k)
-        decimator = BandDecimator(10240.0, 40.0)
-        samples = decimator.add(cell.samples())
+        resampler = Resampler(10240.0, whole_ratio(10240.0, 40.0))
+        samples = resampler.add(cell.samples())
         channels = cell.streams[0].channels
         forces, motions = channels[:3], channels[3:]
-        records.append(
-            BandRecord(decimator.sample_rate, decimator.usable_band, samples[:, :3], samples[:, 3:], forces, motions)
-        )
+        records.append(BandRecording(f"test {k + 1}", resampler.rate, samples[:, :3], samples[:, 3:], forces, motions))
     return records
 
 
@@ -85,13 +83,13 @@ def test_derivatives_equal_differences_and_the_scaling_changes_nothing() -> None
     assert np.abs(derivative @ gauge_directions(model)).max() < 1e-9 * size
 
 
-def record(rate: float, n: int, names: str = "xyz", quantity: str = "acceleration") -> BandRecord:
+def record(rate: float, n: int, names: str = "xyz", quantity: str = "acceleration") -> BandRecording:
     rng = np.random.default_rng(n)
     forces = tuple(Channel(f"f{a}", "force", "N", "TCP", f"+{a.upper()}") for a in names)
     unit = {"acceleration": "m/s^2", "temperature": "K"}[quantity]
     motions = tuple(Channel(f"a{a}", quantity, unit, "TCP", f"+{a.upper()}") for a in names)
     shape = (n, len(names))
-    return BandRecord(rate, 0.4 * rate, rng.standard_normal(shape), rng.standard_normal(shape), forces, motions)
+    return BandRecording("test", rate, rng.standard_normal(shape), rng.standard_normal(shape), forces, motions)
 
 
 @pytest.mark.parametrize(
@@ -106,7 +104,7 @@ def record(rate: float, n: int, names: str = "xyz", quantity: str = "acceleratio
     ],
 )
 def test_records_that_cannot_be_used_are_refused(
-    records: list[BandRecord], band: tuple[float, float], message: str
+    records: list[BandRecording], band: tuple[float, float], message: str
 ) -> None:
     with pytest.raises(InputError, match=message):
         fit_subspace(records, band)

@@ -7,8 +7,8 @@ import pytest
 
 from cutting import MillingProcess
 from cutting.one_tooth import tooth_offsets
+from foundation import TIP
 from modal_fit import ModalModel
-from replay_data.robot_structure import TOOL_TIP
 from replay_data.simulation.material import material_named
 from replay_data.simulation.milling_loop import empty_memory, mill, prepare_cut
 from replay_data.simulation.modal_integrator import discretise
@@ -22,7 +22,7 @@ def benchmark_structure() -> ModalModel:
     damped = natural * math.sqrt(1 - zeta**2)
     right = np.array([[1 / (2j * mass * damped), 0, 0]])
     left = np.array([[1, 0, 0]], dtype=complex)
-    return ModalModel(np.array([-zeta * natural + 1j * damped]), right, left, TOOL_TIP, TOOL_TIP)
+    return ModalModel(np.array([-zeta * natural + 1j * damped]), right, left, TIP, TIP)
 
 
 def growth_per_tooth(start: float, leave: float, speed_rpm: float, depth: float) -> float:

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cutting import MillingProcess
+from foundation import TIP
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
 RPM = pi / 30
-TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 STEPS = 240
 """A tooth period; the immersion is a whole number of them, so that no step lies across an entry or an exit."""
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError
 
-from ...frf_matrix.frf import Frf
+from ...frf_matrix import Frf
 from ..entries import FrfEntry
 
 ORDINARY, MULTIPLE = 6, 26

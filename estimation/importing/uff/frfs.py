@@ -13,7 +13,7 @@ import numpy as np
 from acquisition import read_uff_sets
 from foundation import FileFormatError, InputError
 
-from ...frf_matrix.frf import Frf
+from ...frf_matrix import Frf
 from ..entries import FrfEntry, ImportedFrf, assembled
 from .coherences import MULTIPLE, ORDINARY, Coherence, coherences_of, with_coherences, with_multiple_coherence
 from .uff_units import StatedUnit, stated_unit

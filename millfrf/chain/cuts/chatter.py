@@ -11,14 +11,14 @@ import numpy as np
 
 from acquisition import Channel, Recording
 from cutting import MillingProcess
-from estimation import choose_channels
+from estimation import choose_channels, derivative_orders
 from foundation import DegreeOfFreedom, InputError
 from modal_fit import ModalModel
 from stability import ChatterVerdict, ModelledCut, classify_cut
 
 from ...gate import check_one_speed, check_recordings
-from ...progress import Watch, silent
-from ...tables.result_tables import Table
+from ...progress import Progress, silent
+from ...tables import Table
 
 OTHERS = "name the other channels with --response"
 """Remedy of a channel that cannot be used."""
@@ -65,10 +65,8 @@ class CutOptions:
 
 MOTION = ("displacement", "velocity", "acceleration")
 """Quantities whose size tells by how much the chip changes."""
-TIP = "TCP"
+TIP_NODE = "TCP"
 """Node of the tool's tip."""
-DERIVATIVES = {"acceleration": 2, "velocity": 1}
-"""How often a quantity is the time derivative of displacement; 0 for all others."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +100,7 @@ class JudgedCut:
 
 
 def judge_recordings(
-    paths: Sequence[str | os.PathLike[str]], options: CutOptions, watch: Watch = silent
+    paths: Sequence[str | os.PathLike[str]], options: CutOptions, progress: Progress = silent
 ) -> tuple[JudgedCut, ...]:
     """The verdict on each recording.
 
@@ -117,7 +115,7 @@ def judge_recordings(
             stream = recording.stream(options.stream)
             _, responses = choose_channels(stream, None, options.responses or None)
             rpm, tool = _speed(recording, options), tool_channels(responses)
-            with watch(f"judging {Path(path).name}"):
+            with progress(f"judging {Path(path).name}"):
                 samples = stream.read(channels=[channel.name for channel in responses])
                 found = classify_cut(
                     samples,
@@ -125,7 +123,7 @@ def judge_recordings(
                     rpm * math.pi / 30,
                     options.teeth,
                     runout=options.runout,
-                    derivatives=[DERIVATIVES.get(channel.quantity, 0) for channel in responses],
+                    derivatives=derivative_orders(responses).tolist(),
                     natural_frequencies=() if options.model is None else options.model.natural_frequencies.tolist(),
                     chip=options.chip if tool else math.nan,
                     tool=tool,
@@ -145,7 +143,7 @@ def tool_channels(channels: Sequence[Channel]) -> tuple[int, ...]:
     nodes = [channel.node for _, channel in across]
     if not nodes:
         return ()
-    chosen = TIP if TIP in nodes else nodes[0]
+    chosen = TIP_NODE if TIP_NODE in nodes else nodes[0]
     return tuple(number for number, channel in across if channel.node == chosen)
 
 
@@ -157,11 +155,11 @@ def modelled_cut(options: CutOptions, channels: Sequence[Channel]) -> ModelledCu
     there = {
         channel.direction[1:]: (number, -1 if channel.direction[:1] == "-" else 1)
         for number, channel in enumerate(channels)
-        if channel.quantity in MOTION and channel.node == TIP
+        if channel.quantity in MOTION and channel.node == TIP_NODE
     }
     for axis in "XY":
         ends = [
-            any((one.node, one.axis) == (TIP, axis) for one in map(DegreeOfFreedom.parse, names))
+            any((one.node, one.axis) == (TIP_NODE, axis) for one in map(DegreeOfFreedom.parse, names))
             for names in (model.responses, model.excitations)
         ]
         if axis not in there or not all(ends):
@@ -207,7 +205,7 @@ def tone_table(cuts: Sequence[JudgedCut]) -> Table:
 
 
 def doubts_of_cuts(
-    paths: Sequence[str | os.PathLike[str]], process: MillingProcess, options: CutOptions, watch: Watch = silent
+    paths: Sequence[str | os.PathLike[str]], process: MillingProcess, options: CutOptions, progress: Progress = silent
 ) -> list[str]:
     """Judge recordings before they are classified: their channels, and what they state of speed and teeth.
 
@@ -223,7 +221,7 @@ def doubts_of_cuts(
             _, responses = choose_channels(stream, None, options.responses or None)
             doubts += check_one_speed(recording.path.name, recording.setup, process, options.speed_rpm)
         names = [channel.name for channel in responses]
-        doubts += check_recordings([path], stream=options.stream, responses=names, watch=watch, remedy=OTHERS)
+        doubts += check_recordings([path], stream=options.stream, responses=names, progress=progress, remedy=OTHERS)
     return doubts
 
 

@@ -8,7 +8,7 @@ from acquisition import Recording
 from estimation import choose_channels
 from stability import cut_spectrum, gather_evidence
 
-from ...progress import Watch, silent
+from ...progress import Progress, silent
 from .chatter import CutOptions, JudgedCut
 from .chatter_file import KeptCut
 
@@ -19,7 +19,7 @@ ABOVE = 1.5
 
 
 def keep_spectra(
-    paths: Sequence[str | os.PathLike[str]], cuts: Sequence[JudgedCut], options: CutOptions, watch: Watch = silent
+    paths: Sequence[str | os.PathLike[str]], cuts: Sequence[JudgedCut], options: CutOptions, progress: Progress = silent
 ) -> tuple[KeptCut, ...]:
     """Compute the spectrum behind each verdict.
 
@@ -38,7 +38,7 @@ def keep_spectra(
             stream = recording.stream(options.stream)
             _, responses = choose_channels(stream, None, options.responses or None)
             samples = stream.read(channels=[channel.name for channel in responses])
-        with watch(f"spectrum of {cut.name}"):
+        with progress(f"spectrum of {cut.name}"):
             speed = cut.stated_rpm * math.pi / 30
             evidence = gather_evidence(samples, stream.sample_rate, speed, options.teeth)
             spectrum = cut_spectrum(evidence, _highest(cut, options.teeth))

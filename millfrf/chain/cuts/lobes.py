@@ -23,7 +23,7 @@ from stability import (
 )
 
 from ...gate import check_band_of_lobes, check_frf, check_model, check_window_damping
-from ...progress import Watch, silent
+from ...progress import Progress, silent
 
 Speeds = NDArray[np.float64]
 
@@ -67,7 +67,7 @@ def compute_lobes(
     spindle_speeds: NDArray[np.float64],
     max_depth: float,
     method: str = CERTIFIED,
-    watch: Watch = silent,
+    progress: Progress = silent,
     name: str = "the structure",
 ) -> StabilityLobes:
     """Depth limit at each spindle speed (rad/s), up to ``max_depth`` (m), certified unless a solver is named.
@@ -91,7 +91,7 @@ def compute_lobes(
         doubts = check_frf(dynamics, name)
     else:
         doubts = check_model(dynamics, name)
-    with watch(f"lobes, {method}"):
+    with progress(f"lobes, {method}"):
         found = _solved(known, process, spindle_speeds, max_depth, method)
     doubts += check_band_of_lobes(known, found, process)
     return replace(found, warnings=(*found.warnings, *doubts))

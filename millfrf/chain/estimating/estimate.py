@@ -36,7 +36,7 @@ from ...gate import (
     driven_lines,
     gain_of,
 )
-from ...progress import Watch, silent
+from ...progress import Progress, silent
 from ...provenance import sources, versions
 from .estimate_options import INSTRUMENTAL, LOCAL, TITLES, Estimate, EstimateOptions, check_options
 from .instruments import channels_with_instruments, only_inputs
@@ -46,7 +46,7 @@ SPECTRAL: dict[str, Callable[[CrossSpectra], Frf]] = {"h1": h1, "h2": h2, "hv": 
 
 
 def spectra_of_tests(
-    paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, watch: Watch = silent
+    paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, progress: Progress = silent
 ) -> tuple[CrossSpectra, ...]:
     """Spectra of each recording on the lines that are wanted.
 
@@ -64,11 +64,11 @@ def spectra_of_tests(
                 f"{Path(path).name} was sampled at {rate:g} Hz, {Path(paths[0]).name} at {rates[0]:g} Hz; "
                 "stack tests of one sample rate"
             )
-    return tuple(_spectra(path, options, watch) for path in paths)
+    return tuple(_spectra(path, options, progress) for path in paths)
 
 
 def estimate_recordings(
-    paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, watch: Watch = silent
+    paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, progress: Progress = silent
 ) -> Estimate:
     """FRF over one or many recordings.
 
@@ -80,7 +80,7 @@ def estimate_recordings(
     """
     check_options(options)
     if options.estimator == LOCAL:
-        return _local_estimate(paths, options, watch)
+        return _local_estimate(paths, options, progress)
     forces, taken = options.excitations, options
     if options.estimator == INSTRUMENTAL and paths:
         names = (options.excitations, options.responses)
@@ -93,9 +93,9 @@ def estimate_recordings(
         responses=taken.responses,
         excluding=taken.exclude,
         segments=Segmentation(taken.segment, taken.overlap, taken.window),
-        watch=watch,
+        progress=progress,
     )
-    tests = spectra_of_tests(paths, taken, watch)
+    tests = spectra_of_tests(paths, taken, progress)
     total = sum_tests(tests)
     if options.estimator == INSTRUMENTAL:
         tests = tuple(only_inputs(test, forces) for test in tests)
@@ -112,17 +112,17 @@ def estimate_recordings(
     return _finished(frf, tests, doubts)
 
 
-def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, watch: Watch) -> Estimate:
+def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, progress: Progress) -> Estimate:
     """By local polynomials over whole records; the inputs are judged by spectra as everywhere."""
     assert options.band is not None
     names = (options.excitations, options.responses)
     doubts = check_recordings(
-        paths, stream=options.stream, excitations=names[0], responses=names[1], segments=None, watch=watch
+        paths, stream=options.stream, excitations=names[0], responses=names[1], segments=None, progress=progress
     )
-    records = band_records(paths, names, options.stream, options.band[1], watch)
+    records = band_records(paths, names, options.stream, options.band[1], progress)
     tests = tuple(lines_of(test, options.band) for test in judging_spectra(records, options.band))
     doubts += [*_rate_doubts(paths, tests), *check_inputs(sum_tests(tests))]
-    frf = local_frf(records, options.band, watch)
+    frf = local_frf(records, options.band, progress)
     return _finished(frf, tests, [*doubts, *check_local_frf(frf, len(records))])
 
 
@@ -174,11 +174,11 @@ def _sample_rate(path: str | os.PathLike[str], stream: str | None) -> float:
         return recording.stream(stream).sample_rate
 
 
-def _spectra(path: str | os.PathLike[str], options: EstimateOptions, watch: Watch) -> CrossSpectra:
+def _spectra(path: str | os.PathLike[str], options: EstimateOptions, progress: Progress) -> CrossSpectra:
     with Recording(path) as recording:
         source = recording.stream(options.stream)
         settings = settings_for(source.sample_rate, options.segment, overlap=options.overlap, window=options.window)
-        with watch(f"spectra of {Path(path).name}", source.n_samples) as update:
+        with progress(f"spectra of {Path(path).name}", source.n_samples) as update:
             spectra = cross_spectra(
                 recording,
                 settings,

@@ -6,18 +6,18 @@ from pathlib import Path
 
 from acquisition import Recording
 from estimation import (
-    BandRecord,
+    BandRecording,
     CrossSpectra,
     Frf,
     SpectralAccumulator,
-    band_record,
+    band_of_channels,
     choose_channels,
     local_polynomial,
     settings_for,
 )
 from foundation import Band, InputError
 
-from ...progress import Watch
+from ...progress import Progress
 
 LONGEST = 8.0
 """Longest segment of the spectra by which the inputs are judged, s."""
@@ -28,8 +28,8 @@ def band_records(
     names: tuple[Sequence[str], Sequence[str]],
     stream: str | None,
     highest: float,
-    watch: Watch,
-) -> tuple[BandRecord, ...]:
+    progress: Progress,
+) -> tuple[BandRecording, ...]:
     """Read each recording up to ``highest`` (Hz).
 
     Parameters
@@ -47,32 +47,32 @@ def band_records(
         with Recording(path) as recording:
             source = recording.stream(stream)
             channels = choose_channels(source, names[0] or None, names[1] or None)
-            with watch(f"reading {Path(path).name}", source.n_samples) as update:
-                records.append(band_record(recording, highest, *channels, stream=stream, progress=update))
+            with progress(f"reading {Path(path).name}", source.n_samples) as update:
+                records.append(band_of_channels(source, *channels, highest, update))
     for path, record in zip(paths, records, strict=True):
-        if record.sample_rate != records[0].sample_rate:
+        if record.rate != records[0].rate:
             raise InputError(
                 f"{Path(path).name} and {Path(paths[0]).name} have other sample rates; stack tests of one rate"
             )
     return tuple(records)
 
 
-def judging_spectra(records: Sequence[BandRecord], band: Band) -> tuple[CrossSpectra, ...]:
+def judging_spectra(records: Sequence[BandRecording], band: Band) -> tuple[CrossSpectra, ...]:
     """Spectra of each record in the band, by which its inputs are judged; each input can have a segment of its own."""
     n_inputs = len(records[0].excitations)
-    shortest = min(len(record.excitation_samples) / record.sample_rate for record in records)
+    shortest = min(len(record.force) / record.rate for record in records)
     seconds = min(LONGEST, shortest, shortest * len(records) / (2 * n_inputs))
-    return tuple(_spectra(record, max(seconds, 8 / record.sample_rate)) for record in records)
+    return tuple(_spectra(record, max(seconds, 8 / record.rate)) for record in records)
 
 
-def _spectra(record: BandRecord, seconds: float) -> CrossSpectra:
-    settings = settings_for(record.sample_rate, seconds, window="hann")
-    accumulator = SpectralAccumulator(record.excitations, record.responses, record.sample_rate, settings)
-    accumulator.add(record.excitation_samples, record.response_samples)
+def _spectra(record: BandRecording, seconds: float) -> CrossSpectra:
+    settings = settings_for(record.rate, seconds, window="hann")
+    accumulator = SpectralAccumulator(record.excitations, record.responses, record.rate, settings)
+    accumulator.add(record.force, record.response)
     return accumulator.finish()
 
 
-def local_frf(records: Sequence[BandRecord], band: Band, watch: Watch) -> Frf:
+def local_frf(records: Sequence[BandRecording], band: Band, progress: Progress) -> Frf:
     """The FRF on every Fourier line of the band."""
-    with watch(f"local polynomials, {band[0]:g} to {band[1]:g} Hz"):
+    with progress(f"local polynomials, {band[0]:g} to {band[1]:g} Hz"):
         return local_polynomial(records, band)

@@ -12,7 +12,7 @@ from foundation import writing_whole_file
 from modal_fit import ModalModel, TipCalibration, calibrate_to_tip, write_modal_model
 
 from ...gate import check_model, check_tip_and_sensor, stored_doubts
-from ...progress import Watch, silent
+from ...progress import Progress, silent
 from ...provenance import add_to_json, read_provenance, sources, versions
 
 
@@ -20,7 +20,7 @@ def calibrate_model(
     model: ModalModel,
     tip: Frf,
     sensor: Frf,
-    watch: Watch = silent,
+    progress: Progress = silent,
     names: tuple[str, str] = ("the tip's FRF", "the sensor's FRF"),
 ) -> TipCalibration:
     """Carry a model to the tool tip by two hammer FRFs.
@@ -32,7 +32,7 @@ def calibrate_model(
         of the FRFs in its messages.
     """
     doubts = [*check_model(model), *check_tip_and_sensor(model, tip, sensor, names)]
-    with watch("calibrating to the tool tip"):
+    with progress("calibrating to the tool tip"):
         found = calibrate_to_tip(model, tip, sensor)
     return replace(found, warnings=(*doubts, *found.warnings))
 

@@ -12,7 +12,7 @@ from modal_fit import ModalFit, SubspaceFit
 
 from ...file_kinds import FRF, RECORDING, kind_of
 from ...gate import stored_doubts
-from ...progress import Watch, silent
+from ...progress import Progress, silent
 from .fit import fit_model, fit_recordings
 from .fit_options import METHODS, POLYREFERENCE, SUBSPACE, FitOptions
 
@@ -23,7 +23,7 @@ def fit_files(
     files: Sequence[str | os.PathLike[str]],
     method: str | None,
     options_of: Callable[[str], FitOptions],
-    watch: Watch = silent,
+    progress: Progress = silent,
 ) -> tuple[ModalFit | SubspaceFit, FitOptions]:
     """Fit one FRF file or all recordings; returns the fit and the options it was made with.
 
@@ -46,10 +46,10 @@ def fit_files(
     kinds = {kind_of(file) for file in files}
     if kinds == {RECORDING}:
         options = options_of(method or SUBSPACE)
-        return _counted(fit_recordings(files, options, watch), options), options
+        return _counted(fit_recordings(files, options, progress), options), options
     if kinds == {FRF} and len(files) == 1:
         options = options_of(method or POLYREFERENCE)
-        fit = fit_model(read_frf(files[0]), options, watch, Path(files[0]).name)
+        fit = fit_model(read_frf(files[0]), options, progress, Path(files[0]).name)
         fit = _counted(fit, options)
         return replace(fit, warnings=(*stored_doubts(files[0]), *fit.warnings)), options
     raise InputError(

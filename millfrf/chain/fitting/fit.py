@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import Recording
-from estimation import BandRecord, Frf, band_record, choose_channels, widest_band
+from estimation import BandRecording, Frf, band_of_channels, choose_channels, widest_band
 from foundation import InputError, writing_whole_file
 from modal_fit import (
     ModalFit,
@@ -19,7 +19,7 @@ from modal_fit import (
 )
 
 from ...gate import check_frf_for_fit, check_recordings, check_records, fit_doubts
-from ...progress import Watch, silent
+from ...progress import Progress, silent
 from ...provenance import add_to_json, sources, versions
 from .fit_options import (
     KEPT_ABOVE,
@@ -32,7 +32,7 @@ from .fit_options import (
 from .pole_picking import check_picking, fit_picked
 
 
-def fit_model(frf: Frf, options: FitOptions, watch: Watch = silent, name: str = "the FRF") -> ModalFit:
+def fit_model(frf: Frf, options: FitOptions, progress: Progress = silent, name: str = "the FRF") -> ModalFit:
     """Fit a modal model to an FRF; ``name`` is that of its file, for messages.
 
     Raises
@@ -47,7 +47,7 @@ def fit_model(frf: Frf, options: FitOptions, watch: Watch = silent, name: str = 
         raise InputError(f"method {options.method!r} does not fit an FRF; use {POLYREFERENCE}, or give recordings")
     check_picking(options)
     doubts = check_frf_for_fit(frf, options.band, name)
-    with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
+    with progress(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
         if options.poles is None:
             fit = fit_polyreference(frf, options.band, max_order=options.max_order, n_modes=options.n_modes)
         else:
@@ -56,7 +56,9 @@ def fit_model(frf: Frf, options: FitOptions, watch: Watch = silent, name: str = 
     return replace(fit, warnings=(*doubts, *fit.warnings, *poor))
 
 
-def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions, watch: Watch = silent) -> SubspaceFit:
+def fit_recordings(
+    paths: Sequence[str | os.PathLike[str]], options: FitOptions, progress: Progress = silent
+) -> SubspaceFit:
     """Fit a modal model to recordings of one set-up, without spectra in between.
 
     Raises
@@ -71,16 +73,16 @@ def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions,
     if options.poles is not None or options.refine:
         raise InputError("--poles picks poles of an FRF; estimate one from these recordings first")
     doubts = check_recordings(
-        paths, stream=options.stream, excitations=options.excitations, responses=options.responses, watch=watch
+        paths, stream=options.stream, excitations=options.excitations, responses=options.responses, progress=progress
     )
-    records = [_band_record(path, options, watch) for path in paths]
+    records = [_band_recording(path, options, progress) for path in paths]
     doubts += check_records(
         [record for record, _ in records],
         options.band,
         [Path(path).name for path in paths],
         [rate for _, rate in records],
     )
-    with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
+    with progress(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
         fit = fit_subspace(
             [record for record, _ in records],
             options.band,
@@ -90,13 +92,15 @@ def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions,
     return replace(fit, warnings=(*doubts, *fit.warnings, *fit_doubts(fit.reduced_chi_square, None)))
 
 
-def _band_record(path: str | os.PathLike[str], options: FitOptions, watch: Watch) -> tuple[BandRecord, float]:
+def _band_recording(
+    path: str | os.PathLike[str], options: FitOptions, progress: Progress
+) -> tuple[BandRecording, float]:
     with Recording(path) as recording:
         stream = recording.stream(options.stream)
         channels = choose_channels(stream, options.excitations or None, options.responses or None)
-        with watch(f"reading {Path(path).name}", stream.n_samples) as update:
+        with progress(f"reading {Path(path).name}", stream.n_samples) as update:
             highest = max(options.band[1], min(KEPT_ABOVE * options.band[1], widest_band(stream.sample_rate)))
-            made = band_record(recording, highest, *channels, stream=options.stream, progress=update)
+            made = band_of_channels(stream, *channels, highest, update)
     return made, stream.sample_rate
 
 

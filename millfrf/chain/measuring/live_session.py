@@ -7,15 +7,10 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from acquisition import Source
-from acquisition.session import Session
-from acquisition.sources.events import announced_events
-from acquisition.sources.feeds import WithFeeds
+from acquisition import Session, Source, WithFeeds, announced_events
 from foundation import MillfrfError
 
-from ...live import LiveControl, LiveMonitor, LiveServer, LiveSettings
-from ...live.control import MARKS
-from ...live.server import LOOPBACK
+from ...live import LOOPBACK, MARKS, LiveControl, LiveMonitor, LiveServer, LiveSettings
 from .record_session import OpenedSession, Tally, acquire, interrupts
 
 _LINGER = 3.0  # s in which open pages learn how it ended

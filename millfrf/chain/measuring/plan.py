@@ -12,7 +12,7 @@ from estimation import SweepDemand, SweepPlan, plan_sweeps
 from foundation import FileFormatError, mistake_in_words
 
 from ...gate import check_demand, check_duration, read_checked_cutting
-from ...tables.result_tables import Table
+from ...tables import Table
 
 RPM = math.pi / 30
 

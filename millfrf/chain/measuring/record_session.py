@@ -9,10 +9,20 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from acquisition import Block, DeviceError, DiskFull, Events, Paced, Source, record
-from acquisition.session import Session, build_source
-from acquisition.session.read import session_from_text, session_text
-from acquisition.session.tables import SimulatedDevice
+from acquisition import (
+    Block,
+    DeviceError,
+    DiskFull,
+    Events,
+    Paced,
+    Session,
+    SimulatedDevice,
+    Source,
+    build_source,
+    record,
+    session_from_text,
+    session_text,
+)
 from foundation import MillfrfError
 
 Watcher = Callable[[Block | Events], None]
@@ -97,7 +107,7 @@ def _simulated(session: Session) -> Source:
     """The simulated cell, milling in real time."""
     from replay_data import MillingCell, default_structure, milling_sensors
 
-    from ...demonstration.whole_chain import CUTTER
+    from ...demonstration import CUTTER
 
     device = session.device
     assert isinstance(device, SimulatedDevice)
@@ -147,7 +157,7 @@ def acquire(
     tally = Tally({stream.name: stream.sample_rate for stream in opened.source.streams})
     duration = opened.session.duration_s or math.inf
 
-    def watch(taken: Block | Events) -> None:
+    def observe(taken: Block | Events) -> None:
         tally(taken)
         for watcher in watchers:
             watcher(taken)
@@ -157,7 +167,7 @@ def acquire(
             record(
                 opened.source,
                 out,
-                watch=watch,
+                observer=observe,
                 progress=progress,
                 stop=lambda: interrupted() or stop() or tally.seconds() >= duration,
             )

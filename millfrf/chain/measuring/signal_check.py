@@ -14,7 +14,7 @@ from acquisition import Block, Channel, Source, StreamDescription
 from estimation import find_taps
 from foundation import InputError
 
-from ...tables.result_tables import Table
+from ...tables import Table
 
 LEAST_MARGIN_DB = 6.0
 """Headroom below which a peak is too near to full scale."""

@@ -1,6 +1,5 @@
 """What the samples of a recording show by themselves, in one pass over the file."""
 
-from .channel_levels import ChannelLevel, level_table
-from .one_pass import Look, look, rate_concerns
+import lazy_loader
 
-__all__ = ["ChannelLevel", "Look", "level_table", "look", "rate_concerns"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

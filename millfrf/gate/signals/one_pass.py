@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition import Stream
 
-from ...progress import Watch, silent
+from ...progress import Progress, silent
 from .channel_levels import ChannelLevel
 from .copies import Copies
 from .repeated_rows import RepeatedRows
@@ -61,7 +61,7 @@ def rate_concerns(sample_rate: float) -> list[str]:
     ]
 
 
-def look(stream: Stream, names: Sequence[str] | None = None, watch: Watch = silent) -> Look:
+def look(stream: Stream, names: Sequence[str] | None = None, progress: Progress = silent) -> Look:
     """Read a stream once and judge its channels.
 
     Parameters
@@ -70,7 +70,7 @@ def look(stream: Stream, names: Sequence[str] | None = None, watch: Watch = sile
         Stream of an open recording.
     names
         Names of the channels to look at; None: all.
-    watch
+    progress
         Shows progress while samples are read.
     """
     known = {channel.name: channel for channel in stream.channels}
@@ -78,7 +78,7 @@ def look(stream: Stream, names: Sequence[str] | None = None, watch: Watch = sile
     levels = tuple(ChannelLevel(known[name]) for name in chosen)
     repeats, copies = RepeatedRows(), Copies(chosen)
     done = 0
-    with watch(f"levels of {stream.name}", stream.n_samples) as update:
+    with progress(f"levels of {stream.name}", stream.n_samples) as update:
         for block in stream.blocks(channels=chosen):
             _take(block, levels, repeats, copies)
             done += len(block)

@@ -13,7 +13,7 @@ from foundation import writing_whole_file
 from mismatch.adapters.cut import COEFFICIENT_NAMES, CutDiagnosis
 
 from ...provenance import versions
-from ...tables.result_tables import Table
+from ...tables import Table
 from ..section import Picture, Section
 
 

@@ -147,11 +147,11 @@ def _times(diagnosis: StructureDiagnosis) -> list[str]:
     """Said only where a recording is not affected as a whole."""
     said = []
     for one in diagnosis.details.recordings:
-        stretches = [row for row in diagnosis.located["times"] if row["recording"] == one.trial.name]
+        stretches = [row for row in diagnosis.located["times"] if row["recording"] == one.recording.name]
         held = sum(row["end_s"] - row["start_s"] for row in stretches)
-        if stretches and held < 0.8 * (one.trial.duration - one.start / one.trial.rate):
+        if stretches and held < 0.8 * (one.recording.duration - one.start / one.recording.rate):
             spans = ", ".join(f"{row['start_s']:.3g} to {row['end_s']:.3g} s" for row in stretches[:6])
-            said.append(f"In {one.trial.name} it is seen at {spans}{' and later' if len(stretches) > 6 else ''}.")
+            said.append(f"In {one.recording.name} it is seen at {spans}{' and later' if len(stretches) > 6 else ''}.")
     return said
 
 

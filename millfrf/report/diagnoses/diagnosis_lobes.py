@@ -10,7 +10,7 @@ from mismatch.adapters.structure.pruning import zero_of
 from mismatch.models.equivalent_receptance import equivalent_receptance
 from stability import StabilityLobes, zero_order
 
-from ...tables.result_tables import Table
+from ...tables import Table
 from ..section import Picture, Section
 
 ASSUMED = MillingProcess(
@@ -79,7 +79,7 @@ def _curves(diagnosis: StructureDiagnosis, cut: MillingProcess) -> dict[str, Sta
     curves = {"nominal": limits(nominal, 0)}
     if any(cause.direction is not None for cause in final.causes) and len(lines) > 1:
         for place in (0, len(lines) - 1):
-            curves[f"improved, as in {lines[place].trial.name}"] = limits(final, place)
+            curves[f"improved, as in {lines[place].recording.name}"] = limits(final, place)
     else:
         curves["improved"] = limits(final, 0)
     if any(not np.isfinite(lobes.depth_limits).any() for lobes in curves.values()):

@@ -74,7 +74,7 @@ def _drawn_sections(diagnosis: StructureDiagnosis, process: MillingProcess | Non
 def report_text(diagnosis: StructureDiagnosis, model_name: str = "", process: MillingProcess | None = None) -> str:
     """The page as text."""
     sections = (number_section(diagnosis), *_drawn_sections(diagnosis, process), candidate_section(diagnosis))
-    names = ", ".join(one.trial.name for one in diagnosis.details.recordings)
+    names = ", ".join(one.recording.name for one in diagnosis.details.recordings)
     environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
     return environment.get_template("diagnosis.html.j2").render(
         title=f"{model_name or 'Nominal model'} against {names}",

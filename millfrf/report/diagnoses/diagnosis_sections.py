@@ -13,7 +13,7 @@ from mismatch.location.held_out_spectra import held_out_spectra
 from mismatch.location.locate import significant_cells
 from mismatch.location.recording_errors import recording_errors
 
-from ...tables.result_tables import Table
+from ...tables import Table
 from ..section import Picture, Section
 from .diagnosis_answers import number, place, words
 

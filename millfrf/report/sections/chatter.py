@@ -4,8 +4,7 @@ import math
 
 from figures import ShownCut, as_data_uri, chatter_figure
 
-from ...chain.cuts.chatter import tone_table, verdict_table
-from ...chain.cuts.chatter_file import KeptCut
+from ...chain import KeptCut, tone_table, verdict_table
 from ..collection import Collected
 from ..section import Picture, Section
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from modal_fit import ModalModel, ModePair, compare_modes
 
-from ...tables.result_tables import Table, with_error
+from ...tables import Table, with_error
 from ..collection import Collected, SourceFile
 from ..section import Section
 

@@ -1,6 +1,6 @@
 """Poles that an automatic fit did not take for modes, with the reasons, folded."""
 
-from ...tables.result_tables import Table
+from ...tables import Table
 from ..collection import SourceFile
 from ..section import Fold
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from ...tables.result_tables import Table
+from ...tables import Table
 from ..collection import Collected
 from ..section import Section
 

@@ -7,11 +7,11 @@ from typing import Any
 from acquisition import Recording
 from figures import as_data_uri, time_figure
 
-from ...chain.estimating.estimate_options import LOCAL
-from ...gate.signals import level_table, look
-from ...progress import Watch
-from ...tables.result_tables import Table
-from ...tap_concerns import tap_concerns
+from ...chain import LOCAL
+from ...gate import level_table, look
+from ...progress import Progress
+from ...tables import Table
+from ...taps import tap_concerns
 from ..collection import Collected, SourceFile
 from ..section import Picture, Section
 
@@ -67,7 +67,7 @@ def _value(value: Any) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def channel_section(collected: Collected, watch: Watch) -> tuple[Section, list[str]]:
+def channel_section(collected: Collected, progress: Progress) -> tuple[Section, list[str]]:
     """Levels of every channel, an overview in time, and what looks wrong."""
     tables, pictures, concerns = [], [], []
     for number, file in enumerate(collected.recordings):
@@ -77,7 +77,7 @@ def channel_section(collected: Collected, watch: Watch) -> tuple[Section, list[s
             for stream in recording.streams.values():
                 if not stream.n_samples:
                     continue
-                seen = look(stream, watch=watch)
+                seen = look(stream, progress=progress)
                 table = level_table(stream, seen.levels)
                 tables.append(Table(f"{file.path.name}, {table.title}", table.columns, table.rows))
                 looks = [*seen.concerns(stream.sample_rate), *tap_concerns(stream, seen.levels)]

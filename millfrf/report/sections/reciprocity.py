@@ -4,7 +4,7 @@ from estimation import reciprocity_pairs
 from figures import as_data_uri, reciprocity_figure
 
 from ...gate import shown_pairs
-from ...tables.reciprocity_tables import pair_table, vector_table
+from ...reciprocity_tables import pair_table, vector_table
 from ..collection import Collected
 from ..section import Picture, Section
 

@@ -7,11 +7,9 @@ import numpy as np
 from figures import as_data_uri, input_figure, stabilisation_figure
 from modal_fit import ModalModel
 
-from ...chain.estimating.estimate import spectra_of_tests
-from ...chain.estimating.estimate_options import EstimateOptions
-from ...chain.fitting.fit_options import chart_from_json
-from ...progress import Watch
-from ...tables.result_tables import error_table, mode_table
+from ...chain import EstimateOptions, chart_from_json, spectra_of_tests
+from ...progress import Progress
+from ...tables import error_table, mode_table
 from ..collection import Collected, SourceFile
 from ..section import Fold, Picture, Section
 from .dropped_part import dropped_part
@@ -20,7 +18,7 @@ from .indicator_part import has_lines, indicator_part
 from .shape_part import shape_part
 
 
-def input_section(collected: Collected, band: Band | None, watch: Watch) -> Section:
+def input_section(collected: Collected, band: Band | None, progress: Progress) -> Section:
     """Independence of the inputs of each FRF whose recordings are among the files."""
     pictures = []
     for file, frf in collected.frfs:
@@ -29,7 +27,7 @@ def input_section(collected: Collected, band: Band | None, watch: Watch) -> Sect
             continue
         if not recordings or len(recordings) != len(file.provenance["sources"]) or len(frf.excitations) < 2:
             continue
-        tests = spectra_of_tests([recording.path for recording in recordings], _options(file), watch)
+        tests = spectra_of_tests([recording.path for recording in recordings], _options(file), progress)
         found = collected.model_of(file, frf)
         axis = band or axis_of(frf, band_of(found[0]) if found else None)
         caption = (

@@ -3,8 +3,7 @@
 from figures import as_data_uri, assurance_figure, compass_figure, mode_figure
 from modal_fit import ModalModel, ModeShapes
 
-from ...tables.mode_shapes import shape_table, shapes_of
-from ...tables.result_tables import Table
+from ...tables import Table, shape_table, shapes_of
 from ..section import Picture
 
 FEW = 6

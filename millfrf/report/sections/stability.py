@@ -9,7 +9,7 @@ from cutting import MillingProcess
 from figures import LobesBand, as_data_uri, lobes_figure
 from stability import StabilityLobes
 
-from ...tables.result_tables import Table
+from ...tables import Table
 from ..collection import Collected
 from ..lobes_check import CheckedLobes, checked_lobes, lobes_warnings
 from ..recommendation import recommendation

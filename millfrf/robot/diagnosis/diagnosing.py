@@ -22,7 +22,7 @@ from robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read
 from ...gate import RECORD_AGAIN, check_channels
 from ...options import check_band
 from ...progress import bar
-from ...report.diagnoses.robot_diagnosis_page import write_robot_report
+from ...report import write_robot_report
 from ...result_folder import refuse_file
 from ..postures import Asked, posture_of, spatial
 from .diagnosis_words import summary
@@ -90,7 +90,7 @@ def _doubts(paths: Sequence[Path], stream: str | None) -> list[str]:
     return [
         doubt
         for path in paths
-        for doubt in check_channels([path], posed_channels, stream, watch=bar, remedy=RECORD_AGAIN)
+        for doubt in check_channels([path], posed_channels, stream, progress=bar, remedy=RECORD_AGAIN)
     ]
 
 

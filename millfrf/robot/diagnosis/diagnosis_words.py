@@ -12,7 +12,7 @@ from mismatch.adapters.robot import (
 )
 from mismatch.inference import AcceptedCause, Candidate
 
-from ...tables.result_tables import with_error
+from ...tables import with_error
 
 UNITS = {"rad": ("deg", 180 / np.pi), "m/N": ("µm/N", 1e6), "m": ("m", 1.0)}
 """How numbers are told to a reader: unit and factor from SI."""

@@ -4,9 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foundation import InputError
-from robot_model import Payload, PlanarCase, SpatialCase, close_loops, payload_wrench
-from robot_model.finite_elements.gravity import STANDARD_GRAVITY
-from robot_model.spatial.weight import tool_attitude
+from robot_model import STANDARD_GRAVITY, Payload, PlanarCase, SpatialCase, close_loops, payload_wrench, tool_attitude
 
 Real = NDArray[np.float64]
 

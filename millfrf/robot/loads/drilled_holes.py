@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cutting import Drill, DrillingLoad, drilling_load, fitted_to_catalogue
 from foundation import InputError, warning_lines, writing_whole_file
 from robot_model import (
+    NO_MASSES,
     DeviationMap,
     LoadUncertainty,
     SpatialCase,
@@ -29,10 +30,9 @@ from robot_model import (
     sag_parts,
     tool_down,
 )
-from robot_model.spatial.weight import NO_MASSES
 
 from ...options import check_output
-from ...tables.result_tables import Table, show
+from ...tables import Table, show
 from ..asked_loads import Loads, check_axis, check_places, check_positive
 from ..postures import spatial
 

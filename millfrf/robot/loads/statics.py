@@ -12,7 +12,7 @@ from robot_model import PlanarCase, PostureResult, SpatialCase, in_posture, read
 
 from ...options import check_output
 from ...provenance import versions
-from ...tables.result_tables import Table, show
+from ...tables import Table, show
 from ..asked_loads import Loads, check_positive
 from ..postures import Asked, mechanism_of, posture_of
 from ..results import warn

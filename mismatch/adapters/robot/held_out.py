@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
+from estimation import WindowedSpectrum
+
 from ...inference import HeldOutError, Improvement, ProofSettings, ratio_interval
-from ...records.windowed_lines import WindowedLines
 from .posed_recording import halves
 from .posed_robot import Changes, PosedRobot
 from .receptance import RobotModes, predicted_spectrum
@@ -109,13 +110,13 @@ def held_out_test(folds: Sequence[Fold], changes: Changes) -> HeldOutTest:
     return HeldOutTest(np.array(numbers), np.array(errors), np.array([fold.floor for fold in folds]), tuple(blocks))
 
 
-def _error(modes: RobotModes, spectrum: WindowedLines) -> float:
+def _error(modes: RobotModes, spectrum: WindowedSpectrum) -> float:
     """Error of a prediction relative to the measured response."""
     rest = np.linalg.norm(spectrum.measured - predicted_spectrum(modes, spectrum))
     return float(rest / np.linalg.norm(spectrum.measured))
 
 
-def block_errors(modes: RobotModes, spectrum: WindowedLines) -> Real:
+def block_errors(modes: RobotModes, spectrum: WindowedSpectrum) -> Real:
     """Squared error of a prediction in blocks of time, over the mean square response, (n_blocks,).
 
     Parameters
@@ -125,7 +126,7 @@ def block_errors(modes: RobotModes, spectrum: WindowedLines) -> Real:
     spectrum
         Windowed spectrum of the recording.
     """
-    frequencies, recording = spectrum.padded_frequencies, spectrum.trial
+    frequencies, recording = spectrum.padded_frequencies, spectrum.recording
     inside = (frequencies >= spectrum.frequencies[0]) & (frequencies <= spectrum.frequencies[-1])
     rest = rfft(recording.response, n=spectrum.padded, axis=0) * inside[:, None]
     size = irfft(rest, n=spectrum.padded, axis=0)

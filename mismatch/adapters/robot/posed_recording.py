@@ -1,7 +1,7 @@
 """`PosedRecording`: one recording, the posture it was made in, and its spectrum in the band that is compared."""
 
 import os
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,16 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Recording, Stream
-from foundation import InputError
+from estimation import (
+    DERIVATIVE_ORDERS,
+    BandRecording,
+    WindowedSpectrum,
+    channel_at,
+    channels_in_words,
+    names_at,
+    windowed_spectrum,
+)
+from foundation import HOUSING, TIP, InputError
 from modal_fit import ModalModel
 
-from ...records.trial import POWERS, Trial, read_trial
-from ...records.windowed_lines import WindowedLines, windowed_lines
+from ...records.reading import read_at
 
 Real = NDArray[np.float64]
-
-TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
-HOUSING = ("HOUSING:+X", "HOUSING:+Y", "HOUSING:+Z")
 
 
 @dataclass(frozen=True)
@@ -41,16 +46,16 @@ class PosedRecording:
     axes: Real
     responses: tuple[str, ...]
     excitations: tuple[str, ...]
-    spectrum: WindowedLines
+    spectrum: WindowedSpectrum
 
     @property
     def name(self) -> str:
         """Name of the recording."""
-        return self.spectrum.trial.name
+        return self.spectrum.recording.name
 
 
 def posed(
-    recording: Trial,
+    recording: BandRecording,
     q: Real,
     band: tuple[float, float],
     *,
@@ -87,7 +92,7 @@ def posed(
             f"{recording.name}: a robot's model gives motion at {', '.join((*TIP, *HOUSING))} for forces at the tip, "
             f"not at {', '.join(strange) or 'the housing'}"
         )
-    spectrum = windowed_lines(recording, band, decay)
+    spectrum = windowed_spectrum(recording, band, decay)
     if len(spectrum.frequencies) < 50:
         raise InputError(
             f"{recording.name}: {len(spectrum.frequencies)} lines between {band[0]:g} and {band[1]:g} Hz; "
@@ -100,15 +105,8 @@ def posed(
 def posed_channels(stream: Stream) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names of the channels that a robot's diagnosis uses: forces at the tip, and motions at the tip or the housing."""
 
-    def named(quantities: Collection[str], labels: Sequence[str]) -> tuple[str, ...]:
-        wanted = {_axis(*label.split(":")) for label in labels}
-        return tuple(
-            c.name
-            for c in stream.channels
-            if c.node and c.quantity in quantities and _axis(c.node, c.direction) in wanted
-        )
-
-    return named(("force",), TIP), named(POWERS, (*TIP, *HOUSING))
+    forces = names_at(stream.channels, TIP, ("force",))
+    return forces, names_at(stream.channels, (*TIP, *HOUSING), DERIVATIVE_ORDERS)
 
 
 def read_posed(
@@ -137,39 +135,20 @@ def read_posed(
     Raises
     ------
     InputError
-        No force at the tip, no motion at tip or housing, or what :func:`mismatch.read_trial` refuses.
+        No force at the tip, no motion at tip or housing, or what :func:`mismatch.read_recording` refuses.
     """
     with Recording(path) as recording:
         channels = recording.stream(stream).channels
-    forces = {_axis(c.node, c.direction) for c in channels if c.quantity == "force" and c.node}
-    motions = {_axis(c.node, c.direction) for c in channels if c.quantity in POWERS and c.node}
-    excitations = tuple(label for label in TIP if _axis(*label.split(":")) in forces)
-    responses = tuple(label for label in (*TIP, *HOUSING) if _axis(*label.split(":")) in motions)
+    excitations = tuple(label for label in TIP if channel_at(channels, label, ("force",)))
+    responses = tuple(label for label in (*TIP, *HOUSING) if channel_at(channels, label, DERIVATIVE_ORDERS))
     if not (excitations and responses):
         raise InputError(
             f"{Path(path).name}: a force at TCP and a motion at TCP or HOUSING are needed; "
-            f"it has {', '.join(f'{c.name} ({c.quantity} {c.degree_of_freedom})' for c in channels)}"
+            f"it has {channels_in_words(channels)}"
         )
-    wanted = _over(model, responses, excitations)
-    trial = read_trial(path, wanted, stream=stream)
+    found = read_at(path, excitations, responses, replace(model, band=None), stream=stream)
     decay = float((-model.poles.real).min())
-    return posed(trial, q, band, responses=responses, excitations=excitations, axes=axes, decay=decay)
-
-
-def _axis(node: str, direction: str) -> str:
-    return f"{node}:{direction.lstrip('+-')}"
-
-
-def _over(model: ModalModel, responses: tuple[str, ...], excitations: tuple[str, ...]) -> ModalModel:
-    """A stand-in with these degrees of freedom: poles alone matter to a reader."""
-    n = len(model.poles)
-    return ModalModel(
-        model.poles,
-        np.ones((n, len(responses)), dtype=complex),
-        np.ones((n, len(excitations)), dtype=complex),
-        responses,
-        excitations,
-    )
+    return posed(found, q, band, responses=responses, excitations=excitations, axes=axes, decay=decay)
 
 
 def halves(recording: PosedRecording) -> tuple[PosedRecording, PosedRecording]:
@@ -185,7 +164,7 @@ def halves(recording: PosedRecording) -> tuple[PosedRecording, PosedRecording]:
     InputError
         A half with too few lines.
     """
-    whole, frequencies = recording.spectrum.trial, recording.spectrum.frequencies
+    whole, frequencies = recording.spectrum.recording, recording.spectrum.frequencies
     band = (float(frequencies[0]), float(frequencies[-1]))
     middle = len(whole.force) // 2
     cuts = (("first half", slice(0, middle)), ("second half", slice(middle, None)))

@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from robot_model import SpatialRobot, housing_node, modes_at
-from robot_model.spatial.spatial_modes import modal_damping
+from estimation import WindowedSpectrum
+from foundation import HOUSING, TIP
+from robot_model import SpatialRobot, housing_node, modal_damping, modes_at
 
 from ...inference import LabError
-from ...records.windowed_lines import WindowedLines
-from .posed_recording import HOUSING, TIP, PosedRecording
+from .posed_recording import PosedRecording
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -209,7 +209,7 @@ def robot_modes(robot: SpatialRobot, recording: PosedRecording, offset: Real, se
     )
 
 
-def predicted_spectrum(modes: RobotModes, spectrum: WindowedLines) -> Complex:
+def predicted_spectrum(modes: RobotModes, spectrum: WindowedSpectrum) -> Complex:
     """Windowed response lines (n_lines, n_responses) that the modes give for the recorded forces.
 
     Lines above 1.5 times the band are left out: they reach into it by leakage alone.
@@ -229,7 +229,7 @@ def predicted_spectrum(modes: RobotModes, spectrum: WindowedLines) -> Complex:
     return spectrum.cut(spectrum.signal(response))
 
 
-def quick_spectrum(modes: RobotModes, spectrum: WindowedLines) -> Complex:
+def quick_spectrum(modes: RobotModes, spectrum: WindowedSpectrum) -> Complex:
     """The same from the windowed forces, line by line: for searches and derivatives, without leakage.
 
     Parameters

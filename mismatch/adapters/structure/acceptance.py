@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import WindowedSpectrum
+
 from ...inference import EvidenceSettings, Proposal
 from ...models.fitting import Fit, fit
 from ...models.hypothesis import Cause, Hypothesis
 from ...physics import ChainPhysics, LimitedPhysics, ModePhysics
-from ...records.windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
 
@@ -100,7 +101,7 @@ def evidence_needed(current: Fit, base: Fit, settings: EvidenceSettings) -> floa
 
 
 def worth_it(
-    proposal: Proposal[Fit], current: Fit, base: Fit, lines: list[WindowedLines], settings: EvidenceSettings
+    proposal: Proposal[Fit], current: Fit, base: Fit, lines: list[WindowedSpectrum], settings: EvidenceSettings
 ) -> bool:
     """Whether a cause has enough evidence; of evidence in the lab's belief alone, most of what was odd must go.
 
@@ -133,7 +134,7 @@ def worth_it(
     return proposal.evidence > _plainer_gain(current, lines)
 
 
-def _plainer_gain(current: Fit, lines: list[WindowedLines]) -> float:
+def _plainer_gain(current: Fit, lines: list[WindowedSpectrum]) -> float:
     """What the score would gain if nothing were believed of the dampings, or of the frequencies."""
     shape = current.hypothesis.shape
     rows = shape.modal_rows(current.hypothesis.u)[: shape.believed]
@@ -141,14 +142,14 @@ def _plainer_gain(current: Fit, lines: list[WindowedLines]) -> float:
     return max(float(np.sum(rows[:, k] ** 2 - cost)) for k in (0, 1))
 
 
-def _places_of_a_mode(fitted: Fit, lines: list[WindowedLines]) -> float:
+def _places_of_a_mode(fitted: Fit, lines: list[WindowedSpectrum]) -> float:
     """Evidence that chance finds for the mode added last among all the places where one as narrow might lie."""
     pole = fitted.hypothesis.model.poles[-1]
     band = max(one.frequencies[-1] for one in lines) - min(one.frequencies[0] for one in lines)
     return 2 * float(np.log(max(band / (-float(pole.real) / np.pi), 1.0)))
 
 
-def _is_missed(fitted: Fit, lines: list[WindowedLines], needed: float) -> bool:
+def _is_missed(fitted: Fit, lines: list[WindowedSpectrum], needed: float) -> bool:
     """Whether modes, from where they are with a cause of the measuring chain, cannot make up for it.
 
     A delay is taken up by real modes to first order: its number has a wide error, and still it is not none.

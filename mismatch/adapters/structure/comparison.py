@@ -3,11 +3,12 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from estimation import WindowedSpectrum
+
 from ...inference import Proposal, Remainder, Round, Search, Settings, equivalents_of
 from ...models.fitting import Fit, fit
 from ...models.refinement import settled
 from ...physics import JointPhysics, Physics
-from ...records.windowed_lines import WindowedLines
 from ...remainder.leftover import leftover
 from .acceptance import evidence_needed, impossible, plainest, possible_gains, worth_it
 from .rounds import Standing, StructureRound, Weighed, weigh
@@ -32,7 +33,7 @@ class StructureComparison:
         What of the residual moves with the signal without any cause.
     """
 
-    lines: list[WindowedLines]
+    lines: list[WindowedSpectrum]
     causes: Mapping[str, Physics]
     settings: Settings
     before: Remainder

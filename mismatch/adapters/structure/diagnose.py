@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass, replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from modal_fit import ModalModel
 
 from ...faults.fault_repair import repair_faults, with_tones_settled
@@ -30,9 +31,7 @@ from ...models.linear_part import with_linear_part
 from ...models.model_shape import ModelShape
 from ...physics import is_fault, library
 from ...records.compared_band import compared_band
-from ...records.trial import Trial
 from ...records.true_forces import without_force_noise
-from ...records.windowed_lines import WindowedLines, windowed_lines
 from ...remainder.beyond_model import beyond_model
 from ...remainder.leftover import leftover
 from .comparison import StructureComparison
@@ -51,7 +50,7 @@ MOSTLY = 0.5
 
 def diagnose(
     model: ModalModel,
-    recordings: Sequence[Trial],
+    recordings: Sequence[BandRecording],
     settings: Settings | None = None,
     progress: Progress | None = None,
     *,
@@ -84,7 +83,7 @@ def diagnose(
 
 def _diagnosed(
     model: ModalModel,
-    recordings: Sequence[Trial],
+    recordings: Sequence[BandRecording],
     settings: Settings,
     progress: Progress,
     speeds: Mapping[str, SpindleSpeed],
@@ -92,7 +91,7 @@ def _diagnosed(
     """One step after the other."""
     decay = float((-model.poles.real).min())
     bands = [compared_band(model, one.rate) for one in recordings]
-    lines = [windowed_lines(one, band.edges, decay) for one, band in zip(recordings, bands, strict=True)]
+    lines = [windowed_spectrum(one, band.edges, decay) for one, band in zip(recordings, bands, strict=True)]
     progress("modal parameters")
     shape = ModelShape(model, settings.lab)
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=FIRST_FIT)
@@ -130,8 +129,8 @@ def _diagnosed(
 
 
 def _with_true_forces(
-    lines: list[WindowedLines], base: Fit, settings: EvidenceSettings
-) -> tuple[list[WindowedLines], Fit]:
+    lines: list[WindowedSpectrum], base: Fit, settings: EvidenceSettings
+) -> tuple[list[WindowedSpectrum], Fit]:
     """Forces as measured, with the noise that the first fit found taken out, or with that of their quietest lines.
 
     The likelihood chooses, and must gain as much as a cause: hum on the responses hides how noisy the forces are, and
@@ -147,7 +146,7 @@ def _with_true_forces(
     return best if best[1].score < base.score - settings.least else found[0]
 
 
-def _mostly_kept(lines: WindowedLines, before: WindowedLines) -> bool:
+def _mostly_kept(lines: WindowedSpectrum, before: WindowedSpectrum) -> bool:
     """Whether most of every force's power is left: else its quietest lines were not those without force."""
     left, had = (np.sum(np.abs(one.force_here) ** 2, axis=0) for one in (lines, before))
     return bool((left > MOSTLY * had).all())
@@ -194,7 +193,7 @@ def _answer(
     return _Answer(verdict, (), base, comparison.before, held_out, rejected)
 
 
-def _deviation(lines: list[WindowedLines], current: Fit) -> AcceptedCause | None:
+def _deviation(lines: list[WindowedSpectrum], current: Fit) -> AcceptedCause | None:
     """Modal parameters that are off by more than a lab's error, and not by the linear part of a joint's law."""
     found = modal_deviation(current)
     causes = current.hypothesis.causes

@@ -9,13 +9,14 @@ from scipy.fft import irfft
 from scipy.stats import chi2
 from scipy.stats import t as student
 
+from estimation import WindowedSpectrum
+
 from ...models.fitting import Fit, fit
 from ...models.hypothesis import held_values, predict_lines
 from ...models.jacobian import jacobian
 from ...models.misfit import through_structure
 from ...noise.noise_model import NoiseModel, whitening
 from ...physics import FormedPhysics, JointPhysics
-from ...records.windowed_lines import WindowedLines
 from .held_out import block_slices
 
 Complex = NDArray[np.complex128]
@@ -34,7 +35,7 @@ NORMAL = 1.959964
 """Standard errors to a side of a 95 % interval."""
 
 
-def with_form_spread(fitted: Fit, lines: Sequence[WindowedLines]) -> Fit:
+def with_form_spread(fitted: Fit, lines: Sequence[WindowedSpectrum]) -> Fit:
     """A fit whose covariance holds, beside the noise, what its numbers owe to the form of their laws.
 
     A law that has a wider form, one shape number more, is fitted in that form too: what its numbers then differ, and
@@ -65,7 +66,7 @@ def with_form_spread(fitted: Fit, lines: Sequence[WindowedLines]) -> Fit:
     return replace(fitted, covariance=fitted.covariance + np.diag(extra))
 
 
-def _of_wider_forms(fitted: Fit, lines: list[WindowedLines]) -> Real:
+def _of_wider_forms(fitted: Fit, lines: list[WindowedSpectrum]) -> Real:
     """Variance that each number gains when its law may take a wider form, (size,).
 
     The wider law is fitted like the named one; what its number differs, squared, and how much less surely it is known
@@ -95,7 +96,7 @@ def _of_wider_forms(fitted: Fit, lines: list[WindowedLines]) -> Real:
     return extra
 
 
-def _of_other_forms(fitted: Fit, lines: list[WindowedLines]) -> Real:
+def _of_other_forms(fitted: Fit, lines: list[WindowedSpectrum]) -> Real:
     """Variance that numbers owe to another form of their law, by how likely that form is beside the named one, (size,).
 
     The squared difference counts by the likelihood of the other form over that of the named one (Bayes' information
@@ -119,7 +120,7 @@ def _of_other_forms(fitted: Fit, lines: list[WindowedLines]) -> Real:
     return extra
 
 
-def _between(fitted: Fit, lines: Sequence[WindowedLines], which: NDArray[np.int64]) -> Real:
+def _between(fitted: Fit, lines: Sequence[WindowedSpectrum], which: NDArray[np.int64]) -> Real:
     """Variance between parts of the recordings for the coordinates ``which``."""
     parts = [
         part for one, noise in zip(lines, fitted.noises, strict=True) for part in _parts(fitted, one, noise, which)
@@ -129,7 +130,9 @@ def _between(fitted: Fit, lines: Sequence[WindowedLines], which: NDArray[np.int6
     return np.array([_variance(steps[:, k], variances[:, k]) for k in range(len(which))])
 
 
-def _parts(fitted: Fit, lines: WindowedLines, noise: NoiseModel, which: NDArray[np.int64]) -> list[tuple[Real, Real]]:
+def _parts(
+    fitted: Fit, lines: WindowedSpectrum, noise: NoiseModel, which: NDArray[np.int64]
+) -> list[tuple[Real, Real]]:
     """Normal equations of the weak, the middle and the strong part of a recording."""
     hypothesis = fitted.hypothesis
     predicted = predict_lines(hypothesis, lines)
@@ -152,7 +155,7 @@ def _parts(fitted: Fit, lines: WindowedLines, noise: NoiseModel, which: NDArray[
     return found
 
 
-def _signal(lines: WindowedLines, part: Complex) -> Real:
+def _signal(lines: WindowedSpectrum, part: Complex) -> Real:
     """Windowed signals in time of lines (n_lines, ...)."""
     spectrum = np.zeros((len(lines.window) // 2 + 1, *part.shape[1:]), dtype=complex)
     spectrum[lines.band] = part

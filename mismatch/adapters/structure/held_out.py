@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft
 
+from estimation import WindowedSpectrum
+
 from ...faults.shown_faults import residual_lines
 from ...inference import AcceptedCause, Improvement, ProofSettings, in_processes, ratio_interval
 from ...models.fitting import Fit, fit
 from ...models.hypothesis import Hypothesis
 from ...models.misfit import least_misfit, through_structure
 from ...noise.noise_model import NoiseModel, whitening
-from ...records.windowed_lines import WindowedLines
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -56,15 +57,15 @@ class Recordings:
         As they were measured: what errors are counted on.
     """
 
-    mended: list[WindowedLines]
-    measured: list[WindowedLines]
+    mended: list[WindowedSpectrum]
+    measured: list[WindowedSpectrum]
 
     @property
     def kept(self) -> int:
         """Number of the one that is held out: the middle level, of two the weaker, so that the others bracket it."""
         return (len(self.mended) - 1) // 2
 
-    def others(self, which: list[WindowedLines]) -> list[WindowedLines]:
+    def others(self, which: list[WindowedSpectrum]) -> list[WindowedSpectrum]:
         """All but that one; all where there is only one."""
         return [one for k, one in enumerate(which) if k != self.kept] or which
 
@@ -141,7 +142,7 @@ def scored(
     against = "refitted" if whole and (faults or evidence > settings.gain) else "nominal"
     rival = rests[1] if against == "refitted" else rests[0]
     improvement = Improvement(
-        here.trial.name,
+        here.recording.name,
         before,
         refitted,
         after,
@@ -155,7 +156,7 @@ def scored(
 
 
 def chance_of_no_gain(
-    lines: WindowedLines, covariance: Complex, rival: Complex, final: Complex, settings: ProofSettings
+    lines: WindowedSpectrum, covariance: Complex, rival: Complex, final: Complex, settings: ProofSettings
 ) -> float:
     """p-value over blocks of time that the final residual is no smaller than a rival's.
 
@@ -177,7 +178,7 @@ def chance_of_no_gain(
     return settings.test(rival_power, power)
 
 
-def block_powers(lines: WindowedLines, rest: Complex) -> Real:
+def block_powers(lines: WindowedSpectrum, rest: Complex) -> Real:
     """Power of residual lines in blocks of time, (n_blocks,): their sum is that of the lines (Parseval).
 
     Parameters
@@ -193,7 +194,7 @@ def block_powers(lines: WindowedLines, rest: Complex) -> Real:
     return np.array([np.sum(signal[block] ** 2) for block in block_slices(lines)]) * len(lines.window) / 2
 
 
-def block_slices(lines: WindowedLines) -> list[slice]:
+def block_slices(lines: WindowedSpectrum) -> list[slice]:
     """Blocks of time of the part of a recording that is compared.
 
     Parameters
@@ -201,6 +202,6 @@ def block_slices(lines: WindowedLines) -> list[slice]:
     lines
         The recording.
     """
-    count = max(2, round(len(lines.window) / lines.trial.rate / BLOCK))
+    count = max(2, round(len(lines.window) / lines.recording.rate / BLOCK))
     edges = np.linspace(0, len(lines.window), count + 1).astype(int)
     return [slice(int(a), int(b)) for a, b in pairwise(edges)]

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft
 
+from estimation import BandRecording, windowed_spectrum
 from modal_fit import ModalModel
 
 from ...faults.shown_faults import with_faults
 from ...models.hypothesis import predict_lines
 from ...models.model_terms import hypothesis_of
-from ...records.trial import Trial, band_of
-from ...records.windowed_lines import windowed_lines
+from ...records.reading import band_of
 
 Real = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ class Prediction:
     band: tuple[float, float]
 
 
-def predict(model: ModalModel, trial: Trial) -> Prediction:
+def predict(model: ModalModel, trial: BandRecording) -> Prediction:
     """Simulate a recording's forces through a model and its terms of physics.
 
     A limit (``clipping``) is applied to its channel. A steady tone (``unmeasured_excitation``) has no known phase in
@@ -58,7 +58,7 @@ def predict(model: ModalModel, trial: Trial) -> Prediction:
     hypothesis = hypothesis_of(model)
     band = band_of(model, trial.rate)
     decay = float((-model.poles.real).min())
-    lines = windowed_lines(trial, band, decay)
+    lines = windowed_spectrum(trial, band, decay)
     n = len(trial.force)
     response = np.asarray(irfft(predict_lines(hypothesis, lines).spectrum, n=lines.padded, axis=0)[:n])
     response = with_faults(response, trial, lines.start, model.physics)

@@ -4,10 +4,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from estimation import WindowedSpectrum
+
 from ...inference import Candidate, Proposal, Remainder, Round, Settings, in_processes
 from ...models.fitting import Fit
 from ...physics import ChainPhysics, JointPhysics, ModePhysics, Physics, answer_name
-from ...records.windowed_lines import WindowedLines
 from ...remainder.leftover import leftover
 from ...screening.chain_screening import ScreenedChain, screen_chains
 from ...screening.joint_candidates import SightedLaws, joint_candidates, sighted_laws
@@ -33,7 +34,7 @@ class Standing:
         Thresholds.
     """
 
-    lines: list[WindowedLines]
+    lines: list[WindowedSpectrum]
     current: Fit
     base: Fit
     moving: Remainder

@@ -4,9 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..variable_projection.elimination import Elimination, Modes, Real
-from ..variable_projection.neighbourhood import half_power_lines
-from ..variable_projection.whitened_lines import MeasuredLines
+from ..variable_projection import Elimination, MeasuredLines, Modes, Real, half_power_lines
 from .steady_poles import Candidate
 
 _COLOUR = 0.1  # correlation of neighbouring lines' errors from which a mode may stand for two

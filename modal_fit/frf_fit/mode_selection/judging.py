@@ -5,17 +5,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..variable_projection.elimination import Elimination, Modes, Real, eliminate
-from ..variable_projection.neighbourhood import (
+from ..variable_projection import (
+    Elimination,
+    MeasuredLines,
+    Modes,
+    Real,
     around,
+    eliminate,
     half_power_lines,
     mode_power,
     outside_power,
     participation,
+    refine,
     without_modes,
 )
-from ..variable_projection.refinement import refine
-from ..variable_projection.whitened_lines import MeasuredLines
 from .needed import CLEAN, NEAR, NEEDED, Trial, as_good_without, copy_of_near_mode, most_missed, unneeded
 from .steady_poles import Candidate
 

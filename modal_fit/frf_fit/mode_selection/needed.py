@@ -5,10 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.shape_measures import modal_assurance
-from ..variable_projection.elimination import Elimination, Modes, Real
-from ..variable_projection.neighbourhood import half_power_lines, mode_power, outside_power
-from ..variable_projection.whitened_lines import MeasuredLines
+from ...models import modal_assurance
+from ..variable_projection import Elimination, MeasuredLines, Modes, Real, half_power_lines, mode_power, outside_power
 from .steady_poles import Candidate
 
 CLEAN = 2.0  # misfit over the noise expected up to which noise alone decides

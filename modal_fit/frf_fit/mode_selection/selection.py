@@ -5,12 +5,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...models.shape_measures import modal_assurance
-from ..variable_projection.elimination import Elimination, Modes, eliminate
-from ..variable_projection.neighbourhood import participations
-from ..variable_projection.outer_modes import inside, just_outside
-from ..variable_projection.refinement import refine
-from ..variable_projection.whitened_lines import MeasuredLines
+from ...models import modal_assurance
+from ..variable_projection import (
+    Elimination,
+    MeasuredLines,
+    Modes,
+    eliminate,
+    inside,
+    just_outside,
+    participations,
+    refine,
+)
 from .judging import judge, judge_again, judge_early
 from .steady_poles import Candidate
 

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from estimation import Frf
 
-from ...stabilisation.chart import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
-from ...stabilisation.matrix_fraction import matrix_fraction_poles
+from ...stabilisation import PoleGroup, StabilisationChart, choose_poles, matrix_fraction_poles, stabilisation_chart
 
 _RANGES = (0.4, 0.6, 0.8, 1.0)  # of the highest order: low orders show strong modes, high orders weak and close ones
 Complex = NDArray[np.complex128]

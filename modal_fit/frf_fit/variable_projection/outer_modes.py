@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.modal_model import ModalModel, Residuals
+from ...models import ModalModel, Residuals
 from .elimination import Modes
 
 REACH = 1.5

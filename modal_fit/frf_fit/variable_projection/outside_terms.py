@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ...models.out_of_band import basis_with_poles, fixed_poles
+from ...models import basis_with_poles, fixed_poles
 from .elimination import Modes
 from .refinement import refine
 from .whitened_lines import MeasuredLines

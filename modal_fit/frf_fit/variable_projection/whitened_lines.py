@@ -5,13 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import Frf, window_correlation
+from estimation import FRF_ORDERS, Frf, window_correlation
 
-from ...models.out_of_band import basis_with_poles, fixed_pole, fixed_poles
+from ...models import basis_with_poles, fixed_pole, fixed_poles
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
-_DERIVATIVES = {"mobility": 1, "accelerance": 2}
 _MANY = 60  # lines from which on three fixed poles stand for the modes outside, else one
 _OUTLIER = float(np.log(30.0))  # an entry's noise power below what row and column say
 _OUTLIER_ROUNDS = 20
@@ -187,7 +186,7 @@ def _assembled(
     values = np.einsum("kpq,kjq,up->kju", frf.values[chosen], drive, whitening, optimize=True)
     return MeasuredLines(
         s=s,
-        factor=s ** _DERIVATIVES.get(frf.quantity, 0),
+        factor=s ** FRF_ORDERS.get(frf.quantity, 0),
         values=np.ascontiguousarray(values),
         drive=np.ascontiguousarray(drive),
         whitening=whitening,

@@ -1,29 +1,5 @@
 """What the recording of a cut holds: the spindle's angle, orders, lines, how they vary, what they do to the chip."""
 
-from .course import Course, course_of
-from .envelope import Envelope, envelope_of
-from .evidence import Evidence, gather_evidence
-from .families import SHARP, TOLERANCE, Family, largest_motion
-from .irregular import irregular_change
-from .lines import Line
-from .teeth import alternating_change, alternation, alternation_course
-from .tool_motion import ToolMotion
+import lazy_loader
 
-__all__ = [
-    "SHARP",
-    "TOLERANCE",
-    "Course",
-    "Envelope",
-    "Evidence",
-    "Family",
-    "Line",
-    "ToolMotion",
-    "alternating_change",
-    "alternation",
-    "alternation_course",
-    "course_of",
-    "envelope_of",
-    "gather_evidence",
-    "irregular_change",
-    "largest_motion",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,6 +9,7 @@ import numpy as np
 from acquisition import record
 from cutting import MillingProcess
 from estimation import Frf, write_frf
+from foundation import HOUSING, TIP
 from modal_fit import ModalModel, write_modal_model
 from replay_data import (
     HammerCell,
@@ -20,7 +21,7 @@ from replay_data import (
     tip_accelerometers,
 )
 from replay_data import table_one_model as tip_structure
-from replay_data.robot_structure import HOUSING, TOOL_TIP, select
+from replay_data.robot_structure import select
 
 RPM = math.pi / 30
 RATE = 512.0
@@ -102,11 +103,11 @@ def make(folder: Path) -> None:
     tip = tip_structure()
     tip = ModalModel(tip.poles, tip.right, tip.left, tip.responses, tip.excitations, band=(12.0, 60.0))
     write_modal_model(folder / "model_tip.json", tip)
-    housing = select(structure, HOUSING, TOOL_TIP)
+    housing = select(structure, HOUSING, TIP)
     write_modal_model(folder / "model_housing.json", replace(housing, band=(10.0, 150.0)))
     write_modal_model(folder / "model_process.json", replace(first_modes(housing, 2), band=(13.0, 25.0)))
     lines = np.arange(4.0, 64.0, 0.25)
-    write_frf(folder / "frf_tip.h5", hammered(select(structure, TOOL_TIP, TOOL_TIP), lines, 1))
+    write_frf(folder / "frf_tip.h5", hammered(select(structure, TIP, TIP), lines, 1))
     write_frf(folder / "frf_housing.h5", hammered(housing, lines, 2))
     for name, text in (
         ("cut.toml", CUT),
@@ -155,7 +156,7 @@ def _recordings(folder: Path) -> None:
 
 def _hammer_tests(folder: Path) -> None:
     """Three files with one hammer, ``tap_x.h5`` ``tap_y.h5`` ``tap_z.h5``: three taps each, on the tool tip."""
-    for number, (force, place) in enumerate(zip(dynamometer(0.001, 2000.0), TOOL_TIP, strict=True)):
+    for number, (force, place) in enumerate(zip(dynamometer(0.001, 2000.0), TIP, strict=True)):
         sensors = (replace(force, name="hammer"), *tip_accelerometers(0.001))
         cell = HammerCell(
             default_structure(),

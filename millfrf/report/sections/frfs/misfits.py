@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from estimation import Frf
 from modal_fit import Synthesis
 
-from ....tables.result_tables import Table
+from ....tables import Table
 
 SHOWN = 12
 """Rows of the table that is not folded."""

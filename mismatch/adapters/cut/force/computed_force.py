@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
-from cutting.one_tooth import specific_forces
+from cutting import MillingProcess, specific_forces
 
 from ..physics import CutPhysics, ToothView
 from .tooth_views import CutView

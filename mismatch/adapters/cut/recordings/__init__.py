@@ -2,14 +2,13 @@
 
 from .chatter import CutChatter, chatter_of
 from .reading import read_cut_recording
-from .recording import FINE, MOST_ORDERS, TIP, CutRecording, cut_recording
+from .recording import FINE, MOST_ORDERS, CutRecording, cut_recording
 from .spindle_law import SpindleLaw, found_law, stated_law
 from .tip_motion import TipMotion
 
 __all__ = [
     "FINE",
     "MOST_ORDERS",
-    "TIP",
     "CutChatter",
     "CutRecording",
     "SpindleLaw",

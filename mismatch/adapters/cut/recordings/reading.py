@@ -1,22 +1,26 @@
 """Reading a recording of a cut: forces and motion at the tip, and the speed that it states."""
 
 import os
-from collections.abc import Sequence
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from acquisition import Channel, Recording, Stream, aligned_samples
+from acquisition import Recording
 from cutting import MillingProcess, refuse_varied
-from foundation import DegreeOfFreedom, InputError
+from estimation import (
+    DERIVATIVE_ORDERS,
+    band_recording,
+    before_force_high_pass,
+    channel_at,
+    channels_in_words,
+    high_pass_corners,
+)
+from foundation import TIP, InputError
 from modal_fit import ModalModel
 
-from ....records.trial import POWERS
-from .recording import TIP, CutRecording, cut_recording
+from .recording import CutRecording, cut_recording
 from .spindle_law import stated_law
-
-Real = NDArray[np.float64]
 
 
 def read_cut_recording(
@@ -55,41 +59,22 @@ def read_cut_recording(
     stated = stated_law(path, speed)
     with Recording(path) as recording:
         source = recording.stream(stream)
-        forces = [_channel(source, label, ("force",)) for label in TIP]
-        motions = [_channel(source, label, tuple(POWERS)) for label in TIP]
+        forces = [channel_at(source.channels, label, ("force",)) for label in TIP]
+        motions = [channel_at(source.channels, label, DERIVATIVE_ORDERS) for label in TIP]
         axes = tuple(axis for axis, found in enumerate(forces) if found is not None)
-        rate = source.sample_rate
         if not {0, 1} <= set(axes):
-            there = ", ".join(f"{c.name} ({c.quantity} {c.degree_of_freedom})" for c in source.channels)
+            there = channels_in_words(source.channels)
             raise InputError(f"{Path(path).name}: forces at TCP:+X and TCP:+Y are needed; it has {there}")
-        force = _samples(source, [one for one in forces if one is not None])
         wanted = (0, 1) if process.edge_angle > np.pi / 2 - 1e-6 else (0, 1, 2)
-        moving = [motions[axis] for axis in wanted]
-        known = [one for one in moving if one is not None]
-        samples = _samples(source, known) if len(known) == len(wanted) else None
-    quantities = [one[0].quantity for one in known]
+        moving = [one for one in (motions[axis] for axis in wanted) if one is not None]
+        if len(moving) < len(wanted):
+            moving = []
+        pushing = [one for one in forces if one is not None]
+        # at its own rate: how much of it is needed depends on the speed that is found
+        whole = before_force_high_pass(band_recording(source, pushing, moving, Fraction(1)))
     return cut_recording(
-        Path(path).stem, rate, force, axes, process, stated,
-        motion=None if samples is None else (samples, wanted, tuple(POWERS[quantity] for quantity in quantities)),
+        whole.name, whole.rate, whole.force, axes, process, stated,
+        motion=(whole.response, wanted, whole.orders.tolist()) if moving else None,
+        high_passes=high_pass_corners(whole.responses),
         model=model,
     )  # fmt: skip
-
-
-def _channel(stream: Stream, label: str, quantities: tuple[str, ...]) -> tuple[Channel, float] | None:
-    aim = DegreeOfFreedom.parse(label)
-    for channel in stream.channels:
-        if channel.quantity in quantities and channel.node:
-            here = DegreeOfFreedom(channel.node, channel.direction)
-            if (here.node, here.axis) == (aim.node, aim.axis):
-                return channel, float(here.sign * aim.sign)
-    return None
-
-
-def _samples(stream: Stream, found: Sequence[tuple[Channel, float]]) -> Real:
-    names = [channel.name for channel, _ in found]
-    samples = np.asarray(aligned_samples(stream, names) * np.array([sign for _, sign in found]))
-    bad = ~np.isfinite(samples).all(axis=0)
-    if bad.any():
-        name = names[int(np.argmax(bad))]
-        raise InputError(f"{stream.path.name}: channel {name} holds values that are not finite; cut them out first")
-    return samples

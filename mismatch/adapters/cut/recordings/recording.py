@@ -2,22 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import resample_poly
 
 from cutting import MillingProcess
-from foundation import InputError
+from estimation import needed_ratio, resampled
+from foundation import TIP, InputError
 from modal_fit import ModalModel
 
 from .spindle_law import SpindleLaw, found_law
 from .tip_motion import TipMotion, computed, corner_of, integrated, integrated_noise
 
 Real = NDArray[np.float64]
-
-TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 
 MOST_ORDERS = 8
 """Harmonics of the tooth passing up to which forces are compared."""
@@ -91,6 +88,7 @@ def cut_recording(
     stated: SpindleLaw,
     *,
     motion: tuple[Real, Sequence[int], Sequence[int]] | None = None,
+    high_passes: Sequence[float] = (),
     model: ModalModel | None = None,
 ) -> CutRecording:
     """Prepare samples in memory.
@@ -106,6 +104,8 @@ def cut_recording(
     motion
         Samples (n, k), their directions (0, 1, 2), and how often each is differentiated from displacement; measured at
         the tip.
+    high_passes
+        Corners of the known first-order high-passes of ``motion``, Hz; empty: none of them has one.
     model
         Receptance of the tip, for its motion where ``motion`` is None.
 
@@ -120,14 +120,16 @@ def cut_recording(
         raise InputError(f"{name} holds {turns:.0f} revolutions; {LEAST_TURNS} are the least, record longer")
     top = MOST_ORDERS * process.teeth * stated.about(duration / 2).speed / (2 * np.pi)
     columns = [force] if motion is None else [force, motion[0]]
-    brought, rate = _brought_down(np.hstack(columns), rate, FINE * top)
+    brought, rate = resampled(np.hstack(columns), rate, needed_ratio(rate, FINE * top))
     force = brought[:, : force.shape[1]]
     law = found_law(force, rate, stated, process.teeth)
     corner = corner_of(law.speed / (2 * np.pi))
     tip: TipMotion | None = None
     run_in = 1 / corner
     if motion is not None:
-        tip = _measured_motion(brought[:, force.shape[1] :], motion[1], motion[2], rate, corner)
+        tip = _measured_motion(
+            brought[:, force.shape[1] :], motion[1], motion[2], high_passes or [0.0] * len(motion[1]), rate, corner
+        )
     elif model is not None:
         tip = _modelled_motion(name, model, force, axes, rate, corner)
         run_in = max(run_in, RUNG_OUT / float((-model.poles.real).min()))
@@ -135,13 +137,13 @@ def cut_recording(
 
 
 def _measured_motion(
-    samples: Real, axes: Sequence[int], powers: Sequence[int], rate: float, corner: float
+    samples: Real, axes: Sequence[int], orders: Sequence[int], high_passes: Sequence[float], rate: float, corner: float
 ) -> TipMotion:
     moved, noise = np.zeros((2, len(samples), 3)), np.zeros((2, len(samples), 3))
-    for column, (axis, power) in enumerate(zip(axes, powers, strict=True)):
+    for column, (axis, order, high_pass) in enumerate(zip(axes, orders, high_passes, strict=True)):
         one = samples[:, column : column + 1]
-        moved[:, :, axis] = np.stack(integrated(one, power, rate, corner))[:, :, 0]
-        noise[:, :, axis] = np.stack(integrated_noise(one, power, rate, corner, axis))[:, :, 0]
+        moved[:, :, axis] = np.stack(integrated(one, order, rate, corner, high_pass))[:, :, 0]
+        noise[:, :, axis] = np.stack(integrated_noise(one, order, rate, corner, axis, high_pass))[:, :, 0]
     return TipMotion(moved[0], moved[1], "measured", noise)
 
 
@@ -160,13 +162,3 @@ def _modelled_motion(
     driven[:, [model.excitations.index(label) for label in TIP]] = force
     displacement, velocity = computed(model, driven, rate, corner)
     return TipMotion(displacement[:, rows], velocity[:, rows], "model")
-
-
-def _brought_down(samples: Real, rate: float, needed: float) -> tuple[Real, float]:
-    """Sampled no faster than twice what is needed."""
-    if rate < 1.5 * needed:
-        return samples, rate
-    ratio = Fraction(needed / rate).limit_denominator(50)
-    if ratio.numerator == 0:
-        ratio = Fraction(1, 50)
-    return np.asarray(resample_poly(samples, ratio.numerator, ratio.denominator, axis=0)), rate * float(ratio)

@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import median_filter, uniform_filter1d
 
+from estimation import kinematic_factor
 from modal_fit import ModalModel
 
-from ....records.windowed_lines import receptance_at
+from ....models.modal_lines import receptance_at
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -66,10 +67,11 @@ def corner_of(rotation: float) -> float:
     return min(0.1 * rotation, CORNER)
 
 
-def integrated(samples: Real, power: int, rate: float, corner: float) -> tuple[Real, Real]:
-    """Displacement and velocity from displacement (power 0), velocity (1) or acceleration (2), in frequency.
+def integrated(samples: Real, order: int, rate: float, corner: float, high_pass: float = 0.0) -> tuple[Real, Real]:
+    """Displacement and velocity from displacement (order 0), velocity (1) or acceleration (2), in frequency.
 
-    ``X = S / (i w)^power``, faded in from ``corner`` to 2.5 times it. A regression on noisy motion comes out too small;
+    ``X = S / (i w)^order``, a known high-pass undone, faded in from ``corner`` to 2.5 times it.
+    A regression on noisy motion comes out too small;
     lines are weighed by what they say of the true motion, ``1 - S / P`` with P the power around a line and S that of
     the quietest lines, on which it does not (Carroll, Ruppert, Stefanski & Crainiceanu, Measurement Error in Nonlinear
     Models, 2nd ed., chapter 4).
@@ -78,24 +80,26 @@ def integrated(samples: Real, power: int, rate: float, corner: float) -> tuple[R
     ----------
     samples : (n, n_channels)
         Samples of one quantity, SI.
-    power
+    order
         How often displacement must be differentiated to give the samples.
     rate, corner
         Sampling rate and corner frequency, Hz.
     """
     spectrum, frequencies = _padded(samples - samples.mean(axis=0), rate, corner)
     trusted = spectrum * _true_part(spectrum, _quiet(spectrum, frequencies))
-    return _motion(trusted / _s(frequencies)[:, None] ** power, frequencies, corner, len(samples))
+    return _motion(trusted / _kinematic(frequencies, order, high_pass), frequencies, corner, len(samples))
 
 
-def integrated_noise(samples: Real, power: int, rate: float, corner: float, seed: int) -> tuple[Real, Real]:
+def integrated_noise(
+    samples: Real, order: int, rate: float, corner: float, seed: int, high_pass: float = 0.0
+) -> tuple[Real, Real]:
     """A draw of the noise that :func:`integrated` leaves in displacement and velocity.
 
     Parameters
     ----------
     samples : (n, n_channels)
         Samples of one quantity, SI.
-    power
+    order
         How often displacement must be differentiated to give the samples.
     rate, corner
         Sampling rate and corner frequency, Hz.
@@ -104,7 +108,7 @@ def integrated_noise(samples: Real, power: int, rate: float, corner: float, seed
     """
     spectrum, frequencies = _padded(samples - samples.mean(axis=0), rate, corner)
     drawn = _drawn(spectrum, frequencies, seed)
-    return _motion(drawn / _s(frequencies)[:, None] ** power, frequencies, corner, len(samples))
+    return _motion(drawn / _kinematic(frequencies, order, high_pass), frequencies, corner, len(samples))
 
 
 def computed(model: ModalModel, force: Real, rate: float, corner: float) -> tuple[Real, Real]:
@@ -164,12 +168,12 @@ def _motion(displacement: Complex, frequencies: Real, corner: float, n: int) -> 
     fade = 0.5 - 0.5 * np.cos(np.pi * np.clip((frequencies - corner) / (1.5 * corner), 0.0, 1.0))
     room = 2 * (len(frequencies) - 1)
     shown = displacement * fade[:, None]
-    velocity = shown * _s(frequencies)[:, None]
+    velocity = shown * _kinematic(frequencies, 1)
     return np.asarray(irfft(shown, n=room, axis=0)[:n]), np.asarray(irfft(velocity, n=room, axis=0)[:n])
 
 
-def _s(frequencies: Real) -> Complex:
-    """``i w``, one at 0 Hz, which is faded out."""
-    s = np.asarray(2j * np.pi * frequencies)
-    s[0] = 1.0
-    return s
+def _kinematic(frequencies: Real, order: int, high_pass: float = 0.0) -> Complex:
+    """Factor (n, 1) from displacement to what is measured, one at 0 Hz, which is faded out."""
+    factor = np.ones((len(frequencies), 1), dtype=complex)
+    factor[1:] = kinematic_factor(frequencies[1:], np.array([order]), (high_pass,))
+    return factor

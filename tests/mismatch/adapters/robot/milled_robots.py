@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mismatch import Trial
+from mismatch import BandRecording
 from mismatch.adapters.robot import ROBOT as ROBOT_SETTINGS
 from mismatch.adapters.robot import PosedRecording, PosedRobot, posed
 from robot_model import SpatialRobot, frf_at, read_spatial_robot
@@ -26,7 +26,7 @@ def milled(
     labels: tuple[str, ...] = TIP,
     seconds: float = 12.0,
     noise: float = 0.02,
-) -> Trial:
+) -> BandRecording:
     """Broad forces at the tip and the accelerations they cause, exactly by all modes; noise on both; posture in deg."""
     rng = np.random.default_rng(seed)
     columns = [TIP.index(label) for label in labels]
@@ -40,7 +40,7 @@ def milled(
     response = np.fft.irfft(moved * (2j * np.pi * lines[:, None]) ** 2, n=n, axis=0)[:, columns]
     noisy = [part + noise * part.std(axis=0) * rng.normal(size=part.shape) for part in (force, response)]
     names = tuple(kind + label[-1].lower() for kind in "fa" for label in labels)
-    return Trial(f"posture {seed + 1}", RATE, *noisy, np.full(len(columns), 2), names)
+    return BandRecording(f"posture {seed + 1}", RATE, *noisy, np.full(len(columns), 2), names)
 
 
 def in_postures(

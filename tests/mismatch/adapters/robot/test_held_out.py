@@ -53,8 +53,8 @@ def test_a_single_recording_is_cut_in_two() -> None:
     case = small_case(seconds=12.0)
     folds = folds_of(case, free_fit(case, ()), ())
     assert [fold.name for fold in folds] == ["posture 1, first half", "posture 1, second half"]
-    halves = [fold.alone.recordings[0].spectrum.trial for fold in folds]
-    whole = case.recordings[0].spectrum.trial
+    halves = [fold.alone.recordings[0].spectrum.recording for fold in folds]
+    whole = case.recordings[0].spectrum.recording
     assert np.concatenate([half.force for half in halves]) == pytest.approx(whole.force)
 
 
@@ -63,7 +63,7 @@ def test_blocks_of_a_prediction_of_nothing_hold_all_of_the_response() -> None:
     spectrum = case.recordings[0].spectrum
     modes = case.modes(())[0]
     nothing = block_errors(replace(modes, shapes=0 * modes.shapes), spectrum)
-    assert len(nothing) == len(spectrum.window) // int(spectrum.trial.rate)
+    assert len(nothing) == len(spectrum.window) // int(spectrum.recording.rate)
     assert nothing.mean() == pytest.approx(1.0, rel=0.05)
     # and of the true robot the noise alone: two per cent on the force and on the response
     assert np.sqrt(block_errors(modes, spectrum).mean()) == pytest.approx(0.02, rel=0.8)

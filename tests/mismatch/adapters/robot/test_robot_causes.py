@@ -10,7 +10,7 @@ from milled_robots import NAME, POSTURES, RATE, ROBOT, heavy_elbow, in_postures,
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from mismatch import Trial
+from mismatch import BandRecording
 from mismatch.adapters.robot import RobotDiagnosis, diagnose_robot, number_of, posed, standard_error_of
 from modal_fit import read_modal_model
 from robot_model import (
@@ -42,7 +42,7 @@ def test_a_softer_joint_is_named_with_its_stiffness_from_one_posture() -> None:
     assert modes_at(improved, q + offset).frequencies[:4] == pytest.approx(truth, rel=0.01)
 
 
-def write(path: Path, trial: Trial) -> Path:
+def write(path: Path, trial: BandRecording) -> Path:
     """A trial as a recording's file."""
     channels = [
         Channel(name, *(("force", "N") if name[0] == "f" else ("acceleration", "m/s^2")), "TCP", "+" + name[1].upper())

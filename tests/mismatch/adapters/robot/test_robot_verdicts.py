@@ -8,8 +8,9 @@ from independent_robot import SPRINGS, Lump, OtherRobot, receptance
 from numpy.typing import NDArray
 from payload_information import Recorded, mass_errors
 
+from estimation import BandRecording, channels_of
+from foundation import TIP
 from millfrf.robot.diagnosis.diagnosis_words import describe, summary
-from mismatch import Trial
 from mismatch.adapters.robot import (
     PosedRecording,
     RobotDiagnosis,
@@ -68,8 +69,8 @@ def recorded(truth: OtherRobot, count: int = 3, noise: float = 0.02, seed: int =
         moved = np.einsum("kpq,kq->kp", receptance(truth, q, lines), pushed) * (2j * np.pi * lines[:, None]) ** 2
         pair = [np.fft.irfft(one, n=n, axis=0) for one in (pushed, moved)]
         noisy = [one + noise * one.std(axis=0) * rng.normal(size=one.shape) for one in pair]
-        names = ("fx", "fy", "fz", "ax", "ay", "az")
-        made.append(posed(Trial(f"posture {number + 1}", RATE, *noisy, np.full(3, 2), names), q, BAND))
+        channels = [channels_of(quantity, TIP) for quantity in ("force", "acceleration")]
+        made.append(posed(BandRecording(f"posture {number + 1}", RATE, noisy[0], noisy[1], *channels), q, BAND))
     return made
 
 
@@ -264,7 +265,7 @@ def test_beams_and_a_lighter_spindle() -> None:
     bodies = (*KUKA.bodies[:-1], replace(KUKA.bodies[-1], mass=KUKA.bodies[-1].mass - 10.0))
     from_beams = []
     for recording, q in zip(recorded(TRUTH), POSTURES, strict=True):
-        trial = recording.spectrum.trial
+        trial = recording.spectrum.recording
         n = len(trial.force)
         lines = np.fft.rfftfreq(n, 1 / RATE)
         pushed = np.fft.rfft(trial.force, axis=0)

@@ -1,0 +1,39 @@
+from .band_recording import BandRecording, band_recording, before_force_high_pass
+from .channel_matching import MatchedChannel, channel_at, channels_in_words, channels_of, matched_channels, names_at
+from .motion_quantities import (
+    DERIVATIVE_ORDERS,
+    before_high_pass,
+    derivative_orders,
+    high_pass_corners,
+    kinematic_factor,
+)
+from .reading import band_of_channels, read_band_recording
+from .resampling import Resampler, needed_ratio, resampled, whole_ratio, widest_band
+from .windowed_spectrum import WindowedSpectrum, padded_force, windowed_spectrum
+
+__all__ = [
+    "DERIVATIVE_ORDERS",
+    "BandRecording",
+    "MatchedChannel",
+    "Resampler",
+    "WindowedSpectrum",
+    "band_of_channels",
+    "band_recording",
+    "before_force_high_pass",
+    "before_high_pass",
+    "channel_at",
+    "channels_in_words",
+    "channels_of",
+    "derivative_orders",
+    "high_pass_corners",
+    "kinematic_factor",
+    "matched_channels",
+    "names_at",
+    "needed_ratio",
+    "padded_force",
+    "read_band_recording",
+    "resampled",
+    "whole_ratio",
+    "widest_band",
+    "windowed_spectrum",
+]

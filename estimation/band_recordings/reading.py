@@ -1,0 +1,83 @@
+"""Reading a recording at given degrees of freedom or channels, brought down to the rate that is needed."""
+
+import os
+from collections.abc import Callable, Sequence
+
+from acquisition import Channel, Recording, Stream
+
+from .band_recording import BandRecording, band_recording, before_force_high_pass
+from .channel_matching import MatchedChannel, matched_channels
+from .motion_quantities import DERIVATIVE_ORDERS
+from .resampling import needed_ratio, whole_ratio
+
+EXCITING = ("force", "voltage")
+"""Quantities that drive a structure or a transducer at a degree of freedom."""
+
+
+def read_band_recording(
+    path: str | os.PathLike[str],
+    excitations: Sequence[str],
+    responses: Sequence[str],
+    needed: float,
+    *,
+    stream: str | None = None,
+) -> BandRecording:
+    """Read forces and motions at degrees of freedom, in that order and along those directions.
+
+    Known input delays and known high-passes of the forces are taken out.
+
+    Parameters
+    ----------
+    path
+        File of the recording.
+    excitations
+        Degrees of freedom (``node:direction``) of forces or voltages.
+    responses
+        Degrees of freedom of displacements, velocities or accelerations.
+    needed
+        Sample rate that is enough, Hz; a recording that was sampled much faster is brought down to about it.
+    stream
+        Sample clock; None: the only one.
+
+    Raises
+    ------
+    InputError
+        A channel is missing, values are not finite, or the recording is shorter than the filter.
+    """
+    with Recording(path) as recording:
+        source = recording.stream(stream)
+        forces = matched_channels(source, excitations, EXCITING)
+        motions = matched_channels(source, responses, tuple(DERIVATIVE_ORDERS))
+        found = band_recording(source, forces, motions, needed_ratio(source.sample_rate, needed))
+    return before_force_high_pass(found)
+
+
+def band_of_channels(
+    stream: Stream,
+    excitations: Sequence[Channel],
+    responses: Sequence[Channel],
+    highest_frequency: float,
+    progress: Callable[[int], None] | None = None,
+) -> BandRecording:
+    """Read chosen channels of an open recording, and keep the band up to a frequency flat.
+
+    Known input delays are taken out. Known high-passes stay, and the channels of the result state them.
+
+    Parameters
+    ----------
+    stream
+        Samples of an open recording.
+    excitations, responses
+        Channels to keep, in the order of the columns.
+    highest_frequency
+        Upper end of the band that must stay flat, Hz.
+    progress
+        Called with the number of samples read so far.
+
+    Raises
+    ------
+    InputError
+        The band does not fit the sample rate, values are not finite, or the recording is shorter than the filter.
+    """
+    forces, motions = ([MatchedChannel(one) for one in side] for side in (excitations, responses))
+    return band_recording(stream, forces, motions, whole_ratio(stream.sample_rate, highest_frequency), progress)

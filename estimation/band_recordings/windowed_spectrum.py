@@ -1,0 +1,157 @@
+"""Spectra of one recording on the lines that count, and predictions that are cut in exactly the same way."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, prev_fast_len, rfft
+
+from .band_recording import BandRecording
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class WindowedSpectrum:
+    """A recording's window, its padded force spectrum and its measured lines.
+
+    The whole recording is predicted. Its force is ramped in over a second and padded with zeros, so that the structure
+    rings out. Then prediction and measurement are cut and windowed alike: nothing leaks that does not leak in both.
+
+    Parameters
+    ----------
+    recording
+        Forces and responses.
+    padded
+        Samples of the padded recording.
+    start
+        First sample compared, after the run-in.
+    window : (n_kept,)
+        Window of the samples compared; the sum of its squares is 1.
+    band : (n_lines,)
+        Which lines of the windowed spectrum are compared.
+    frequencies : (n_lines,), Hz
+        Frequencies of the lines that are compared.
+    force_lines : (padded // 2 + 1, n_excitations)
+        Spectrum of the ramped and padded force.
+    force_here : (n_lines, n_excitations)
+        Spectrum of the windowed force.
+    trust : (n_lines, n_excitations, n_excitations)
+        What the noise of the forces used is multiplied by: less than one where they were replaced by what they say of
+        the true ones.
+    measured : (n_lines, n_responses)
+        Spectrum of the windowed response, scaled so that white noise of variance v has variance v a line.
+    """
+
+    recording: BandRecording
+    padded: int
+    start: int
+    window: Real
+    band: NDArray[np.int64]
+    frequencies: Real
+    force_lines: Complex
+    force_here: Complex
+    measured: Complex
+    trust: Complex
+
+    @cached_property
+    def padded_frequencies(self) -> Real:
+        """Frequencies of ``force_lines``, Hz."""
+        return np.asarray(np.arange(self.padded // 2 + 1) * self.recording.rate / self.padded)
+
+    def thinned(self, enough: int) -> "WindowedSpectrum":
+        """Every few lines, so that about ``enough`` are left; itself where it has no more."""
+        every = len(self.frequencies) // enough
+        if every < 2:
+            return self
+        return replace(
+            self,
+            band=self.band[::every],
+            frequencies=self.frequencies[::every],
+            force_here=self.force_here[::every],
+            measured=self.measured[::every],
+            trust=self.trust[::every],
+        )
+
+    def with_measured_forces(self) -> "WindowedSpectrum":
+        """Forces as they were measured, where they were replaced."""
+        n = len(self.window) + self.start
+        return replace(
+            self,
+            force_lines=padded_force(self),
+            force_here=self.cut(self.recording.force[:n]),
+            trust=_full_trust(self.recording, len(self.band)),
+        )
+
+    def cut(self, signal: NDArray[np.floating]) -> Complex:
+        """Windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the recording."""
+        kept = signal[self.start : self.start + len(self.window)]
+        return np.asarray(rfft(kept * self.window[:, None].astype(kept.dtype), axis=0)[self.band])
+
+    def signal(self, spectrum: Complex) -> Real:
+        """Time signals (n_samples, n) of padded spectra (padded // 2 + 1, n)."""
+        return np.asarray(irfft(spectrum, n=self.padded, axis=0)[: len(self.recording.force)])
+
+    @cached_property
+    def padded_kinematic(self) -> Complex:
+        """Factor (padded // 2 + 1, n_responses) from displacement to each response's quantity."""
+        return self.recording.kinematic(self.padded_frequencies)
+
+    @cached_property
+    def kinematic(self) -> Complex:
+        """The same at the lines that are compared, (n_lines, n_responses)."""
+        return self.recording.kinematic(self.frequencies)
+
+    def from_force(self, receptance: Complex, force_lines: Complex) -> Complex:
+        """Windowed response lines (n_lines, n_responses) of padded force lines through padded receptance lines."""
+        response = np.einsum("kpq,kq->kp", receptance, force_lines) * self.padded_kinematic
+        return self.cut(self.signal(response))
+
+
+def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay: float) -> WindowedSpectrum:
+    """Window a recording and transform it.
+
+    Parameters
+    ----------
+    recording
+        Forces and responses.
+    band
+        Lowest and highest frequency compared, Hz.
+    decay
+        Decay rate of the slowest mode, 1/s: run-in and padding last seven of its time constants, at most a fifth of it.
+    """
+    from scipy.signal.windows import tukey  # here, because scipy.signal alone takes 75 MB
+
+    n = len(recording.force)
+    run_in = int(min(7.0 / decay * recording.rate, 0.2 * n))
+    padded = next_fast_len(n + run_in, real=True)
+    padded += padded % 2
+    rising = _rising(recording)
+    kept = prev_fast_len(n - run_in - rising // 2, real=True)
+    window = tukey(kept, 0.08)
+    window /= np.sqrt(np.sum(window**2))
+    axis = np.arange(kept // 2 + 1) * recording.rate / kept
+    lines = np.flatnonzero((axis >= max(band[0], 3 * recording.rate / kept)) & (axis <= band[1]))
+    none, trust = np.zeros(0, dtype=complex), _full_trust(recording, len(lines))
+    stub = WindowedSpectrum(recording, padded, run_in, window, lines, axis[lines], none, none, none, trust)
+    return replace(stub.with_measured_forces(), measured=stub.cut(recording.response))
+
+
+def _full_trust(recording: BandRecording, count: int) -> Complex:
+    """That of forces as measured."""
+    return np.tile(np.eye(recording.force.shape[1], dtype=complex), (count, 1, 1))
+
+
+def _rising(recording: BandRecording) -> int:
+    """Samples over which the force is ramped in and out."""
+    return min(int(recording.rate), len(recording.force) // 20)
+
+
+def padded_force(spectrum: WindowedSpectrum) -> Complex:
+    """Spectrum of the ramped and padded force."""
+    ramp, rising = np.ones(len(spectrum.recording.force)), _rising(spectrum.recording)
+    ramp[:rising] = 0.5 - 0.5 * np.cos(np.pi * np.arange(rising) / rising)
+    ramp[-rising:] = ramp[:rising][::-1]
+    return np.asarray(rfft(spectrum.recording.force * ramp[:, None], n=spectrum.padded, axis=0))

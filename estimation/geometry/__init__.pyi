@@ -1,0 +1,10 @@
+from .geometry import Geometry
+from .geometry_file import import_geometry, is_geometry_table, read_geometry, write_geometry
+
+__all__ = [
+    "Geometry",
+    "import_geometry",
+    "is_geometry_table",
+    "read_geometry",
+    "write_geometry",
+]

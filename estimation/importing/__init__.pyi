@@ -1,0 +1,17 @@
+from .any_file import import_frf, looks_like_frf
+from .entries import ImportedFrf
+from .frf_mapping import FrfMapping, is_frf_mapping, load_frf_mapping
+from .uff import UffChoice, import_uff, import_uffs, read_frf_uff
+
+__all__ = [
+    "FrfMapping",
+    "ImportedFrf",
+    "UffChoice",
+    "import_frf",
+    "import_uff",
+    "import_uffs",
+    "is_frf_mapping",
+    "load_frf_mapping",
+    "looks_like_frf",
+    "read_frf_uff",
+]

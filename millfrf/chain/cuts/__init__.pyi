@@ -1,0 +1,22 @@
+from .chatter import CutOptions, doubts_of_cuts, judge_recordings, stated_runout, tone_table, verdict_table
+from .chatter_file import KeptCut, read_cuts, write_cuts
+from .chatter_spectra import keep_spectra
+from .lobes import LOBE_METHODS, compute_lobes, lobes_summary, mode_coupling_line, speed_axis
+
+__all__ = [
+    "LOBE_METHODS",
+    "CutOptions",
+    "KeptCut",
+    "compute_lobes",
+    "doubts_of_cuts",
+    "judge_recordings",
+    "keep_spectra",
+    "lobes_summary",
+    "mode_coupling_line",
+    "read_cuts",
+    "speed_axis",
+    "stated_runout",
+    "tone_table",
+    "verdict_table",
+    "write_cuts",
+]

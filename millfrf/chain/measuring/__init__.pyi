@@ -1,0 +1,16 @@
+from .live_session import acquire_live
+from .plan import plan_from_file, plan_tables
+from .record_session import OpenedSession, Tally, acquire, open_session
+from .signal_check import listen, preflight
+
+__all__ = [
+    "OpenedSession",
+    "Tally",
+    "acquire",
+    "acquire_live",
+    "listen",
+    "open_session",
+    "plan_from_file",
+    "plan_tables",
+    "preflight",
+]

@@ -1,0 +1,5 @@
+from .commands import cut_app
+
+__all__ = [
+    "cut_app",
+]

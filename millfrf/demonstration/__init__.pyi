@@ -1,0 +1,13 @@
+from .concealment import ConcealOptions, run_concealed
+from .concealment_result import concealment_table
+from .whole_chain import CUTTER, DemoOptions, comparison_tables, run_demo
+
+__all__ = [
+    "CUTTER",
+    "ConcealOptions",
+    "DemoOptions",
+    "comparison_tables",
+    "concealment_table",
+    "run_concealed",
+    "run_demo",
+]

@@ -1,0 +1,137 @@
+"""From a nominal model and recordings to a folder with the diagnosis and the improved model."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from cutting import MillingProcess
+from mismatch import Settings, StructureDiagnosis, diagnose, improved_model_of, read_recordings, write_diagnosis
+from mismatch.location.spindle_orders import SpindleSpeed, spindle_speed
+from mismatch.records.reading import measured_part
+from modal_fit import read_modal_model, write_modal_model
+
+from .chain import SUBSPACE, FitOptions, fit_recordings
+from .gate import check_model_and_recordings
+from .progress import Progress, silent
+from .report import write_diagnosis_report
+from .result_folder import refuse_file
+
+
+@dataclass(frozen=True)
+class DiagnosisFiles:
+    """What a diagnosis wrote, and lines that sum it up."""
+
+    diagnosis: StructureDiagnosis
+    written: tuple[Path, ...]
+    summary: tuple[str, ...]
+
+
+def diagnose_files(
+    model_path: str | os.PathLike[str],
+    recordings: Sequence[str | os.PathLike[str]],
+    out: str | os.PathLike[str],
+    settings: Settings | None = None,
+    *,
+    stream: str | None = None,
+    process: MillingProcess | None = None,
+    progress: Progress = silent,
+) -> DiagnosisFiles:
+    """Diagnose and write diagnosis, improved model and report into a folder, made if need be.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be used together, or a folder that cannot be made.
+    """
+    folder = Path(out)
+    refuse_file(folder)
+    whole = read_modal_model(model_path)
+    model = measured_part(whole, recordings, stream=stream)
+    doubts = check_model_and_recordings(model_path, model, recordings, stream, progress)
+    trials = read_recordings(recordings, model, stream=stream)
+    with progress("diagnosing"):
+        diagnosis = diagnose(model, trials, settings, speeds=_speeds(recordings))
+    diagnosis = replace(diagnosis, doubts=(*doubts, *diagnosis.doubts))
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = (folder / "diagnosis.json", folder / "improved_model.json", folder / "report.html")
+    write_diagnosis(paths[0], diagnosis)
+    write_modal_model(paths[1], improved_model_of(diagnosis))
+    with progress("writing the report"):
+        write_diagnosis_report(paths[2], diagnosis, Path(model_path).name, process)
+    missing = [label for label in whole.responses if label not in model.responses]
+    note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []
+    return DiagnosisFiles(diagnosis, paths, (*note, *summary(diagnosis)))
+
+
+def nominal_from_simulation(
+    simulated: str | os.PathLike[str],
+    band: tuple[float, float],
+    out: str | os.PathLike[str],
+    *,
+    stream: str | None = None,
+    progress: Progress = silent,
+) -> Path:
+    """Fit the nominal model to a simulated recording, by the subspace method; write it as ``nominal.json``.
+
+    Raises
+    ------
+    InputError
+        A recording that cannot be fitted in that band.
+    """
+    fitted = fit_recordings([simulated], FitOptions(band, SUBSPACE, stream=stream), progress)
+    Path(out).mkdir(parents=True, exist_ok=True)
+    path = Path(out) / "nominal.json"
+    write_modal_model(path, fitted.model)
+    return path
+
+
+def _speeds(recordings: Sequence[str | os.PathLike[str]]) -> dict[str, SpindleSpeed]:
+    """Spindle speed by recording's name, where it is stated."""
+    stated = {Path(path).stem: spindle_speed(path) for path in recordings}
+    return {name: speed for name, speed in stated.items() if speed is not None}
+
+
+def summary(diagnosis: StructureDiagnosis) -> list[str]:
+    """A few lines for the terminal: verdict, causes with numbers, error before and after."""
+    lines = [f"verdict: {diagnosis.verdict}"]
+    lines.append(diagnosis.details.band.sentence)
+    lines += [f"warning: {doubt}" for doubt in diagnosis.doubts]
+    for cause in diagnosis.physics:
+        numbers = ", ".join(
+            f"{name} {value:.4g}" + (f" ± {cause.standard_errors[name]:.2g}" if name in cause.standard_errors else "")
+            for name, value in cause.parameters.items()
+        )
+        place = ", ".join(f"{key} {value}" for key, value in cause.location.items())
+        lines.append(f"{cause.name}{f' ({place})' if place else ''}: {numbers}; evidence {cause.evidence:.0f}")
+    if diagnosis.equivalents:
+        lines.append(f"cannot be told from: {', '.join(diagnosis.equivalents)}")
+    if diagnosis.verdict == "partly explained":
+        lines.append(
+            f"{100 * diagnosis.improvement.after:.3g} % of the held-out response is still not predicted, more than a "
+            "whole explanation may leave"
+        )
+    lines += [
+        f"{one.name} is not told: {one.location['impossible']}"
+        for one in diagnosis.candidates
+        if one.stage == "impossible"
+    ][:1]
+    if diagnosis.verdict == "unexplained":
+        lines.append(
+            f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal: a cause is missing"
+        )
+    lines.append(_error_line(diagnosis))
+    return lines
+
+
+def _error_line(diagnosis: StructureDiagnosis) -> str:
+    """Errors on the recording held out."""
+    gain = diagnosis.improvement
+    said = (
+        f"{100 * gain.before:.3g} % nominal, {100 * gain.refitted:.3g} % refitted, {100 * gain.after:.3g} % improved, "
+        f"noise {100 * gain.noise_floor:.3g} %"
+    )
+    if len(diagnosis.details.recordings) < 2:
+        return f"error on {gain.held_out}, the only recording, so not held out: {said}"
+    test = f", p = {gain.p_value:.2g} that improved is no better than {gain.against}" if diagnosis.physics else ""
+    return f"error on {gain.held_out}, held out: {said}{test}"

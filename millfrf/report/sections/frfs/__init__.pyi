@@ -1,0 +1,10 @@
+from .choice import Band, axis_of, band_of, shown_frf
+from .measured_frfs import frf_section
+
+__all__ = [
+    "Band",
+    "axis_of",
+    "band_of",
+    "frf_section",
+    "shown_frf",
+]

@@ -1,1 +1,0 @@
-"""Stability of a robot's postures on the command line: lobes, and maps of depth limits."""

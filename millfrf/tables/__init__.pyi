@@ -1,0 +1,16 @@
+from .mode_shapes import shape_table, shapes_of
+from .point_words import points_in_words
+from .poles_table import poles_in_words
+from .result_tables import Table, error_table, mode_table, show, with_error
+
+__all__ = [
+    "Table",
+    "error_table",
+    "mode_table",
+    "points_in_words",
+    "poles_in_words",
+    "shape_table",
+    "shapes_of",
+    "show",
+    "with_error",
+]

@@ -1,0 +1,47 @@
+"""What a modal model gives at lines from 0 Hz on: receptance, and displacement under forces."""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modal_fit import ModalModel
+
+from .modal_loops import modal_displacement
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+def receptance_at(model: ModalModel, frequencies: Real) -> Complex:
+    """Receptance (n, n_responses, n_excitations) at lines from 0 Hz on.
+
+    A residual inertia stands for modes below the band and says nothing below it: under a third of the lowest mode it
+    is left out, or the mean cutting force would carry the tool away.
+    """
+    if model.residuals is None or not model.residuals.lower.any():
+        return model.receptance(frequencies)
+    plain = replace(model, residuals=replace(model.residuals, lower=np.zeros_like(model.residuals.lower)))
+    values = plain.receptance(frequencies)
+    inside = frequencies >= model.natural_frequencies.min() / 3
+    values[inside] -= model.residuals.lower / (2 * np.pi * frequencies[inside, None, None]) ** 2
+    return values
+
+
+def displacement_at(model: ModalModel, frequencies: Real, force: Complex) -> Complex:
+    """``H F`` (n, n_responses) at lines from 0 Hz on, with H as in :func:`receptance_at` but never written out.
+
+    Parameters
+    ----------
+    frequencies : (n,), Hz
+    force : (n, n_excitations), N
+    """
+    s = np.asarray(2j * np.pi * frequencies, dtype=complex)
+    out = np.empty((len(s), model.right.shape[1]), dtype=complex)
+    modal_displacement(s, model.poles, model.right, model.left, np.ascontiguousarray(force), out)
+    if model.residuals is not None:
+        plain = replace(model.residuals, lower=np.zeros_like(model.residuals.lower))
+        out += np.einsum("kpq,kq->kp", plain.receptance(s), force)
+        inside = (frequencies >= model.natural_frequencies.min() / 3) & (frequencies > 0)
+        out[inside] += (force[inside] @ model.residuals.lower.T) / s[inside, None] ** 2
+    return out * np.exp(-s * model.delay)[:, None] if model.delay else out

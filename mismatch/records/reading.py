@@ -1,0 +1,167 @@
+"""Recordings at a model's degrees of freedom, brought down to what a comparison with the model needs."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from acquisition import Recording
+from estimation import DERIVATIVE_ORDERS, BandRecording, channel_at, read_band_recording
+from foundation import InputError
+from modal_fit import ModalModel
+
+from .compared_band import ABOVE, compared_band, reach_of
+
+SHORTEST = 20.0
+"""Least length of a recording, in periods of the lowest mode."""
+
+KEPT = 6.0
+"""Sample rate that is kept, in times the highest frequency of interest: tones above the band are looked for there."""
+
+
+def band_of(model: ModalModel, rate: float) -> tuple[float, float]:
+    """Band (Hz) in which a model and a recording are compared: both edges of :func:`compared_band`.
+
+    Parameters
+    ----------
+    model
+        With or without a band of its own.
+    rate
+        Sample rate of the recording, Hz.
+
+    Raises
+    ------
+    InputError
+        The recording is sampled too slowly for the model.
+    """
+    return compared_band(model, rate).edges
+
+
+def read_recording(path: str | os.PathLike[str], model: ModalModel, *, stream: str | None = None) -> BandRecording:
+    """Read one recording at the degrees of freedom of a model of receptances.
+
+    Parameters
+    ----------
+    path
+        Recording with a force channel at each of the model's excitations and a displacement, velocity or acceleration
+        at each of its responses.
+    model
+        What will be compared.
+    stream
+        Sample clock; None: the only one.
+
+    Raises
+    ------
+    InputError
+        A channel is missing, values are not finite, or the recording is too short or sampled too slowly.
+    """
+    return read_at(path, model.excitations, model.responses, model, stream=stream)
+
+
+def read_at(
+    path: str | os.PathLike[str],
+    excitations: Sequence[str],
+    responses: Sequence[str],
+    model: ModalModel,
+    *,
+    stream: str | None = None,
+) -> BandRecording:
+    """Read one recording at given degrees of freedom; the model's modes say how fast and how long it must be.
+
+    Parameters
+    ----------
+    path
+        Recording.
+    excitations, responses
+        Degrees of freedom of the columns, ``node:direction``.
+    model
+        Modes of the band.
+    stream
+        Sample clock; None: the only one.
+
+    Raises
+    ------
+    InputError
+        As :func:`read_recording`.
+    """
+    highest = ABOVE * float(model.natural_frequencies.max())
+    if model.band is not None:
+        highest = max(highest, model.band[1])
+    recording = read_band_recording(path, excitations, responses, KEPT * highest, stream=stream)
+    reach_of(model, recording.rate)
+    compared_band(model, recording.rate)
+    least = SHORTEST / float(model.natural_frequencies.min())
+    if recording.duration < least:
+        raise InputError(
+            f"{Path(path).name} lasts {recording.duration:.3g} s; {SHORTEST:g} periods of the lowest mode, "
+            f"{least:.3g} s, are the least"
+        )
+    return recording
+
+
+def read_recordings(
+    paths: Sequence[str | os.PathLike[str]], model: ModalModel, *, stream: str | None = None
+) -> list[BandRecording]:
+    """Read recordings for a diagnosis, weakest force first.
+
+    Parameters
+    ----------
+    paths
+        Recordings.
+    model
+        What will be compared.
+    stream
+        Sample clock; None: the only one of each recording.
+
+    Raises
+    ------
+    InputError
+        No recording, or what :func:`read_recording` refuses.
+    """
+    if not paths:
+        raise InputError("no recording given; name one or more")
+    if model.quantity != "receptance":
+        raise InputError(
+            f"a diagnosis needs a model of receptances, this is one of {model.quantity}; calibrate it first"
+        )
+    found = (read_recording(path, model, stream=stream) for path in paths)
+    return sorted(found, key=lambda recording: recording.level)
+
+
+def measured_part(
+    model: ModalModel, paths: Sequence[str | os.PathLike[str]], *, stream: str | None = None
+) -> ModalModel:
+    """The model with the responses that every recording has; a sensor that was not mounted is no obstacle.
+
+    Parameters
+    ----------
+    model
+        What will be compared.
+    paths
+        Recordings.
+    stream
+        Sample clock; None: the only one of each recording.
+
+    Raises
+    ------
+    InputError
+        No response of the model is in all recordings.
+    """
+    rows = list(range(len(model.responses)))
+    for path in paths:
+        with Recording(path) as recording:
+            channels = recording.stream(stream).channels
+            rows = [k for k in rows if channel_at(channels, model.responses[k], DERIVATIVE_ORDERS) is not None]
+    if not rows:
+        raise InputError(
+            f"no displacement, velocity or acceleration at {', '.join(model.responses)} is in every recording; "
+            "give recordings of the model's degrees of freedom"
+        )
+    if len(rows) == len(model.responses):
+        return model
+    residuals = model.residuals
+    if residuals is not None:
+        kept = None if residuals.residues is None else residuals.residues[:, rows]
+        residuals = replace(residuals, upper=residuals.upper[rows], lower=residuals.lower[rows], residues=kept)
+    labels = tuple(model.responses[k] for k in rows)
+    return replace(model, right=model.right[:, rows], responses=labels, residuals=residuals, covariance=None)

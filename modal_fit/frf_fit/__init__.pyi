@@ -1,0 +1,12 @@
+from .fit import NOT_REFINED, REFINED, MatrixFit, fit_matrix
+from .mode_selection import default_order
+from .picked import fit_picked
+
+__all__ = [
+    "NOT_REFINED",
+    "REFINED",
+    "MatrixFit",
+    "default_order",
+    "fit_matrix",
+    "fit_picked",
+]

@@ -1,0 +1,11 @@
+from .chart import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
+from .matrix_fraction import OrderPoles, matrix_fraction_poles
+
+__all__ = [
+    "OrderPoles",
+    "PoleGroup",
+    "StabilisationChart",
+    "choose_poles",
+    "matrix_fraction_poles",
+    "stabilisation_chart",
+]

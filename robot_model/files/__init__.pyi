@@ -1,0 +1,13 @@
+from .planar_file import PlanarCase, read_planar_robot
+from .robot_files import assumptions, read_table, robot_names
+from .spatial_file import SpatialCase, read_spatial_robot
+
+__all__ = [
+    "PlanarCase",
+    "SpatialCase",
+    "assumptions",
+    "read_planar_robot",
+    "read_spatial_robot",
+    "read_table",
+    "robot_names",
+]

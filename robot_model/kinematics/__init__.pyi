@@ -1,0 +1,25 @@
+from .damped_least_squares import inverse_kinematics
+from .joint_values import LARGEST_TRAVEL, driven_values, named_values, shown_values, typed_values, unit_doubts
+from .loop_closure import close_loops, posture_warnings, tool_jacobian
+from .mechanism import Frame, Mechanism, drive_direction, rotation_vector
+from .spherical_wrist import has_spherical_wrist, nearest_solution, wrist_solutions
+
+__all__ = [
+    "LARGEST_TRAVEL",
+    "Frame",
+    "Mechanism",
+    "close_loops",
+    "drive_direction",
+    "driven_values",
+    "has_spherical_wrist",
+    "inverse_kinematics",
+    "named_values",
+    "nearest_solution",
+    "posture_warnings",
+    "rotation_vector",
+    "shown_values",
+    "tool_jacobian",
+    "typed_values",
+    "unit_doubts",
+    "wrist_solutions",
+]

@@ -1,0 +1,30 @@
+from .causes import Cause, PostureFrequencies, equivalent_causes, explain_frequencies
+from .change import Change, Companion, Numbered
+from .changes import changed_robot, possible_changes, unnamed_changes
+from .variations import (
+    with_damping_factor,
+    with_joint_factor,
+    with_lighter_end,
+    with_link_factor,
+    with_payload,
+    with_rigid_links,
+)
+
+__all__ = [
+    "Cause",
+    "Change",
+    "Companion",
+    "Numbered",
+    "PostureFrequencies",
+    "changed_robot",
+    "equivalent_causes",
+    "explain_frequencies",
+    "possible_changes",
+    "unnamed_changes",
+    "with_damping_factor",
+    "with_joint_factor",
+    "with_lighter_end",
+    "with_link_factor",
+    "with_payload",
+    "with_rigid_links",
+]

@@ -1,0 +1,5 @@
+from .certified import certified_lobes
+
+__all__ = [
+    "certified_lobes",
+]

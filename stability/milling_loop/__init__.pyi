@@ -1,0 +1,16 @@
+from .beyond_band import with_residual_flexibility
+from .delayed_state import DelaySystem, delay_system
+from .engagement import Piece, engagement_pieces
+from .tip_receptance import ToolReceptance, reaching, tool_directions, tool_receptance
+
+__all__ = [
+    "DelaySystem",
+    "Piece",
+    "ToolReceptance",
+    "delay_system",
+    "engagement_pieces",
+    "reaching",
+    "tool_directions",
+    "tool_receptance",
+    "with_residual_flexibility",
+]
