@@ -32,17 +32,17 @@ class ClockFit:
     Parameters
     ----------
     origin_local
-        In the device's unit: samples, or s.
-    origin_host
-        Host's monotonic time there, s.
+        Time of the origin in the device's unit: samples, or s.
+    origin_host : s
+        Host's monotonic time at the origin.
     slope
         Host seconds per unit.
     drift
         Relative error of the device's unit against its nominal one, positive where the device is slow.
-    scatter
-        Half the range between the lateness of the windows' pairs that counts as usual (quartiles), s.
+    scatter : s
+        Half the range between the lateness of the windows' pairs that counts as usual (quartiles).
     n_pairs
-        Pairs used.
+        Number of pairs used.
     """
 
     origin_local: float

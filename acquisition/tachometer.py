@@ -38,13 +38,13 @@ def pulse_times(
     Parameters
     ----------
     samples : (n,)
-        The channel, any unit.
-    sample_rate
-        Hz.
+        Samples of the pulse channel, in any unit.
+    sample_rate : Hz
+        Samples a second.
     low, high
         Levels of the hysteresis; None: at 40 % and 60 % between the 1st and 99th percentile.
-    delay
-        By which the channel comes late behind those it is compared with, s; taken off the times.
+    delay : s
+        Time by which the channel comes late behind those it is compared with; it is taken off the times.
 
     Raises
     ------

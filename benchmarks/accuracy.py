@@ -29,11 +29,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Recording, record
-from benchmarks.frf_trial.stable_clusters import OrderPoles, choose
 from cutting import MillingProcess
 from estimation import Frf, band_record, choose_channels, cross_spectra, h1, settings_for, sum_tests
 from modal_fit import fit_polyreference, fit_subspace
 from replay_data import LinearSweep, MillingCell, default_structure, milling_sensors
+
+from .frf_trial.stable_clusters import OrderPoles, choose
 
 RPM = pi / 30
 CUTTER = MillingProcess(2, 12.7e-3, pi / 2, 119e6, 0.17, 0.33, 0.0, pi, 0.1e-3, runout=5e-6)

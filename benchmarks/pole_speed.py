@@ -24,7 +24,7 @@ import numpy as np
 
 from estimation import Frf
 from modal_fit import ModalModel
-from modal_fit.matrix_fraction import matrix_fraction_poles
+from modal_fit.stabilisation.matrix_fraction import matrix_fraction_poles
 
 ORDER = 60
 BAND = (10.0, 410.0)

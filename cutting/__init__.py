@@ -13,7 +13,7 @@ from .directional import (
 )
 from .drilling_force import Drill, DrillingLoad, SpecificForce, catalogue_load, drilling_load, fitted_to_catalogue
 from .engaged_edge import damping_matrices, edge_matrices
-from .force_harmonics import force_harmonics
+from .force_fourier import force_harmonics
 from .immersion import IMMERSIONS, immersion_angles
 from .milling_process import MillingProcess
 from .refusal import refuse_varied

@@ -10,16 +10,16 @@ from .milling_process import MillingProcess
 
 
 def write_cutting_process(path: str | os.PathLike[str], process: MillingProcess, comments: Sequence[str] = ()) -> None:
-    """Write a process whole; the engagement as its two angles.
+    """Write a process to a cutting file; the engagement is written as its two angles.
 
     Parameters
     ----------
     path
-        ``CUT.toml``.
+        Cutting file to write, such as ``CUT.toml``.
     process
         Cutter, engagement and coefficients.
     comments
-        Lines for the head of the file.
+        Lines of comment for the head of the file.
 
     Raises
     ------

@@ -15,8 +15,8 @@ def chip_direction(process: MillingProcess, angles: NDArray[np.float64]) -> NDAr
     ----------
     process
         Cutter; gamma is its edge angle.
-    angles : (n,)
-        Immersion angles phi of one tooth, rad.
+    angles : (n,), rad
+        Immersion angles phi of one tooth.
 
     Returns
     -------
@@ -55,8 +55,8 @@ def directional_matrix(process: MillingProcess, angles: NDArray[np.float64]) -> 
     ----------
     process
         Cutter and engagement.
-    angles : (n,)
-        Spindle angle, rad: immersion of tooth 0.
+    angles : (n,), rad
+        Spindle angles: the immersion of tooth 0.
 
     Returns
     -------

@@ -19,16 +19,16 @@ class Drill:
 
     Parameters
     ----------
-    diameter
-        m.
-    edge_angle
-        chi_r: half the point angle, rad.
-    rake
-        gamma_n0: normal rake at the periphery, rad.
-    inclination
-        lambda_s0: inclination of the edge at the periphery, rad.
+    diameter : m
+        Diameter of the drill.
+    edge_angle : rad
+        Angle chi_r between edge and axis: half the point angle.
+    rake : rad
+        Normal rake gamma_n0 at the periphery.
+    inclination : rad
+        Inclination lambda_s0 of the edge at the periphery.
     edges
-        Number of edges.
+        Number of cutting edges.
 
     Raises
     ------
@@ -75,7 +75,7 @@ class DrillingLoad:
 def drilling_load(
     drill: Drill, feed: float, tangential: SpecificForce, axial: SpecificForce, depth: float = np.inf
 ) -> DrillingLoad:
-    """Load at ``depth`` (m) of the point below the surface; infinite: the whole edge cuts.
+    """Give the load on a drill whose point is ``depth`` (m) below the surface; at infinite depth the whole edge cuts.
 
     ``F_a = N int k_a h^(1-m) dr / sin chi``, ``M = N int k_t h^(1-m) r dr / sin chi`` with ``h = f / N sin chi`` and
     ``tan gamma_n = r / (D / 2) tan gamma_n0`` (Ferreras-Higuero et al., Eqs. 16-19). The edge is in the work as far
@@ -85,12 +85,13 @@ def drilling_load(
     Parameters
     ----------
     drill
-    feed
-        Per revolution, m.
+        Geometry of the drill.
+    feed : m
+        Feed per revolution.
     tangential, axial
-        Specific pressures.
-    depth
-        Of the drill's point, m, 0 or more.
+        Specific pressures of the cutting force and of the thrust.
+    depth : m
+        Depth of the drill's point below the surface, 0 or more.
 
     Raises
     ------
@@ -118,7 +119,7 @@ def drilling_load(
 
 
 def catalogue_load(diameter: float, feed: float, material: float = 1.01) -> DrillingLoad:
-    """A maker's formulas for twist drills: ``570 K D f^0.85`` N and ``K D^2 (0.630 + 16.84 f) / 100`` N m.
+    """Give a maker's load for twist drills: ``570 K D f^0.85`` N and ``K D^2 (0.630 + 16.84 f) / 100`` N m.
 
     D in mm, f in mm per revolution; K = 1.01: aluminium. Arguments here in m.
 

@@ -19,10 +19,10 @@ def edge_matrices(process: MillingProcess, angles: Real, depth: float) -> Real:
     ----------
     process
         Cutter and engagement.
-    angles : (n,)
-        Spindle angle, rad: immersion of tooth 0 at its tip.
-    depth
-        Axial depth a, m; of no effect with straight edges.
+    angles : (n,), rad
+        Spindle angles: the immersion of tooth 0 at its tip.
+    depth : m
+        Axial depth of cut a; it has no effect with straight edges.
 
     Returns
     -------

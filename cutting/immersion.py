@@ -8,7 +8,7 @@ IMMERSIONS = ("up", "down", "slot", "central")
 
 
 def immersion_angles(kind: str, radial_depth: float, diameter: float) -> tuple[float, float]:
-    """Immersion of a cutter that takes ``radial_depth`` (m) of its diameter.
+    """Give the immersion of a cutter that takes ``radial_depth`` (m) of its diameter.
 
     Up milling enters at 0 with no chip and leaves at ``acos(1 - 2 b / D)``; down milling is its mirror image; a central
     cut lies evenly about pi/2 (Altintas, Manufacturing Automation, 2nd ed., section 2.6).
@@ -16,11 +16,11 @@ def immersion_angles(kind: str, radial_depth: float, diameter: float) -> tuple[f
     Parameters
     ----------
     kind
-        ``up``, ``down``, ``slot`` or ``central``.
-    radial_depth
-        b, m; of no effect in a slot.
-    diameter
-        D, m.
+        Way the cutter is led: ``up``, ``down``, ``slot`` or ``central``.
+    radial_depth : m
+        Radial depth of cut b; it has no effect in a slot.
+    diameter : m
+        Diameter D of the cutter.
 
     Returns
     -------

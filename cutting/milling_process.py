@@ -19,28 +19,29 @@ class MillingProcess:
     ----------
     teeth
         Number of cutting edges N >= 1.
-    diameter
-        Of the cutter, m.
-    edge_angle
-        Cutting edge angle gamma, rad, 0 < gamma <= pi/2 (pi/2: square end mill).
-    ktc
-        Tangential force coefficient K_tc, Pa.
+    diameter : m
+        Diameter of the cutter.
+    edge_angle : rad
+        Cutting edge angle gamma, 0 < gamma <= pi/2 (pi/2: square end mill).
+    ktc : Pa
+        Tangential force coefficient K_tc.
     krc, kac
         Radial and axial coefficients as shares of ``ktc``.
-    start_angle, exit_angle
-        Immersion, rad, 0 <= start < exit <= pi.
-    feed_per_tooth
-        m.
-    kte, kre, kae
-        Edge coefficients, N/m of edge engaged.
-    runout
-        Radial offset of the spindle axis, m; tooth j runs ``runout * cos(2 pi j / teeth)`` large.
-    helix_angle
-        Of the edges, rad, 0 <= beta < pi/2; at the height z an edge stands ``2 z tan(beta) / diameter`` behind its tip.
-    pitch_angles : (teeth,)
-        From each tooth j to the one before it in the cut, j + 1, rad; together 2 pi. Empty: equal.
-    process_damping
-        Coefficient C, N/m: the flank takes ``C v_n / V`` per metre of edge, v_n the speed into the surface, V the
+    start_angle, exit_angle : rad
+        Immersion angles at which a tooth enters and leaves, 0 <= start < exit <= pi.
+    feed_per_tooth : m
+        Feed per tooth.
+    kte, kre, kae : N/m
+        Tangential, radial and axial edge coefficients, force per metre of engaged edge.
+    runout : m
+        Radial offset of the spindle axis; tooth j runs ``runout * cos(2 pi j / teeth)`` large.
+    helix_angle : rad
+        Helix angle beta of the edges, 0 <= beta < pi/2; at the height z an edge stands ``2 z tan(beta) / diameter``
+        behind its tip.
+    pitch_angles : (teeth,), rad
+        Angle from each tooth j to the one before it in the cut, j + 1; they add up to 2 pi. Empty: equal pitch.
+    process_damping : N/m
+        Coefficient C: the flank takes ``C v_n / V`` per metre of edge, with v_n the speed into the surface and V the
         cutting speed (Tyler & Schmitz, Precision Engineering 37, 2013, Eq. 1).
     ktc_std, krc_std, kac_std
         Standard errors of ``ktc`` (Pa), ``krc`` and ``kac``, taken as independent of each other. Zero: not known.
@@ -139,7 +140,7 @@ class MillingProcess:
 
     @property
     def thickest_chip(self) -> float:
-        """Of a tool that does not vibrate and has no runout, across the tool's axis: ``feed * max sin(phi)``, m."""
+        """Give the thickest chip, m, of a tool that does not vibrate and has no runout: ``feed * max sin(phi)``."""
         top = min(max(math.pi / 2, self.start_angle), self.exit_angle)
         return self.feed_per_tooth * math.sin(top)
 

@@ -13,13 +13,13 @@ def refuse_varied(process: MillingProcess, what: str, remedy: str, *, takes: Col
     Parameters
     ----------
     process
-        Cutter.
+        Milling process to check.
     what
-        Name of the calculation, subject of the sentence.
+        Name of the calculation; it is the subject of the message.
     remedy
         What to do instead.
     takes
-        Of ``helix``, ``pitch`` and ``damping`` those that it covers.
+        Those of ``helix``, ``pitch`` and ``damping`` that the calculation covers.
 
     Raises
     ------

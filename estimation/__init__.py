@@ -1,13 +1,15 @@
 """Spectra, coherence and frequency response functions from recordings: knows nothing of modes."""
 
 from .band_records import BandDecimator, BandRecord, band_record, widest_band
-from .coherence import input_coherence, multiple_coherence, partial_coherence, principal_inputs, virtual_coherence
-from .cross_spectra import CrossSpectra, SpectralSettings
-from .error_in_variables import h2, hv, instrumental_variable
-from .frf import Frf, FrfCovariance
-from .frf_file import read_frf, write_frf
+from .estimators.error_in_variables import h2, hv, instrumental_variable
+from .estimators.least_squares import h1, h1_side_by_side
+from .estimators.local_polynomials import local_half_width, local_polynomial
+from .frf_matrix.band_of_frf import known_band
+from .frf_matrix.frf import Frf, FrfCovariance
+from .frf_matrix.frf_file import read_frf, write_frf
+from .frf_matrix.quantities import correct_high_pass, to_receptance
+from .frf_matrix.uff_file import is_uff_number, uff_node_numbers, write_frf_uff
 from .geometry import Geometry, import_geometry, is_geometry_table, read_geometry, write_geometry
-from .h1 import h1, h1_side_by_side
 from .hammer import (
     Decay,
     Disagreement,
@@ -41,20 +43,24 @@ from .importing import (
     looks_like_frf,
     read_frf_uff,
 )
-from .independence import RANK_TOLERANCE, InputIndependence, bands_text, input_independence
 from .integration import displacement_from_acceleration
-from .known_band import known_band
-from .local_polynomial import local_half_width, local_polynomial
-from .order_tracking import excitation_map, spectrogram, track_order
-from .quantities import correct_high_pass, to_receptance
 from .reciprocity import ReciprocityPair, SharedPoint, reciprocity_pairs, shared_points
-from .recording_spectra import choose_channels, cross_spectra
-from .spectral_accumulator import SpectralAccumulator
-from .stacking import sum_tests
+from .spectra.coherence import (
+    input_coherence,
+    multiple_coherence,
+    partial_coherence,
+    principal_inputs,
+    virtual_coherence,
+)
+from .spectra.independence import RANK_TOLERANCE, InputIndependence, bands_text, input_independence
+from .spectra.order_tracking import excitation_map, spectrogram, track_order
+from .spectra.recording_spectra import choose_channels, cross_spectra
+from .spectra.spectral_accumulator import SpectralAccumulator
+from .spectra.spectral_matrix import CrossSpectra, SpectralSettings
+from .spectra.stacking import sum_tests
+from .spectra.trusted_samples import usable_samples
+from .spectra.windows import effective_averages, settings_for
 from .sweep_plan import SweepDemand, SweepPlan, plan_sweeps, predicted_spectra
-from .uff_file import is_uff_number, uff_node_numbers, write_frf_uff
-from .usable_samples import usable_samples
-from .windows import effective_averages, settings_for
 
 __all__ = [
     "RANK_TOLERANCE",

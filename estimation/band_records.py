@@ -22,12 +22,14 @@ class BandRecord:
 
     Parameters
     ----------
-    sample_rate
-        After decimation, Hz.
-    usable_band
-        Upper end of the flat, alias-free band, Hz.
+    sample_rate : Hz
+        Sample rate after decimation.
+    usable_band : Hz
+        Upper end of the flat, alias-free band.
     excitation_samples : (n_samples, n_excitations), SI
+        Samples of the excitations, filtered and decimated.
     response_samples : (n_samples, n_responses), SI
+        Samples of the responses, filtered and decimated.
     excitations, responses
         Channels along the columns.
     """
@@ -58,10 +60,10 @@ class BandDecimator:
 
     Parameters
     ----------
-    sample_rate
-        Of the samples that come, Hz.
-    highest_frequency
-        Upper end of the band that must stay flat (ripple below 1e-4), Hz.
+    sample_rate : Hz
+        Sample rate of the samples that arrive.
+    highest_frequency : Hz
+        Upper end of the band that must stay flat (ripple below 1e-4).
 
     Raises
     ------
@@ -134,13 +136,13 @@ def band_record(
     Parameters
     ----------
     recording
-        Open recording.
-    highest_frequency
-        Upper end of the band that must stay flat, Hz.
+        Open recording to read.
+    highest_frequency : Hz
+        Upper end of the band that must stay flat.
     excitations, responses
         Channels to keep.
     stream
-        Sample clock; None: the only one.
+        Name of the sample clock; None: the only one.
     progress
         Called with the number of samples read so far.
 

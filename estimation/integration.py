@@ -18,10 +18,11 @@ def displacement_from_acceleration(
     Parameters
     ----------
     acceleration : (n_samples, n_channels), m/s^2
-    sample_rate
-        Hz.
-    low_cut
-        Hz; all that is slower (drift, the sensor's own high-pass, thermal wander) is left out.
+        Acceleration of each channel.
+    sample_rate : Hz
+        Samples a second.
+    low_cut : Hz
+        Frequency below which everything is left out: drift, the sensor's own high-pass, thermal wander.
 
     Returns
     -------

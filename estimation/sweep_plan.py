@@ -21,22 +21,22 @@ _STEPS = 24  # of the immersion's start over 180 degrees
 
 @dataclass(frozen=True)
 class SweepDemand:
-    """What a plan shall reach.
+    """Demands on a plan of sweeps: band, noise, wanted error.
 
     Parameters
     ----------
-    band
-        Hz.
-    depth
-        Axial depth of the sweeps, m.
-    resolution
-        Width over which lines may be averaged, Hz: well below the half-power bandwidth of the narrowest mode.
-    response_noise
-        Standard deviation density of a response's noise at the band's centre, as displacement, m/sqrt(Hz).
-    frf_error
-        Largest standard deviation wanted of any FRF entry, m/N.
-    widths
-        Immersion widths that the fixture allows, rad.
+    band : Hz
+        Lowest and highest frequency that must be excited.
+    depth : m
+        Axial depth of the sweeps.
+    resolution : Hz
+        Width over which lines may be averaged: well below the half-power bandwidth of the narrowest mode.
+    response_noise : m/sqrt(Hz)
+        Standard deviation density of a response's noise at the band's centre, as displacement.
+    frf_error : m/N
+        Largest standard deviation wanted of any FRF entry.
+    widths : rad
+        Immersion widths that the fixture allows.
     """
 
     band: tuple[float, float]
@@ -64,16 +64,17 @@ class SweepPlan:
     Parameters
     ----------
     processes
-        The cutter in each immersion, one a test.
-    spindle_speeds
-        First and last speed of every sweep, rad/s.
-    duration
-        Of each sweep, s.
+        Milling process of the cutter in each immersion, one a test.
+    spindle_speeds : rad/s
+        First and last speed of every sweep.
+    duration : s
+        Duration of each sweep.
     frequencies : (n_frequencies,), Hz
-    singular_values : (n_frequencies, 3)
-        Predicted, of the one-sided force spectra averaged over the tests, N^2/Hz.
-    frf_errors : (n_frequencies, 3)
-        Predicted standard deviation of an FRF entry at ``resolution``, one column an excitation, m/N.
+        Frequencies at which the errors are predicted.
+    singular_values : (n_frequencies, 3), N^2/Hz
+        Predicted singular values of the one-sided force spectra averaged over the tests.
+    frf_errors : (n_frequencies, 3), m/N
+        Predicted standard deviation of an FRF entry at ``resolution``, one column an excitation.
     condition
         Largest over smallest singular value, at worst over the band.
     """

@@ -25,11 +25,10 @@ from scipy.io import loadmat
 from scipy.optimize import least_squares
 from scipy.signal import butter, filtfilt, resample_poly
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 from figures import COLOURS, house_style, new_figure
-from mismatch import Diagnosis, Trial, diagnose
+from mismatch import StructureDiagnosis, Trial, diagnose, predict
 from mismatch.models.model_terms import improved_model
-from mismatch.models.prediction import predict
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
@@ -141,9 +140,9 @@ def halves(trial: Trial) -> list[Trial]:
     return [Trial(name, trial.rate, trial.force[cut], trial.response[cut], *rest) for name, cut in cuts.items()]
 
 
-def named_friction(found: Diagnosis) -> tuple[float, float]:
+def named_friction(found: StructureDiagnosis) -> tuple[float, float]:
     """Size (N) and smoothing velocity (m/s) of the friction that was found; nothing if none was."""
-    for cause in found.final.hypothesis.causes:
+    for cause in found.details.final.hypothesis.causes:
         if cause.physics.name == "coulomb_friction":
             return float(cause.values[0]), float(cause.values[1])
     return 0.0, 1e-3
@@ -243,7 +242,7 @@ def picture(drives: dict[str, Drive], train: Record, test: Record) -> Figure:
     return figure
 
 
-def study(folder: Path) -> tuple[Diagnosis, dict[str, Drive], dict[str, float]]:
+def study(folder: Path) -> tuple[StructureDiagnosis, dict[str, Drive], dict[str, float]]:
     """Diagnosis of the training record, drives before and after, and the tool's own relative error on the test."""
     train, test = (read_record(folder / name) for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"))
     rigid = by_inverse_dynamics(train)
@@ -258,7 +257,7 @@ def study(folder: Path) -> tuple[Diagnosis, dict[str, Drive], dict[str, float]]:
         "published": Drive(*PUBLISHED),
     }
     trial = as_trial("test", test, loop)
-    models = {"rigid mass": nominal, "named cause": improved_model(found.final.hypothesis)}
+    models = {"rigid mass": nominal, "named cause": improved_model(found.details.final.hypothesis)}
     return found, drives, {name: predict(model, trial).total_error for name, model in models.items()}
 
 

@@ -21,7 +21,7 @@ from robot_model import (
     structure_at,
     tip_compliance,
 )
-from robot_model.mechanism import rotation_vector
+from robot_model.kinematics.mechanism import rotation_vector
 
 CASE = read_spatial_robot("fanuc_s420if")
 

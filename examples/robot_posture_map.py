@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from cutting import MillingProcess
+from millfrf.robot.lobes.posture_maps import depth_over_places, depth_over_redundancy
 from millfrf.robot.posture_figure import draw_posture_map
-from millfrf.robot.posture_maps import depth_over_places, depth_over_redundancy
 from robot_model import (
     CutPlace,
     PostureMap,

@@ -20,9 +20,8 @@ from scipy.optimize import least_squares
 from scipy.signal import csd, welch
 
 from figures import COLOURS, house_style, new_figure
-from mismatch import Diagnosis, Trial, diagnose, linear_floor, seen_motion
+from mismatch import StructureDiagnosis, Trial, diagnose, linear_floor, predict, seen_motion
 from mismatch.models.model_terms import improved_model
-from mismatch.models.prediction import predict
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
@@ -100,7 +99,7 @@ def free_run_errors(model: ModalModel, signals: Signals) -> dict[str, float]:
     }
 
 
-def study(folder: Path) -> tuple[Signals, ModalModel, Diagnosis]:
+def study(folder: Path) -> tuple[Signals, ModalModel, StructureDiagnosis]:
     """Signals, nominal model, and what the diagnosis makes of three realisations."""
     raw = read_signals(folder)
     nominal, offset = linear_model(raw)
@@ -110,25 +109,28 @@ def study(folder: Path) -> tuple[Signals, ModalModel, Diagnosis]:
     return signals, nominal, diagnose(nominal, trials)
 
 
-def picture(signals: Signals, nominal: ModalModel, found: Diagnosis) -> Figure:
+def picture(signals: Signals, nominal: ModalModel, found: StructureDiagnosis) -> Figure:
     """Free-run error over the arrowhead, and the force that the residual asks for over the deflection."""
     figure = new_figure(85)
     errors, law = figure.subplots(1, 2, width_ratios=(3, 2))
     part = PARTS["arrowhead"][0]
     time, measured = np.arange(part.stop) / RATE, signals.response[part]
-    models = {"linear model": nominal, "with the named cause": improved_model(found.final.hypothesis)}
+    models = {"linear model": nominal, "with the named cause": improved_model(found.details.final.hypothesis)}
     errors.plot(time, 1e3 * measured, color="#bbbbbb", lw=0.4, label="measured")
     for (name, model), colour in zip(models.items(), (COLOURS[2], COLOURS[1]), strict=True):
         errors.plot(
             time, 1e3 * (free_run(model, signals, part) - measured), color=colour, lw=0.4, label=f"error, {name}"
         )
     errors.set(xlabel="time (s)", ylabel="output (mV)", title="arrowhead test, simulated from rest")
-    cause = next(cause for cause in found.final.hypothesis.causes if cause.physics.name == "stiffness_hardening")
+    cause = next(
+        cause for cause in found.details.final.hypothesis.causes if cause.physics.name == "stiffness_hardening"
+    )
     assert cause.direction is not None
-    linear = replace(found.final, hypothesis=replace(found.final.hypothesis, causes=()))
-    floor = linear_floor(linear, list(found.lines))
+    final = found.details.final
+    linear = replace(final, hypothesis=replace(final.hypothesis, causes=()))
+    floor = linear_floor(linear, list(found.details.recordings))
     seen = [seen_motion(record, linear.hypothesis, cause.direction) for record in floor.records]
-    kept = slice(found.lines[0].start, -int(2 * RATE))
+    kept = slice(found.details.recordings[0].start, -int(2 * RATE))
     x, g = (np.concatenate([getattr(one, name)[kept] for one in seen]) for name in ("deflection", "force"))
     law.plot(1e3 * x[::7], 1e3 * g[::7], ".", ms=1, color="#999999", label="asked for by the residual")
     line = np.linspace(x.min(), x.max(), 400)
@@ -150,7 +152,7 @@ def main(folder: Path, target: Path | None) -> None:
             f"{k} {v:.4g} +- {cause.standard_errors.get(k, 0):.1g}" for k, v in cause.parameters.items()
         )
         print(f"  {cause.name}: {numbers}; evidence {cause.evidence:.0f}")
-    after = improved_model(found.final.hypothesis)
+    after = improved_model(found.details.final.hypothesis)
     before_errors, after_errors = free_run_errors(nominal, signals), free_run_errors(after, signals)
     for name in PARTS:
         print(f"free run, {name}: {before_errors[name]:.2f} mV before, {after_errors[name]:.3f} mV after")

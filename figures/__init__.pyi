@@ -1,4 +1,4 @@
-from .cuts import LobesBand, ShownCut, TriedCut, chatter_figure, lobes_figure
+from .cuts import LobesBand, ShownCut, TriedCut, chatter_figure, draw_lobes, lobes_figure
 from .diagnosis import (
     channel_map_figure,
     cut_orders_figure,
@@ -16,6 +16,9 @@ from .measurement import (
     FrfCurves,
     GalleryEntry,
     coherent_lines,
+    draw_frf,
+    draw_spectra,
+    draw_stream,
     frf_figures,
     gallery_page,
     input_figure,
@@ -25,6 +28,7 @@ from .measurement import (
 from .modes import (
     assurance_figure,
     compass_figure,
+    draw_model,
     indicator_figure,
     mode_figure,
     stabilisation_figure,
@@ -69,6 +73,11 @@ __all__ = [
     "compass_figure",
     "cut_orders_figure",
     "cut_turn_figure",
+    "draw_frf",
+    "draw_lobes",
+    "draw_model",
+    "draw_spectra",
+    "draw_stream",
     "frf_figures",
     "gallery_page",
     "growth_figure",

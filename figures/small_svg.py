@@ -18,8 +18,8 @@ class SmallSvg:
 
     Parameters
     ----------
-    width, height
-        mm.
+    width, height : mm
+        Size of the page.
     style
         CSS rules for classes of lines and texts.
     """

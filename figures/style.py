@@ -77,8 +77,9 @@ def new_figure(height_mm: float, layout: Literal["constrained"] | None = "constr
 
 
 def line_style(number: int) -> dict[str, Any]:
-    """Colour and dashes of the n-th line of a panel."""
-    return {"color": COLOURS[number % len(COLOURS)], "linestyle": LINE_STYLES[number % len(LINE_STYLES)]}
+    """Colour and dashes of the n-th line of a panel; from the seventh on also marks, for colours come round again."""
+    look = {"color": COLOURS[number % len(COLOURS)], "linestyle": LINE_STYLES[number % len(LINE_STYLES)]}
+    return look if number < len(COLOURS) else look | {"marker": "o", "markevery": 0.08, "markersize": 3.0}
 
 
 def panel_letter(axes: Axes, number: int) -> None:

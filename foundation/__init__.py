@@ -3,13 +3,14 @@
 Nothing here knows about signals, models or the command line.
 """
 
-from foundation.atomic_files import writing_whole_file
-from foundation.degrees_of_freedom import DegreeOfFreedom
-from foundation.errors import FileFormatError, InputError, MillfrfError
-from foundation.noted_table import WARNING, apart, warning_lines
-from foundation.table_mistakes import mistake_in_words, shown
-from foundation.units import SI_UNITS, si_factor, unit_factor
-from foundation.valid_band import Band, checked_band, shared_band
+from .atomic_files import writing_whole_file
+from .degrees_of_freedom import DegreeOfFreedom
+from .errors import FileFormatError, InputError, MillfrfError, MillfrfWarning
+from .noted_table import WARNING, apart, warning_lines
+from .results import Result, Summary, counted, drawing, listed, optional_library, same_values
+from .table_mistakes import mistake_in_words, shown
+from .units import SI_UNITS, si_factor, unit_factor
+from .valid_band import Band, checked_band, shared_band
 
 __all__ = [
     "SI_UNITS",
@@ -19,9 +20,17 @@ __all__ = [
     "FileFormatError",
     "InputError",
     "MillfrfError",
+    "MillfrfWarning",
+    "Result",
+    "Summary",
     "apart",
     "checked_band",
+    "counted",
+    "drawing",
+    "listed",
     "mistake_in_words",
+    "optional_library",
+    "same_values",
     "shared_band",
     "shown",
     "si_factor",

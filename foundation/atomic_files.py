@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from foundation.errors import InputError
+from .errors import InputError
 
 
 @contextmanager
@@ -16,7 +16,7 @@ def writing_whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     Parameters
     ----------
     path
-        Where the finished file shall be. Its folder must exist.
+        Final place of the finished file. Its folder must exist.
 
     Yields
     ------

@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from foundation.errors import InputError
+from .errors import InputError
 
 _PATTERN = re.compile(r"^(?P<node>[^:]+):(?P<sign>[+-])(?P<axis>R?[XYZ]|S)$")
 

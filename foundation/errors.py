@@ -1,4 +1,4 @@
-"""The few named exceptions: a message shows the offending value and the remedy, in one line."""
+"""The few named exceptions, and the one warning: a message shows the offending value and the remedy, in one line."""
 
 
 class MillfrfError(Exception):
@@ -11,3 +11,7 @@ class InputError(MillfrfError):
 
 class FileFormatError(InputError):
     """A file is not what it should be: wrong kind, wrong version, damaged, or lacking a field."""
+
+
+class MillfrfWarning(UserWarning):
+    """A doubt about what was given or found: the result stands, and its user should know of it."""

@@ -3,11 +3,11 @@
 from collections.abc import Iterable, Sequence
 
 WARNING = "# warning: "
-"""Begin of a line that holds one warning."""
+"""Beginning of a line that holds one warning."""
 
 
 def warning_lines(warnings: Sequence[str]) -> list[str]:
-    """One line a warning, to stand above the headings.
+    """Write one line for each warning, to stand above the headings.
 
     Examples
     --------

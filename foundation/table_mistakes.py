@@ -24,7 +24,7 @@ MUST_BE: dict[str, str] = {
     "model_attributes_type": "must be a table",
     "too_short": "must have more entries",
 }
-"""By pydantic's name of the mistake; those with a bound are in :data:`BOUNDS`."""
+"""What a value must be, by pydantic's name of the mistake; mistakes with a bound are in :data:`BOUNDS`."""
 
 BOUNDS: dict[str, tuple[str, str]] = {
     "greater_than": ("must be above {}", "gt"),
@@ -37,22 +37,22 @@ BOUNDS: dict[str, tuple[str, str]] = {
     "enum": ("must be {}", "expected"),
 }
 _TYPES = ("constrained-int", "constrained-str", "int", "str", "float", "bool")
-"""Parts of a location that are pydantic's names of types and no keys."""
+"""Parts of a location that name a type of pydantic, not a key of the file."""
 
 _LONGEST = 60
 
 
 def mistake_in_words(error: Any, schema: Any = None, known: Mapping[str, str] | None = None) -> str:
-    """The first mistake of a table as one sentence, and how many more there are.
+    """Give the first mistake of a table as one sentence, and say how many more there are.
 
     Parameters
     ----------
     error
-        pydantic's ``ValidationError``.
+        The ``ValidationError`` that pydantic raised.
     schema
         The model class that refused the table; its keys are proposed where a key is not known.
     known
-        Sentences for keys of its own, by pydantic's name of the mistake.
+        Sentences for particular mistakes, by pydantic's name of the mistake.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def mistake_in_words(error: Any, schema: Any = None, known: Mapping[str, str] | 
 
 
 def _deepest(mistakes: list[Any]) -> Any:
-    """Of several readings of one value, that which got farthest."""
+    """Give, among several readings of one value, the mistake of the reading that got farthest."""
     first = mistakes[0]
     same = [one for one in mistakes if one["loc"][:1] == first["loc"][:1] and one["input"] == first["input"]]
     return max(same, key=lambda one: one["type"] in BOUNDS) if len(same) > 1 else first
@@ -94,7 +94,7 @@ def _sentence(mistake: Any, schema: Any, known: Mapping[str, str]) -> str:
 
 
 def place(location: Iterable[str | int]) -> str:
-    """``channels[2].unit``, counted from 1 as people do.
+    """Write the place of a key, such as ``channels[2].unit``, counted from 1 as people do.
 
     Examples
     --------
@@ -108,7 +108,7 @@ def place(location: Iterable[str | int]) -> str:
 
 
 def shown(value: object) -> str:
-    """A value as a user wrote it, cut off where it is long.
+    """Give a value as a user wrote it, cut off where it is long.
 
     Examples
     --------

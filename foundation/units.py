@@ -5,7 +5,7 @@ from functools import cache
 from tokenize import TokenError
 from typing import TYPE_CHECKING
 
-from foundation.errors import InputError
+from .errors import InputError
 
 if TYPE_CHECKING:
     import pint
@@ -46,10 +46,10 @@ def si_factor(quantity: str, unit: str) -> float:
     Parameters
     ----------
     quantity
-        One of :data:`SI_UNITS`.
+        Name of the quantity, one of :data:`SI_UNITS`.
     unit
-        As a lab writes it: ``N``, ``kN``, ``m/s^2``, ``mm/s**2``, ``g`` (standard gravity when the
-        quantity is an acceleration), ``um``, ``mV`` ...
+        Unit as a lab writes it: ``N``, ``kN``, ``m/s^2``, ``mm/s**2``, ``g`` (standard gravity when the quantity is an
+        acceleration), ``um``, ``mV`` ...
 
     Raises
     ------
@@ -84,7 +84,7 @@ def unit_factor(unit: str, target: str) -> float | None:
     Parameters
     ----------
     unit
-        Any unit, such as one from a file; unlike in :func:`si_factor`, ``g`` is gram here.
+        Unit to convert from, such as one read from a file; unlike in :func:`si_factor`, ``g`` is gram here.
     target
         A unit that is known to be one, such as ``m/s^2/N``.
 

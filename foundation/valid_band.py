@@ -9,14 +9,14 @@ Band = tuple[float, float]
 
 
 def checked_band(band: Band | None, owner: str) -> Band | None:
-    """The band as two plain numbers, or None where nobody knows in which band the owner holds.
+    """Give the band as two plain numbers, or None where the band of the owner is not known.
 
     Parameters
     ----------
     band
         Lowest and highest frequency, Hz, or None.
     owner
-        What carries the band, for the message: ``modal model``, ``FRF``.
+        Name of what carries the band, for the message: ``modal model``, ``FRF``.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def checked_band(band: Band | None, owner: str) -> Band | None:
 
 
 def shared_band(one: Band | None, other: Band | None) -> Band | None:
-    """The band in which both hold; a side that is not known (None) puts no limit.
+    """Give the band in which both results hold; a side that is not known (None) sets no limit.
 
     Raises
     ------

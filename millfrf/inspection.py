@@ -13,8 +13,8 @@ from estimation import Frf, Geometry, read_frf, read_geometry
 from modal_fit import read_modal_model
 from stability import STATUSES, read_lobes
 
-from .chain.chatter import tone_table, verdict_table
-from .chain.chatter_file import read_cuts
+from .chain.cuts.chatter import tone_table, verdict_table
+from .chain.cuts.chatter_file import read_cuts
 from .file_kinds import CHATTER, CUTTING, FRF, GEOMETRY, LOBES, MODEL, POLES, RECORDING, kind_of
 from .gate import (
     check_frf,
@@ -26,13 +26,13 @@ from .gate import (
     stored_doubts,
 )
 from .gate.signals import level_table, look
-from .point_words import points_in_words
-from .poles_table import poles_in_words
 from .progress import Watch, silent
 from .provenance import read_provenance
-from .reciprocity_tables import pair_table, vector_table
-from .shape_table import shape_table
-from .tables import Table, error_table, mode_table
+from .tables.mode_shapes import shape_table
+from .tables.point_words import points_in_words
+from .tables.poles_table import poles_in_words
+from .tables.reciprocity_tables import pair_table, vector_table
+from .tables.result_tables import Table, error_table, mode_table
 from .tap_concerns import tap_concerns
 
 LARGEST = 100.0
@@ -41,16 +41,16 @@ LARGEST = 100.0
 
 @dataclass(frozen=True)
 class Findings:
-    """What a look at a file gave.
+    """Findings of a look at a file.
 
     Parameters
     ----------
     kind, summary
-        What it is, in one line.
+        Kind of the file, and its content in one line.
     tables
-        Its contents.
+        Tables that show its contents.
     concerns
-        What looks wrong, one sentence each with the remedy; empty where nothing does.
+        Doubts about the file, one sentence each with the remedy; empty where there is none.
     """
 
     kind: str

@@ -7,12 +7,12 @@ _INVALID = re.compile(r"Invalid value for '(?P<option>--[\w-]+)[^:]*: (?P<said>.
 
 
 def usage_in_words(said: str, arguments: Sequence[str]) -> str:
-    """One line for a command line that was not understood.
+    """Say in one line why a command line was not understood.
 
     Parameters
     ----------
     said
-        By the parser.
+        Message of the parser.
     arguments
         The words of the command line as they were typed.
 

@@ -1,11 +1,21 @@
 """Where a model and recordings disagree: locate it, name the physics, model it, show the fit improve."""
 
-from .adapters.structure.diagnose import Settings, diagnose
-from .inference.diagnosis import AcceptedCause, Candidate, Diagnosis, Improvement
+from .adapters.structure import Prediction, diagnose, improved_model_of, predict
+from .inference import (
+    AcceptedCause,
+    Candidate,
+    Diagnosis,
+    Improvement,
+    LabError,
+    Settings,
+    read_diagnosis,
+    write_diagnosis,
+)
 from .joints.joint_law import JointLaw, JointMotion
+from .location.structure_details import StructureDetails, StructureDiagnosis
 from .models.fitting import Fit, fit, residual
 from .models.hypothesis import Cause, Hypothesis, predict_lines
-from .models.model_shape import LabError, ModelShape
+from .models.model_shape import ModelShape
 from .records.trial import Trial, band_of, read_trial, read_trials
 from .records.windowed_lines import WindowedLines, windowed_lines
 from .screening.joint_direction import JointSighting, SeenMotion, find_direction, seen_motion
@@ -16,28 +26,35 @@ __all__ = [
     "Candidate",
     "Cause",
     "Diagnosis",
-    "Hypothesis",
     "Fit",
     "Floor",
+    "Hypothesis",
     "Improvement",
     "JointLaw",
     "JointMotion",
     "JointSighting",
     "LabError",
     "ModelShape",
+    "Prediction",
     "SeenMotion",
     "Settings",
+    "StructureDetails",
+    "StructureDiagnosis",
     "Trial",
     "WindowedLines",
     "band_of",
     "diagnose",
     "find_direction",
     "fit",
+    "improved_model_of",
     "linear_floor",
+    "predict",
     "predict_lines",
+    "read_diagnosis",
     "read_trial",
     "read_trials",
     "residual",
     "seen_motion",
     "windowed_lines",
+    "write_diagnosis",
 ]

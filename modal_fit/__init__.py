@@ -1,6 +1,5 @@
 """Modal models, their fitting and the calibration to the tool tip: knows nothing of cutting."""
 
-from .comparison import ModePair, compare_modes
 from .indicators import (
     ComplexModeIndicator,
     IndicatorPeak,
@@ -8,10 +7,13 @@ from .indicators import (
     complex_mode_indicator,
     multivariate_mode_indicator,
 )
-from .modal_model import ModalModel, Residuals
-from .modal_model_file import read_modal_model, write_modal_model
-from .mode_errors import ModeErrors
-from .mode_shapes import ModeReciprocity, ModeShapes, mode_complexity, mode_reciprocity, mode_shapes
+from .models.comparison import ModePair, compare_modes
+from .models.modal_model import ModalModel, Residuals
+from .models.modal_model_file import read_modal_model, write_modal_model
+from .models.mode_errors import ModeErrors
+from .models.shape_measures import modal_assurance, phase_collinearity, phase_deviation, reciprocity_residual
+from .models.synthesised import Synthesis, synthesis
+from .models.uncertainty import derived_covariance, frequency_and_damping_errors
 from .pole_picking import (
     CandidateGroup,
     candidate_groups,
@@ -21,13 +23,11 @@ from .pole_picking import (
     write_pole_candidates,
 )
 from .polyreference import ModalFit, fit_polyreference
-from .shape_measures import modal_assurance, phase_collinearity, phase_deviation, reciprocity_residual
-from .stabilisation import PoleGroup, StabilisationChart
+from .shapes import ModeReciprocity, ModeShapes, mode_complexity, mode_reciprocity, mode_shapes
+from .stabilisation.chart import PoleGroup, StabilisationChart
 from .subspace import SubspaceFit, fit_subspace
-from .synthesis import Synthesis, synthesis
 from .tip_calibration import TipCalibration, calibrate_to_tip
 from .uff_modes import import_modes_uff, read_modes_uff, write_modes_uff
-from .uncertainty import derived_covariance, frequency_and_damping_errors
 
 __all__ = [
     "CandidateGroup",

@@ -14,22 +14,22 @@ _CHUNK = 4096
 
 @dataclass(frozen=True)
 class CorrelationBlocks:
-    """``sum over tests and samples of z z^T`` with z = (future force, past force, past response, future response).
+    """Sum of ``z z^T`` over tests and samples; z = (future force, past force, past response, future response).
 
     Parameters
     ----------
     matrix : (n, n) with n = 2 block_rows (n_excitations + n_responses)
-        Of channels scaled to unit root mean square.
+        The sum, for channels scaled to unit root mean square.
     block_rows
-        Samples in the past and in the future.
+        Number of samples in the past and in the future.
     n_excitations, n_responses
-        Channels.
+        Numbers of channels on either side.
     response_scale : (n_responses,)
         Root mean square of each response over all tests.
-    sample_rate
-        Hz.
+    sample_rate : Hz
+        Samples a second.
     n_samples
-        Columns summed.
+        Number of columns z that were summed.
     """
 
     matrix: NDArray[np.float64]

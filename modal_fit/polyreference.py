@@ -9,10 +9,10 @@ from estimation import Frf
 from foundation import InputError, MillfrfError
 
 from .frf_fit import NOT_REFINED, REFINED, MatrixFit, default_order, fit_matrix
-from .matrix_fraction import matrix_fraction_poles
-from .modal_model import ModalModel
-from .record_spectra import RecordSpectra
-from .stabilisation import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
+from .maximum_likelihood.whole_records import RecordSpectra
+from .models.modal_model import ModalModel
+from .stabilisation.chart import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
+from .stabilisation.matrix_fraction import matrix_fraction_poles
 from .transfer_delay import transfer_delay
 
 Complex = NDArray[np.complex128]
@@ -27,20 +27,20 @@ class ModalFit:
     Parameters
     ----------
     model
-        Modes, residuals and covariance.
+        Modal model: modes, residuals and covariance.
     chart
-        Poles over order.
+        Stabilisation chart: poles over order.
     dropped
         Groups of poles that were not taken for modes, each with its reason.
-    band
-        Hz.
+    band : Hz
+        Lowest and highest frequency of the fit.
     reduced_chi_square
         Misfit over what the noise explains; 1 is perfect, much above 1 means more than noise is left. NaN
         where the FRF came without a covariance.
     relative_error : (n_responses, n_excitations)
         Root mean square misfit over root mean square FRF in the band.
     warnings
-        One sentence each.
+        Doubts about the fit, one sentence each.
     status
         ``refined``, or ``poly-reference poles`` where the refinement did not hold on lines that it had not seen.
     """

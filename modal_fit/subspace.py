@@ -10,12 +10,12 @@ from estimation import BandRecord
 from foundation import InputError, MillfrfError
 
 from .correlation_blocks import CorrelationBlocks, correlation_blocks
-from .likelihood_result import best_fit, modal_model_from
-from .matrix_fraction import OrderPoles
-from .modal_model import ModalModel
-from .noise_levels import NoiseLevels
-from .record_spectra import record_spectra
-from .stabilisation import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
+from .maximum_likelihood.likelihood_result import best_fit, modal_model_from
+from .maximum_likelihood.noise_levels import NoiseLevels
+from .maximum_likelihood.whole_records import record_spectra
+from .models.modal_model import ModalModel
+from .stabilisation.chart import PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
+from .stabilisation.matrix_fraction import OrderPoles
 
 _BLOCK_ROWS = 25
 _SPARE_ROWS = 1.5  # observability matrix has so many times more rows than the highest order has states
@@ -31,18 +31,18 @@ class SubspaceFit:
     model
         Receptance model with residuals and covariance.
     chart
-        Poles over order.
+        Stabilisation chart: poles over order.
     dropped
         Groups of poles not taken for modes, each with its reason.
-    band
-        Hz.
+    band : Hz
+        Lowest and highest frequency of the fit.
     reduced_chi_square
         Misfit over the noise found; noise is estimated from the misfit itself, so 1 only says that the error
         is spread over channels and lines as noise on forces and responses would be.
     noise
         Noise variances found on responses and forces, per test.
     warnings
-        One sentence each.
+        Doubts about the fit, one sentence each.
     """
 
     model: ModalModel

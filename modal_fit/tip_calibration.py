@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from estimation import Frf, FrfCovariance, to_receptance
 from foundation import InputError, MillfrfError, shared_band
 
-from .modal_model import ModalModel, Residuals
+from .models.modal_model import ModalModel, Residuals
+from .models.shape_measures import modal_assurance
+from .models.uncertainty import derived_covariance
 from .polyreference import ModalFit, fit_polyreference
-from .shape_measures import modal_assurance
-from .uncertainty import derived_covariance
 
 Complex = NDArray[np.complex128]
 _POOR = 0.3  # relative standard error above which a ratio is replaced
@@ -24,17 +24,17 @@ class TipCalibration:
     Parameters
     ----------
     model
-        With the tip's degrees of freedom as responses.
+        Calibrated model, with the tip's degrees of freedom as responses.
     ratios : (n_modes, n_directions), complex
-        phi_tip / phi_sensor that each mode's right vector was multiplied by.
+        Ratio phi_tip / phi_sensor by which each mode's right vector was multiplied.
     ratio_errors : (n_modes, n_directions)
         Standard errors of the ratios (circular), NaN where the hammer FRFs came without covariance.
-    hammer_modes : (n_modes,)
-        Which hammer mode served each in-process mode.
+    hammer_modes : (n_modes,), int
+        Index of the hammer mode that served each in-process mode.
     hammer_fit
         The fit of both hammer FRFs with common poles.
     warnings
-        One sentence each.
+        Doubts about the calibration, one sentence each.
     """
 
     model: ModalModel
@@ -62,10 +62,10 @@ def calibrate_to_tip(
     tip, sensor
         Hammer FRFs, both excited at the tip: response at the tip and at the sensor, same directions in the
         same order, on the same frequency axis.
-    band
-        Hz; None: the range of the model's modes, widened by a quarter on either side.
+    band : Hz
+        Band of the hammer fit; None: the range of the model's modes, widened by a quarter on either side.
     max_order
-        Of the hammer fit.
+        Highest order of the hammer fit.
 
     Raises
     ------

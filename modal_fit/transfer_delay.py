@@ -4,10 +4,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from .likelihood_model import Setting
-from .linear_start import regressors
-from .out_of_band import out_of_band_basis
-from .record_spectra import RecordSpectra
+from .maximum_likelihood.likelihood_model import Setting
+from .maximum_likelihood.linear_start import regressors
+from .maximum_likelihood.whole_records import RecordSpectra
+from .models.out_of_band import out_of_band_basis
 
 Complex = NDArray[np.complex128]
 _LONGEST = 4.0  # periods of the band's upper end
@@ -15,7 +15,7 @@ _GRID = 160
 
 
 def transfer_delay(poles: Complex, spectra: RecordSpectra, band: tuple[float, float]) -> float:
-    """Delay tau (s) for which ``H(s) exp(s tau)`` is best explained by modes at ``poles`` and out-of-band terms.
+    """Find the delay tau (s) for which modes at ``poles`` and out-of-band terms explain ``H(s) exp(s tau)`` best.
 
     A delay of a fraction of a period turns the phase of a mode far from its resonance, which no modal model of
     few terms can follow. With the poles held, everything but tau is linear and is eliminated: the misfit left is a
@@ -24,10 +24,11 @@ def transfer_delay(poles: Complex, spectra: RecordSpectra, band: tuple[float, fl
     Parameters
     ----------
     poles : (n_modes,), rad/s
+        Poles that are held, in the upper half plane.
     spectra
-        Lines of a ``transfer``.
-    band
-        Hz.
+        Spectra of a ``transfer``.
+    band : Hz
+        Lowest and highest frequency of the lines.
     """
     setting = Setting(spectra, out_of_band_basis(spectra.s, band), np.zeros((0, len(spectra.s))))
     design = regressors(poles, setting, 0, 0)

@@ -1,10 +1,7 @@
 """The simulated robot cell and its recordings: knows nothing of fitting or diagnosis."""
 
 from .hammer_cell import HammerCell
-from .material import Material
-from .milling_cell import MillingCell
-from .robot_structure import default_structure, table_one_model, tip_model
-from .sensors import (
+from .laboratory.sensors import (
     Sensor,
     dynamometer,
     hammer_sensors,
@@ -12,7 +9,10 @@ from .sensors import (
     milling_sensors,
     tip_accelerometers,
 )
-from .settling import Settling, settle
+from .milling_cell import MillingCell
+from .robot_structure import default_structure, table_one_model, tip_model
+from .simulation.material import Material
+from .simulation.settling import Settling, settle
 from .speed_profiles import ConstantSpeed, DriftingSpeed, LinearSweep, SpeedProfile
 
 __all__ = [

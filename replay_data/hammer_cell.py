@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .modal_integrator import discretise, respond
+from .laboratory.sensors import Sensor, hammer_sensors
+from .laboratory.setup_notes import setup_text
 from .robot_structure import TOOL_TIP
 from .sampled_cell import March, SampledCell
-from .sensors import Sensor, hammer_sensors
-from .setup_text import setup_text
+from .simulation.modal_integrator import discretise, respond
 
 LEAD = 0.05
 """Quiet time before the first tap, s."""
@@ -31,17 +31,17 @@ class HammerCell(SampledCell):
     structure
         Modal model (receptance) with excitations ``TCP:+X +Y +Z`` and the responses the sensors need.
     directions
-        Where to tap, in this order, a part of ``TCP:+X +Y +Z``.
+        Degrees of freedom to tap, in this order, among ``TCP:+X +Y +Z``.
     taps
-        In each direction.
-    spacing
-        Between taps, s; a segment of this length holds one tap and its ring-down.
-    peak
-        Mean amplitude A, N.
-    width
-        Of the half sine, s; 4 ms (a soft tip) excites up to about 250 Hz.
+        Number of taps in each direction.
+    spacing : s
+        Time between taps; a segment of this length holds one tap and its ring-down.
+    peak : N
+        Mean amplitude A of the taps.
+    width : s
+        Duration of the half sine; 4 ms (a soft tip) excites up to about 250 Hz.
     sample_rate, sensors, seed, oversampling, block_length
-        As for :class:`MillingCell`; default sensors :func:`hammer_sensors`.
+        Options of the same names in :class:`MillingCell`; default sensors :func:`hammer_sensors`.
 
     Raises
     ------

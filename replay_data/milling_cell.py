@@ -7,16 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cutting import MillingProcess, refuse_varied
-from cutting.tooth_force import tooth_offsets
+from cutting.one_tooth import tooth_offsets
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .material import Material, material_named
-from .milling_loop import empty_memory, mill, prepare_cut
-from .modal_integrator import discretise
+from .laboratory.sensors import Sensor, milling_sensors
+from .laboratory.setup_notes import cutting_table, setup_text
 from .sampled_cell import March, SampledCell
-from .sensors import Sensor, milling_sensors
-from .setup_text import cutting_table, setup_text
+from .simulation.material import Material, material_named
+from .simulation.milling_loop import empty_memory, mill, prepare_cut
+from .simulation.modal_integrator import discretise
 from .speed_profiles import ConstantSpeed, SpeedProfile
 
 REHEARSAL = 5.0
@@ -26,7 +26,7 @@ _LEAST_STEPS_PER_TOOTH = 8
 
 
 class MillingCell(SampledCell):
-    """A structure is milled with regenerative feedback, and sensors record forces and motion.
+    """A simulated milling test: a structure is milled with regenerative feedback, sensors record forces and motion.
 
     ``X = H F`` and ``F = F_p + a Ktc [alpha(t)] (X - X_tau)`` (Mohammadi & Ahmadi, Eqs. 1 and 4) while every tooth
     stays in the cut; beyond it, teeth leave the cut and the surface of several earlier teeth counts, so that chatter
@@ -38,26 +38,26 @@ class MillingCell(SampledCell):
         Modal model (receptance) with responses and excitations ``TCP:+X +Y +Z``, and those the sensors need.
     process
         Cutter, immersion, force coefficients, feed, runout.
-    depth
-        Axial depth of cut, m.
-    speed
-        Spindle speed, rad/s, or a profile: :class:`LinearSweep`, :class:`DriftingSpeed`.
-    duration
-        s.
-    sample_rate
-        Of the recording, Hz.
+    depth : m
+        Axial depth of cut.
+    speed : rad/s
+        Spindle speed, or a profile: :class:`LinearSweep`, :class:`DriftingSpeed`.
+    duration : s
+        Duration of the recording.
+    sample_rate : Hz
+        Sample rate of the recording.
     material
         ``"homogeneous"``, ``"porous"`` or a :class:`Material`.
     sensors
-        Default :func:`milling_sensors`: ``fx fy fz`` at the tip and ``ax ay az`` at the housing, 1 % noise. The
-        noise is a share of the channel's standard deviation in a rehearsal without noise of at most 5 s, in which the
-        speed runs through its whole course.
+        Sensors of the cell. Default :func:`milling_sensors`: ``fx fy fz`` at the tip and ``ax ay az`` at the housing, 1
+        % noise. The noise is a share of the channel's standard deviation in a rehearsal without noise of at most 5 s,
+        in which the speed runs through its whole course.
     seed
-        Of noise and pores; the same seed gives the same recording, whatever the block length.
+        Seed of noise and pores; the same seed gives the same recording, whatever the block length.
     oversampling
-        Steps of the simulation per sample.
+        Number of steps of the simulation per sample.
     block_length
-        Samples per block.
+        Number of samples per block.
 
     Raises
     ------

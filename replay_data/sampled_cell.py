@@ -11,9 +11,9 @@ from acquisition import Block, StreamDescription
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .modal_integrator import ResponseMap, require_simulable
-from .sensors import Sensor
-from .signal_chain import Decimator, SignalChain
+from .laboratory.sensors import Sensor
+from .laboratory.signal_chain import Decimator, SignalChain
+from .simulation.modal_integrator import ResponseMap, require_simulable
 
 STREAM = "daq"
 """Name of the one stream a simulated cell gives."""

@@ -90,10 +90,10 @@ class LinearSweep:
 
     Parameters
     ----------
-    first, last
-        Speeds, rad/s, above zero; up or down.
-    duration
-        Of the sweep, s.
+    first, last : rad/s
+        First and last speed of the sweep, above zero; up or down.
+    duration : s
+        Duration of the sweep.
 
     Raises
     ------
@@ -151,12 +151,12 @@ class DriftingSpeed:
 
     Parameters
     ----------
-    mean
-        rad/s, above zero.
+    mean : rad/s
+        Mean speed, above zero.
     share
         Largest departure as a share of the mean, 0 <= share < 1.
-    period
-        s.
+    period : s
+        Period of the drift.
 
     Raises
     ------

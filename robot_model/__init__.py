@@ -1,13 +1,36 @@
 """Robots as data: posture to stiffness, modes, receptance and deviation; knows nothing of recordings."""
 
 from .any_robot import PostureResult, in_posture, named_posture, read_robot
-from .beam_element import beam_mass, beam_stiffness
-from .causes import Cause, PostureFrequencies, equivalent_causes, explain_frequencies
-from .cell_structure import cell_structure_at
-from .change import Change, Companion, Numbered
-from .changes import changed_robot, possible_changes, unnamed_changes
-from .constrained_statics import constrained_system, tip_compliance, tip_stiffness
-from .drilling_deviation import (
+from .dynamic_stiffness.exact_beam import planar_dynamic_stiffness, spatial_dynamic_stiffness
+from .dynamic_stiffness.exact_chain import coupled_receptance, exact_receptance
+from .dynamic_stiffness.exact_structure import coupled_frf_at, exact_frf_at
+from .dynamic_stiffness.receptance_coupling import block_diagonal, couple_along, couple_receptances
+from .files.planar_file import PlanarCase, read_planar_robot
+from .files.robot_files import assumptions, robot_names
+from .files.spatial_file import SpatialCase, read_spatial_robot
+from .finite_elements.beam_element import beam_mass, beam_stiffness
+from .finite_elements.constrained_statics import constrained_system, tip_compliance, tip_stiffness
+from .finite_elements.generalised_coordinates import coordinate_basis
+from .finite_elements.gravity import gravity_hessian, gravity_torques, with_gravity
+from .finite_elements.modal_damping import modal_damping_matrix, rayleigh_constants
+from .finite_elements.modal_reduction import modal_model
+from .finite_elements.section import Material, Section, hollow_circle
+from .finite_elements.structure import Beam, Body, Spring, Structure, mass_matrix, stiffness_matrix
+from .identification.parameter_search import Identification, identify
+from .identification.planar_identification import apply_identified, identify_from_frequencies, identify_from_frfs
+from .identification.stiffness_identification import (
+    Deflection,
+    apply_joint_stiffness,
+    identify_joint_stiffness,
+    predicted_deflections,
+    stiffness_names,
+)
+from .kinematics.damped_least_squares import inverse_kinematics
+from .kinematics.joint_values import driven_values, shown_values, typed_values, unit_doubts
+from .kinematics.loop_closure import close_loops, posture_warnings, tool_jacobian
+from .kinematics.mechanism import Frame, Mechanism
+from .kinematics.spherical_wrist import has_spherical_wrist, nearest_solution, wrist_solutions
+from .machining.drilling_deviation import (
     DeviationMap,
     deviation_map,
     drilling_wrench,
@@ -15,45 +38,18 @@ from .drilling_deviation import (
     joint_deviation,
     sag_parts,
 )
-from .exact_beam import planar_dynamic_stiffness, spatial_dynamic_stiffness
-from .exact_chain import coupled_receptance, exact_receptance
-from .exact_structure import coupled_frf_at, exact_frf_at
-from .flexible_chain import FlexibleChain, flexible_chain
-from .generalised_coordinates import coordinate_basis
-from .gravity import gravity_hessian, gravity_torques, with_gravity
-from .identification import Identification, identify
-from .inverse_kinematics import inverse_kinematics
-from .joint_values import driven_values, shown_values, typed_values, unit_doubts
-from .loop_closure import close_loops, posture_warnings, tool_jacobian
-from .mechanism import Frame, Mechanism
-from .modal_damping import modal_damping_matrix, rayleigh_constants
-from .modal_reduction import modal_model
-from .natural_coordinates import NaturalChain
-from .natural_robot import NaturalRobot, natural_robot
-from .path_compensation import CompensatedPath, ToolPath, compensate_path
-from .path_file import read_tool_path, write_compensated_path
-from .planar_file import PlanarCase, read_planar_robot
-from .planar_identification import apply_identified, identify_from_frequencies, identify_from_frfs
-from .planar_robot import PlanarRobot
-from .posture_map import CutPlace, PostureMap, frequencies_over, posture_map, target_of, tool_down, turned_place
-from .receptance_coupling import block_diagonal, couple_along, couple_receptances
-from .rigid_links import rigid_matrices, rigid_model
-from .robot_files import assumptions, robot_names
-from .section import Material, Section, hollow_circle
-from .spatial_file import SpatialCase, read_spatial_robot
-from .spatial_modes import StructureModes, damping_warnings, frf_at, modal_model_at, model_of_modes, modes_at
-from .spatial_robot import ElasticJoint, Link, LumpedBody, SpatialRobot, drive_stiffness, structure_at
-from .spherical_wrist import has_spherical_wrist, nearest_solution, wrist_solutions
-from .stiffness_identification import (
-    Deflection,
-    apply_joint_stiffness,
-    identify_joint_stiffness,
-    predicted_deflections,
-    stiffness_names,
+from .machining.path_compensation import CompensatedPath, ToolPath, compensate_path
+from .machining.path_file import read_tool_path, write_compensated_path
+from .machining.redundancy import (
+    CutPlace,
+    PostureMap,
+    frequencies_over,
+    posture_map,
+    target_of,
+    tool_down,
+    turned_place,
 )
-from .structure import Beam, Body, Spring, Structure, mass_matrix, stiffness_matrix
-from .tool_spring import housing_node, tool_spring, with_tool_spring
-from .uncertainty_budget import (
+from .machining.uncertainty_budget import (
     LoadUncertainty,
     UncertaintyBudget,
     deformation_uncertainty,
@@ -65,7 +61,10 @@ from .uncertainty_budget import (
     position_verdict,
     tolerance_grade,
 )
-from .variations import (
+from .model_updating.causes import Cause, PostureFrequencies, equivalent_causes, explain_frequencies
+from .model_updating.change import Change, Companion, Numbered
+from .model_updating.changes import changed_robot, possible_changes, unnamed_changes
+from .model_updating.variations import (
     with_damping_factor,
     with_joint_factor,
     with_lighter_end,
@@ -73,7 +72,16 @@ from .variations import (
     with_payload,
     with_rigid_links,
 )
-from .weight import Payload, StaticResponse, counted_weight, payload_wrench, sag_at, static_response
+from .planar.flexible_links import FlexibleChain, flexible_chain
+from .planar.natural_coordinates import NaturalChain
+from .planar.planar_robot import PlanarRobot
+from .planar.rigid_links import rigid_matrices, rigid_model
+from .spatial.cell_structure import cell_structure_at
+from .spatial.compliant_tool import housing_node, tool_spring, with_tool_spring
+from .spatial.natural_coordinates import NaturalRobot, natural_robot
+from .spatial.spatial_modes import StructureModes, damping_warnings, frf_at, modal_model_at, model_of_modes, modes_at
+from .spatial.spatial_robot import ElasticJoint, Link, LumpedBody, SpatialRobot, drive_stiffness, structure_at
+from .spatial.weight import Payload, StaticResponse, counted_weight, payload_wrench, sag_at, static_response
 
 __all__ = [
     "Beam",

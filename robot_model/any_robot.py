@@ -10,23 +10,23 @@ from scipy.linalg import eigh
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .flexible_chain import flexible_chain
-from .loop_closure import close_loops, posture_warnings
-from .planar_file import PlanarCase, read_planar_robot
-from .planar_robot import TIP_IN_PLANE
-from .rigid_links import planar_compliance, planar_sag, rigid_matrices, rigid_model
-from .robot_files import read_table
-from .spatial_file import SpatialCase, read_spatial_robot
-from .spatial_modes import TIP, TIP_ROTATIONS, damping_warnings, model_of_modes, modes_at
-from .spatial_robot import rigid_arms, structure_at
-from .weight import NO_MASSES, static_response
+from .files.planar_file import PlanarCase, read_planar_robot
+from .files.robot_files import read_table
+from .files.spatial_file import SpatialCase, read_spatial_robot
+from .kinematics.loop_closure import close_loops, posture_warnings
+from .planar.flexible_links import flexible_chain
+from .planar.planar_robot import TIP_IN_PLANE
+from .planar.rigid_links import planar_compliance, planar_sag, rigid_matrices, rigid_model
+from .spatial.spatial_modes import TIP, TIP_ROTATIONS, damping_warnings, model_of_modes, modes_at
+from .spatial.spatial_robot import rigid_arms, structure_at
+from .spatial.weight import NO_MASSES, static_response
 
 Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class PostureResult:
-    """What every model gives in a posture.
+    """Results that every robot model gives in a posture.
 
     Parameters
     ----------
@@ -34,12 +34,12 @@ class PostureResult:
         All undamped natural frequencies; empty where the robot's file gives no masses.
     model
         Modal model at the tool tip, or None without masses.
-    compliance : (n_dof, n_dof)
-        At the tool over ``labels``, m/N, rad/N, rad/(N m).
+    compliance : (n_dof, n_dof), m/N, rad/N, rad/(N m)
+        Static compliance at the tool over ``labels``.
     labels
-        ``node:direction``.
+        Degrees of freedom at the tool, ``node:direction``.
     warnings
-        Limits, singularities, damping, what the file does not tell: one sentence each.
+        Doubts about limits, singularities, damping and missing data of the file: one sentence each.
     own_weight : (n_dof,), m and rad, or None
         Deflection at the tool under the weight of links and bodies, over ``labels``; None: masses are unknown.
     """
@@ -104,18 +104,18 @@ def named_posture(case: PlanarCase | SpatialCase, name: str | None) -> Real:
 def in_posture(
     case: PlanarCase | SpatialCase, driven: Real, axes: Real | None = None, *, links: bool = False
 ) -> PostureResult:
-    """Frequencies, modal model and compliance at driven joint values (rad; prismatic joints: m).
+    """Compute frequencies, modal model and compliance at driven joint values (rad; prismatic joints: m).
 
     Parameters
     ----------
     case
-        Of either kind.
-    driven
-        As many as the robot has driven joints.
+        Planar robot or robot in space, as read from its file.
+    driven : (n_active,), rad or m
+        Values of the driven joints.
     axes : (3, 3) or None
         Frame of the tool's degrees of freedom, as columns in the base frame (robots in space only).
     links
-        Planar robots: take the file's link sections in, not the joints alone (robots in space always do).
+        Whether a planar robot's link sections count, not the joints alone (robots in space always count them).
     """
     if isinstance(case, PlanarCase):
         return _planar(case, driven, links)

@@ -1,8 +1,6 @@
 """Stability lobes from modal models and measured FRFs: knows nothing of acquisition hardware."""
 
-from .beyond_band import with_residual_flexibility
-from .boundary import StabilityBoundary, StabilityGrid, stability_grid, trace_boundary
-from .certified import certified_lobes
+from .certification.certified import certified_lobes
 from .chatter import (
     ChatterVerdict,
     CutSpectrum,
@@ -13,23 +11,25 @@ from .chatter import (
     cut_spectrum,
     gather_evidence,
 )
-from .collocation import collocation, collocation_limits, lowest_limits
-from .delay_system import DelaySystem, delay_system
-from .limit_band import LimitBand, limit_band
-from .limit_samples import drawn, sampled_limits
-from .limit_sensitivity import LimitSensitivity, limit_sensitivities
-from .lobes_file import read_lobes, write_lobes
-from .mode_coupling import ModeCouplingLimit, mode_coupling_limit
-from .multi_frequency import multi_frequency, multi_frequency_limits
-from .multipliers import Multipliers, multipliers
-from .nyquist import is_stable, nyquist_limits, unstable_poles
-from .recommended_cut import RecommendedCut, certified_cut, lowered, recommended_cut
-from .semi_discretisation import semi_discretisation, semi_discretised_multipliers
-from .stability_limits import StabilityLimits
-from .stability_lobes import STATUSES, StabilityLobes
-from .tool_receptance import ToolReceptance, tool_receptance
-from .uncertainty import depth_errors, probability_of_stability
-from .zero_order import zero_order
+from .floquet.floquet_multipliers import Multipliers, multipliers
+from .limit_uncertainty.first_order import depth_errors, probability_of_stability
+from .limit_uncertainty.limit_interval import LimitBand, limit_band
+from .limit_uncertainty.limit_samples import drawn, sampled_limits
+from .limit_uncertainty.limit_sensitivity import LimitSensitivity, limit_sensitivities
+from .lobes.lobes_file import read_lobes, write_lobes
+from .lobes.stability_limits import StabilityLimits
+from .lobes.stability_lobes import STATUSES, StabilityLobes
+from .milling_loop.beyond_band import with_residual_flexibility
+from .milling_loop.delayed_state import DelaySystem, delay_system
+from .milling_loop.tip_receptance import ToolReceptance, tool_receptance
+from .recommendation import RecommendedCut, certified_cut, lowered, recommended_cut
+from .solvers.boundary import StabilityBoundary, StabilityGrid, stability_grid, trace_boundary
+from .solvers.collocation_solver import collocation, collocation_limits, lowest_limits
+from .solvers.mode_coupling import ModeCouplingLimit, mode_coupling_limit
+from .solvers.multi_frequency_solver import multi_frequency, multi_frequency_limits
+from .solvers.nyquist import is_stable, nyquist_limits, unstable_poles
+from .solvers.semi_discretisation_solver import semi_discretisation, semi_discretised_multipliers
+from .solvers.zero_order_solver import zero_order
 
 __all__ = [
     "STATUSES",

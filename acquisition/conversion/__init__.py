@@ -1,10 +1,10 @@
 """Conversion between recordings and the files other programs read and write."""
 
 from .array_file import ArrayFile, open_arrays
-from .convert import convert
+from .convert_file import convert
 from .mapping import ArrayMapping, ChannelMapping, CsvOptions, Mapping, load_mapping
-from .uff_lines import UffLines, read_uff_lines
-from .uff_sets import read_uff_sets
+from .uff.lines import UffLines, read_uff_lines
+from .uff.sets import read_uff_sets
 
 __all__ = [
     "ArrayFile",

@@ -13,7 +13,7 @@ from scipy.io import loadmat
 
 from foundation import FileFormatError, InputError
 
-from ..guarded_reading import read_guarded
+from ..file_safety.guarded_reading import read_guarded
 from .csv_file import read_csv
 from .flat_fields import numbers
 from .mat_check import is_plain_mat
@@ -28,13 +28,13 @@ class ArrayFile:
     Parameters
     ----------
     path
-        The file.
+        Path of the file.
     fields
-        Whatever it holds, by name.
+        Everything the file holds, by name.
     headings
-        Of the columns of its only table.
-    sample_rate
-        Hz, where the file states it.
+        Headings of the columns of its only table.
+    sample_rate : Hz
+        Sample rate, where the file states it.
     """
 
     def __init__(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError, InputError
 
-from ..source import StreamDescription
+from ..sources.source import StreamDescription
 from .array_file import ArrayFile, open_arrays
 from .content import ArraySamples, Content
 from .mapping import ArrayMapping, ChannelMapping, Mapping

@@ -16,7 +16,7 @@ from foundation import FileFormatError, InputError, mistake_in_words, writing_wh
 
 from ..drivers.can_bus import CanSignal, DbcDecoder
 from ..errors import DriverMissing
-from ..recording import Recording
+from ..recordings.recording import Recording
 from .content import recording_content
 from .writers import require_writable, write_content
 
@@ -34,7 +34,7 @@ class LogSignal(BaseModel):
 
 
 class LogMapping(BaseModel):
-    """What a log belongs to.
+    """Mapping of a log of bus messages to a recording.
 
     Parameters
     ----------
@@ -42,10 +42,10 @@ class LogMapping(BaseModel):
         File beside the log; its samples and events go into the output too.
     dbc
         File beside the log that names the signals.
-    offset_s
-        Time of the log's first message on the recording's axis, s.
+    offset_s : s
+        Time of the log's first message on the recording's axis.
     signals
-        Those to keep.
+        Signals to keep.
     """
 
     model_config = _STRICT

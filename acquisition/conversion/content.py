@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError
 
-from ..recording import Recording
-from ..source import StreamDescription
+from ..recordings.recording import Recording
+from ..sources.source import StreamDescription
 
 Pairs = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -79,14 +79,14 @@ class ArraySamples:
 
 @dataclass(frozen=True)
 class Content:
-    """A recording's content, wherever it lies.
+    """The content of a recording, wherever it is stored.
 
     Parameters
     ----------
     streams
-        One a sample clock.
+        Samples, one entry a sample clock.
     title, setup, recorded_at
-        As in a recording; ``recorded_at`` is empty where it is not known.
+        Title, set-up and date, as in a recording; ``recorded_at`` is empty where it is not known.
     events
         Times (s) and values by name.
     event_texts

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError
 
-from ..recording_format import check_format, stream_from_attributes
+from ..recordings.recording_format import check_format, stream_from_attributes
 from .content import ArraySamples, Content
 from .flat_fields import event_texts
 
@@ -35,11 +35,11 @@ def read_csv(
     Parameters
     ----------
     delimiter
-        None: whichever of comma, semicolon and tabulator the first line holds most of.
+        Sign between the columns; None: comma, semicolon or tabulator, whichever the first line holds most of.
     decimal
-        Decimal sign.
+        Decimal sign, a point or a comma.
     skip_lines
-        Lines to skip at the top.
+        Number of lines to skip at the top.
 
     Raises
     ------

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError
 
-from ..recording_format import FORMAT, check_format, stream_from_attributes
+from ..recordings.recording_format import FORMAT, check_format, stream_from_attributes
 from .content import ArraySamples, Content, Pairs, Samples
 
 FlatFields = dict[str, Any]

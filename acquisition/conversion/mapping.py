@@ -25,14 +25,14 @@ class NameChange(BaseModel):
 
 
 class ArrayMapping(BaseModel):
-    """Where an array lies and what its axes are.
+    """Place of an array, and the names of its axes.
 
     Parameters
     ----------
     file
         A file beside the input, or ``{replace, by}`` applied to the input's name; None: the input itself.
     name
-        Of the array inside its file; None: the mapping's own key where the file has it, else the only array.
+        Name of the array inside its file; None: the mapping's own key where the file has it, else the only array.
     axes
         One name an axis, ``sample`` among them, ``channel`` where there are several columns; None: the mapping's.
     """
@@ -51,11 +51,12 @@ class ChannelMapping(BaseModel):
     Parameters
     ----------
     name, quantity, unit, node, direction, high_pass_hz, sensor, input_delay_s
-        As in a recording's `Channel`, but ``unit`` is the file's own: ``kN``, ``g``, ``um``.
+        Fields of the same names in a recording's `Channel`, but ``unit`` is the file's own: ``kN``, ``g``, ``um``.
     array
         Key of ``[arrays.KEY]`` or name of an array in the input; None where there is only one.
     column
-        Along the ``channel`` axis: a number counted from 1, or a heading of the table. None where there is one column.
+        Column along the ``channel`` axis: a number counted from 1, or a heading of the table. None where there is one
+        column.
     full_scale
         Largest magnitude the input holds, in ``unit``.
     sensitivity

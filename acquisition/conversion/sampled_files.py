@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError
 
-from .uff_sets import read_uff_sets
+from .uff.sets import read_uff_sets
 
 _TIME_RESPONSE = 1
 _TRANSLATIONS = {1: "+X", 2: "+Y", 3: "+Z", 4: "+RX", 5: "+RY", 6: "+RZ"}

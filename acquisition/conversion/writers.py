@@ -12,9 +12,9 @@ from scipy.io import savemat
 
 from foundation import InputError
 
-from ..events import EventAxis, Events
-from ..recording_format import FORMAT, FORMAT_VERSION
-from ..recording_writer import RecordingWriter
+from ..recordings.recording_format import FORMAT, FORMAT_VERSION
+from ..recordings.recording_writer import RecordingWriter
+from ..sources.events import EventAxis, Events
 from .content import Content, row_blocks
 from .flat_fields import to_fields
 

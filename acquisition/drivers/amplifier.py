@@ -9,7 +9,7 @@ from typing import Any
 from foundation import InputError
 
 from ..errors import DeviceError, DeviceTimeout
-from ..events import EventAxis, Events
+from ..sources.events import EventAxis, Events
 from .serial_line import on_line, open_line
 
 
@@ -38,11 +38,11 @@ class Amplifier:
     Parameters
     ----------
     port, baud
-        Of the line.
+        Name and speed (bits/s) of the serial line.
     on_open, on_close
         Commands in their order: range, reset, operate; at the end: reset.
     ending
-        Of each line.
+        Characters at the end of each command.
 
     Raises
     ------

@@ -13,9 +13,9 @@ import numpy as np
 from foundation import FileFormatError, InputError
 
 from ..errors import DeviceTimeout, Disconnected, DriverMissing
-from ..events import EventAxis, Events
-from ..receiver import Put
-from ..threaded_feed import ThreadedFeed
+from ..sources.events import EventAxis, Events
+from ..sources.receiver import Put
+from ..sources.threaded_feed import ThreadedFeed
 from .serial_line import LINE_FAILURES
 
 _POLL = 0.1
@@ -53,7 +53,7 @@ class DbcDecoder:
     path
         DBC file (or another that cantools reads).
     signals
-        Those to keep.
+        Names of the signals to keep.
 
     Raises
     ------
@@ -103,13 +103,13 @@ class CanFeed(ThreadedFeed):
     Parameters
     ----------
     interface, channel
-        As python-can names them: ``socketcan`` and ``can0``; ``pcan`` and ``PCAN_USBBUS1`` ...
+        Names of interface and channel in python-can: ``socketcan`` and ``can0``; ``pcan`` and ``PCAN_USBBUS1`` ...
     dbc
         The bus's DBC file.
     signals
-        Those to keep.
-    silence
-        s without a wanted message after which the bus counts as lost.
+        Names of the signals to keep.
+    silence : s
+        Time without a wanted message after which the bus counts as lost.
     options
         Further arguments of `can.Bus`: ``bitrate``, ``port`` ...
 

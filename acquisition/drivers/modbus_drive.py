@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import DeviceTimeout, Disconnected, DriverMissing
-from ..events import HOST_AXIS, Events
-from ..receiver import Put
-from ..threaded_feed import ThreadedFeed
+from ..sources.events import HOST_AXIS, Events
+from ..sources.receiver import Put
+from ..sources.threaded_feed import ThreadedFeed
 from .serial_line import BITS_A_BYTE, LINE_FAILURES
 
 _REPLY_BYTES = 7  # address, function, length, two data bytes, two of the checksum
@@ -24,15 +24,15 @@ class Register:
     Parameters
     ----------
     address
-        Of the register, counted from 0.
+        Address of the register, counted from 0.
     series
-        Its name in the recording.
+        Name of its event series in the recording.
     factor
-        Multiplies the integer.
+        Factor by which the integer is multiplied.
     signed
-        Two's complement.
+        Whether the integer is in two's complement.
     input_register
-        Read with function 4 instead of 3 (holding register).
+        Whether it is read with function 4 instead of 3 (holding register).
     """
 
     address: int
@@ -48,15 +48,15 @@ class ModbusFeed(ThreadedFeed):
     Parameters
     ----------
     port, baud
-        Of the line.
+        Name and speed (bits/s) of the serial line.
     slave
         Address of the drive, 1 ... 247.
     registers
-        Those to read.
-    interval
-        s between two rounds.
-    timeout
-        s to wait for an answer; after five in a row without one the drive counts as lost.
+        Registers to read.
+    interval : s
+        Time between two rounds.
+    timeout : s
+        Time to wait for an answer; after five in a row without one the drive counts as lost.
     """
 
     def __init__(

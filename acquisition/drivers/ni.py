@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from ..errors import DeviceError, Overrun
-from ..source import Block, StreamDescription
+from ..sources.source import Block, StreamDescription
 from .ni_channels import NiInput, input_delay
 from .ni_errors import speaking_to
 
@@ -40,19 +40,19 @@ class NiSource:
     Parameters
     ----------
     inputs
-        What is wired where.
-    sample_rate
-        Hz, as wished; `streams` says what the device made of it.
-    block_duration
-        s in a block.
-    buffer_duration
-        s of samples the driver holds while this computer is busy.
-    timeout
-        s to wait for a block beyond its own duration.
-    duration
-        s to record; None: until stopped.
+        Inputs, each with the sensor that is wired to it.
+    sample_rate : Hz
+        Wanted sample rate; `streams` says what the device made of it.
+    block_duration : s
+        Duration of a block.
+    buffer_duration : s
+        Duration of the samples that the driver holds while this computer is busy.
+    timeout : s
+        Time to wait for a block beyond its own duration.
+    duration : s
+        Time to record; None: until stopped.
     name, title, setup
-        Of the stream and the recording.
+        Name of the stream, title and set-up of the recording.
 
     Raises
     ------

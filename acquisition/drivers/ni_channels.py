@@ -21,13 +21,13 @@ class NiInput:
     channel
         Name, quantity and place; its full scale is set from the range where it is None.
     terminal
-        ``cDAQ1Mod1/ai0``.
+        Name of the terminal, such as ``cDAQ1Mod1/ai0``.
     sensitivity
-        V per SI unit of the channel: V/(m/s²), V/N; of a charge amplifier the reciprocal of its N/V.
-    range_volts
-        Largest magnitude of the input, V.
-    iepe_current
-        Excitation of an IEPE sensor, A; 0: a plain voltage.
+        Sensitivity in V per SI unit of the channel: V/(m/s²), V/N; of a charge amplifier the reciprocal of its N/V.
+    range_volts : V
+        Largest magnitude of the input.
+    iepe_current : A
+        Excitation current of an IEPE sensor; 0: a plain voltage.
 
     Raises
     ------

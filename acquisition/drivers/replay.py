@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..events import EventAxis, Events
-from ..pacing import Pace
-from ..recording import Recording
-from ..source import Block, StreamDescription
+from ..recordings.recording import Recording
+from ..sources.events import EventAxis, Events
+from ..sources.pacing import Pace
+from ..sources.source import Block, StreamDescription
 
 
 class ReplaySource:

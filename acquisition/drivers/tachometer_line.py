@@ -10,9 +10,9 @@ import numpy as np
 from foundation import InputError
 
 from ..errors import DeviceTimeout
-from ..events import HOST_AXIS, EventAxis, Events
-from ..receiver import Put
-from ..threaded_feed import ThreadedFeed
+from ..sources.events import HOST_AXIS, EventAxis, Events
+from ..sources.receiver import Put
+from ..sources.threaded_feed import ThreadedFeed
 from .serial_line import BITS_A_BYTE, on_line, open_line
 
 _NUMBER = r"([-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)"
@@ -25,18 +25,18 @@ class TachometerFeed(ThreadedFeed):
     Parameters
     ----------
     port, baud
-        ``COM3`` or ``/dev/ttyUSB0``; bits/s.
+        Name of the serial line, ``COM3`` or ``/dev/ttyUSB0``, and its speed in bits/s.
     series
         Name of the event series.
     pattern
         Regular expression whose first group is the number.
     factor
-        Multiplies it.
-    period
-        s between two lines where the instrument keeps it exactly: then its own clock is followed, and a computer that
-        is busy does not blur the times. None: a line's time is its arrival less its transmission.
-    silence
-        s without a line after which the instrument counts as lost.
+        Factor by which the number is multiplied.
+    period : s
+        Time between two lines where the instrument keeps it exactly: then its own clock is followed, and a computer
+        that is busy does not blur the times. None: a line's time is its arrival less its transmission.
+    silence : s
+        Time without a line after which the instrument counts as lost.
 
     Raises
     ------

@@ -6,22 +6,22 @@ from foundation import InputError
 
 from ..drivers.ni import NiSource
 from ..drivers.replay import ReplaySource
-from ..feeds import WithFeeds
-from ..source import Source
+from ..sources.feeds import WithFeeds
+from ..sources.source import Source
 from .tables import NiDevice, ReplayDevice, Session
 
 
 def build_source(session: Session, setup: str, folder: Path, sampled: Source | None = None) -> Source:
-    """The source of a session; its sampled device is set up already, so that the achieved rate is known.
+    """Build the source of a session; its sampled device is set up already, so that the achieved rate is known.
 
     Parameters
     ----------
     session
-        Checked.
+        Session that was read and checked.
     setup
-        TOML text for the recording.
+        Set-up of the recording, TOML text.
     folder
-        Where files that the session names are looked for.
+        Folder in which files that the session names are looked for.
     sampled
         The sampled source where the device is not one of this package (the simulated cell).
 

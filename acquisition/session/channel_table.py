@@ -15,26 +15,26 @@ Name = Annotated[str, Field(min_length=1)]
 
 
 class ChannelTable(BaseModel):
-    """One input.
+    """One input of a session file.
 
     Parameters
     ----------
     name, quantity, node, direction, high_pass_hz, sensor
-        As in a recording's `Channel`.
+        Fields of the same names in a recording's `Channel`.
     unit
-        In which the calibration sheet speaks: ``N``, ``kN``, ``g``, ``m/s^2``, ``V``.
+        Unit of the calibration sheet: ``N``, ``kN``, ``g``, ``m/s^2``, ``V``.
     terminal
-        ``cDAQ1Mod1/ai0``.
-    mv_per_unit
-        Sensor's sensitivity, mV per ``unit``.
-    units_per_volt
-        Instead: a charge amplifier's setting, ``unit`` per V.
-    range_v
-        Largest magnitude of the input, V.
-    iepe_ma
-        Excitation current of an IEPE sensor, mA; 0: none.
-    delay_us
-        By which an amplifier before the input delays the signal, microseconds; the module's own delay is added.
+        Name of the terminal, such as ``cDAQ1Mod1/ai0``.
+    mv_per_unit : mV per ``unit``
+        Sensitivity of the sensor.
+    units_per_volt : ``unit`` per V
+        Setting of a charge amplifier, given instead of a sensitivity.
+    range_v : V
+        Largest magnitude of the input.
+    iepe_ma : mA
+        Excitation current of an IEPE sensor; 0: none.
+    delay_us : microseconds
+        Time by which an amplifier before the input delays the signal; the module's own delay is added.
     """
 
     model_config = STRICT

@@ -68,26 +68,26 @@ FeedTable = CanTable | TachometerTable | ModbusTable | AmplifierTable
 
 
 class Session(BaseModel):
-    """What is recorded, from what, for how long.
+    """A session file: what is recorded, from which devices, and for how long.
 
     Parameters
     ----------
     title
-        Of the recording.
-    duration_s
-        s; None: until stopped.
-    band_hz
-        Frequencies that matter, Hz; the sample rate is held against them.
+        Title of the recording.
+    duration_s : s
+        Duration of the recording; None: until stopped.
+    band_hz : Hz
+        Lowest and highest frequency that matter; the sample rate is held against them.
     tool, cut, pose, cutting, plan
         Free tables; they go into the recording as its set-up (``cutting`` and ``plan`` are those of `millfrf plan`).
     live
-        What the live page estimates.
+        Settings of the live page.
     device
-        The sampled one.
+        The device that samples.
     channels
-        Its inputs; needed for ``ni``, refused for the others, which bring their own.
+        Inputs of that device; needed for ``ni``, refused for the others, which bring their own.
     can, tachometer, modbus, amplifier
-        Further devices.
+        Tables of further devices.
     """
 
     model_config = STRICT

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.blind_trial.effects import ALL, FOREIGN, LISTED
+from .effects import ALL, FOREIGN, LISTED
 
 STRENGTHS = (0.5, 1.0, 2.0, 5.0, 20.0)
 NOISES = (0.01, 0.02, 0.03)

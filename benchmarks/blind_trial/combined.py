@@ -4,10 +4,10 @@ import argparse
 import json
 from pathlib import Path
 
-from benchmarks.blind_trial.case_spec import draw_cases
-from benchmarks.blind_trial.run_trial import score_all
-from benchmarks.blind_trial.scoring import Score
-from benchmarks.blind_trial.tables import report
+from .case_spec import draw_cases
+from .run_trial import score_all
+from .scoring import Score
+from .tables import report
 
 
 def scores_of(out: Path) -> list[Score]:

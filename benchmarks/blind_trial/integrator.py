@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import resample
 
-from benchmarks.blind_trial.compiled import compiled
-from benchmarks.blind_trial.excitation import RATE
-from benchmarks.blind_trial.laws import IWAN, N_MEMORY, N_PARAMETERS, drag_sliders, law_force, memory_rate
-from benchmarks.blind_trial.structures import Structure
+from .compiled import compiled
+from .excitation import RATE
+from .laws import IWAN, N_MEMORY, N_PARAMETERS, drag_sliders, law_force, memory_rate
+from .structures import Structure
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from math import exp, sqrt, tanh
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.blind_trial.compiled import compiled
+from .compiled import compiled
 
 CUBIC, POWER, SATURATING, RATIONAL, ROOT, BUMPER = 1, 2, 3, 4, 5, 6
 GAP_SHARP, GAP_SMOOTH, SCHEDULED, VISCOUS = 7, 8, 9, 10

@@ -9,8 +9,8 @@ poles.
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.blind_trial.excitation import KEPT, RATE
-from benchmarks.blind_trial.structures import Structure
+from .excitation import KEPT, RATE
+from .structures import Structure
 
 
 def after_refit(structure: Structure, force: NDArray[np.float64], residual: NDArray[np.float64]) -> NDArray[np.float64]:

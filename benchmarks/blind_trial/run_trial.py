@@ -20,11 +20,11 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
 
-from benchmarks.blind_trial.case_spec import CaseSpec, draw_cases
-from benchmarks.blind_trial.diagnosis_reading import read_answer
-from benchmarks.blind_trial.scoring import Score, held_out_errors, score_case
-from benchmarks.blind_trial.sealed_case import case_name, open_truth, write_case
-from benchmarks.blind_trial.tables import report
+from .case_spec import CaseSpec, draw_cases
+from .diagnosis_reading import read_answer
+from .scoring import Score, held_out_errors, score_case
+from .sealed_case import case_name, open_truth, write_case
+from .tables import report
 
 GIVEN = ("low.h5", "mid.h5", "high.h5")
 """What the tool is given; ``unseen.h5`` never."""

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Recording
-from benchmarks.blind_trial.diagnosis_reading import Answer
-from benchmarks.blind_trial.excitation import RATE
-from benchmarks.blind_trial.integrator import linear_response
-from benchmarks.blind_trial.structures import Structure
 from foundation import MillfrfError
 from modal_fit import read_modal_model
+
+from .diagnosis_reading import Answer
+from .excitation import RATE
+from .integrator import linear_response
+from .structures import Structure
 
 ALIASES = {
     "delay_s": ("delay", "delay_seconds", "tau", "tau_s"),

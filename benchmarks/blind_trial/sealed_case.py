@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from acquisition import Channel, RecordingWriter, StreamDescription
-from benchmarks.blind_trial.case_spec import CaseSpec
-from benchmarks.blind_trial.excitation import RATE
-from benchmarks.blind_trial.simulation import Case, build_case
 from modal_fit import write_modal_model
+
+from .case_spec import CaseSpec
+from .excitation import RATE
+from .simulation import Case, build_case
 
 FORMAT = "millfrf.blind_trial.truth"
 

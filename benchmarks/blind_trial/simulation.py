@@ -6,14 +6,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.blind_trial.case_spec import CaseSpec
-from benchmarks.blind_trial.effects import ALL, FOREIGN, Change, Effect, Scene
-from benchmarks.blind_trial.excitation import KEPT, LEVELS, Test, milling_test
-from benchmarks.blind_trial.integrator import linear_response, respond, tip_motion
-from benchmarks.blind_trial.noise import measurement_noise
-from benchmarks.blind_trial.refit import after_refit
-from benchmarks.blind_trial.structures import LabError, Structure, draw_structure, nominal_model
 from modal_fit import ModalModel
+
+from .case_spec import CaseSpec
+from .effects import ALL, FOREIGN, Change, Effect, Scene
+from .excitation import KEPT, LEVELS, Test, milling_test
+from .integrator import linear_response, respond, tip_motion
+from .noise import measurement_noise
+from .refit import after_refit
+from .structures import LabError, Structure, draw_structure, nominal_model
 
 SMALL_MODES = 0.3
 """Response of the small unmodelled modes of a control, in units of noise."""

@@ -5,8 +5,8 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from benchmarks.blind_trial.effects import LISTED
-from benchmarks.blind_trial.scoring import Score, wilson
+from .effects import LISTED
+from .scoring import Score, wilson
 
 Rows = list[list[str]]
 

@@ -18,8 +18,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.frf_trial.engines import engine
-from benchmarks.frf_trial.problem import Answer, Problem, read_problem, write_answer
+from .engines import engine
+from .problem import Answer, Problem, read_problem, write_answer
 
 DONE = "@done"
 """Before the exit code, for engines print lines of their own."""

@@ -3,7 +3,7 @@
 import importlib
 from collections.abc import Callable
 
-from benchmarks.frf_trial.problem import Answer, Problem
+from .problem import Answer, Problem
 
 ENGINES = {
     "ours": ("ours", "this project's poly-reference fit, no choice by hand"),

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from benchmarks.frf_trial.child import DONE
-from benchmarks.frf_trial.problem import Answer, Problem, read_answer, write_answer, write_problem
+from .child import DONE
+from .problem import Answer, Problem, read_answer, write_answer, write_problem
 
 
 @dataclass(frozen=True)

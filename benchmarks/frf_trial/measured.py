@@ -16,11 +16,11 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.frf_trial.engines import ENGINES
-from benchmarks.frf_trial.isolated import Limits, running
-from benchmarks.frf_trial.measured_sets import MeasuredRun, beam_runs, plane_runs
-from benchmarks.frf_trial.problem import FoundMode, read_answer
-from benchmarks.frf_trial.scoring import Score, partners, score
+from .engines import ENGINES
+from .isolated import Limits, running
+from .measured_sets import MeasuredRun, beam_runs, plane_runs
+from .problem import FoundMode, read_answer
+from .scoring import Score, partners, score
 
 
 def main() -> None:

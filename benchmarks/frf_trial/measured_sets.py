@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.frf_trial.problem import Problem
+from .problem import Problem
 
 PLANE_BAND = (10.0, 180.0)
 BEAM_BANDS = ((108.0, 116.0), (300.0, 312.0), (590.0, 600.0), (970.0, 980.0))

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.frf_trial.structure import Structure
+from .structure import Structure
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

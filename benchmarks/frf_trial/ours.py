@@ -5,10 +5,11 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.frf_trial.problem import UNITS, Answer, FoundMode, Problem
 from estimation import Frf, FrfCovariance
 from modal_fit import ModalFit, fit_polyreference
 from modal_fit.frf_fit import REFINED
+
+from .problem import UNITS, Answer, FoundMode, Problem
 
 
 def find_modes(problem: Problem) -> Answer:

@@ -14,8 +14,8 @@ import logging
 import numpy as np
 from pyoma2.functions import gen, plscf
 
-from benchmarks.frf_trial.problem import Answer, Problem
-from benchmarks.frf_trial.stable_clusters import OrderPoles, candidates, choose
+from .problem import Answer, Problem
+from .stable_clusters import OrderPoles, candidates, choose
 
 
 def find_modes(problem: Problem) -> Answer:

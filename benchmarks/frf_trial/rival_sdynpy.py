@@ -14,8 +14,8 @@ import numpy as np
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # its import asks for a window system
 import sdynpy
 
-from benchmarks.frf_trial.problem import DERIVATIVES, Answer, Problem
-from benchmarks.frf_trial.stable_clusters import OrderPoles, candidates, choose
+from .problem import DERIVATIVES, Answer, Problem
+from .stable_clusters import OrderPoles, candidates, choose
 
 
 def find_modes(problem: Problem) -> Answer:

@@ -10,8 +10,8 @@ difference. Its choice of poles is by hand in a chart; here it is that of :mod:`
 import numpy as np
 from sdypy import EMA
 
-from benchmarks.frf_trial.problem import Answer, Problem
-from benchmarks.frf_trial.stable_clusters import OrderPoles, candidates, choose
+from .problem import Answer, Problem
+from .stable_clusters import OrderPoles, candidates, choose
 
 ORDER = 100
 

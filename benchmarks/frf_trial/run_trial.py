@@ -21,12 +21,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from benchmarks.frf_trial.engines import ENGINES
-from benchmarks.frf_trial.isolated import Limits, running
-from benchmarks.frf_trial.problem import read_answer
-from benchmarks.frf_trial.scoring import Score, score
-from benchmarks.frf_trial.sets import GENERATOR, draw_set
-from benchmarks.frf_trial.tables import report
+from .engines import ENGINES
+from .isolated import Limits, running
+from .problem import read_answer
+from .scoring import Score, score
+from .sets import GENERATOR, draw_set
+from .tables import report
 
 
 def main() -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from benchmarks.frf_trial.problem import Answer, FoundMode
+from .problem import Answer, FoundMode
 
 LEAST_TOLERANCE = 0.005
 

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.frf_trial.noise import KINDS, TOLD, Noise, draw_noise
-from benchmarks.frf_trial.observable import visibility
-from benchmarks.frf_trial.problem import DERIVATIVES, Problem
-from benchmarks.frf_trial.shapes import Layout, draw_layout, draw_shapes
-from benchmarks.frf_trial.spectrum import MAX_LINES, Spectrum, draw_spectrum
-from benchmarks.frf_trial.structure import Structure, assurance, poles_of
+from .noise import KINDS, TOLD, Noise, draw_noise
+from .observable import visibility
+from .problem import DERIVATIVES, Problem
+from .shapes import Layout, draw_layout, draw_shapes
+from .spectrum import MAX_LINES, Spectrum, draw_spectrum
+from .structure import Structure, assurance, poles_of
 
 GENERATOR = 3
 """Version of the draw: results of another one are not mixed with these."""

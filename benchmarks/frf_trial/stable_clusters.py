@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.frf_trial.problem import FoundMode
+from .problem import FoundMode
 
 Complex = NDArray[np.complex128]
 FREQUENCY, DAMPING, ASSURANCE = 0.01, 0.10, 0.80

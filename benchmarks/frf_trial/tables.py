@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from benchmarks.frf_trial.scoring import Match, Score
+from .scoring import Match, Score
 
 HEADS = (
     "kind", "sets", "modes", "recall %", "all found %", "invented %", "fn error %", "zeta error %",

@@ -21,16 +21,16 @@ GLOBAL = 0
 
 @dataclass(frozen=True)
 class CoordinateSystem:
-    """One system in the structure's own axes.
+    """One coordinate system of a file, expressed in the structure's own axes.
 
     Parameters
     ----------
     kind
         0: Cartesian, 1: cylindrical (r, angle in degrees, z), 2: spherical (r, angle from z, angle around z).
     axes : (3, 3)
-        Rows are its X, Y, Z.
+        Unit vectors of its X, Y and Z as rows.
     origin : (3,)
-        In the file's unit of length.
+        Position of its origin, in the file's unit of length.
     """
 
     kind: int

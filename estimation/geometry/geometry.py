@@ -20,9 +20,9 @@ class Geometry:
     Parameters
     ----------
     nodes
-        Names, as they stand before the colon of a degree of freedom.
+        Names of the nodes, as they stand before the colon of a degree of freedom.
     positions : (n_nodes, 3), m
-        In the structure's own axes X, Y, Z.
+        Positions of the nodes in the structure's own axes X, Y, Z.
     axes : (n_nodes, 3, 3) or None
         Local axes: ``axes[k, 0]`` is the direction of +X at node k. They are made unit vectors. None: the structure's
         own axes everywhere.

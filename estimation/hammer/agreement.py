@@ -5,20 +5,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..frf import Frf
+from ..frf_matrix.frf import Frf
 from .sums import TapSums
 
 
 @dataclass(frozen=True)
 class Disagreement:
-    """An entry that two tests measured, and that one of them sees differently.
+    """An entry of the FRF matrix that two tests measured and that one of them sees differently.
 
     Parameters
     ----------
     test
-        Its name.
+        Name of the test that differs.
     response, excitation
-        Of the entry.
+        Degrees of freedom of the entry, ``node:direction``.
     share
         Energy of the difference from the merged entry over the energy of that entry, weighed by the force.
     """

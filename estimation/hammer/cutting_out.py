@@ -21,16 +21,16 @@ _QUIET = 0.25  # of a segment, before a tap, from which the resting level is tol
 
 
 def segments_of(found: FoundTaps, settings: TapSettings, before: int = 0) -> Iterator[tuple[int, Real]]:
-    """Number and samples of each usable tap of a test, the resting levels taken off.
+    """Give the number and samples of each usable tap of a test, with the resting levels taken off.
 
     Parameters
     ----------
     found
-        With room for a segment each.
+        Taps of one test, each with room for a segment.
     settings
-        How they are cut.
+        Lengths with which the segments are cut.
     before
-        Samples to give before the segment as well; 0 where the recording has none.
+        Number of samples to give before the segment as well; 0 where the recording has none.
 
     Yields
     ------

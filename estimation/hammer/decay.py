@@ -36,18 +36,18 @@ _LOWEST = 4  # lines: below them the window's main lobe holds what is left of th
 
 @dataclass(frozen=True)
 class Decay:
-    """What rings longest.
+    """The mode that rings longest in the segments of a tap.
 
     Parameters
     ----------
     left
-        Share of the answer's amplitude at the segment's end, of the mode of which most is left.
-    frequency
-        Of that mode, Hz.
+        Amplitude of that mode at the segment's end, as a share of its amplitude at the beginning.
+    frequency : Hz
+        Frequency of that mode.
     response
-        Where it was seen.
+        Degree of freedom of the response in which it was seen.
     before
-        Share of the answer to the tap before that still rings when a tap comes, where most does; 0: not seen.
+        Share of the response to the tap before that still rings when a tap comes, where it is largest; 0: not seen.
     """
 
     left: float

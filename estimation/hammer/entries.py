@@ -24,10 +24,13 @@ class Entries:
     Parameters
     ----------
     values : (n_frequencies, n_rows, n_columns), complex
+        Values of the FRF in these rows and columns.
     coherence : (n_frequencies, n_rows, n_columns)
-        NaN where it is not known.
+        Ordinary coherence, 0 to 1; NaN where it is not known.
     averages : (n_rows, n_columns), int
+        Number of averages behind each entry.
     valid : (n_frequencies,), bool
+        Whether the line has an FRF.
     """
 
     values: Complex

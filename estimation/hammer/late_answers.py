@@ -18,22 +18,23 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class LateAnswers:
-    """Powers of the answers to one tap, under one Hann window of half a segment, averaged over the taps of a point.
+    """Powers of the responses to one tap, under one Hann window of half a segment, averaged over the taps of a point.
 
     Parameters
     ----------
     places
         Degrees of freedom of the responses.
     n_taps, n_earlier
-        Taps averaged, and taps among them with another one before.
+        Number of taps averaged, and number of those that follow another tap.
     middle, last : (n_lines, n_responses)
-        In the middle and in the last half of the segment.
+        Power in the middle and in the last half of the segment.
     whole : (2 n_lines - 1, n_responses)
-        Of the whole segment, without a window.
+        Power of the whole segment, without a window.
     coherence : (n_lines, n_responses)
-        Of force and answer in the last half.
+        Coherence of force and response in the last half.
     earlier, rest : (n_lines, n_responses)
-        In the half before a tap that follows another one, and before a recording's first tap; 0: not recorded.
+        Power in the half segment before a tap that follows another one, and before a recording's first tap; 0: not
+        recorded.
     quiet_known
         Whether a recording holds half a segment before its first tap.
     force : (n_lines,)

@@ -7,7 +7,7 @@ import numpy as np
 
 from foundation import Band, InputError
 
-from ..frf import Frf
+from ..frf_matrix.frf import Frf
 from .agreement import Disagreement, disagreements_of
 from .entries import Entries, solve_entries
 from .places import blocks, check_whole, labels_of, turned
@@ -19,17 +19,17 @@ BAND = 1e-2
 
 @dataclass(frozen=True)
 class MergedTaps:
-    """An FRF matrix of hammer tests.
+    """An FRF matrix merged from hammer tests, with what its tests disagree on.
 
     Parameters
     ----------
     frf
-        With coherence, averages, band and the window's time constant.
+        FRF matrix with coherence, averages, band and the window's time constant.
     bands
-        Of each excitation: lowest and highest frequency (Hz) around its strongest line without a drop by 20 dB; None
-        where there is no such stretch.
+        For each excitation, the lowest and highest frequency (Hz) around its strongest line without a drop by 20 dB;
+        None where there is no such stretch.
     disagreements
-        The worst first.
+        Entries that tests see differently, the worst first.
     """
 
     frf: Frf
@@ -38,7 +38,7 @@ class MergedTaps:
 
 
 def merge_taps(tests: Sequence[TapSums], time_constant: float | None = None) -> MergedTaps:
-    """``H = S_xf S_ff^-1``, row by row over the tests that measured the row's response.
+    """Merge tests to ``H = S_xf S_ff^-1``, row by row over the tests that measured the row's response.
 
     A force that a test did not measure was not there: only one hammer hits. Taps of a point in several tests are
     averages of one entry. A sign in the direction of a point turns the sign of what was measured there.
@@ -50,9 +50,9 @@ def merge_taps(tests: Sequence[TapSums], time_constant: float | None = None) -> 
     Parameters
     ----------
     tests
-        On one frequency axis.
-    time_constant
-        Of the exponential window, s.
+        Summed spectra of each test, on one frequency axis.
+    time_constant : s
+        Time constant of the exponential window; None: no such window.
 
     Raises
     ------

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition import Channel, Recording
 
-from ..usable_samples import OVERLOAD
+from ..spectra.trusted_samples import OVERLOAD
 from .taps import SETTLE, Tap, at_rest, find_taps, noise_of
 
 Real = NDArray[np.float64]
@@ -25,18 +25,18 @@ _STEEP = 2.5  # times the smallest step: beside a smooth maximum the samples are
 
 @dataclass(frozen=True)
 class TapTest:
-    """A recording of taps as a job sees it.
+    """A recording of taps, with the channels and the stretch of time that a job uses.
 
     Parameters
     ----------
     path
-        Of the recording.
+        Path of the recording.
     excitations, responses
         Channels by the names they have in the file, at the places where they were in this test.
     stream
-        Sample clock; None: the only one.
-    span
-        Times (s, on the recording's axis) between which taps count.
+        Name of the sample clock; None: the only one.
+    span : s
+        Times on the recording's axis between which taps count.
     """
 
     path: Path
@@ -72,22 +72,22 @@ class JudgedTap:
 
 @dataclass(frozen=True)
 class FoundTaps:
-    """The taps of one test.
+    """The taps found in one test.
 
     Parameters
     ----------
     test
-        Where they were found.
-    sample_rate
-        Hz.
+        The test in which they were found.
+    sample_rate : Hz
+        Sample rate of the recording.
     n_samples
-        Of the recording.
-    start_time
-        Of its first sample, s.
+        Number of samples of the recording.
+    start_time : s
+        Time of the recording's first sample.
     noise : (n_excitations,), N
         Standard deviation of each force between the taps.
     taps
-        In order of time.
+        The taps with their judgement, in order of time.
     busy
         Share of the time in which a force exceeds a fifth of the largest: taps are short, cuts and shakers are not.
     """

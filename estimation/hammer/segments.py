@@ -63,18 +63,19 @@ def choose_segments(
     pre_trigger: float | None = None,
     force_window: float | None = None,
 ) -> TapSettings:
-    """Segments for the taps of all tests, as long as the time between taps allows.
+    """Choose segments for the taps of all tests, as long as the time between taps allows.
 
     Parameters
     ----------
     found
-        At least one usable tap.
-    segment
-        Duration, s; None: the time between taps, up to 16 s; where a few follow one another much sooner, they are lost.
-    pre_trigger
-        Time before a tap's peak, s; None: twice the longest contact, 24 samples at least, or what there is.
-    force_window
-        Time from the peak after which the force is cut off, s; 0: never; None: twice the longest contact, 24 samples at
+        Taps of each test; at least one of them is usable.
+    segment : s
+        Duration of a segment; None: the time between taps, up to 16 s; where a few follow one another much sooner, they
+        are lost.
+    pre_trigger : s
+        Time before a tap's peak; None: twice the longest contact, 24 samples at least, or what there is.
+    force_window : s
+        Time from the peak after which the force is cut off; 0: never; None: twice the longest contact, 24 samples at
         least.
 
     Raises

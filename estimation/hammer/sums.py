@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from acquisition import Channel
 from foundation import Band, InputError
 
-from ..quantities import frf_quantity
+from ..frf_matrix.quantities import frf_quantity
 from .cutting_out import segments_of
 from .screening import FoundTaps
 from .segments import TapSettings
@@ -26,20 +26,21 @@ class TapSums:
     Parameters
     ----------
     name
-        Of the test, for messages.
+        Name of the test, for messages.
     frequencies : (n_frequencies,), Hz
+        Frequencies of the lines.
     input_power : (n_frequencies, n_excitations, n_excitations)
-        ``sum f_i conj(f_j)``.
+        Products of the forces, ``sum f_i conj(f_j)``.
     cross : (n_frequencies, n_responses, n_excitations)
-        ``sum x_p conj(f_q)``.
+        Products of responses and forces, ``sum x_p conj(f_q)``.
     output_power : (n_frequencies, n_responses)
-        ``sum |x_p|^2``.
+        Power of the responses, ``sum |x_p|^2``.
     excitations, responses
         Degrees of freedom along the axes.
     counts : (n_excitations,), int
-        Taps that hit each excitation hardest.
+        Number of taps that hit each excitation hardest.
     quantity, unit
-        Of responses over forces.
+        Quantity and unit of responses over forces.
     grounded
         Whether responses hold down to 0 Hz: none of their sensors has a high-pass.
     """
@@ -69,13 +70,13 @@ def tap_sums(
     Parameters
     ----------
     found
-        At least one usable tap.
+        Taps of the test; at least one is usable.
     settings
-        Segments and windows.
-    band
-        Lines to keep, Hz; None: all.
+        Lengths of the segments, and windows.
+    band : Hz
+        Lowest and highest frequency of the lines to keep; None: all.
     places
-        Points that taps of other tests hit: what an oblique tap of this test gives them is a force, too.
+        Degrees of freedom that taps of other tests hit: the share of an oblique tap of this test there is a force, too.
 
     Raises
     ------

@@ -26,14 +26,14 @@ class Tap:
 
     Parameters
     ----------
-    time
-        Of its peak, s from the record's start.
-    peak
+    time : s
+        Time of its peak from the record's start.
+    peak : N
         Largest force, with its sign.
-    contact
-        Duration of the first contact, s.
-    second_hit
-        Delay of a second contact, s, or None: such a tap must be left out, its force has holes in the spectrum.
+    contact : s
+        Duration of the first contact.
+    second_hit : s, or None
+        Delay of a second contact. Such a tap must be left out: its force has holes in the spectrum.
     second_share
         Peak of the second contact over the first; 0 without one.
     channel
@@ -58,12 +58,13 @@ def find_taps(force: Real, sample_rate: float, *, settle: float = SETTLE, least:
     Parameters
     ----------
     force : (n_samples,) or (n_samples, n_channels), N
-    sample_rate
-        Hz.
-    settle
-        Shortest time between taps, s.
+        Signal of one hammer, or of several force channels.
+    sample_rate : Hz
+        Samples a second.
+    settle : s
+        Shortest time between taps.
     least
-        Share of the largest force from which a hit counts as a tap.
+        Force from which a hit counts as a tap, as a share of the largest force.
 
     Returns
     -------

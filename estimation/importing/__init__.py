@@ -1,9 +1,9 @@
 """FRFs of other programs: UFF, MAT, NPZ, CSV and the text exports of analysers."""
 
+from .any_file import import_frf, looks_like_frf
 from .entries import ImportedFrf
 from .frf_mapping import FrfMapping, is_frf_mapping, load_frf_mapping
-from .import_frf import import_frf, looks_like_frf
-from .uff_frfs import UffChoice, import_uff, import_uffs, read_frf_uff
+from .uff.frfs import UffChoice, import_uff, import_uffs, read_frf_uff
 
 __all__ = [
     "FrfMapping",

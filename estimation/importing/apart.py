@@ -15,7 +15,7 @@ from .frf_mapping import PARTS, FrfMapping, FrfTable
 from .numbers import complex_values, hertz, stated_frequency_unit, stated_phase_unit
 from .single_frfs import OneFrf, single_frfs
 from .sources import FrfSource
-from .uff_units import StatedUnit, given_unit
+from .uff.uff_units import StatedUnit, given_unit
 from .units import frf_unit
 
 _VALUES = ("values", "real", "imaginary", "magnitude", "phase")
@@ -118,14 +118,15 @@ def _unit(source: FrfSource, places: Mapping[str, int | str], table: FrfTable) -
 
 
 def entries_of(sources: Sequence[FrfSource], mapping: FrfMapping) -> tuple[list[FrfEntry], StatedUnit, tuple[str, ...]]:
-    """All entries that a mapping lists, in SI units, with what they are and what was inferred.
+    """Read all entries that a mapping lists, in SI units, with what they are and what was inferred.
 
     Parameters
     ----------
     sources
-        The files.
+        The files, opened as sources.
     mapping
-        With an entry for each FRF; without entries one response and one excitation of the only file.
+        Mapping with an entry for each FRF; without entries it describes one response and one excitation of the only
+        file.
 
     Raises
     ------

@@ -21,7 +21,7 @@ _WORD = r"(?:^|[\s_.:,;|(\[-])(?:{})(?:$|[\s_.:,;|(\[)\]-])"
 
 
 def column_roles(table: TextTable) -> dict[str, int]:
-    """Column, counted from 1, of each part that is certain.
+    """Find the column, counted from 1, of each part that is certain.
 
     Certain is a frequency that one heading names, and with it either a real and an imaginary part or a magnitude and a
     phase, each named once, with the coherence.
@@ -29,7 +29,7 @@ def column_roles(table: TextTable) -> dict[str, int]:
     Parameters
     ----------
     table
-        With headings.
+        Table of numbers with headings.
     """
     found: dict[str, list[int]] = {role: [] for role in _ROLES}
     for number, heading in enumerate(table.headings, 1):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from foundation import DegreeOfFreedom, FileFormatError
 
-from ..frf import Frf
+from ..frf_matrix.frf import Frf
 from .units import SI
 
 Real = NDArray[np.float64]
@@ -28,15 +28,17 @@ class FrfEntry:
     Parameters
     ----------
     response, excitation
-        ``node:direction``.
+        Degrees of freedom, ``node:direction``.
     frequencies : (n_frequencies,), Hz
+        Frequencies of the lines.
     values : (n_frequencies,), complex
+        Values of the FRF on the lines, in SI units.
     source
-        File and place in it, for messages.
+        Name of the file and place in it, for messages.
     coherence : (n_frequencies,) or None
-        Ordinary coherence.
+        Ordinary coherence of each line, 0 to 1.
     averages
-        0 where it is not known.
+        Number of averages; 0 where it is not known.
     """
 
     response: str
@@ -60,11 +62,11 @@ class ImportedFrf:
     Parameters
     ----------
     frf
-        In SI units.
+        The FRF, in SI units.
     inferred
-        What the files say by themselves and nobody had to write down, one sentence each.
+        Facts that the files state by themselves, so that nobody had to write them down; one sentence each.
     doubts
-        What they do not say and was taken nevertheless, or leave open, one sentence each.
+        Facts that the files leave open or that were assumed; one sentence each.
     """
 
     frf: Frf
@@ -73,16 +75,16 @@ class ImportedFrf:
 
 
 def assembled(entries: Sequence[FrfEntry], quantity: str, unit: str) -> Frf:
-    """One FRF matrix of all entries; responses and excitations in the order in which they first appear.
+    """Assemble one FRF matrix of all entries; responses and excitations keep the order in which they first appear.
 
     A line at which every entry is 0, or 0 Hz with values that are not finite, has no FRF and is not valid.
 
     Parameters
     ----------
     entries
-        One or more.
+        One FRF or more, on the same frequency axis.
     quantity, unit
-        Of all of them; ``unit`` counts for a ``transfer`` only.
+        Quantity and unit of all entries; ``unit`` counts for a ``transfer`` only.
 
     Raises
     ------

@@ -98,7 +98,7 @@ PARTS = ("values", "real", "imaginary", "magnitude", "phase", "coherence")
 
 
 class EntryMapping(FrfParts):
-    """One FRF of several.
+    """Mapping of one FRF of several.
 
     Parameters
     ----------
@@ -106,13 +106,13 @@ class EntryMapping(FrfParts):
         Degrees of freedom, ``node:direction``. One of them may be left out where parts are lists: they run along the
         ``responses`` or ``excitations`` under ``[frf]``.
     file
-        Name of the file it lies in; None: the only one.
+        Name of the file that holds the FRF; None: the only one.
     record
-        Of a UFF file: the place of its data set, counted from 1.
+        Place of the data set in a UFF file, counted from 1.
     averages
-        Number of averages; None: as ``[frf]`` says.
+        Number of averages; None: the number under ``[frf]``.
     values, real, imaginary, magnitude, phase, coherence
-        Where its numbers lie; as ``[frf]`` says where none of them is given.
+        Arrays or columns that hold its numbers; if none is given, those under ``[frf]`` hold.
     """
 
     response: Label | None = None
@@ -123,14 +123,14 @@ class EntryMapping(FrfParts):
 
 
 class FrfTable(FrfParts):
-    """What holds for all FRFs.
+    """The part of a mapping that holds for all FRFs, the table ``[frf]``.
 
     Parameters
     ----------
     quantity
-        Needed for a ``transfer`` only: otherwise the unit tells.
+        Quantity of the FRFs; a ``transfer`` needs it, otherwise the unit tells it.
     unit
-        Of the numbers in the file: ``m/s^2/N``, ``g/N``, ``um/N``; of a ``transfer`` the unit to keep.
+        Unit of the numbers in the file: ``m/s^2/N``, ``g/N``, ``um/N``; of a ``transfer`` the unit to keep.
     frequency
         Array or column of frequencies, in ``frequency_unit``; or instead ``frequency_step_hz`` of evenly spaced lines
         from ``frequency_start_hz`` on.
@@ -138,21 +138,21 @@ class FrfTable(FrfParts):
         Arrays or columns; ``H[2]`` is the second column of array H. Where file or headings leave no doubt they may be
         left out. Lists run along ``responses`` or ``excitations``.
     phase_unit
-        ``deg`` or ``rad``.
+        Unit of the phases, ``deg`` or ``rad``.
     decibels
-        The magnitude is 20 times the logarithm of the ratio to 1 ``unit``.
+        Whether the magnitude is 20 times the logarithm of the ratio to 1 ``unit``.
     axes
-        Of arrays with several axes.
+        Order of the axes of arrays that have several.
     responses, excitations
-        Degrees of freedom along the axes, in which ``1..68:+Z`` stands for 68 of them; of a UFF file those to take.
+        Degrees of freedom along the axes, in which ``1..68:+Z`` stands for 68 of them; for a UFF file, those to take.
     conjugate
-        The file's phases stand for ``exp(-i w t)``.
+        Whether the file's phases stand for ``exp(-i w t)``.
     averages
         Number of averages behind each FRF.
-    exponential_time_constant_s
-        Of an exponential window on force and response, s, whose damping is still in the FRF.
+    exponential_time_constant_s : s
+        Time constant of an exponential window on force and response, whose damping is still in the FRF.
     title
-        Of the FRF file that is written.
+        Title of the FRF file that is written.
     """
 
     quantity: Literal["receptance", "mobility", "accelerance", "transfer"] | None = None

@@ -17,12 +17,12 @@ AXES = ("frequency", "response", "excitation")
 
 
 def matrix_entries(parts: Parts) -> tuple[list[FrfEntry], tuple[str, ...]]:
-    """All entries of an array, in SI units, and how its axes were taken where the mapping does not say it.
+    """Read all entries of an array, in SI units, and say how its axes were taken where the mapping does not say it.
 
     Parameters
     ----------
     parts
-        Of a source whose arrays have the same axes; the coherence's too.
+        Places of the parts in a source whose arrays, the coherence's too, have the same axes.
 
     Raises
     ------

@@ -17,11 +17,11 @@ class OneFrf:
     Parameters
     ----------
     response, excitation
-        ``node:direction``.
+        Degrees of freedom, ``node:direction``.
     given
-        Places by part, of those that the entry names.
+        Places of those parts that the entry names, by part.
     file, record, averages
-        As in an `EntryMapping`.
+        Name of the file, place of its data set and number of averages, as in an `EntryMapping`.
     """
 
     response: str

@@ -73,9 +73,9 @@ class ArraySource:
     Parameters
     ----------
     path
-        The file.
+        Path of the file.
     arrays
-        Of numbers, by name.
+        Arrays of numbers, by name.
     """
 
     path: Path

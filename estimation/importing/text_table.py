@@ -32,10 +32,11 @@ class TextTable:
     Parameters
     ----------
     path
-        The file.
+        Path of the file.
     headings, units
-        Of each column; empty texts where the header says none.
+        Heading and unit of each column; empty texts where the header says none.
     values : (n_rows, n_columns)
+        Numbers of the table.
     """
 
     path: Path

@@ -8,16 +8,16 @@ from foundation import DegreeOfFreedom, InputError
 
 @dataclass(frozen=True)
 class SharedPoint:
-    """A node and axis among responses and excitations.
+    """A node and axis that stand among responses and excitations.
 
     Parameters
     ----------
     name
-        ``node:axis``, without a sign.
+        Node and axis, ``node:axis``, without a sign.
     row, column
-        Of the response and of the excitation.
+        Row of the response and column of the excitation.
     response_sign, excitation_sign
-        +1 or -1: direction of either along the axis.
+        Direction of either along the axis, +1 or -1.
     """
 
     name: str

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from foundation import Band
 
-from ..frf import Frf
+from ..frf_matrix.frf import Frf
 from .drive_pairs import SharedPoint, shared_points
 
 Complex = NDArray[np.complex128]
@@ -23,8 +23,9 @@ class ReciprocityPair:
     first, second
         The points p and q, ``node:axis``.
     frequencies : (n_lines,), Hz
+        Frequencies of the lines that are compared.
     forth, back : (n_lines,), complex
-        ``H_pq`` (response at p, force at q) and ``H_qp``.
+        The entries ``H_pq`` (response at p, force at q) and ``H_qp``.
     difference
         ``|H_pq - H_qp|`` over the mean of both, root mean square over the lines: 0 where they agree, 2 where they are
         opposite.
@@ -32,7 +33,7 @@ class ReciprocityPair:
         ``|sum H_pq conj(H_qp)|^2 / (sum |H_pq|^2 sum |H_qp|^2)``, as a coherence over the lines: 1 where they differ by
         a factor only.
     factor
-        ``H_pq = factor H_qp`` by least squares: -1 tells a wrong sign, 1.2 a wrong calibration.
+        Factor in ``H_pq = factor H_qp`` by least squares: -1 tells a wrong sign, 1.2 a wrong calibration.
     noise
         The difference that noise alone gives, root mean square as above; NaN where the noise is not known.
     weight

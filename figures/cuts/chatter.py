@@ -18,16 +18,16 @@ _DECADES = 0.5  # below the floor that are drawn
 
 @dataclass(frozen=True)
 class ShownCut:
-    """One panel.
+    """One panel of the figure: a cut with its spectrum.
 
     Parameters
     ----------
     title
-        Above it.
+        Text above the panel.
     quantity
-        Of the channel, with its unit, for the axis.
+        Quantity of the channel with its unit, for the axis.
     verdict, spectrum
-        What was told, and from what.
+        Verdict on the cut, and the spectrum it was found from.
     """
 
     title: str

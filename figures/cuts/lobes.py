@@ -13,6 +13,9 @@ from stability import StabilityLobes
 
 from ..style import COLOURS, SHADE, house_style, legend_above, line_style, new_figure, panel_letter
 
+LIMITS = "limits"
+"""Mark of the lines of depth limits, by which a further line finds its number and so its own colour."""
+
 
 @dataclass(frozen=True)
 class TriedCut:
@@ -33,12 +36,14 @@ class TriedCut:
 
 @dataclass(frozen=True)
 class LobesBand:
-    """Interval of a depth limit.
+    """Confidence interval of a depth limit over spindle speed.
 
     Parameters
     ----------
     spindle_speeds_rpm : (n_speeds,), rpm
+        Spindle speeds of the limits.
     low, high : (n_speeds,), m
+        Lower and upper end of the interval.
     """
 
     spindle_speeds_rpm: NDArray[np.float64]
@@ -57,17 +62,18 @@ def lobes_figure(
         figure = new_figure(115.0)
         depth, chatter = figure.subplots(2, 1, sharex=True, height_ratios=[1.9, 1.0])
         for number, (label, lobes) in enumerate(curves.items()):
-            _draw_curve(depth, chatter, label, lobes, number)
+            draw_limits(depth, lobes, label, number)
+            _draw_chatter(chatter, lobes, number)
         _draw_cuts(depth, cuts)
         if band is not None:
             low, high = 1e3 * band.low, 1e3 * band.high
             depth.fill_between(
                 band.spindle_speeds_rpm, low, high, color=COLOURS[1], alpha=0.3, linewidth=0, label="95 % interval"
             )
-        top = _depth_limit(list(curves.values()), cuts)
+        top = depth_axis_top(list(curves.values()), cuts)
         depth.set_ylim(0, top)
         if curves:
-            _shade_unstable(depth, next(iter(curves.values())), top)
+            shade_unstable(depth, next(iter(curves.values())), top)
         depth.set_ylabel("Axial depth limit (mm)")
         chatter.set_ylabel("Chatter\nfrequency (Hz)")
         chatter.set_xlabel("Spindle speed (rpm)")
@@ -77,16 +83,24 @@ def lobes_figure(
     return figure
 
 
-def _draw_curve(depth: Axes, chatter: Axes, label: str, lobes: StabilityLobes, number: int) -> None:
+def draw_limits(axes: Axes, lobes: StabilityLobes, label: str, number: int) -> None:
+    """Depth limits in mm over rpm, period doublings in a heavier line; ``number`` chooses colour and dashes."""
     rpm = lobes.spindle_speeds_rpm
     limit = np.where(np.isfinite(lobes.depth_limits), 1e3 * lobes.depth_limits, np.nan)
-    style = line_style(number)
-    depth.plot(rpm, limit, label=label, linewidth=1.6 if number == 0 else 1.2, **style)
-    chatter.plot(rpm, _without_jumps(lobes.chatter_frequencies), linewidth=1.6 if number == 0 else 1.2, **style)
+    axes.plot(rpm, limit, label=label, linewidth=_width(number), gid=LIMITS, **line_style(number))
     doubled = np.array([name == "period-doubling" for name in lobes.bifurcations], dtype=bool)
     if doubled.any():
         edge = np.where(doubled, limit, np.nan)
-        depth.plot(rpm, edge, color=COLOURS[2], linewidth=2.4, zorder=3, label=f"{label}, period doubling")
+        axes.plot(rpm, edge, color=COLOURS[2], linewidth=2.4, zorder=3, label=f"{label}, period doubling")
+
+
+def _draw_chatter(axes: Axes, lobes: StabilityLobes, number: int) -> None:
+    frequencies = _without_jumps(lobes.chatter_frequencies)
+    axes.plot(lobes.spindle_speeds_rpm, frequencies, linewidth=_width(number), **line_style(number))
+
+
+def _width(number: int) -> float:
+    return 1.6 if number == 0 else 1.2
 
 
 def _without_jumps(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -96,7 +110,8 @@ def _without_jumps(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
     return broken
 
 
-def _shade_unstable(axes: Axes, lobes: StabilityLobes, top: float) -> None:
+def shade_unstable(axes: Axes, lobes: StabilityLobes, top: float) -> None:
+    """Grey above the limits, up to ``top`` (mm)."""
     limit = np.where(np.isfinite(lobes.depth_limits), 1e3 * lobes.depth_limits, top)
     rpm = lobes.spindle_speeds_rpm
     axes.fill_between(rpm, np.minimum(limit, top), top, color=SHADE, linewidth=0, zorder=0, label="unstable")
@@ -118,7 +133,8 @@ def _draw_cuts(axes: Axes, cuts: Sequence[TriedCut]) -> None:
             axes.plot(rpm, depths, linestyle="none", color="black", markersize=6, label=label, zorder=5, **marks)
 
 
-def _depth_limit(curves: Sequence[StabilityLobes], cuts: Sequence[TriedCut]) -> float:
+def depth_axis_top(curves: Sequence[StabilityLobes], cuts: Sequence[TriedCut] = ()) -> float:
+    """Upper end of an axis of depths (mm): above nearly all limits and above every cut that was tried."""
     finite = np.concatenate(
         [1e3 * lobes.depth_limits[np.isfinite(lobes.depth_limits)] for lobes in curves]
         + [np.array([1e3 * cut.depth for cut in cuts])]

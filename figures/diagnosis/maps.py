@@ -25,14 +25,14 @@ LEAST_TOP = 10.0
 
 
 def channel_map_figure(view: ResidualView, significant: NDArray[np.bool_]) -> Figure:
-    """Residual power over noise power, a column a recording, upper row before and lower row after the causes.
+    """Draw residual power over noise power, a column a recording, upper row before and lower row after the causes.
 
     Parameters
     ----------
     view
-        Maps.
-    significant : (n_recordings, n_bands, n_responses)
-        Cells that get a dot in the upper row.
+        Maps of the residual before and after the causes.
+    significant : (n_recordings, n_bands, n_responses), bool
+        Whether a cell gets a dot in the upper row.
     """
     maps = (view.before, view.after)
     shades = _shades([one.ratio for one in maps])

@@ -29,18 +29,18 @@ _SYMBOLS = {"receptance": "H", "mobility": "Y", "accelerance": "A"}
 
 @dataclass(frozen=True)
 class FrfCurves:
-    """What one figure shows.
+    """The FRF, models and bands that one figure shows.
 
     Parameters
     ----------
     measured
-        Any quantity; the models must give the same unit.
+        Measured FRF of any quantity; the models must give the same unit.
     band : (low, high), Hz
-        Frequency axis.
+        Limits of the frequency axis.
     fitted, reference
-        Models drawn over it where they are given.
-    fit_band
-        Hz, where the fitted model holds; None: the whole axis.
+        Models that are drawn over it where they are given.
+    fit_band : Hz
+        Band in which the fitted model holds; None: the whole axis.
     """
 
     measured: Frf

@@ -33,15 +33,16 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @dataclass(frozen=True)
 class GalleryEntry:
-    """One FRF.
+    """One FRF of a gallery.
 
     Parameters
     ----------
     title, misfit
-        Above the panel, at its left and right.
+        Texts above the panel, at its left and right.
     measured : (n_lines,), complex
-        NaN where there is none.
+        Measured values; NaN where there is none.
     fitted, reference : (n_lines,), complex, or None
+        Values of the fitted model and of a reference model.
     """
 
     title: str
@@ -52,14 +53,14 @@ class GalleryEntry:
 
 
 def gallery_page(entries: Sequence[GalleryEntry], frequencies: Real) -> SmallSvg:
-    """One page: four entries a row, each with its own scale of magnitude.
+    """Draw one page: four entries a row, each with its own scale of magnitude.
 
     Parameters
     ----------
     entries
-        At most ``ENTRIES_PER_PAGE``.
+        FRFs to draw, at most ``ENTRIES_PER_PAGE``.
     frequencies : (n_lines,), Hz
-        Of all entries.
+        Frequencies of all entries.
     """
     rows = -(-len(entries) // COLUMNS)
     page = SmallSvg(WIDTH_MM, _TOP + rows * _CELL_HEIGHT + _FOOT, _STYLE)

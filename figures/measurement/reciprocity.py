@@ -18,14 +18,14 @@ _MAGNITUDE, _DIFFERENCE = (6.0, 26.0), (34.0, 13.0)
 
 
 def reciprocity_figure(pairs: Sequence[ReciprocityPair], unit: str) -> Figure:
-    """Three pairs a row.
+    """Draw pairs of FRFs that reciprocity makes equal, three pairs a row.
 
     Parameters
     ----------
     pairs
-        To draw, at most six or so.
+        Pairs to draw, at most six or so.
     unit
-        Of the FRF.
+        Unit of the FRF.
     """
     rows = -(-len(pairs) // _COLUMNS)
     height = _TOP + rows * _ROW

@@ -18,7 +18,7 @@ def indicator_figure(
     Parameters
     ----------
     complex_indicator, multivariate
-        Of one FRF in one band.
+        Complex and multivariate mode indicators of one FRF in one band.
     model
         Its natural frequencies are marked.
     """

@@ -21,16 +21,16 @@ _KINDS = (
 
 
 def stabilisation_figure(chart: StabilisationChart, frf: Frf | None = None, model: ModalModel | None = None) -> Figure:
-    """Poles over order and over damping.
+    """Draw a stabilisation chart: poles over order and over damping.
 
     Parameters
     ----------
     chart
-        Of a fit.
+        Stabilisation chart of a fit.
     frf
-        Its summed magnitude is drawn behind the chart.
+        FRF whose summed magnitude is drawn behind the chart.
     model
-        Its natural frequencies and damping ratios are marked.
+        Modal model whose natural frequencies and damping ratios are marked.
     """
     with house_style():
         figure = new_figure(125.0)

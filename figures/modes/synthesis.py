@@ -9,14 +9,14 @@ from ..style import FITTED, MEASURED, TRUE, house_style, legend_above, new_figur
 
 
 def synthesis_figure(compared: Synthesis, unit: str) -> Figure:
-    """Sums of magnitudes over the entries that the model has.
+    """Draw the sums of magnitudes over the entries that the model has.
 
     Parameters
     ----------
     compared
-        Measured and synthesised FRFs.
+        FRFs of the measurement and of the model.
     unit
-        Of both.
+        Unit of both FRFs.
     """
     known = np.isfinite(compared.misfit)
     measured, made = compared.measured[:, known], compared.synthesised[:, known]

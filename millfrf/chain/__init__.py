@@ -1,11 +1,11 @@
 """The steps of the main job, as the commands and the demonstration both call them."""
 
-from .calibrate import calibrate_model
-from .estimate import estimate_recordings
-from .estimate_options import Estimate, EstimateOptions
-from .fit import fit_model, fit_recordings
-from .fit_options import FitOptions
-from .lobes import LOBE_METHODS, compute_lobes, speed_axis
+from .cuts.lobes import LOBE_METHODS, compute_lobes, speed_axis
+from .estimating.estimate import estimate_recordings
+from .estimating.estimate_options import Estimate, EstimateOptions
+from .fitting.calibrate import calibrate_model
+from .fitting.fit import fit_model, fit_recordings
+from .fitting.fit_options import FitOptions
 
 __all__ = [
     "LOBE_METHODS",

@@ -6,25 +6,24 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cutting import MillingProcess
-from mismatch import Diagnosis, Settings, diagnose, read_trials
-from mismatch.inference.diagnosis_file import improved_model_of, write_diagnosis
+from mismatch import Settings, StructureDiagnosis, diagnose, improved_model_of, read_trials, write_diagnosis
 from mismatch.location.spindle_orders import SpindleSpeed, spindle_speed
 from mismatch.records.trial import measured_part
 from modal_fit import read_modal_model, write_modal_model
 
 from ..gate import check_model_and_recordings
 from ..progress import Watch, silent
-from ..report.diagnosis_page import with_location, write_diagnosis_report
+from ..report.diagnoses.diagnosis_page import write_diagnosis_report
 from ..result_folder import refuse_file
-from .fit import fit_recordings
-from .fit_options import SUBSPACE, FitOptions
+from .fitting.fit import fit_recordings
+from .fitting.fit_options import SUBSPACE, FitOptions
 
 
 @dataclass(frozen=True)
 class DiagnosisFiles:
     """What a diagnosis wrote, and lines that sum it up."""
 
-    diagnosis: Diagnosis
+    diagnosis: StructureDiagnosis
     written: tuple[Path, ...]
     summary: tuple[str, ...]
 
@@ -53,16 +52,14 @@ def diagnose_files(
     doubts = check_model_and_recordings(model_path, model, recordings, stream, watch)
     trials = read_trials(recordings, model, stream=stream)
     with watch("diagnosing"):
-        diagnosis = diagnose(model, trials, settings)
+        diagnosis = diagnose(model, trials, settings, speeds=_speeds(recordings))
     diagnosis = replace(diagnosis, doubts=(*doubts, *diagnosis.doubts))
-    with watch("locating"):
-        diagnosis, view = with_location(diagnosis, trials, _speeds(recordings))
     folder.mkdir(parents=True, exist_ok=True)
     paths = (folder / "diagnosis.json", folder / "improved_model.json", folder / "report.html")
     write_diagnosis(paths[0], diagnosis)
     write_modal_model(paths[1], improved_model_of(diagnosis))
     with watch("writing the report"):
-        write_diagnosis_report(paths[2], view, Path(model_path).name, process)
+        write_diagnosis_report(paths[2], diagnosis, Path(model_path).name, process)
     missing = [label for label in whole.responses if label not in model.responses]
     note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []
     return DiagnosisFiles(diagnosis, paths, (*note, *summary(diagnosis)))
@@ -96,11 +93,10 @@ def _speeds(recordings: Sequence[str | os.PathLike[str]]) -> dict[str, SpindleSp
     return {name: speed for name, speed in stated.items() if speed is not None}
 
 
-def summary(diagnosis: Diagnosis) -> list[str]:
+def summary(diagnosis: StructureDiagnosis) -> list[str]:
     """A few lines for the terminal: verdict, causes with numbers, error before and after."""
     lines = [f"verdict: {diagnosis.verdict}"]
-    if diagnosis.band is not None:
-        lines.append(diagnosis.band.sentence)
+    lines.append(diagnosis.details.band.sentence)
     lines += [f"warning: {doubt}" for doubt in diagnosis.doubts]
     for cause in diagnosis.physics:
         numbers = ", ".join(
@@ -129,14 +125,14 @@ def summary(diagnosis: Diagnosis) -> list[str]:
     return lines
 
 
-def _error_line(diagnosis: Diagnosis) -> str:
+def _error_line(diagnosis: StructureDiagnosis) -> str:
     """Errors on the recording held out."""
     gain = diagnosis.improvement
     said = (
         f"{100 * gain.before:.3g} % nominal, {100 * gain.refitted:.3g} % refitted, {100 * gain.after:.3g} % improved, "
         f"noise {100 * gain.noise_floor:.3g} %"
     )
-    if len(diagnosis.lines) < 2:
+    if len(diagnosis.details.recordings) < 2:
         return f"error on {gain.held_out}, the only recording, so not held out: {said}"
     test = f", p = {gain.p_value:.2g} that improved is no better than {gain.against}" if diagnosis.physics else ""
     return f"error on {gain.held_out}, held out: {said}{test}"

@@ -25,8 +25,8 @@ def acquire(
     """Record from the devices of a session until its duration is over, Stop is pressed or Ctrl-C."""
     from foundation import InputError
 
-    from ..chain.acquire import open_session
-    from .options import check_output
+    from ..chain.measuring.record_session import open_session
+    from ..options import check_output
 
     if (out is None) == (not check):
         raise InputError("give either --out REC.h5 to record or --check to look at the signals first")
@@ -40,7 +40,7 @@ def acquire(
     if out is None:
         _check(opened.source, seconds)
     elif live:
-        from ..chain.acquire_live import acquire_live
+        from ..chain.measuring.live_session import acquire_live
 
         tally = acquire_live(opened, out, address=live_address, port=live_port, at_once=at_once, say=_say)
         _report(tally, out)
@@ -52,8 +52,8 @@ def _check(source: object, seconds: float) -> None:
     from acquisition import Source
     from foundation import MillfrfError
 
-    from ..chain.preflight import listen, preflight
-    from ..tables import show
+    from ..chain.measuring.signal_check import listen, preflight
+    from ..tables.result_tables import show
 
     assert isinstance(source, Source)
     found = preflight(listen(source, seconds))
@@ -69,7 +69,7 @@ def _check(source: object, seconds: float) -> None:
 
 
 def _record(opened: object, out: Path) -> None:
-    from ..chain.acquire import OpenedSession, acquire
+    from ..chain.measuring.record_session import OpenedSession, acquire
     from ..progress import bar
 
     assert isinstance(opened, OpenedSession)
@@ -84,7 +84,7 @@ def _say(line: str) -> None:
 
 
 def _report(tally: object, out: Path) -> None:
-    from ..chain.acquire import Tally
+    from ..chain.measuring.record_session import Tally
 
     if not isinstance(tally, Tally):
         typer.echo("stopped before Start; nothing was recorded")

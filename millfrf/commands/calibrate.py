@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Output, check_output
+from ..options import Output, check_output
 
 
 def calibrate(
@@ -18,9 +18,9 @@ def calibrate(
     from estimation import read_frf
     from modal_fit import read_modal_model
 
-    from ..chain.calibrate import calibrate_model, write_calibration
+    from ..chain.fitting.calibrate import calibrate_model, write_calibration
     from ..progress import bar
-    from ..tables import mode_table, show
+    from ..tables.result_tables import mode_table, show
 
     check_output(out, (".json",), [model, tip, sensor])
     result = calibrate_model(read_modal_model(model), read_frf(tip), read_frf(sensor), bar, (tip.name, sensor.name))

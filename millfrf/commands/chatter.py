@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Stream, check_output, names
+from ..options import Stream, check_output, names
 
 
 def chatter(
@@ -38,7 +38,7 @@ def chatter(
 
     from modal_fit import read_modal_model
 
-    from ..chain.chatter import (
+    from ..chain.cuts.chatter import (
         CutOptions,
         doubts_of_cuts,
         judge_recordings,
@@ -46,12 +46,12 @@ def chatter(
         tone_table,
         verdict_table,
     )
-    from ..chain.chatter_file import write_cuts
-    from ..chain.chatter_spectra import keep_spectra
+    from ..chain.cuts.chatter_file import write_cuts
+    from ..chain.cuts.chatter_spectra import keep_spectra
     from ..gate import read_checked_cutting
     from ..progress import bar
     from ..provenance import of_chatter
-    from ..tables import show
+    from ..tables.result_tables import show
 
     if out is not None:
         check_output(out, (".json",), [*recordings, cutting, *([] if model is None else [model])])

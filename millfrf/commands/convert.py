@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import check_output
+from ..options import check_output
 
 
 def convert(
@@ -25,8 +25,8 @@ def convert(
     from acquisition.conversion.can_log import add_can_log
     from foundation import InputError
 
-    from ..chain.convert_files import FRF_SUFFIXES, convert_files, is_frf_conversion
-    from ..chain.convert_uff import is_uff_conversion
+    from ..chain.converting.conversions import FRF_SUFFIXES, convert_files, is_frf_conversion
+    from ..chain.converting.convert_uff import is_uff_conversion
     from ..progress import bar
 
     if len(files) < 2:

@@ -18,9 +18,9 @@ def demo(
     if conceal:
         _concealed(out, noise, seed)
         return
-    from ..demonstration import DemoOptions, comparison_tables, run_demo
+    from ..demonstration.whole_chain import DemoOptions, comparison_tables, run_demo
     from ..progress import bar
-    from ..tables import show
+    from ..tables.result_tables import show
 
     result = run_demo(DemoOptions(out, noise, 0 if seed is None else seed), bar, typer.echo)
     for table in comparison_tables(result):
@@ -29,10 +29,10 @@ def demo(
 
 
 def _concealed(out: Path, noise: float, seed: int | None) -> None:
-    from ..concealment import ConcealOptions, run_concealed
-    from ..concealment_table import concealment_table
+    from ..demonstration.concealment import ConcealOptions, run_concealed
+    from ..demonstration.concealment_result import concealment_table
     from ..progress import bar
-    from ..tables import show
+    from ..tables.result_tables import show
 
     result = run_concealed(ConcealOptions(out, noise, seed), bar, typer.echo)
     show(concealment_table(result))

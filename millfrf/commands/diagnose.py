@@ -7,7 +7,7 @@ import typer
 
 from foundation import InputError
 
-from .options import check_shares
+from ..options import check_shares
 
 
 def diagnose(

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Band, Output, Stream, check_band, check_output, names
+from ..options import Band, Output, Stream, check_band, check_output, names
 
 
 def estimate(
@@ -43,8 +43,8 @@ def estimate(
     and, by feedback, the force; --instrument names what it does not reach. local-polynomial: whole records instead of
     segments, without leakage, for short records and forces that are rough in frequency.
     """
-    from ..chain.estimate import estimate_recordings, write_estimate
-    from ..chain.estimate_options import EstimateOptions
+    from ..chain.estimating.estimate import estimate_recordings, write_estimate
+    from ..chain.estimating.estimate_options import EstimateOptions
     from ..progress import bar
 
     check_output(out, (".h5", ".hdf5"), recordings)

@@ -7,7 +7,7 @@ import typer
 
 from foundation import InputError
 
-from .options import Output, Stream, check_band, check_output, names
+from ..options import Output, Stream, check_band, check_output, names
 
 
 def fit(
@@ -41,12 +41,12 @@ def fit(
     """
     from modal_fit import ModalFit
 
-    from ..chain.fit import write_fit
-    from ..chain.fit_files import fit_files
-    from ..chain.fit_options import FitOptions
-    from ..chain.pole_picking import check_candidates, picked_in_words, write_candidates
+    from ..chain.fitting.choice_of_fit import fit_files
+    from ..chain.fitting.fit import write_fit
+    from ..chain.fitting.fit_options import FitOptions
+    from ..chain.fitting.pole_picking import check_candidates, picked_in_words, write_candidates
     from ..progress import bar
-    from ..tables import error_table, mode_table, show
+    from ..tables.result_tables import error_table, mode_table, show
 
     check_output(out, (".json",), [*files, *([poles] if poles else [])])
     if candidates is not None:

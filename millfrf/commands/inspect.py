@@ -14,7 +14,7 @@ def inspect(
     """Say what is in a file, and what looks wrong: levels, overload, dead channels, missing samples."""
     from ..inspection import inspect_file
     from ..progress import bar
-    from ..tables import show
+    from ..tables.result_tables import show
 
     findings = inspect_file(file, bar)
     typer.echo(f"{file.name}: {findings.summary}")

@@ -8,7 +8,7 @@ import typer
 
 from foundation import InputError
 
-from .options import Output, check_output
+from ..options import Output, check_output
 
 
 def lobes(
@@ -33,7 +33,7 @@ def lobes(
     from modal_fit import ModalModel, read_modal_model
     from stability import write_lobes
 
-    from ..chain.lobes import compute_lobes, lobes_summary, mode_coupling_line, speed_axis
+    from ..chain.cuts.lobes import compute_lobes, lobes_summary, mode_coupling_line, speed_axis
     from ..file_kinds import FRF, MODEL, kind_of
     from ..gate import (
         check_depth,

@@ -10,8 +10,8 @@ def plan(
     session: Annotated[Path, typer.Argument(metavar="SESSION.toml", help="File with tables [cutting] and [plan].")],
 ) -> None:
     """Propose three speed sweeps whose forces are independent, long enough for the FRF error that is wanted."""
-    from ..chain.plan import plan_from_file, plan_tables
-    from ..tables import show
+    from ..chain.measuring.plan import plan_from_file, plan_tables
+    from ..tables.result_tables import show
 
     found, doubts = plan_from_file(session)
     for doubt in doubts:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Output, check_output
+from ..options import Output, check_output
 
 
 def predict(

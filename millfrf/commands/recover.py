@@ -15,8 +15,8 @@ def recover(
     """Copy everything a killed writer had written into a new recording; the old file is left as it is."""
     from acquisition import recover as recover_file
 
+    from ..options import check_output
     from ..progress import bar
-    from .options import check_output
 
     if out is not None:
         check_output(out, (".h5", ".hdf5"), [recording])

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Band, Output, check_band, check_output
+from ..options import Band, Output, check_band, check_output
 
 
 def report(

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Band, Output, Stream, check_band, check_output, names
+from ..options import Band, Output, Stream, check_band, check_output, names
 
 
 def tap(
@@ -51,7 +51,7 @@ def tap(
     point was hit is taken from --points, --point, the recording's set-up, or the force channel.
     """
     from ..progress import bar
-    from ..tables import show
+    from ..tables.result_tables import show
     from ..taps import TapOptions, tap_recordings, tap_tables, write_taps
 
     check_output(out, (".h5", ".hdf5"), [*recordings, *([points] if points else [])])

@@ -18,7 +18,7 @@ from modal_fit import read_modal_model
 
 from ..gate import RECORD_AGAIN, check_depth, check_one_speed, check_recordings, read_checked_cutting
 from ..progress import bar
-from ..report.cut_diagnosis_page import write_cut_report
+from ..report.diagnoses.cut_diagnosis_page import write_cut_report
 from ..result_folder import refuse_file
 from .diagnosis_words import summary
 

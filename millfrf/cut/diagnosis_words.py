@@ -5,7 +5,7 @@ import math
 from mismatch import AcceptedCause
 from mismatch.adapters.cut import COEFFICIENTS, NOISE_LIKE, CutDiagnosis
 
-from ..tables import with_error
+from ..tables.result_tables import with_error
 
 UNITS = {"radial_offset_m": ("µm", 1e6), "angle_rad": ("deg", 180 / math.pi), "coefficient_n_per_m": ("kN/m", 1e-3)}
 """How numbers are told to a reader: unit and factor from SI."""

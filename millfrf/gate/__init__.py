@@ -6,6 +6,7 @@ be done with what is given, and returns doubts: sentences that a command prints 
 
 from .belonging import Given, check_belonging
 from .calibrations import check_tip_and_sensor
+from .cut_statements import check_one_speed, stated_cut
 from .cutting_data import check_cutting, read_checked_cutting
 from .frfs import check_frf, check_frf_for_fit
 from .hammer import (
@@ -27,7 +28,6 @@ from .recordings import RECORD_AGAIN, check_channels, check_recordings, doubts_o
 from .sample_rates import check_sample_rates, gain_of
 from .scales import check_scales
 from .spindle import check_depth, check_speed, check_speeds, lowest_frequency, rigid_directions
-from .stated_cut import check_one_speed, stated_cut
 from .taps_in_segments import IMPULSIVE, LONGEST, Segmentation
 
 __all__ = [

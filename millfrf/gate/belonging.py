@@ -12,13 +12,13 @@ class Given:
     Parameters
     ----------
     name
-        Without its folder.
+        Name of the file without its folder.
     kind
-        As ``millfrf.file_kinds`` names it.
+        Kind of the file, as ``millfrf.file_kinds`` names it.
     sha256
-        Of its bytes.
+        SHA-256 hash of its bytes.
     provenance
-        What it says of its making.
+        Sources and versions that the file states.
     """
 
     name: str

@@ -21,11 +21,11 @@ def check_tip_and_sensor(
     Parameters
     ----------
     model
-        In-process model at the sensor.
+        In-process model with responses at the sensor.
     tip, sensor
         Hammer FRFs, both excited at the tip.
     names
-        Of their files, for the message.
+        Names of their files, for the message.
 
     Returns
     -------

@@ -10,18 +10,18 @@ from foundation import FileFormatError, InputError
 
 @dataclass(frozen=True)
 class Physical:
-    """What a number of a cutting file can be.
+    """Limits of a number of a cutting file.
 
     Parameters
     ----------
     key
-        Of the file.
+        Key of the number in the file.
     least, most
-        Outside of them the number is refused; SI.
+        Smallest and largest value in SI units; outside of them the number is refused.
     usual
-        Outside of these two it is doubted.
+        Usual range in SI units; outside of it the number is doubted.
     unit
-        As the message says it.
+        Unit in which the message shows the number.
     hint
         The mistake that is most likely.
     """

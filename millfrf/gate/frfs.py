@@ -31,7 +31,7 @@ def check_frf(frf: Frf, name: str = "the FRF") -> list[str]:
     frf
         Measured, imported or evaluated from a model.
     name
-        Of its file, for the message.
+        Name of its file, for the message.
 
     Returns
     -------

@@ -89,11 +89,11 @@ def check_records(records: Sequence[BandRecord], band: Band, names: Sequence[str
     Parameters
     ----------
     records
-        Of one set-up.
-    band
-        Of the fit, Hz.
+        Records of one set-up.
+    band : Hz
+        Lowest and highest frequency of the fit.
     names, rates
-        Of the recordings they were made from; rates in Hz, as the files state them.
+        Names of the recordings they were made from, and their sample rates (Hz) as the files state them.
 
     Raises
     ------

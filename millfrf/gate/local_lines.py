@@ -20,9 +20,9 @@ def check_local_frf(frf: Frf, n_tests: int) -> list[str]:
     Parameters
     ----------
     frf
-        With the covariance that :func:`estimation.local_polynomial` gives.
+        FRF with the covariance that :func:`estimation.local_polynomial` gives.
     n_tests
-        Records behind it.
+        Number of records behind it.
     """
     lines = 2 * local_half_width(n_tests, len(frf.excitations)) + 1
     shared = (

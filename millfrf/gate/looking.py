@@ -9,14 +9,14 @@ T = TypeVar("T")
 
 
 def doubts_of(check: Callable[[T, str], list[str]], given: T, name: str) -> list[str]:
-    """Doubts of a check, and what it refuses as one more of them.
+    """Collect the doubts of a check; a refusal counts as one more doubt.
 
     Parameters
     ----------
     check
-        Of the gate, for what is given and the name of its file.
+        Check of the gate, a function of what is given and of the name of its file.
     given, name
-        What it is asked about.
+        Object that is checked, and the name of its file.
     """
     try:
         return check(given, name)

@@ -33,7 +33,7 @@ def check_model(model: ModalModel, name: str = "the model") -> list[str]:
     model
         Fitted, imported or written by hand.
     name
-        Of its file, for the message.
+        Name of its file, for the message.
 
     Returns
     -------

@@ -40,11 +40,11 @@ class DrivePoint:
     Parameters
     ----------
     name
-        ``node:axis``.
+        Node and axis, ``node:axis``.
     row, column
-        Of the response and of the excitation.
+        Row of the response and column of the excitation.
     sign
-        -1 where their directions are opposite.
+        Product of their directions: -1 where they are opposite, else 1.
     """
 
     name: str

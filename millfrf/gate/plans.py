@@ -25,20 +25,20 @@ MOST_NOISE = 1.0
 def check_demand(
     band: tuple[float, float], depth: float, noise: float, widths_deg: tuple[float, ...], cutter: MillingProcess
 ) -> list[str]:
-    """Judge what a plan is asked for, before it is computed.
+    """Judge the demands on a plan before it is computed.
 
     Parameters
     ----------
-    band
-        Lowest and highest frequency to be excited, Hz.
-    depth
-        Axial, m.
-    noise
-        Of the accelerometers, m/s^2/sqrt(Hz).
-    widths_deg
-        Immersion widths, degrees.
+    band : Hz
+        Lowest and highest frequency to be excited.
+    depth : m
+        Axial depth of the sweeps.
+    noise : m/s^2/sqrt(Hz)
+        Noise density of the accelerometers.
+    widths_deg : degrees
+        Immersion widths of the sweeps.
     cutter
-        Whose teeth sweep the band.
+        Milling process of the cutter that sweeps the band.
 
     Returns
     -------

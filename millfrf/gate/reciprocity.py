@@ -30,11 +30,11 @@ def check_reciprocity(frf: Frf, name: str = "the FRF", band: Band | None = None)
     Parameters
     ----------
     frf
-        Receptance, mobility or accelerance.
+        FRF of receptance, mobility or accelerance.
     name
-        Of its file.
-    band
-        Hz; None: the FRF's own, or all its lines.
+        Name of its file.
+    band : Hz
+        Lowest and highest frequency; None: the FRF's own, or all its lines.
 
     Returns
     -------

@@ -46,15 +46,15 @@ class Gain:
     Parameters
     ----------
     name
-        Of the recording.
-    rate
-        As the recording states it, Hz.
+        Name of the recording.
+    rate : Hz
+        Sample rate that the recording states.
     first
         Number of the first step; the frequency of step k is ``exp(STEP k)`` Hz.
     values : (n_steps,)
         Natural logarithm of the gain; NaN where the forces have no power.
     shares : (n_excitations,)
-        Of each channel in the force power.
+        Share of each channel in the force power.
     """
 
     name: str
@@ -83,12 +83,12 @@ def gain_of(spectra: CrossSpectra, name: str, rate: float) -> Gain:
 
 
 def check_sample_rates(gains: Sequence[Gain]) -> list[str]:
-    """Hold each recording's gain against the first one's, as it is and moved by a factor.
+    """Compare each recording's gain with the first one's, as it is and moved by a factor.
 
     Parameters
     ----------
     gains
-        Of the recordings of one set-up.
+        Gains of the recordings of one set-up.
 
     Returns
     -------

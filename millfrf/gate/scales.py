@@ -21,7 +21,7 @@ UNITS = (
 
 
 def check_scales(names: Sequence[str], measured: NDArray[np.float64], predicted: NDArray[np.float64]) -> list[str]:
-    """Judge each response's size and sign against the prediction.
+    """Judge each response's size and sign by comparison with the prediction.
 
     ``gain = <predicted, measured> / <measured, measured>``, told where the two are one signal but for a factor that a
     wrong unit or a sensor turned round gives.
@@ -29,9 +29,9 @@ def check_scales(names: Sequence[str], measured: NDArray[np.float64], predicted:
     Parameters
     ----------
     names
-        Of the responses.
+        Names of the responses.
     measured, predicted : (n_samples, n_responses)
-        In the same unit, after the run-in.
+        Measured and predicted responses in the same unit, after the run-in.
 
     Returns
     -------

@@ -56,11 +56,11 @@ def check_speeds(
     Parameters
     ----------
     speeds
-        As typed after ``--speeds``.
+        Lowest and highest speed (rpm) and their number, as typed after ``--speeds``.
     process
-        Cutter.
-    lowest_mode
-        Lowest natural frequency of the structure, Hz, where it is known.
+        Milling process of the cutter.
+    lowest_mode : Hz
+        Lowest natural frequency of the structure; None: not known.
 
     Raises
     ------

@@ -36,16 +36,16 @@ EARLY = 0.25
 
 @dataclass(frozen=True)
 class Segmentation:
-    """Segments of a job.
+    """Segments into which a job cuts a recording.
 
     Parameters
     ----------
-    seconds
-        Duration of one.
+    seconds : s
+        Duration of a segment.
     overlap
-        Share that it has in common with the next.
+        Share that a segment has in common with the next.
     window
-        Its name.
+        Name of the window.
     """
 
     seconds: float

@@ -22,11 +22,11 @@ class Mark:
     Parameters
     ----------
     number, note
-        Counted from 1; what the user typed, possibly empty.
-    host_time
-        Host's monotonic time, s.
-    shown_at
-        Where the page draws it, s since the start.
+        Number of the mark, counted from 1, and the text that the user typed, possibly empty.
+    host_time : s
+        Host's monotonic time of the mark.
+    shown_at : s
+        Time since the start at which the page draws it.
     """
 
     number: int

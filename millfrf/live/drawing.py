@@ -17,7 +17,7 @@ class Drawing:
     Parameters
     ----------
     figure
-        For the layout.
+        Figure of the page, for the layout.
     update
         Called in the page's own thread.
     """

@@ -10,14 +10,14 @@ from estimation import Frf, to_receptance
 
 @dataclass(frozen=True)
 class BandProgress:
-    """One band of frequencies.
+    """Progress in one band of frequencies.
 
     Parameters
     ----------
-    low, high
-        Hz.
+    low, high : Hz
+        Lower and upper end of the band.
     share
-        Of its lines that reach the wanted error, 0 ... 1.
+        Share of its lines that reach the wanted error, 0 ... 1.
     error
         Median of the error over the wanted one; below 1 is enough.
     """
@@ -51,11 +51,11 @@ def band_progress(
     Parameters
     ----------
     frf
-        With its covariance; None: nothing is known yet.
-    band
-        Hz; cut into bands of equal width.
+        FRF with its covariance; None: nothing is known yet.
+    band : Hz
+        Lowest and highest frequency; the band is cut into parts of equal width.
     n_bands
-        How many.
+        Number of parts.
     relative
         Wanted standard deviation of a column of the FRF over its length (2-norm over the responses).
     absolute

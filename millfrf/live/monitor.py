@@ -25,22 +25,22 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LiveSettings:
-    """What is estimated.
+    """Settings of what the live page estimates.
 
     Parameters
     ----------
-    band
-        Hz; None: up to 2 kHz or what the sample rate allows.
-    segment
-        s.
+    band : Hz
+        Lowest and highest frequency; None: up to 2 kHz or what the sample rate allows.
+    segment : s
+        Duration of a segment.
     relative_error, absolute_error
         Wanted standard deviation of the FRF, see :func:`millfrf.live.enough.band_progress`.
     n_bands
-        For which that is told.
+        Number of bands for which progress is told.
     teeth
-        Of the cutter; 0: unknown, no tooth-passing line.
-    spindle_speed_rpm
-        As planned; replaced by what a device says.
+        Number of teeth of the cutter; 0: unknown, no tooth-passing line.
+    spindle_speed_rpm : rpm
+        Planned spindle speed; a device's speed replaces it.
     """
 
     band: tuple[float, float] | None = None
@@ -54,24 +54,26 @@ class LiveSettings:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """All that a page draws.
+    """State of the live page: everything it draws at one moment.
 
     Parameters
     ----------
     seconds, n_samples
-        Of the stream since the start.
+        Time (s) and number of samples of the stream since the start.
     times : (n,), s
+        Times of the traces.
     traces : (n, n_channels)
+        Samples of the traces, in the channels' units.
     peaks, overloads : (n_channels,)
         Largest magnitude of the last second, in the channel's unit; samples at full scale since the start.
     spectra
-        None until a segment is full.
+        Spectra so far; None until a segment is full.
     bands
-        Enough data?
-    tooth_passing
-        Hz; 0: unknown.
+        Progress of each band of frequencies.
+    tooth_passing : Hz
+        Tooth-passing frequency; 0: unknown.
     n_skipped
-        Blocks that were recorded but not drawn, because the page did not keep up.
+        Number of blocks that were recorded but not drawn, because the page did not keep up.
     """
 
     seconds: float
@@ -92,9 +94,9 @@ class LiveMonitor:
     Parameters
     ----------
     streams
-        Of the source; the one with most channels is shown.
+        Streams of the source; the one with most channels is shown.
     settings
-        What is estimated.
+        Settings of what is estimated.
     """
 
     def __init__(self, streams: Sequence[StreamDescription], settings: LiveSettings) -> None:

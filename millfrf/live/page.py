@@ -64,7 +64,7 @@ def build_page(document: Any, monitor: LiveMonitor, control: LiveControl) -> Non
 
 def _choices(monitor: LiveMonitor) -> tuple[list[str], list[str], list[str]]:
     """Response, excitation and all names, in the order of the spectra."""
-    from estimation.recording_spectra import EXCITING, RESPONDING
+    from estimation.spectra.recording_spectra import EXCITING, RESPONDING
 
     excitations = [c.name for c in monitor.channels if c.quantity in EXCITING and c.node]
     responses = [c.name for c in monitor.channels if c.quantity in RESPONDING]

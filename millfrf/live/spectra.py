@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from acquisition import Channel
 from estimation import Frf, SpectralAccumulator, h1, settings_for
 from estimation.band_records import BandDecimator
-from estimation.recording_spectra import EXCITING, RESPONDING
+from estimation.spectra.recording_spectra import EXCITING, RESPONDING
 from foundation import InputError
 
 Real = NDArray[np.float64]
@@ -17,19 +17,20 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class GrownSpectra:
-    """What came out so far.
+    """Spectra and FRF estimated so far.
 
     Parameters
     ----------
     frequencies : (n,), Hz
+        Frequencies of the lines.
     power : (n, n_channels), unit^2/Hz
-        Of the excitations, then the responses.
+        Power spectral density of the excitations, then of the responses.
     channels
-        Their names, in that order.
+        Names of the channels, in that order.
     frf
-        None until there are more segments than excitations.
+        FRF so far; None until there are more segments than excitations.
     averages
-        Independent averages.
+        Number of independent averages.
     """
 
     frequencies: Real
@@ -40,18 +41,18 @@ class GrownSpectra:
 
 
 class LiveSpectra:
-    """Grows while samples come.
+    """Spectra that grow while samples come.
 
     Parameters
     ----------
     channels
-        Of the stream; forces excite, motions respond.
-    sample_rate
-        Hz.
-    highest_frequency
-        Upper end of the band, Hz.
-    segment
-        Length of a segment, s.
+        Channels of the stream; forces excite, motions respond.
+    sample_rate : Hz
+        Samples a second.
+    highest_frequency : Hz
+        Upper end of the band.
+    segment : s
+        Duration of a segment.
 
     Raises
     ------

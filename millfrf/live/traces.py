@@ -14,13 +14,13 @@ class TraceBuffer:
     Parameters
     ----------
     n_channels
-        Columns of the samples.
-    sample_rate
-        Hz.
-    window
-        s that are kept.
+        Number of columns of the samples.
+    sample_rate : Hz
+        Samples a second.
+    window : s
+        Duration that is kept.
     points
-        Buckets in the window.
+        Number of buckets in the window.
     """
 
     def __init__(self, n_channels: int, sample_rate: float, window: float = 5.0, points: int = 400) -> None:

@@ -11,7 +11,7 @@ from foundation import InputError
 from modal_fit import ModalModel
 from stability import StabilityLobes, certified_lobes, zero_order
 
-from .collect import Collected, SourceFile
+from .collection import Collected, SourceFile
 
 Real = NDArray[np.float64]
 

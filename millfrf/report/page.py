@@ -23,27 +23,27 @@ from ..gate import (
 )
 from ..progress import Watch, silent
 from ..provenance import sha256, versions
-from .chatter_section import chatter_in_brief, chatter_section
-from .collect import Collected, SourceFile, collect
-from .comparison_section import comparison_section
-from .frfs import frf_section
-from .hammer_section import hammer_section
-from .measurement_sections import channel_section, file_section, settings_section, setup_section
-from .reciprocity_section import reciprocity_section
-from .result_sections import input_section, mode_section
-from .stability_section import stability_findings
+from .collection import Collected, SourceFile, collect
+from .sections.chatter import chatter_in_brief, chatter_section
+from .sections.comparison import comparison_section
+from .sections.frfs import frf_section
+from .sections.hammer import hammer_section
+from .sections.measurement import channel_section, file_section, settings_section, setup_section
+from .sections.reciprocity import reciprocity_section
+from .sections.results import input_section, mode_section
+from .sections.stability import stability_findings
 
 
 @dataclass(frozen=True)
 class ReportOptions:
-    """What a report shall show.
+    """Options of a report.
 
     Parameters
     ----------
     title
-        Of the page.
-    band
-        Frequency axis of its figures, Hz; None: chosen by the fit.
+        Title of the page.
+    band : Hz
+        Frequency axis of its figures; None: chosen by the fit.
     reference
         Model file with known dynamics to draw beside the measured ones.
     """

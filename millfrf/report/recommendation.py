@@ -44,9 +44,9 @@ class Recommendation:
     cut
         The recommended one; None where there is none.
     sentences
-        For the section on stability.
+        Sentences for the section on stability.
     warnings
-        For the head of the page.
+        Warnings for the head of the page.
     """
 
     band: LimitBand | None = None

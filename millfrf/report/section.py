@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from ..tables import Table
+from ..tables.result_tables import Table
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Picture:
     caption
         What it shows and how to read it.
     alternative
-        For readers who cannot see it.
+        Words for readers who cannot see the picture.
     """
 
     uri: str
@@ -31,9 +31,9 @@ class Fold:
     Parameters
     ----------
     title
-        What is in it.
+        Title of the part.
     tables, pictures
-        In this order.
+        Tables and pictures, in this order.
     opened
         Whether it is open from the start.
     """
@@ -51,9 +51,9 @@ class Section:
     Parameters
     ----------
     title
-        Heading.
+        Heading of the section.
     sentences, tables, pictures, folds
-        In this order on the page.
+        Contents of the section, in this order on the page.
     """
 
     title: str

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .diagnose_command import diagnose
+from .diagnosis.diagnose_command import diagnose
 
 robot_app = typer.Typer(
     name="robot",
@@ -129,8 +129,8 @@ def stiffness(
 ) -> None:
     """Compliance at the tool tip, softest and stiffest directions, deflection under a force, weight and payload."""
     from .asked_loads import loads_of
+    from .loads.statics import show_stiffness
     from .postures import Asked
-    from .statics import show_stiffness
 
     asked = Asked(pose, joints, at, feed, turn, redundancy)
     show_stiffness(robot, asked, force, loads_of(payload, payload_at), links, out)
@@ -173,7 +173,7 @@ def deviation(
     from robot_model import LoadUncertainty
 
     from .asked_loads import loads_of
-    from .drilled_holes import Accuracy, DrillingArea, show_deviation
+    from .loads.drilled_holes import Accuracy, DrillingArea, show_deviation
 
     area = DrillingArea(1e-3 * drill, 1e-3 * feed_rev, x, y, z, links)
     known = LoadUncertainty(1e-2 * force_error, 1e-2 * stiffness_error)
@@ -210,8 +210,8 @@ def lobes(
     ] = None,
 ) -> None:
     """Stability lobes in a posture (--speeds), or the depth limit over a redundancy angle (--angles and --speed)."""
+    from .lobes.robot_lobes import write_lobes_in_posture, write_map_over_redundancy
     from .postures import Asked
-    from .robot_lobes import write_lobes_in_posture, write_map_over_redundancy
 
     asked = Asked(pose, joints, at, feed, turn, redundancy)
     if angles is not None:

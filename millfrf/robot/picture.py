@@ -87,17 +87,18 @@ def draw_deviation(path: Path, found: DeviationMap, shape: tuple[int, int], need
 
 
 def deviation_figure(found: DeviationMap, shape: tuple[int, int], needed: Real, least: str = "") -> Figure:
-    """The same as a figure.
+    """Draw a deviation map and the position tolerance that each hole needs.
 
     Parameters
     ----------
     found
+        Deviation map of the robot.
     shape
-        How many places along x and y.
+        Number of places along x and y.
     needed : (n,), m
-        Position tolerance of each hole.
+        Position tolerance that each hole needs.
     least
-        ``at least `` where parts of the budget are unknown, for the label.
+        Text ``at least `` where parts of the budget are unknown, for the label.
     """
     sizes = 1e3 * np.linalg.norm(found.deviations, axis=1)
     fields = [
@@ -116,13 +117,14 @@ def draw_workspace(path: Path, places: Sequence[CutPlace], shape: tuple[int, int
 
 
 def map_figure(positions: Real, shape: tuple[int, int], fields: Sequence[tuple[Real, str]]) -> Figure:
-    """Fields over y (across) and x (reach), with contours that carry their values; white where not reached.
+    """Draw fields over y (across) and x (reach), with contours that carry their values; white where not reached.
 
     Parameters
     ----------
     positions : (n, 3), m
+        Positions of the places in the base frame.
     shape
-        How many places along x and y.
+        Number of places along x and y.
     fields
         Values (n,) and label with unit, one a panel.
     """

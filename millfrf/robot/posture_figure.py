@@ -17,18 +17,18 @@ def draw_posture_map(path: Path, found: PostureMap, max_depth: float, depth: flo
 
 
 def posture_figure(found: PostureMap, max_depth: float, depth: float | None, what: str) -> Figure:
-    """Largest stable depth and lowest natural frequency over the angle, as Mousavi et al., Fig. 11.
+    """Draw largest stable depth and lowest natural frequency over the angle, as Mousavi et al., Fig. 11.
 
     Parameters
     ----------
     found
-        Values are depth limits, m.
-    max_depth
-        Largest depth looked at, m: limits at it lie beyond.
-    depth
-        Of a cut, m, whose angles are told apart; or None.
+        Posture map whose values are depth limits, m.
+    max_depth : m
+        Largest depth that was searched: limits at it lie beyond.
+    depth : m
+        Depth of a cut whose stable angles are marked; or None.
     what
-        Of the redundancy, for the axis: ``tool and table about the feed``.
+        Words for the redundancy, for the axis: ``tool and table about the feed``.
     """
     angles, limits = np.degrees(found.angles), 1e3 * found.values
     figure = new_figure(95.0)

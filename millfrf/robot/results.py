@@ -24,13 +24,13 @@ from robot_model import (
     write_compensated_path,
 )
 
-from ..commands.options import check_band, check_output
 from ..gate import check_depth, check_speed, read_checked_cutting
+from ..options import check_band, check_output
 from ..progress import bar
 from ..provenance import add_to_json, versions
-from ..tables import Table, show
+from ..tables.result_tables import Table, show
 from .asked_loads import Loads, check_axis, check_degrees, check_near, check_places, check_positive
-from .posture_maps import depth_over_places
+from .lobes.posture_maps import depth_over_places
 from .postures import Asked, mechanism_of, posture_of, spatial
 
 Real = NDArray[np.float64]

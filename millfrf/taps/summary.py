@@ -6,7 +6,7 @@ import numpy as np
 
 from estimation import FoundTaps
 
-from ..tables import Table
+from ..tables.result_tables import Table
 from .run import TapResult
 
 MOST_LISTED = 40

@@ -5,28 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..inference import FAULTS, FaultSettings
+from ..joints.saturation import Saturation, rounded, saturated
 from ..models.fitting import Fit, fit
 from ..records.windowed_lines import WindowedLines
-from .saturation import Saturation, rounded, saturated
 from .tones import shown_signal
 
 Real = NDArray[np.float64]
 
 LIMITS = np.linspace(0.25, 1.0, 76)
 """Limits that are tried, as shares of the largest value measured."""
-
-BEYOND = 1.15
-"""Of a limit: predicted there, a response must show the limit."""
-
-LEAST_BEYOND = 30
-"""Samples."""
-
-FOLLOWS = 0.1
-"""Slope of what is shown on what was due beyond a limit, above which it is no limit: an amplitude that friction or a
-stiffening joint keeps small still rises with its prediction."""
-
-LEAST_GAIN = 60.0
-"""Of twice the log likelihood."""
 
 ROUNDS = 12
 """Of mending and refitting."""
@@ -61,7 +49,7 @@ class Clipping:
         return saturated(signal, self.saturation.limit, self.saturation.sharpness)
 
 
-def find_clipping(fitted: Fit, lines: list[WindowedLines]) -> Clipping | None:
+def find_clipping(fitted: Fit, lines: list[WindowedLines], settings: FaultSettings = FAULTS) -> Clipping | None:
     """The response, if any, that follows its prediction only up to a limit.
 
     Parameters
@@ -70,43 +58,47 @@ def find_clipping(fitted: Fit, lines: list[WindowedLines]) -> Clipping | None:
         What predicts.
     lines
         Recordings, responses as measured.
+    settings
+        Thresholds.
     """
-    return _found([shown_signal(fitted, one) for one in lines], lines)
+    return _found([shown_signal(fitted, one) for one in lines], lines, settings)
 
 
-def _found(predicted: list[Real], lines: list[WindowedLines]) -> Clipping | None:
+def _found(predicted: list[Real], lines: list[WindowedLines], settings: FaultSettings) -> Clipping | None:
     """The clearest limit of any response, its prediction in time known."""
     best: Clipping | None = None
     for p in range(lines[0].measured.shape[1]):
         measured, shown = _channel(predicted, lines, p)
         plain = float(np.sum((measured - shown) ** 2))
         for limit in float(np.abs(measured).max()) * LIMITS:
-            pile = _held(measured, shown, limit)
+            pile = _held(measured, shown, limit, settings)
             if pile is None:
                 continue
             clipped = float(np.sum((measured - np.clip(shown, -limit, limit)) ** 2))
             gain = len(measured) * float(np.log(plain / clipped))
-            if gain > LEAST_GAIN and (best is None or gain > best.gain):
+            if gain > settings.limit_gain and (best is None or gain > best.gain):
                 best = Clipping(p, Saturation(*pile), gain)
     return best
 
 
-def _held(measured: Real, shown: Real, limit: float) -> tuple[float, float] | None:
+def _held(measured: Real, shown: Real, limit: float, settings: FaultSettings) -> tuple[float, float] | None:
     """Place and standard error of a limit: what was due beyond shows it, however much was due, and nothing passes."""
-    beyond = np.abs(shown) > BEYOND * limit
-    if beyond.sum() < LEAST_BEYOND or np.quantile(np.abs(measured), 0.9995) > 1.2 * limit:
+    beyond = np.abs(shown) > settings.beyond * limit
+    if beyond.sum() < settings.least_beyond or np.quantile(np.abs(measured), 0.9995) > 1.2 * limit:
         return None
     due, pile = np.abs(shown[beyond]), measured[beyond] * np.sign(shown[beyond])
     if np.quantile(pile, 0.25) < 0.9 * limit or np.quantile(pile, 0.98) > 1.15 * limit:
         return None
     spread = due - due.mean()
     slope = float(np.sum(spread * pile) / np.sum(spread**2))
-    if abs(slope) > FOLLOWS:
+    if abs(slope) > settings.follows:
         return None
     return float(np.median(pile)), float(np.sqrt(np.pi / 2 / len(pile)) * pile.std())
 
 
-def mended(fitted: Fit, lines: list[WindowedLines], clipping: Clipping) -> tuple[Fit, list[WindowedLines], Clipping]:
+def mended(
+    fitted: Fit, lines: list[WindowedLines], clipping: Clipping, settings: FaultSettings = FAULTS
+) -> tuple[Fit, list[WindowedLines], Clipping]:
     """Put back what the limit cut off, and refit, until both agree.
 
     Each round takes the cut part from the prediction of the last; as that was fitted to too little, rounds approach
@@ -121,6 +113,8 @@ def mended(fitted: Fit, lines: list[WindowedLines], clipping: Clipping) -> tuple
         Recordings as measured.
     clipping
         What was found.
+    settings
+        Thresholds.
 
     Returns
     -------
@@ -134,7 +128,7 @@ def mended(fitted: Fit, lines: list[WindowedLines], clipping: Clipping) -> tuple
         fitted = fit(_repaired(shown, lines, clipping), start.hypothesis, start.noises, iterations=4)
         reached.append(fitted.hypothesis.u)
         start, shown = fitted, [shown_signal(fitted, one) for one in lines]
-        clipping = _again(shown, lines, clipping)
+        clipping = _again(shown, lines, clipping, settings)
         before, error = error, _error(shown, lines, clipping)
         if abs(before - error) < SETTLED * error:
             break
@@ -173,9 +167,9 @@ def _repaired(predicted: list[Real], lines: list[WindowedLines], clipping: Clipp
     return whole
 
 
-def _again(predicted: list[Real], lines: list[WindowedLines], clipping: Clipping) -> Clipping:
+def _again(predicted: list[Real], lines: list[WindowedLines], clipping: Clipping, settings: FaultSettings) -> Clipping:
     """The same channel's limit as the better prediction shows it."""
-    again = _found(predicted, lines)
+    again = _found(predicted, lines, settings)
     found = again if again is not None and again.response == clipping.response else clipping
     sharp = replace(found.saturation, sharpness=np.inf)
     return replace(found, saturation=rounded(*_channel(predicted, lines, found.response), sharp))

@@ -2,36 +2,52 @@
 
 import numpy as np
 
-from ..adapters.structure.acceptance import LEAST_EVIDENCE
-from ..inference.diagnosis import AcceptedCause
+from ..inference import AcceptedCause, FaultSettings, Settings
 from ..models.fitting import Fit, fit
+from ..physics.clipping import PHYSICS as CLIPPING
+from ..physics.unmeasured_excitation import PHYSICS as TONE
 from ..records.windowed_lines import WindowedLines
 from .clipping import Clipping, find_clipping, mended
 from .tones import Tone, find_tone, stands_out, without_tone
 from .tones_beyond import tones_beyond
 
-MOST_TONES = 4
 
+def repair_faults(
+    lines: list[WindowedLines], base: Fit, settings: Settings
+) -> tuple[list[WindowedLines], Fit, list[AcceptedCause]]:
+    """Take out tones and mend clipping, refitting each time.
 
-def repair_plain_faults(lines: list[WindowedLines], base: Fit) -> tuple[list[WindowedLines], Fit, list[AcceptedCause]]:
-    """Take out tones and mend clipping, refitting each time."""
+    Parameters
+    ----------
+    lines
+        Recordings as they were measured.
+    base
+        The fit without any cause.
+    settings
+        Thresholds.
+
+    Returns
+    -------
+    lines, base, found
+        Recordings as mended, the fit to them, and the faults as causes.
+    """
     found: list[AcceptedCause] = []
-    for _ in range(MOST_TONES):
-        tone = find_tone(base, lines)
-        if tone is None or tone.gain < LEAST_EVIDENCE:
+    for _ in range(settings.faults.most_tones):
+        tone = find_tone(base, lines, settings.faults)
+        if tone is None or tone.gain < settings.evidence.least:
             break
         lines = [without_tone(base, one, tone) for one in lines]
         base = fit(lines, base.hypothesis, iterations=4)
         found.append(_tone_cause(tone, lines[0]))
-    clipping = find_clipping(base, lines)
+    clipping = find_clipping(base, lines, settings.faults)
     if clipping is not None:
-        base, lines, clipping = mended(base, lines, clipping)
+        base, lines, clipping = mended(base, lines, clipping, settings.faults)
         found.append(_clipping_cause(clipping, lines[0]))
     return lines, base, found
 
 
 def with_tones_settled(
-    fitted: Fit, lines: list[WindowedLines], accepted: list[AcceptedCause], decay: float
+    fitted: Fit, lines: list[WindowedLines], accepted: list[AcceptedCause], decay: float, settings: FaultSettings
 ) -> list[AcceptedCause]:
     """Accepted causes without tones that stood out only until the others were known, and with those above the band.
 
@@ -44,11 +60,14 @@ def with_tones_settled(
     accepted
         Plain faults and causes.
     decay
-        Of the slowest mode, 1/s.
+        Decay rate of the slowest mode, 1/s.
+    settings
+        Thresholds.
     """
-    tones = [cause for cause in accepted if cause.name == "unmeasured_excitation"]
-    gone = [one for one in tones if not stands_out(fitted, lines, one.parameters["frequency_hz"])]
-    beyond = tones_beyond(fitted.hypothesis, lines, decay, MOST_TONES - len(tones) + len(gone))
+    tones = [cause for cause in accepted if cause.name == TONE.name]
+    gone = [one for one in tones if not stands_out(fitted, lines, one.parameters["frequency_hz"], settings)]
+    most = settings.most_tones - len(tones) + len(gone)
+    beyond = tones_beyond(fitted.hypothesis, lines, decay, most, settings)
     return [cause for cause in accepted if cause not in gone] + [_tone_cause(tone, lines[0]) for tone in beyond]
 
 
@@ -60,7 +79,7 @@ def _tone_cause(tone: Tone, lines: WindowedLines) -> AcceptedCause:
     errors = {"frequency_hz": width * float(np.sqrt(6 / tone.gain)) / np.pi}
     known = [(name, float(one)) for name, one in zip(names, tone.spread, strict=True) if np.isfinite(one)]
     errors |= {f"amplitude_{name}": one for name, one in known}
-    return AcceptedCause("unmeasured_excitation", {"channels": list(names)}, parameters, errors, tone.gain)
+    return AcceptedCause(TONE.name, {"channels": list(names)}, parameters, errors, tone.gain)
 
 
 def _clipping_cause(clipping: Clipping, lines: WindowedLines) -> AcceptedCause:
@@ -69,4 +88,4 @@ def _clipping_cause(clipping: Clipping, lines: WindowedLines) -> AcceptedCause:
     parameters, errors = {"limit": found.limit}, {"limit": found.error}
     if np.isfinite(found.sharpness):
         parameters["sharpness"], errors["sharpness"] = found.sharpness, found.sharpness_error
-    return AcceptedCause("clipping", {"channel": name}, parameters, errors, clipping.gain)
+    return AcceptedCause(CLIPPING.name, {"channel": name}, parameters, errors, clipping.gain)

@@ -8,6 +8,7 @@ from scipy.fft import irfft
 from scipy.ndimage import maximum_filter, median_filter
 from scipy.stats import t as student
 
+from ..inference import FAULTS, FaultSettings
 from ..models.fitting import Fit
 from ..models.hypothesis import predict_lines
 from ..models.misfit import levels, through_structure
@@ -16,21 +17,11 @@ from ..records.windowed_lines import WindowedLines
 
 Real = NDArray[np.float64]
 
-TONE_CONTRAST, SEEN_AGAIN = 60.0, 5.0
-"""Of a residual line against its neighbourhood, summed over recordings, and what two of them must show at least; noise
-alone passes 15 in one recording once in 3 million lines."""
-
-FORCED = 12.0
-"""Contrast of a force from which a line is the cut's own."""
-
 NEAR = np.ones(41, dtype=bool)
 """Lines of a neighbourhood."""
 
 BESIDE = np.array([abs(k) > 3 for k in range(-10, 11)])
 """Lines beside a line, without those that a tone reaches: a narrow resonance is as high there."""
-
-MOST_LINES = 8
-"""That may stand out, tones and their harmonics; more are a comb."""
 
 REACH = 10
 """Lines on each side that a tone reaches through the window."""
@@ -76,21 +67,30 @@ def mean_and_error(sizes: list[Real]) -> tuple[Real, Real]:
     return mean, np.asarray(np.std(sizes, axis=0, ddof=1) * student.ppf(0.975, len(sizes) - 1) / 1.96)
 
 
-def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
+def find_tone(fitted: Fit, lines: list[WindowedLines], settings: FaultSettings = FAULTS) -> Tone | None:
     """The strongest residual line that stands out of the recordings at one frequency, and of no force.
 
     A tone from elsewhere is the weaker beside the noise the harder is cut, as noise grows with the signal: it must be
     seen in two recordings (in the only one, where there is one).
+
+    Parameters
+    ----------
+    fitted
+        The fit whose residual is searched.
+    lines
+        Recordings to which it was fitted.
+    settings
+        Thresholds.
     """
     if len(lines) == 0:
         return None
     powers = [_whitened_power(fitted, one, noise) for one, noise in zip(lines, fitted.noises, strict=True)]
-    together = seen_together([sharp_contrast(power) for power in powers], lines, FORCED)
+    together = seen_together([sharp_contrast(power) for power in powers], lines, settings.forced, settings)
     axis = lines[0].frequencies
-    if is_comb(together):
+    if is_comb(together, settings):
         return None
     for k in np.argsort(-together)[:20]:
-        if together[k] < TONE_CONTRAST:
+        if together[k] < settings.contrast:
             return None
         frequency = float(axis[k])
         if _too_few_left(lines, frequency):
@@ -103,7 +103,9 @@ def find_tone(fitted: Fit, lines: list[WindowedLines]) -> Tone | None:
     return None
 
 
-def seen_together(contrasts: list[Real], lines: list[WindowedLines], forced: float) -> Real:
+def seen_together(
+    contrasts: list[Real], lines: list[WindowedLines], forced: float, settings: FaultSettings = FAULTS
+) -> Real:
     """Contrast of each line of the first recording (n_lines,), summed over recordings; 0 where it is no tone's.
 
     A line of another recording counts with those beside it. Two recordings must show it (the only one, where there is
@@ -116,7 +118,9 @@ def seen_together(contrasts: list[Real], lines: list[WindowedLines], forced: flo
     lines
         They themselves.
     forced
-        Contrast of a force.
+        Contrast of a force from which a line is the cut's own.
+    settings
+        Thresholds.
     """
     axis = lines[0].frequencies
     each = [
@@ -125,10 +129,10 @@ def seen_together(contrasts: list[Real], lines: list[WindowedLines], forced: flo
     ]
     again = np.sort(each, axis=0)[-min(2, len(lines))]
     pushed = [np.interp(axis, one.frequencies, force_contrast(one)) > forced for one in lines]
-    return np.where((again > SEEN_AGAIN) & ~np.any(pushed, axis=0), np.sum(each, axis=0), 0.0)
+    return np.where((again > settings.seen_again) & ~np.any(pushed, axis=0), np.sum(each, axis=0), 0.0)
 
 
-def is_comb(contrast: Real) -> bool:
+def is_comb(contrast: Real, settings: FaultSettings = FAULTS) -> bool:
     """Whether more lines stand out than a machine nearby makes.
 
     Forces that repeat within the record put all that they cause, errors of the model included, on a comb of lines.
@@ -136,19 +140,33 @@ def is_comb(contrast: Real) -> bool:
     Parameters
     ----------
     contrast : (n_lines,)
-        Summed over recordings.
+        Contrast of each line, summed over recordings.
+    settings
+        Thresholds.
     """
-    lines = np.flatnonzero(contrast > TONE_CONTRAST / 3)
-    return int(np.sum(np.diff(lines, prepend=-REACH) > 2)) > MOST_LINES
+    lines = np.flatnonzero(contrast > settings.contrast / 3)
+    return int(np.sum(np.diff(lines, prepend=-REACH) > 2)) > settings.most_lines
 
 
-def stands_out(fitted: Fit, lines: list[WindowedLines], frequency: float) -> bool:
-    """Whether a line (Hz) of recordings that still hold it is a tone beside what a fit leaves."""
+def stands_out(fitted: Fit, lines: list[WindowedLines], frequency: float, settings: FaultSettings = FAULTS) -> bool:
+    """Whether a line of recordings that still hold it is a tone beside what a fit leaves.
+
+    Parameters
+    ----------
+    fitted
+        The fit with all causes.
+    lines
+        Recordings from which no tone was taken out.
+    frequency
+        The line, Hz.
+    settings
+        Thresholds.
+    """
     total = 0.0
     for one, noise in zip(lines, fitted.noises, strict=True):
         power = _whitened_power(fitted, one, noise)
         total += _at(sharp_contrast(power), one, frequency)
-    return total > TONE_CONTRAST
+    return total > settings.contrast
 
 
 def _at(contrast: Real, lines: WindowedLines, frequency: float) -> float:

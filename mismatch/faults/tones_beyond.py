@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from ..inference import FAULTS, FaultSettings
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..records.windowed_lines import WindowedLines, windowed_lines
 from .tones import (
     NEAR,
     REACH,
-    TONE_CONTRAST,
     Tone,
     is_comb,
     mean_and_error,
@@ -23,11 +23,10 @@ Real = NDArray[np.float64]
 HIGHEST = 0.45
 """Highest frequency looked at, as a share of the sample rate."""
 
-QUIET_FORCE = 5.0
-"""Contrast that no force may show there: above the modes a force's line needs no resonance to be seen in a response."""
 
-
-def tones_beyond(hypothesis: Hypothesis, lines: list[WindowedLines], decay: float, most: int) -> list[Tone]:
+def tones_beyond(
+    hypothesis: Hypothesis, lines: list[WindowedLines], decay: float, most: int, settings: FaultSettings = FAULTS
+) -> list[Tone]:
     """Lines above the compared band that stand out of the residual in two recordings, and in no force.
 
     No noise was fitted there, so each response is its own measure: a line's power against the median of its neighbours.
@@ -43,6 +42,9 @@ def tones_beyond(hypothesis: Hypothesis, lines: list[WindowedLines], decay: floa
         Of the slowest mode, 1/s.
     most
         How many tones are looked for.
+    settings
+        Thresholds. No force may show more contrast there than ``quiet_force``: above the modes a force's line needs
+        no resonance to be seen in a response.
 
     Returns
     -------
@@ -54,11 +56,11 @@ def tones_beyond(hypothesis: Hypothesis, lines: list[WindowedLines], decay: floa
         return []
     rests = [one.measured - predict_lines(hypothesis, one).response for one in above]
     contrasts = [np.mean([sharp_contrast(column) for column in (np.abs(rest) ** 2).T], axis=0) for rest in rests]
-    together = seen_together(contrasts, above, QUIET_FORCE)
+    together = seen_together(contrasts, above, settings.quiet_force, settings)
     axis, found = above[0].frequencies, list[Tone]()
-    if is_comb(together):
+    if is_comb(together, settings):
         return found
-    while len(found) < most and together.max() > TONE_CONTRAST:
+    while len(found) < most and together.max() > settings.contrast:
         k = int(np.argmax(together))
         found.append(_tone(above, rests, float(axis[k]), float(together[k])))
         together[max(0, k - REACH) : k + REACH + 1] = 0.0

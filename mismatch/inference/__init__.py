@@ -17,7 +17,9 @@ from .process_pool import in_processes
 from .remainder import Remainder
 from .search import Progress, pruned, released, search
 from .settings import (
+    FAULTS,
     EvidenceSettings,
+    FaultSettings,
     LabError,
     ProofSettings,
     ScreeningSettings,
@@ -28,6 +30,7 @@ from .settings import (
 from .verdict import Findings, leaves_too_much, share_left, verdict_of
 
 __all__ = [
+    "FAULTS",
     "VERDICTS",
     "AcceptedCause",
     "Candidate",
@@ -35,6 +38,7 @@ __all__ = [
     "Descended",
     "Diagnosis",
     "EvidenceSettings",
+    "FaultSettings",
     "Findings",
     "Fitted",
     "HeldOutError",

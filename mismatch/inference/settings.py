@@ -124,6 +124,48 @@ class ScreeningSettings:
 
 
 @dataclass(frozen=True)
+class FaultSettings:
+    """When a tone or a limit is a fault of the recording.
+
+    Parameters
+    ----------
+    contrast
+        Power of a residual line over its neighbourhood, summed over recordings, from which it is a tone. Noise alone
+        passes 15 in one recording once in 3 million lines.
+    seen_again
+        Contrast that two recordings must show at least.
+    forced, quiet_force
+        Contrast of a force, in the compared band and above it, from which a line is the cut's own.
+    most_lines
+        Lines that may stand out as tones; more are a comb, as forces that repeat make it.
+    most_tones
+        Tones taken out at most.
+    limit_gain
+        Twice the logarithm of the likelihood that a limit of a channel must gain.
+    beyond, least_beyond
+        Factor on a limit beyond which a predicted sample must show it, and how many such samples are needed.
+    follows
+        Slope of what is shown on what was predicted beyond a limit, above which it is no limit: an amplitude that
+        friction or a stiffening joint keeps small still rises with its prediction.
+    """
+
+    contrast: float = 60.0
+    seen_again: float = 5.0
+    forced: float = 12.0
+    quiet_force: float = 5.0
+    most_lines: int = 8
+    most_tones: int = 4
+    limit_gain: float = 60.0
+    beyond: float = 1.15
+    least_beyond: int = 30
+    follows: float = 0.1
+
+
+FAULTS = FaultSettings()
+"""The usual thresholds."""
+
+
+@dataclass(frozen=True)
 class ProofSettings:
     """What data that no fit has seen must confirm.
 
@@ -186,7 +228,7 @@ class Settings:
         What the believed model is usually off.
     causes
         Causes that are weighed, by name; None: the whole library of the kind of comparison.
-    evidence, search, screening, proof, verdict
+    evidence, search, screening, faults, proof, verdict
         Thresholds of each step.
     """
 
@@ -195,5 +237,6 @@ class Settings:
     evidence: EvidenceSettings = field(default_factory=EvidenceSettings)
     search: SearchSettings = field(default_factory=SearchSettings)
     screening: ScreeningSettings = field(default_factory=ScreeningSettings)
+    faults: FaultSettings = FAULTS
     proof: ProofSettings = field(default_factory=ProofSettings)
     verdict: VerdictSettings = field(default_factory=VerdictSettings)

@@ -11,25 +11,6 @@ POINTS = 8193
 """Of a table over deflection or velocity."""
 
 
-def saturated(deflection: Real, knee: float, sharpness: float) -> Real:
-    """Deflection that stops growing beyond a knee, ``x / (1 + |x / x0|^n)^(1/n)``.
-
-    Parameters
-    ----------
-    deflection : (n,), m
-    knee
-        x0, m.
-    sharpness
-        n, at least 1.
-
-    Examples
-    --------
-    >>> [round(float(x), 2) for x in saturated(np.array([0.01, 1.0, 100.0]), 1.0, 2.0)]
-    [0.01, 0.71, 1.0]
-    """
-    return np.asarray(deflection / (1 + np.abs(deflection / knee) ** sharpness) ** (1 / sharpness))
-
-
 def _none() -> Real:
     return np.zeros(0)
 

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 
 from .joint_loop import look_up
 

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
-from ..inference.diagnosis import Diagnosis
 from ..joints.joint_simulation import driven_force
 from ..models.fitting import Fit
 from ..models.hypothesis import Cause, Hypothesis, predict_lines
@@ -16,6 +15,7 @@ from ..physics import answer_name
 from ..records.windowed_lines import WindowedLines
 from ..screening.joint_direction import SeenMotion, seen_motion
 from ..screening.linear_floor import FloorRecord
+from .structure_details import StructureDiagnosis
 
 Real = NDArray[np.float64]
 
@@ -82,18 +82,21 @@ class _Sample:
     piece: NDArray[np.int64]
 
 
-def free_form_laws(diagnosis: Diagnosis) -> tuple[FreeFormLaw, ...]:
+def free_form_laws(diagnosis: StructureDiagnosis) -> tuple[FreeFormLaw, ...]:
     """Measured force of each accepted joint cause, all other causes in place."""
     return tuple(
-        _measured(diagnosis, cause) for cause in diagnosis.final.hypothesis.causes if cause.direction is not None
+        _measured(diagnosis, cause)
+        for cause in diagnosis.details.final.hypothesis.causes
+        if cause.direction is not None
     )
 
 
-def _measured(diagnosis: Diagnosis, cause: Cause) -> FreeFormLaw:
-    final = diagnosis.final.hypothesis
+def _measured(diagnosis: StructureDiagnosis, cause: Cause) -> FreeFormLaw:
+    final = diagnosis.details.final.hypothesis
     assert cause.direction is not None
     bare = replace(final, causes=tuple(one for one in final.causes if one is not cause))
-    samples = _joined([_seen(diagnosis.final, bare, cause, k, one) for k, one in enumerate(diagnosis.lines)])
+    details = diagnosis.details
+    samples = _joined([_seen(details.final, bare, cause, k, one) for k, one in enumerate(details.recordings)])
     up = samples.v > 0
     ends = _edges(samples.x)
     elastic = _mean_at(samples.x, samples.force, ends), _mean_at(samples.x, samples.law, ends)

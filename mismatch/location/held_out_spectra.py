@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..adapters.structure.held_out import residual_lines
-from ..faults.shown_faults import FAULTS
-from ..inference.diagnosis import Diagnosis
+from ..faults.shown_faults import residual_lines
 from ..models.misfit import through_structure
+from ..physics import is_fault
 from ..records.windowed_lines import WindowedLines
 from .residual_maps import band_edges
+from .structure_details import StructureDiagnosis
 
 Real = NDArray[np.float64]
 
@@ -46,14 +46,15 @@ class HeldOutSpectra:
     noise: Real
 
 
-def held_out_spectra(diagnosis: Diagnosis) -> HeldOutSpectra:
+def held_out_spectra(diagnosis: StructureDiagnosis) -> HeldOutSpectra:
     """Spectra of the recording named by the diagnosis' improvement, both models fitted to the others only."""
-    lines = list(diagnosis.measured or diagnosis.lines)
+    details = diagnosis.details
+    lines = list(details.measured)
     names = [one.trial.name for one in lines]
     kept = names.index(diagnosis.improvement.held_out)
-    here, final = lines[kept], diagnosis.final
-    before, after = diagnosis.elsewhere
-    faults = [cause for cause in diagnosis.physics if cause.name in FAULTS]
+    here, final = lines[kept], details.final
+    before, after = details.elsewhere
+    faults = [cause for cause in diagnosis.physics if is_fault(cause.name)]
     rests = residual_lines(before, here), residual_lines(after, here, faults)
     covariance = final.noises[kept].covariance(here.frequencies, through_structure(final.hypothesis, here))
     edges = band_edges([here], BANDS_PER_OCTAVE, 3)

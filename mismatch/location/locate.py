@@ -7,11 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
-from ..inference.diagnosis import Diagnosis
-from ..records.trial import Trial
 from .family_wise import FAMILY_WISE, holm
 from .growth import Growth, growth
-from .residual_view import ResidualView, linear_part, residual_view
+from .residual_view import ResidualView, linear_part
 from .spindle_orders import SpindleSpeed, order_powers
 from .time_maps import BlockResidual
 
@@ -23,30 +21,18 @@ NO_SPEED = "no recording states the spindle's speed in events or set-up"
 NO_ORDER = "no order of the spindle stands out of the residual beside it"
 
 
-def locate(
-    diagnosis: Diagnosis,
-    trials: Sequence[Trial] | None = None,
-    speeds: Mapping[str, SpindleSpeed] | None = None,
-) -> dict[str, Any]:
-    """Locate the mismatch of a diagnosis; plain content for its file.
-
-    Parameters
-    ----------
-    diagnosis
-        With its fits and recordings.
-    trials
-        The recordings as read, before tones and clipping were mended; None: what the diagnosis holds.
-    speeds
-        Spindle speed by recording's name.
-    """
-    return located(residual_view(diagnosis, trials), speeds or {})
-
-
 def located(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> dict[str, Any]:
-    """The same from maps that are already made.
+    """Places of the mismatch, from the maps of what is left; plain content for a file.
 
     Every cell of every map is tested for more residual power than noise has; p-values are adjusted together (Holm), so
     that in a diagnosis of noise alone any place at all is named with probability ``family_wise_level``.
+
+    Parameters
+    ----------
+    view
+        Maps of what is left before and after.
+    speeds
+        Spindle speed by the recording's name, where it is known.
     """
     before, after = view.before, view.after
     tables = {
@@ -180,12 +166,12 @@ def _growth(view: ResidualView, bands: Sequence[Mapping[str, Any]]) -> dict[str,
     ranges = [(band["low_hz"], band["high_hz"]) for band in bands]
     if not ranges:
         return {"note": "nothing stands above the noise, so nothing grows"}
-    diagnosis = view.diagnosis
-    refitted = growth(diagnosis.base.hypothesis, view.reference, view.measured, ranges, view.noise.spread)
+    details = view.details
+    refitted = growth(details.base.hypothesis, view.reference, view.measured, ranges, view.noise.spread)
     content = {"residual": _growth_content(refitted)}
-    bare = linear_part(diagnosis)
+    bare = linear_part(details)
     if bare is not None:
-        content["effect"] = _growth_content(growth(bare, view.reference, diagnosis.lines, ranges, view.noise.spread))
+        content["effect"] = _growth_content(growth(bare, view.reference, details.recordings, ranges, view.noise.spread))
     return content
 
 

@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..adapters.structure.held_out import residual_lines
-from ..adapters.structure.pruning import zero_of
-from ..faults.shown_faults import FAULTS
-from ..inference.diagnosis import Diagnosis
+from ..faults.shown_faults import residual_lines
 from ..models.misfit import through_structure
+from ..physics import is_fault
+from .structure_details import StructureDiagnosis
 
 
 @dataclass(frozen=True)
@@ -38,14 +37,15 @@ class RecordingError:
     noise: float
 
 
-def recording_errors(diagnosis: Diagnosis) -> tuple[RecordingError, ...]:
+def recording_errors(diagnosis: StructureDiagnosis) -> tuple[RecordingError, ...]:
     """Of all recordings; of the one held out they are those of the diagnosis' :class:`Improvement`."""
-    linear, improved = diagnosis.elsewhere
-    faults = [cause for cause in diagnosis.physics if cause.name in FAULTS]
+    details = diagnosis.details
+    linear, improved = details.elsewhere
+    faults = [cause for cause in diagnosis.physics if is_fault(cause.name)]
     found = []
-    for one, noise in zip(diagnosis.measured or diagnosis.lines, diagnosis.final.noises, strict=True):
+    for one, noise in zip(details.measured, details.final.noises, strict=True):
         rests = (
-            residual_lines(zero_of(improved.shape), one),
+            residual_lines(improved.nominal, one),
             residual_lines(linear, one),
             residual_lines(improved, one, faults),
         )
@@ -53,6 +53,6 @@ def recording_errors(diagnosis: Diagnosis) -> tuple[RecordingError, ...]:
         covariance = noise.covariance(one.frequencies, through_structure(improved, one))
         nominal, refitted, final = (float(np.sqrt(np.sum(np.abs(rest) ** 2) / power)) for rest in rests)
         floor = float(np.sqrt(np.sum(np.trace(covariance, axis1=1, axis2=2).real) / power))
-        held = one.trial.name == diagnosis.improvement.held_out and len(diagnosis.lines) > 1
+        held = one.trial.name == diagnosis.improvement.held_out and len(details.recordings) > 1
         found.append(RecordingError(one.trial.name, held, one.trial.level, nominal, refitted, final, floor))
     return tuple(found)

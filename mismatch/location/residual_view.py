@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..inference.diagnosis import Diagnosis
 from ..models.fitting import Fit
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..noise.noise_model import NoiseModel
@@ -13,6 +12,7 @@ from ..records.trial import Trial
 from ..records.windowed_lines import WindowedLines, windowed_lines
 from .family_wise import NoiseSpread, noise_spread
 from .residual_maps import ResidualMap, band_edges, residual_map
+from .structure_details import StructureDetails
 from .time_maps import BlockResidual, block_residual
 
 QUIET = NoiseSpread(1.25, 0.5)
@@ -25,8 +25,8 @@ class ResidualView:
 
     Parameters
     ----------
-    diagnosis
-        Whose.
+    details
+        Fits and recordings.
     measured
         Recordings as they were measured: tones and clipping not mended.
     before, after
@@ -40,7 +40,7 @@ class ResidualView:
         How well that noise is known.
     """
 
-    diagnosis: Diagnosis
+    details: StructureDetails
     measured: tuple[WindowedLines, ...]
     before: ResidualMap
     after: ResidualMap
@@ -50,26 +50,27 @@ class ResidualView:
     noise: NoiseSpread
 
 
-def residual_view(diagnosis: Diagnosis, trials: Sequence[Trial] | None = None) -> ResidualView:
+def residual_view(details: StructureDetails, unexplained: bool, trials: Sequence[Trial] | None = None) -> ResidualView:
     """Maps of a diagnosis.
 
     Parameters
     ----------
-    diagnosis
-        With its fits and recordings.
+    details
+        Fits and recordings of a diagnosis.
+    unexplained
+        Whether something stayed unexplained and may have been taken for noise.
     trials
         The recordings as read, so that mended tones and clipping are located too; None: what the diagnosis holds.
     """
-    mended = diagnosis.lines
+    mended = details.recordings
     measured = tuple(_as_measured(one, trials or ()) for one in mended)
     edges = band_edges(measured)
-    base, final = diagnosis.base.hypothesis, diagnosis.final
-    unexplained = diagnosis.verdict == "unexplained"
+    base, final = details.base.hypothesis, details.final
     if unexplained:
         final = replace(final, noises=tuple(_quiet(final, k, one) for k, one in enumerate(mended)))
     after = residual_map(final.hypothesis, final, mended, edges)
     return ResidualView(
-        diagnosis,
+        details,
         measured,
         residual_map(base, final, measured, edges),
         after,
@@ -91,9 +92,9 @@ def _quiet(final: Fit, number: int, lines: WindowedLines) -> NoiseModel:
     return replace(fitted, responses=0 * fitted.responses + level[:, None], forces=0 * fitted.forces - 200.0)
 
 
-def linear_part(diagnosis: Diagnosis) -> Hypothesis | None:
+def linear_part(details: StructureDetails) -> Hypothesis | None:
     """The final model with the causes of its joints taken away; None where it has none."""
-    final = diagnosis.final.hypothesis
+    final = details.final.hypothesis
     kept = tuple(cause for cause in final.causes if cause.direction is None)
     return replace(final, causes=kept) if len(kept) < len(final.causes) else None
 

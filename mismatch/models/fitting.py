@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..inference import Descended, Limits, descend, plain_step
 from ..noise.noise_model import NoiseModel
+from ..physics.modal_parameters import PHYSICS as BELIEF
 from ..records.windowed_lines import WindowedLines
 from .hypothesis import Hypothesis, predict_lines
 from .jacobian import jacobian
@@ -19,9 +21,6 @@ THREADS = 2
 
 ENOUGH, LEFT_OUT = 4000, 3
 """Lines of a recording on which a fit begins if it has more, and the steps on all lines that this saves."""
-
-MORE_THAN_EXPECTED, LONGER = 1.5, 3.0
-"""Gain of a step over the gain that was expected of it from which a longer one is tried, and how much longer."""
 
 
 @dataclass(frozen=True)
@@ -83,15 +82,15 @@ def fit(
     with ThreadPoolExecutor(THREADS) as pool:
         rough = [one.thinned(ENOUGH) for one in lines]
         if any(few is not one for few, one in zip(rough, lines, strict=True)):
-            hypothesis, seen, _ = _descended(pool, rough, hypothesis, known, (iterations, tolerance))
-            known = tuple(one.noise for one in seen)
+            state = _descended(pool, rough, hypothesis, known, Limits(iterations, tolerance)).state
+            hypothesis, known = state.hypothesis, tuple(one.noise for one in state.seen)
             iterations = max(0, iterations - LEFT_OUT)
-        hypothesis, seen, matrix = _descended(pool, lines, hypothesis, known, (iterations, tolerance))
+        end = _descended(pool, lines, hypothesis, known, Limits(iterations, tolerance))
+        hypothesis, seen = end.state.hypothesis, end.state.seen
         cold = list(pool.map(with_noise, lines, [hypothesis] * len(lines), [None] * len(lines), seen))
     # a noise that crept along from a bad beginning may have stopped short: of two searches the better counts
     seen = [min(pair, key=lambda one: one.misfit) for pair in zip(seen, cold, strict=True)]
-    misfit = sum(one.misfit for one in seen)
-    deviation = _deviation(hypothesis)
+    misfit, deviation = sum(one.misfit for one in seen), _deviation(hypothesis)
     count = 2 * sum(one.measured.size for one in lines)
     numbers = sum(cause.size for cause in hypothesis.causes)
     # a mode's length may be shared between its vectors at will: two numbers of each are no freedom
@@ -102,8 +101,56 @@ def fit(
         misfit,
         deviation,
         misfit + deviation + numbers * float(np.log(count)),
-        np.asarray(np.linalg.pinv(matrix, hermitian=True), dtype=float),
+        np.asarray(np.linalg.pinv(end.matrix, hermitian=True), dtype=float),
     )
+
+
+@dataclass(frozen=True)
+class _State:
+    """Where a descent stands: a hypothesis, and every recording under it."""
+
+    hypothesis: Hypothesis
+    seen: list[Misfit]
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """Misfit and deviation of a hypothesis as the descent sees them; the recordings are worked on in threads."""
+
+    pool: ThreadPoolExecutor
+    lines: list[WindowedLines]
+
+    def cost(self, state: _State) -> float:
+        """``misfit + |u|^2``."""
+        return sum(one.misfit for one in state.seen) + _deviation(state.hypothesis)
+
+    def normal_equations(self, state: _State) -> tuple[Real, Real]:
+        """With the lab's belief about u, and a belief so weak about causes that it only keeps them solvable."""
+        hypothesis = state.hypothesis
+        size, count = hypothesis.shape.size, hypothesis.size
+        parts = list(self.pool.map(_normal_of, self.lines, [hypothesis] * len(self.lines), state.seen))
+        belief = np.full(count, 1e-6)
+        belief[:size] = hypothesis.shape.belief
+        matrix = sum((part[0] for part in parts), np.diag(belief))
+        gradient = sum((part[1] for part in parts), np.zeros(count))
+        gradient[:size] -= hypothesis.shape.belief * hypothesis.u
+        return matrix, gradient
+
+    def step(self, state: _State, matrix: Real, gradient: Real) -> Real:
+        """The plain solution."""
+        return plain_step(matrix, gradient)
+
+    def moved(self, state: _State, step: Real) -> _State:
+        """The hypothesis a step away, under the noise so far."""
+        there = _moved(state.hypothesis, step)
+        noises = [one.noise for one in state.seen]
+        return _State(there, list(self.pool.map(misfit_under, self.lines, [there] * len(self.lines), noises)))
+
+    def settled(self, state: _State) -> _State:
+        """The same under the noise that fits its residual best."""
+        there = [state.hypothesis] * len(self.lines)
+        noises = [one.noise for one in state.seen]
+        return replace(state, seen=list(self.pool.map(with_noise, self.lines, there, noises, state.seen)))
 
 
 def _descended(
@@ -111,36 +158,12 @@ def _descended(
     lines: list[WindowedLines],
     start: Hypothesis,
     noises: tuple[NoiseModel, ...] | None,
-    limits: tuple[int, float],
-) -> tuple[Hypothesis, list[Misfit], Real]:
-    """Where Gauss-Newton's steps end, the recordings there, and the normal matrix; limits as for :func:`fit`."""
-    iterations, tolerance = limits
-    hypothesis = start
+    limits: Limits,
+) -> Descended[_State]:
+    """Where Gauss-Newton's steps end."""
     current = list(noises) if noises is not None else [None] * len(lines)
-    seen = list(pool.map(with_noise, lines, [hypothesis] * len(lines), current))
-    matrix, gradient = _normal_equations(pool, lines, hypothesis, seen)
-    damping, idle = 0.0, 0
-    for _ in range(iterations):
-        cost = _cost(seen, hypothesis)
-        step = _solved(matrix + damping * np.diag(np.diag(matrix)), gradient)
-        # where a law is stiffer than its derivatives can follow there is no step either
-        if not step @ gradient >= 0.1 * tolerance or not np.isfinite(step).all():
-            break
-        trial, again, trial_cost = _downhill(pool, lines, hypothesis, (step, float(step @ gradient)), seen)
-        if not trial_cost < cost:
-            if damping > 1:
-                break
-            damping = max(10 * damping, 0.1)
-            continue
-        damping /= 10
-        hypothesis = trial
-        seen = list(pool.map(with_noise, lines, [trial] * len(lines), [one.noise for one in again], again))
-        # the noise may still be settling when a step gains nothing
-        idle = idle + 1 if cost - _cost(seen, hypothesis) < tolerance else 0
-        if idle == 2:
-            break
-        matrix, gradient = _normal_equations(pool, lines, hypothesis, seen)
-    return hypothesis, seen, matrix
+    seen = list(pool.map(with_noise, lines, [start] * len(lines), current))
+    return descend(_Problem(pool, lines), _State(start, seen), limits)
 
 
 def residual(fitted: Fit, lines: list[WindowedLines]) -> list[Complex]:
@@ -148,65 +171,10 @@ def residual(fitted: Fit, lines: list[WindowedLines]) -> list[Complex]:
     return [one.measured - predict_lines(fitted.hypothesis, one).response for one in lines]
 
 
-def _solved(matrix: Real, gradient: Real) -> Real:
-    try:
-        return np.asarray(np.linalg.solve(matrix, gradient), dtype=float)
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.lstsq(matrix, gradient, rcond=1e-12)[0], dtype=float)
-
-
 def _normal_of(lines: WindowedLines, hypothesis: Hypothesis, seen: Misfit) -> tuple[Real, Real]:
     slope = whitened(seen.white, jacobian(hypothesis, lines, seen.predicted))
     small = whitened(seen.white, seen.rest[:, :, None])[:, 0]
     return 2 * (slope.T @ slope), 2 * (slope.T @ small)
-
-
-def _normal_equations(
-    pool: ThreadPoolExecutor, lines: list[WindowedLines], hypothesis: Hypothesis, seen: list[Misfit]
-) -> tuple[Real, Real]:
-    """Normal equations with the lab's belief about u, and a belief so weak that it only keeps them solvable."""
-    size, count = hypothesis.shape.size, hypothesis.size
-    parts = list(pool.map(_normal_of, lines, [hypothesis] * len(lines), seen))
-    belief = np.full(count, 1e-6)
-    belief[:size] = hypothesis.shape.belief
-    matrix = sum((part[0] for part in parts), np.diag(belief))
-    gradient = sum((part[1] for part in parts), np.zeros(count))
-    gradient[:size] -= hypothesis.shape.belief * hypothesis.u
-    return matrix, gradient
-
-
-def _downhill(
-    pool: ThreadPoolExecutor,
-    lines: list[WindowedLines],
-    here: Hypothesis,
-    step: tuple[Real, float],
-    seen: list[Misfit],
-) -> tuple[Hypothesis, list[Misfit], float]:
-    """Where a step (and the gain expected of it) leads, shortened until it gains, lengthened while that gains more."""
-    way, expected = step
-    cost = _cost(seen, here)
-    for _ in range(4):
-        trial, again = _try(pool, lines, here, way, seen)
-        trial_cost = _cost(again, trial)
-        if trial_cost < cost:
-            break
-        way = way / 4
-    while cost - trial_cost > MORE_THAN_EXPECTED * expected:
-        # a valley that is longer than its derivatives say, as those leave leakage out
-        way = LONGER * way
-        farther, then = _try(pool, lines, here, way, seen)
-        if not _cost(then, farther) < trial_cost:
-            break
-        trial, again, trial_cost = farther, then, _cost(then, farther)
-    return trial, again, trial_cost
-
-
-def _try(
-    pool: ThreadPoolExecutor, lines: list[WindowedLines], here: Hypothesis, step: Real, seen: list[Misfit]
-) -> tuple[Hypothesis, list[Misfit]]:
-    """The hypothesis a step away, under the noise so far."""
-    trial = _moved(here, step)
-    return trial, list(pool.map(misfit_under, lines, [trial] * len(lines), [one.noise for one in seen]))
 
 
 def _moved(hypothesis: Hypothesis, step: Real) -> Hypothesis:
@@ -218,9 +186,19 @@ def _moved(hypothesis: Hypothesis, step: Real) -> Hypothesis:
     return moved.with_causes(hypothesis.coordinates() + np.clip(step[size:], -longest, longest))
 
 
-def _cost(seen: list[Misfit], hypothesis: Hypothesis) -> float:
-    return sum(one.misfit for one in seen) + _deviation(hypothesis)
-
-
 def _deviation(hypothesis: Hypothesis) -> float:
     return float(hypothesis.shape.belief @ hypothesis.u**2)
+
+
+def modes_are_odd(fitted: Fit) -> bool:
+    """Whether the believed modes deviate from the nominal model by more than errors of the usual size do.
+
+    Parameters
+    ----------
+    fitted
+        A hypothesis fitted to recordings.
+    """
+    shape = fitted.hypothesis.shape
+    rows = shape.modal_rows(fitted.hypothesis.u)[: shape.believed]
+    # the two numbers of each mode's scale are free
+    return BELIEF.odd(float(np.sum(rows**2)), shape.believed * (shape.per_mode - 2))

@@ -12,7 +12,7 @@ from modal_fit import ModalModel
 
 from ..joints.joint_law import JointLaw, JointMotion
 from ..joints.joint_simulation import JointResponse, common_axes, driven_force, joint_response
-from ..physics import Chain, ChainPhysics, JointPhysics, LimitedPhysics, Physics
+from ..physics import Chain, ChainPhysics, JointPhysics, LimitedPhysics, ModePhysics, Physics
 from ..records.windowed_lines import WindowedLines, displacement_at, receptance_at
 from .model_shape import ModelShape
 
@@ -138,6 +138,37 @@ class Hypothesis:
     def with_cause(self, cause: Cause) -> "Hypothesis":
         """The hypothesis with one more cause, the last."""
         return replace(self, causes=(*self.causes, cause))
+
+    def without(self, place: int) -> "Hypothesis":
+        """The hypothesis without one of its causes; ``place`` counts them in the order found."""
+        kept = (*self.causes[:place], *self.causes[place + 1 :])
+        if not isinstance(self.causes[place].physics, ModePhysics):
+            return replace(self, causes=kept)
+        added = sum(isinstance(cause.physics, ModePhysics) for cause in self.causes[:place])
+        shape, u = self.shape.without_mode(added, self.u)
+        return Hypothesis(shape, u, kept)
+
+    def with_mode(self, pole: complex, right: Complex, left: Complex, physics: ModePhysics) -> "Hypothesis":
+        """The hypothesis with one more mode of ``physics``: pole in rad/s, vectors (n_responses,), (n_excitations,)."""
+        shape = self.shape.with_mode(pole, right, left)
+        own, outside = self.u[: self.shape.modal_size], self.u[self.shape.modal_size :]
+        u = np.concatenate([own, np.zeros(shape.per_mode), outside])
+        return Hypothesis(shape, u, (*self.causes, Cause(physics, np.zeros(0))))
+
+    @property
+    def nominal(self) -> "Hypothesis":
+        """The nominal model without causes."""
+        return Hypothesis(self.shape.bare, np.zeros(self.shape.bare.size))
+
+    @property
+    def laws(self) -> tuple[Cause, ...]:
+        """The causes that are laws of joints."""
+        return tuple(cause for cause in self.causes if cause.direction is not None)
+
+    @property
+    def has_added_physics(self) -> bool:
+        """Whether there is a cause beside added modes."""
+        return any(not isinstance(cause.physics, ModePhysics) for cause in self.causes)
 
     def with_causes(self, coordinates: Real) -> "Hypothesis":
         """The hypothesis with all causes at other coordinates, one after the other."""

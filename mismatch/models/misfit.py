@@ -101,9 +101,7 @@ def whitened(white: Complex, lines: Complex) -> Real:
     return out.reshape(-1, lines.shape[2])
 
 
-def misfit_of(
-    lines: WindowedLines, predicted: Predicted, rest: Complex, through: Complex, noise: NoiseModel
-) -> Misfit:
+def misfit_of(lines: WindowedLines, predicted: Predicted, rest: Complex, through: Complex, noise: NoiseModel) -> Misfit:
     """Misfit of a residual under a given noise; infinite where it is not finite."""
     if not np.isfinite(rest).all():
         return Misfit(predicted, rest, rest, np.inf, noise)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
-from ..inference import LabError as LabError
+from ..inference import LabError
 from ..noise.line_loops import modal_slopes
 from .outside_band import OutsideBand, outside_band
 
@@ -48,15 +48,28 @@ class ModelShape:
     @cached_property
     def outside(self) -> OutsideBand | None:
         """Terms for modes outside the nominal model's band; None where it states none."""
-        believed = len(self.nominal.poles) - self.added
-        bare = replace(
-            self.nominal,
-            poles=self.nominal.poles[:believed],
-            right=self.nominal.right[:believed],
-            left=self.nominal.left[:believed],
-            covariance=None,
-        )
-        return outside_band(bare, self.lab.shape)
+        return outside_band(_modes_of(self.nominal, np.arange(self.believed)), self.lab.shape)
+
+    @property
+    def believed(self) -> int:
+        """Number of modes that the nominal model has."""
+        return len(self.nominal.poles) - self.added
+
+    @property
+    def bare(self) -> "ModelShape":
+        """The same without added modes."""
+        return ModelShape(_modes_of(self.nominal, np.arange(self.believed)), self.lab)
+
+    def without_mode(self, place: int, u: Real) -> tuple["ModelShape", Real]:
+        """The same without one of the added modes, and u (size,) without its numbers.
+
+        ``place`` counts added modes from 0, in the order in which they were added.
+        """
+        gone = self.believed + place
+        kept = np.delete(np.arange(len(self.nominal.poles)), gone)
+        own = np.delete(self.modal_rows(u), gone, axis=0).ravel()
+        shape = ModelShape(_modes_of(self.nominal, kept), self.lab, self.added - 1)
+        return shape, np.concatenate([own, u[self.modal_size :]])
 
     @property
     def modal_size(self) -> int:
@@ -141,3 +154,10 @@ class ModelShape:
         if self.outside is not None:
             result[:, :, self.modal_size :] = self.outside.slopes(s, force, factor)
         return result
+
+
+def _modes_of(model: ModalModel, chosen: NDArray[np.int64]) -> ModalModel:
+    """A model with some of its modes."""
+    return replace(
+        model, poles=model.poles[chosen], right=model.right[chosen], left=model.left[chosen], covariance=None
+    )

@@ -8,10 +8,11 @@ import numpy as np
 from foundation import FileFormatError
 from modal_fit import ModalModel
 
+from ..inference import LabError
 from ..joints.joint_law import JointMotion
-from ..physics import Physics, library
+from ..physics import ChainPhysics, JointPhysics, ModePhysics, Physics, library
 from .hypothesis import Cause, Hypothesis
-from .model_shape import LabError, ModelShape
+from .model_shape import ModelShape
 
 
 def improved_model(hypothesis: Hypothesis, faults: tuple[dict[str, Any], ...] = ()) -> ModalModel:
@@ -26,6 +27,8 @@ def improved_model(hypothesis: Hypothesis, faults: tuple[dict[str, Any], ...] = 
     """
     terms = []
     for cause in hypothesis.causes:
+        if isinstance(cause.physics, ModePhysics):
+            continue
         names = [parameter.name for parameter in cause.physics.parameters]
         location: dict[str, Any] = {"place": cause.place}
         if cause.direction is not None and cause.motion is not None:
@@ -47,18 +50,19 @@ def hypothesis_of(model: ModalModel, causes: dict[str, Physics] | None = None) -
     found = []
     for term in model.physics:
         name = term.get("name")
-        if name in ("unmeasured_excitation", "clipping", "modal_parameters", "missing_mode"):
-            continue
         if name not in known:
             raise FileFormatError(f"the model has a term of unknown physics {name!r}; known are {', '.join(known)}")
+        physics = known[name]
+        if not isinstance(physics, ChainPhysics | JointPhysics):
+            continue
         try:
-            values = np.array([float(term["parameters"][parameter.name]) for parameter in known[name].parameters])
+            values = np.array([float(term["parameters"][parameter.name]) for parameter in physics.parameters])
             location = term["location"]
             if "direction" in location:
                 motion = JointMotion(**location["motion"])
-                found.append(Cause(known[name], values, "", np.array(location["direction"], dtype=float), motion))
+                found.append(Cause(physics, values, "", np.array(location["direction"], dtype=float), motion))
             else:
-                found.append(Cause(known[name], values, str(location["place"])))
+                found.append(Cause(physics, values, str(location["place"])))
         except (KeyError, TypeError, ValueError) as error:
             raise FileFormatError(f"the model's term {name} is incomplete: {error}; diagnose again") from error
     shape = ModelShape(replace(model, physics=()), LabError())

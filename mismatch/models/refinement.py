@@ -2,11 +2,10 @@
 
 from dataclasses import replace
 
-from ...models.fitting import Fit, fit
-from ...models.hypothesis import Cause, Hypothesis
-from ...physics import ChainPhysics
-from ...records.windowed_lines import WindowedLines
-from .reporting_numbers import modal_deviation
+from ..physics import ChainPhysics
+from ..records.windowed_lines import WindowedLines
+from .fitting import Fit, fit, modes_are_odd
+from .hypothesis import Cause, Hypothesis
 
 ITERATIONS, FROM_BELIEF = 60, 20
 
@@ -25,7 +24,7 @@ def settled(lines: list[WindowedLines], fitted: Fit) -> Fit:
         From a few steps.
     """
     rested = fit(lines, fitted.hypothesis, fitted.noises, iterations=ITERATIONS)
-    if modal_deviation(rested) is None or not rested.hypothesis.causes:
+    if not modes_are_odd(rested) or not rested.hypothesis.has_added_physics:
         return rested
     again = fit(lines, believed(rested.hypothesis), rested.noises, iterations=ITERATIONS)
     return min(rested, again, key=lambda one: one.score)
@@ -47,7 +46,7 @@ def with_chain(lines: list[WindowedLines], current: Fit, cause: Cause) -> Fit:
     """
     hypothesis = current.hypothesis
     fitted = fit(lines, hypothesis.with_cause(cause), current.noises)
-    if modal_deviation(current) is None or not isinstance(cause.physics, ChainPhysics):
+    if not modes_are_odd(current) or not isinstance(cause.physics, ChainPhysics):
         return fitted
     absent = replace(cause, values=cause.physics.start(hypothesis.shape.nominal))
     fresh = believed(hypothesis).with_cause(absent)
@@ -57,5 +56,5 @@ def with_chain(lines: list[WindowedLines], current: Fit, cause: Cause) -> Fit:
 def believed(hypothesis: Hypothesis) -> Hypothesis:
     """The same causes and added modes on the lab's own model."""
     shape, u = hypothesis.shape, hypothesis.u.copy()
-    u[: shape.per_mode * (len(shape.nominal.poles) - shape.added)] = 0.0
+    u[: shape.per_mode * shape.believed] = 0.0
     return replace(hypothesis, u=u)

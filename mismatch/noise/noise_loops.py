@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting.compiled import compiled
+from cutting.compilation import compiled
 
 from .line_loops import whiten_in_place
 

@@ -4,18 +4,34 @@ import importlib
 import pkgutil
 from collections.abc import Collection
 
-from .protocol import Chain, ChainPhysics, FormedPhysics, JointPhysics, LimitedPhysics, Parameter, Physics, answer_name
+from .protocol import (
+    BeliefPhysics,
+    Chain,
+    ChainPhysics,
+    FaultPhysics,
+    FormedPhysics,
+    JointPhysics,
+    LimitedPhysics,
+    ModePhysics,
+    Parameter,
+    Physics,
+    answer_name,
+)
 
 __all__ = [
+    "BeliefPhysics",
     "Chain",
     "ChainPhysics",
+    "FaultPhysics",
     "FormedPhysics",
     "JointPhysics",
     "LimitedPhysics",
+    "ModePhysics",
     "Parameter",
     "Physics",
     "answer_name",
     "form_of",
+    "is_fault",
     "library",
 ]
 
@@ -34,6 +50,22 @@ def library() -> dict[str, Physics]:
         if cause is not None:
             found[cause.name] = cause
     return found
+
+
+def is_fault(name: str) -> bool:
+    """Whether a cause of this name is a fault of the recording itself, no part of the structure.
+
+    Parameters
+    ----------
+    name
+        Name of a cause, as a diagnosis tells it.
+
+    Examples
+    --------
+    >>> is_fault("clipping"), is_fault("hysteresis")
+    (True, False)
+    """
+    return isinstance(library().get(name), FaultPhysics)
 
 
 def form_of(answer: str, numbers: Collection[str]) -> Physics | None:

@@ -1,7 +1,8 @@
 """What a hypothesis about left-out physics has to say: the protocols behind every file of this folder."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from foundation import DegreeOfFreedom
 from modal_fit import ModalModel
 
 from ..joints.joint_law import JointLaw, JointMotion
+from ..records.trial import Trial
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -139,7 +141,59 @@ class BoundedPhysics(Protocol):
         ...
 
 
-Physics = ChainPhysics | JointPhysics
+@runtime_checkable
+class FaultPhysics(Protocol):
+    """A fault of a recording itself: it is mended there before causes are looked for, and shown in a prediction.
+
+    Faults are shown in the order of their number ``order``: a limit holds for whatever a channel shows, tones too.
+    """
+
+    order: int
+    name: str
+    equation: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    confusable_with: tuple[str, ...]
+
+    def shown(self, response: Real, recording: Trial, start: int, term: Mapping[str, Any]) -> Real:
+        """A predicted response (n_samples, n_responses) with the fault of a term ``{name, location, parameters}``.
+
+        ``start`` is the first sample after the run-in.
+        """
+        ...
+
+
+@runtime_checkable
+class ModePhysics(Protocol):
+    """A mode that the nominal model lacks: its numbers stand beside those of the model's own modes."""
+
+    name: str
+    equation: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    confusable_with: tuple[str, ...]
+
+    def resolved(self, pole: complex, spacing: float, least: float) -> bool:
+        """Whether a mode is wider than ``least`` spacings of lines (Hz): else it is a tone, or an accident."""
+        ...
+
+
+@runtime_checkable
+class BeliefPhysics(Protocol):
+    """Numbers of the nominal model that are farther off than a laboratory's own error."""
+
+    name: str
+    equation: str
+    source: str
+    parameters: tuple[Parameter, ...]
+    confusable_with: tuple[str, ...]
+
+    def odd(self, deviation: float, count: int) -> bool:
+        """Whether ``|u|^2`` of that many believed numbers is larger than errors of the usual size make it."""
+        ...
+
+
+Physics = ChainPhysics | JointPhysics | FaultPhysics | ModePhysics | BeliefPhysics
 
 
 def answer_name(physics: Physics) -> str:

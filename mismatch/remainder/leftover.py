@@ -1,13 +1,12 @@
 """Is what remains noise? Noise stays when the signal goes; an omission comes and goes with it."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft
 from scipy.signal import ShortTimeFFT
 from scipy.signal.windows import hann
 
+from ..inference import Remainder
 from ..models.hypothesis import Hypothesis, predict_lines
 from ..records.windowed_lines import WindowedLines
 from .cell_regression import moving_power
@@ -26,23 +25,7 @@ SHIFTS, CHANCE = 14, 0.8
 force rings in lightly damped modes, and so few independent swells are easily matched by chance."""
 
 
-@dataclass(frozen=True)
-class Leftover:
-    """What of a residual moves with the signal.
-
-    Parameters
-    ----------
-    share
-        Of the residual's power, 0 (noise) to 1, beyond what chance may well make of noise.
-    power
-        As a share of the response's, mean over channels and recordings, beyond what chance makes on average.
-    """
-
-    share: float
-    power: float
-
-
-def leftover(hypothesis: Hypothesis, lines: list[WindowedLines]) -> Leftover:
+def leftover(hypothesis: Hypothesis, lines: list[WindowedLines]) -> Remainder:
     """How much of the residual moves with the predicted response.
 
     In cells of time and frequency the residual's power is regressed, with non-negative factors, on a constant (noise of
@@ -59,6 +42,12 @@ def leftover(hypothesis: Hypothesis, lines: list[WindowedLines]) -> Leftover:
         After all that was found.
     lines
         Recordings.
+
+    Returns
+    -------
+    Remainder
+        Share of the residual's power beyond what chance may well make of noise, 0 to 1; size: as a share of the
+        response's power, mean over channels and recordings, beyond what chance makes on average.
     """
     found = []
     for one in lines:
@@ -68,7 +57,7 @@ def leftover(hypothesis: Hypothesis, lines: list[WindowedLines]) -> Leftover:
             moving = np.minimum(moving, _moving(hypothesis, measured))
         found.append(np.maximum(moving, _repeating(hypothesis, one)))
     share, power = np.concatenate(found).mean(axis=0)
-    return Leftover(float(share), float(power))
+    return Remainder(float(share), float(power))
 
 
 def _moving(hypothesis: Hypothesis, one: WindowedLines) -> Real:

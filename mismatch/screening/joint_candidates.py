@@ -5,9 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from ..adapters.structure.acceptance import LEAST_EVIDENCE, Option
-from ..inference.diagnosis import Candidate
-from ..inference.process_pool import in_processes
+from ..inference import Candidate, Proposal, Settings, in_processes
 from ..models.fitting import Fit, fit
 from ..models.hypothesis import direction_of
 from ..physics import JointPhysics, answer_name
@@ -16,26 +14,8 @@ from .joint_direction import find_direction
 from .joint_screening import Screened, screen_joints
 from .linear_floor import linear_floor
 
-PROMISING = 0.15
-"""Screened gain, as a share of the best law's, from which a law is fitted."""
-
-MOST_LAWS, MOST_SIMULATED = 4, 2
-"""Laws that are fitted to the motion seen, and the best of them that are then simulated freely."""
-
-LEAST_GAIN = 60.0
-"""Screened gain below which no law is fitted."""
-
-NEARLY = 0.6
-"""Gain of a law driven by the motion seen, as a share of the best law's, from which it is simulated."""
-
-RIVAL = 0.3
-"""Gain of a law driven by the motion seen, as a share of the best linear cause's, from which it is simulated."""
-
 FEW = 1000
 """Lines of a recording on which shapes of a law are compared."""
-
-STANDS_OUT = 50.0
-"""Gain a recording from which a direction is believed."""
 
 
 @dataclass(frozen=True)
@@ -51,14 +31,26 @@ class SightedLaws:
         return self.screened[0].gain if self.screened else 0.0
 
 
-def sighted_laws(lines: list[WindowedLines], current: Fit, laws: list[JointPhysics]) -> SightedLaws:
-    """Screen joint laws along the direction that stands out; nothing where none does."""
+def sighted_laws(lines: list[WindowedLines], current: Fit, laws: list[JointPhysics], settings: Settings) -> SightedLaws:
+    """Screen joint laws along the direction that stands out; nothing where none does.
+
+    Parameters
+    ----------
+    lines
+        Recordings.
+    current
+        The fit with the causes found so far.
+    laws
+        Laws to try.
+    settings
+        Thresholds.
+    """
     taken = {answer_name(cause.physics) for cause in current.hypothesis.causes}
     laws = [law for law in laws if answer_name(law) not in taken]
     floor = linear_floor(current, lines)
     sighting = find_direction(floor, current.hypothesis)
     # along a single axis there is no direction to stand out, and a broad force looks like a higher floor
-    if not laws or (len(sighting.direction) > 1 and sighting.gain < STANDS_OUT * len(lines)):
+    if not laws or (len(sighting.direction) > 1 and sighting.gain < settings.screening.direction * len(lines)):
         return SightedLaws((), ())
     location = {"direction": [round(float(x), 6) for x in sighting.direction]}
     screened = screen_joints(floor, current.hypothesis, sighting.direction, laws)
@@ -66,9 +58,14 @@ def sighted_laws(lines: list[WindowedLines], current: Fit, laws: list[JointPhysi
     return SightedLaws(tuple(screened), tuple(weighed))
 
 
-def joint_options(
-    lines: list[WindowedLines], current: Fit, sighted: SightedLaws, least: float, gained: float = 0.0
-) -> list[Option]:
+def joint_candidates(
+    lines: list[WindowedLines],
+    current: Fit,
+    sighted: SightedLaws,
+    settings: Settings,
+    least: float,
+    gained: float = 0.0,
+) -> list[Proposal[Fit]]:
     """Fit the laws that promise most.
 
     Parameters
@@ -79,24 +76,29 @@ def joint_options(
         Without a law.
     sighted
         Laws to try.
+    settings
+        Thresholds.
     least
         Screened gain from which one is fitted.
     gained
         Score that the best linear cause gains.
     """
-    promising = [one for one in sighted.screened if one.gain > max(LEAST_GAIN, least, PROMISING * sighted.gain)]
-    driven = in_processes([partial(_driven, lines, current, one) for one in promising[:MOST_LAWS]])
+    limits = settings.screening
+    enough = max(limits.least_law, least, limits.promising_law * sighted.gain)
+    promising = [one for one in sighted.screened if one.gain > enough]
+    driven = in_processes([partial(_driven, lines, current, one) for one in promising[: limits.most_laws]])
     driven.sort(key=lambda one: one.score)
     gains = [current.score - one.score for one in driven]
-    enough = max([LEAST_EVIDENCE / 2, RIVAL * gained, *(NEARLY * gain for gain in gains[:1])])
+    nearly = [limits.nearly * gain for gain in gains[:1]]
+    enough = max([settings.evidence.least / 2, limits.rival * gained, *nearly])
     # forms of different causes may differ by a linear spring alone: all that are as good are simulated
     near = [
         one
         for place, (one, gain) in enumerate(zip(driven, gains, strict=True))
-        if gain >= enough and (place < MOST_SIMULATED or gain > gains[0] - LEAST_EVIDENCE)
+        if gain >= enough and (place < limits.most_simulated or gain > gains[0] - settings.evidence.least)
     ]
-    simulated = in_processes([partial(_simulated, lines, one) for one in near])
-    return [option for option in simulated if option is not None]
+    simulated = in_processes([partial(_simulated, lines, current, one) for one in near])
+    return [one for one in simulated if one is not None]
 
 
 def _driven(lines: list[WindowedLines], current: Fit, screened: Screened) -> Fit:
@@ -109,7 +111,7 @@ def _driven(lines: list[WindowedLines], current: Fit, screened: Screened) -> Fit
     return fit(lines, best.hypothesis, best.noises, iterations=4)
 
 
-def _simulated(lines: list[WindowedLines], near: Fit) -> Option | None:
+def _simulated(lines: list[WindowedLines], current: Fit, near: Fit) -> Proposal[Fit] | None:
     """The law of a driven fit, now free to move as it makes the structure move; None if that runs away."""
     last = near.hypothesis.causes[-1]
     free = replace(near.hypothesis, causes=(*near.hypothesis.causes[:-1], replace(last, seen=None)))
@@ -118,4 +120,5 @@ def _simulated(lines: list[WindowedLines], near: Fit) -> Option | None:
         fitted = fit(lines, free, near.noises, iterations=10, tolerance=10.0)
     except np.linalg.LinAlgError:
         return None
-    return Option(answer_name(last.physics), direction_of(fitted.hypothesis.causes[-1]), fitted)
+    location = direction_of(fitted.hypothesis.causes[-1])
+    return Proposal(answer_name(last.physics), location, fitted, current.score - fitted.score)

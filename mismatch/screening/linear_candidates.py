@@ -6,29 +6,24 @@ from typing import Any
 
 import numpy as np
 
-from ..adapters.structure.acceptance import Option
-from ..adapters.structure.settling import with_chain
-from ..inference.process_pool import in_processes
+from ..inference import Proposal, ScreeningSettings, in_processes
 from ..models.fitting import Fit, fit
-from ..models.hypothesis import Cause, Hypothesis
+from ..models.hypothesis import Cause
+from ..models.refinement import with_chain
 from ..physics import FormedPhysics, answer_name
 from ..records.windowed_lines import WindowedLines
 from .chain_screening import ScreenedChain
 from .missing_mode import SightedMode
 
-MOST_CHAINS = 3
-"""Linear causes that are fitted in a round."""
 
-PROMISING = 0.03
-"""Screened gain, as a share of the best linear cause's, from which one is fitted."""
-
-RESOLVED = 2.0
-"""Least half-power bandwidth of an added mode, in spacings of lines."""
-
-
-def linear_options(
-    lines: list[WindowedLines], current: Fit, chains: list[ScreenedChain], mode: SightedMode, least: float
-) -> list[Option]:
+def linear_candidates(
+    lines: list[WindowedLines],
+    current: Fit,
+    chains: list[ScreenedChain],
+    mode: SightedMode | None,
+    settings: ScreeningSettings,
+    least: float,
+) -> list[Proposal[Fit]]:
     """Fit the linear causes that promise most.
 
     Parameters
@@ -36,44 +31,42 @@ def linear_options(
     lines
         Recordings.
     current
-        Without them.
+        The fit without them.
     chains
-        Screened, best first.
+        Linear causes at their places as they were screened, best first.
     mode
-        That would explain most.
+        The further mode that would explain most; None: none is looked for.
+    settings
+        Thresholds.
     least
         Screened gain from which anything is fitted.
     """
     cost = float(np.log(2 * sum(one.measured.size for one in lines)))
-    largest = max([one.gain for one in chains] + [mode.gain, 0.0])
-    tasks: list[Callable[[], Option | None]] = []
-    for one in chains[:MOST_CHAINS]:
-        if one.gain > max(least, one.cause.size * cost, PROMISING * largest):
-            tasks.append(partial(_chain_option, lines, current, one.cause))
+    promising = settings.promising_linear * max([one.gain for one in chains] + [mode.gain if mode else 0.0, 0.0])
+    tasks: list[Callable[[], Proposal[Fit] | None]] = []
+    for one in chains[: settings.most_linear]:
+        if one.gain > max(least, one.cause.size * cost, promising):
+            tasks.append(partial(_with_chain, lines, current, one.cause))
     numbers = current.hypothesis.shape.per_mode - 2
-    if not current.hypothesis.causes and mode.gain > max(least, numbers * cost, PROMISING * largest):
-        tasks.append(partial(_mode_option, lines, current, mode))
-    return [option for option in in_processes(tasks) if option is not None]
+    alone = mode is not None and not current.hypothesis.has_added_physics
+    if alone and mode is not None and mode.gain > max(least, numbers * cost, promising):
+        tasks.append(partial(_with_mode, lines, current, mode, settings.resolved))
+    return [one for one in in_processes(tasks) if one is not None]
 
 
-def _chain_option(lines: list[WindowedLines], current: Fit, cause: Cause) -> Option:
-    return Option(answer_name(cause.physics), channel_of(cause), with_chain(lines, current, cause))
+def _with_chain(lines: list[WindowedLines], current: Fit, cause: Cause) -> Proposal[Fit]:
+    fitted = with_chain(lines, current, cause)
+    return Proposal(answer_name(cause.physics), channel_of(cause), fitted, current.score - fitted.score)
 
 
-def _mode_option(lines: list[WindowedLines], current: Fit, mode: SightedMode) -> Option | None:
-    before, u = current.hypothesis.shape, current.hypothesis.u
-    shape = before.with_mode(mode.pole, mode.right, mode.left)
-    own, outside = u[: before.modal_size], u[before.modal_size :]
-    start = Hypothesis(shape, np.concatenate([own, np.zeros(shape.per_mode), outside]))
+def _with_mode(lines: list[WindowedLines], current: Fit, mode: SightedMode, resolved: float) -> Proposal[Fit] | None:
+    """The mode fitted; None where it is no wider than the lines of a record."""
+    start = current.hypothesis.with_mode(mode.pole, mode.right, mode.left, mode.physics)
     fitted = fit(lines, start, current.noises, iterations=12)
-    return Option("missing_mode", {}, fitted) if _is_resolved(fitted, lines) else None
-
-
-def _is_resolved(fitted: Fit, lines: list[WindowedLines]) -> bool:
-    """Whether the added mode is wider than the lines of a record: else it is a tone, or an accident of some lines."""
-    pole = fitted.hypothesis.model.poles[-1]
-    width = -float(pole.real) / np.pi
-    return width > RESOLVED * max(one.trial.rate / len(one.window) for one in lines)
+    spacing = max(one.trial.rate / len(one.window) for one in lines)
+    if not mode.physics.resolved(complex(fitted.hypothesis.model.poles[-1]), spacing, resolved):
+        return None
+    return Proposal(mode.physics.name, {}, fitted, current.score - fitted.score)
 
 
 def channel_of(cause: Cause) -> dict[str, Any]:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..models.hypothesis import Hypothesis
+from ..physics import ModePhysics
 from .linear_floor import Floor, FloorRecord
 
 Complex = NDArray[np.complex128]
@@ -19,15 +20,29 @@ EVERY = 3
 
 @dataclass(frozen=True)
 class SightedMode:
-    """A further pole with a residue of rank one, and the misfit that it would gain."""
+    """A further pole with a residue of rank one, and the misfit that it would gain.
 
+    Parameters
+    ----------
+    physics
+        The cause that adds it.
+    pole
+        Its pole, rad/s.
+    right : (n_responses,)
+    left : (n_excitations,)
+        Vectors of the residue ``right left^T``.
+    gain
+        Misfit that it would gain.
+    """
+
+    physics: ModePhysics
     pole: complex
     right: Complex
     left: Complex
     gain: float
 
 
-def find_mode(floor: Floor, hypothesis: Hypothesis) -> SightedMode:
+def find_mode(floor: Floor, hypothesis: Hypothesis, physics: ModePhysics) -> SightedMode:
     """The pole and residue that explain most of the residual.
 
     For poles over the band a residue of full rank is fitted by linear least squares after the modal parameters have
@@ -49,7 +64,7 @@ def find_mode(floor: Floor, hypothesis: Hypothesis) -> SightedMode:
     parts = numbers.reshape(2, n, m)
     u, s, vh = np.linalg.svd(parts[0] + 1j * parts[1])
     scale = np.sqrt(s[0] * np.linalg.norm(hypothesis.model.left) / np.linalg.norm(hypothesis.model.right))
-    return SightedMode(pole, u[:, 0] * s[0] / scale, vh[0] * scale, gain * s[0] ** 2 / np.sum(s**2))
+    return SightedMode(physics, pole, u[:, 0] * s[0] / scale, vh[0] * scale, gain * s[0] ** 2 / np.sum(s**2))
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ from numpy.typing import NDArray
 
 from estimation import Frf
 
-from ..modal_model import ModalModel
-from ..mode_errors import ModeErrors
-from ..out_of_band import residuals_with_poles
-from .elimination import Elimination, Modes, Real, derivatives
-from .measured_lines import MeasuredLines
+from ..models.modal_model import ModalModel
+from ..models.mode_errors import ModeErrors
+from ..models.out_of_band import residuals_with_poles
+from .variable_projection.elimination import Elimination, Modes, Real, derivatives
+from .variable_projection.whitened_lines import MeasuredLines
 
 _MOST_PARAMETERS = 700  # with a covariance matrix: its file would pass 10 MB
 
@@ -25,20 +25,20 @@ def modal_model(
     scale: float,
     errors: ModeErrors,
 ) -> ModalModel:
-    """The modes in order of frequency, of receptance, with residual terms.
+    """Assemble the modal model of receptance: modes in order of frequency, with residual terms.
 
     Parameters
     ----------
     frf
-        Axes and quantity.
+        Fitted FRF, which gives axes and quantity.
     modes, found, lines
-        The fit.
-    unknowns
+        Modes, elimination and lines of the fit.
+    unknowns : (2 n_unknowns, 2 n_unknowns)
         Covariance of poles and free left entries by the noise.
     scale
         Variance of a whitened complex value.
     errors
-        Of frequencies and dampings; the covariance is widened to them.
+        Standard errors of frequencies and dampings; the covariance is widened to them.
     """
     order = np.argsort(np.abs(modes.poles))
     back = np.asarray(np.linalg.inv(lines.whitening), dtype=np.float64)

@@ -9,21 +9,21 @@ from threadpoolctl import threadpool_limits
 from estimation import Frf, FrfCovariance
 from foundation import MillfrfError
 
-from ..modal_model import ModalModel
-from ..stabilisation import PoleGroup, StabilisationChart
+from ..models.modal_model import ModalModel
+from ..stabilisation.chart import PoleGroup, StabilisationChart
 from .assembly import modal_model, transposed
-from .candidates import Candidate, candidates
-from .elimination import Elimination, Modes, Real, eliminate
-from .entry_noise import entry_noise
-from .held_out_lines import holds_on_held_out_lines
-from .hidden_modes import hidden_candidates
-from .measured_lines import MeasuredLines, correlated_lines, measured_lines
-from .outer_modes import inside as inside_band
-from .outer_modes import with_outer_as_residuals
-from .outside_terms import with_fewest_terms
-from .refinement import refine
-from .selection import Reweigh, Selection, select_modes
+from .mode_selection.hidden_modes import hidden_candidates
+from .mode_selection.selection import Reweigh, Selection, select_modes
+from .mode_selection.steady_poles import Candidate, candidates
 from .spread import mode_errors, unknowns_covariance
+from .variable_projection.elimination import Elimination, Modes, Real, eliminate
+from .variable_projection.held_out_lines import holds_on_held_out_lines
+from .variable_projection.noise_of_entries import entry_noise
+from .variable_projection.outer_modes import inside as inside_band
+from .variable_projection.outer_modes import with_outer_as_residuals
+from .variable_projection.outside_terms import with_fewest_terms
+from .variable_projection.refinement import refine
+from .variable_projection.whitened_lines import MeasuredLines, correlated_lines, measured_lines
 
 _STEPS, _TOLERANCE = 40, 1e-7
 

@@ -8,17 +8,17 @@ from threadpoolctl import threadpool_limits
 
 from estimation import Frf
 
-from ..mode_errors import ModeErrors
-from ..stabilisation import StabilisationChart
+from ..models.mode_errors import ModeErrors
+from ..stabilisation.chart import StabilisationChart
 from .assembly import modal_model, transposed
-from .candidates import candidates
-from .elimination import Complex, Elimination, Modes, eliminate
 from .fit import _STEPS, _TOLERANCE, REFINED, MatrixFit, _exchanged, _line_weights, _weighted
-from .measured_lines import MeasuredLines
-from .neighbourhood import participations
-from .refinement import Refined
-from .refinement import refine as refine_modes
+from .mode_selection.steady_poles import candidates
 from .spread import mode_errors, unknowns_covariance
+from .variable_projection.elimination import Complex, Elimination, Modes, eliminate
+from .variable_projection.neighbourhood import participations
+from .variable_projection.refinement import Refined
+from .variable_projection.refinement import refine as refine_modes
+from .variable_projection.whitened_lines import MeasuredLines
 
 KEPT = "picked poles"
 
@@ -34,11 +34,11 @@ def fit_picked(
     Parameters
     ----------
     frf, inside, band
-        As in :func:`fit_matrix`.
+        FRF, lines to use and band (Hz), as in :func:`fit_matrix`.
     max_order
-        Of the stabilisation chart beside it.
+        Highest order of the stabilisation chart beside the fit.
     poles : (n_modes,), rad/s
-        Upper half of the pairs.
+        Poles to keep, in the upper half plane.
     refine
         Whether poles and vectors are refined from there, as those of an automatic fit are.
     """

@@ -4,12 +4,12 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from ..mode_errors import ModeErrors
-from .elimination import Elimination, Modes, Real
-from .measured_lines import MeasuredLines
-from .neighbourhood import half_power_lines
-from .outside_terms import with_fixed_poles
-from .refinement import normal_equations, refine, weighted_matrix, without_response
+from ..models.mode_errors import ModeErrors
+from .variable_projection.elimination import Elimination, Modes, Real
+from .variable_projection.neighbourhood import half_power_lines
+from .variable_projection.outside_terms import with_fixed_poles
+from .variable_projection.refinement import normal_equations, refine, weighted_matrix, without_response
+from .variable_projection.whitened_lines import MeasuredLines
 
 _EDGE = 0.05  # of the band
 _OTHER_POLES = (((0.5,), (1.6, 4.0)), ((0.85,), (1.15, 2.0)))  # of the band's lower and upper end
@@ -21,12 +21,12 @@ _SMOOTH = 4  # lines to each side over which the squared error is averaged
 
 
 def mode_errors(modes: Modes, lines: MeasuredLines, found: Elimination, unknowns: Real) -> ModeErrors:
-    """Standard errors of each mode, by where they come from.
+    """Compute standard errors of each mode, by their source.
 
     Parameters
     ----------
     modes, lines, found
-        The fit.
+        Modes, lines and elimination of the fit.
     unknowns : (2 n_unknowns, 2 n_unknowns)
         Covariance of poles and free left entries by the noise.
     """
@@ -103,7 +103,7 @@ def _scatter(modes: Modes, variants: Iterable[MeasuredLines]) -> Real:
 
 
 def unknowns_covariance(modes: Modes, lines: MeasuredLines, found: Elimination, scale: float) -> Real:
-    """Covariance of the real unknowns: real parts of poles and free left entries, then imaginary parts.
+    """Compute the covariance of the real unknowns: real parts of poles and free left entries, then imaginary parts.
 
     ``M^-1 (sum over lines of J^T v J) M^-1`` with v the squared error around each line, so that noise that is
     stronger at resonances widens the bars of what they decide (White, Econometrica 48, 1980).
@@ -111,7 +111,7 @@ def unknowns_covariance(modes: Modes, lines: MeasuredLines, found: Elimination, 
     Parameters
     ----------
     modes, lines, found
-        The fit.
+        Modes, lines and elimination of the fit.
     scale
         Variance of a whitened complex value; half of it is in each part.
     """

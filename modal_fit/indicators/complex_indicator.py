@@ -9,7 +9,7 @@ from scipy.signal import find_peaks
 from estimation import Frf
 from foundation import Band
 
-from ..shape_measures import modal_assurance
+from ..models.shape_measures import modal_assurance
 from .reference_side import indicated_lines, references_last
 
 _SAME_VECTOR = 0.8  # assurance of a curve's vectors on both sides of a peak; below, two curves may cross there
@@ -45,14 +45,15 @@ class ComplexModeIndicator:
     Parameters
     ----------
     frequencies : (n_lines,), Hz
+        Frequencies of the lines.
     singular_values : (n_lines, n_curves)
-        Falling along the second axis, in ``unit``.
+        Singular values in ``unit``, falling along the second axis.
     vectors : (n_lines, n_curves, n_references)
         Unit singular vectors over ``references``.
     references
-        Degrees of freedom of the side with fewer of them.
+        Degrees of freedom of the side with fewer of them, ``node:direction``.
     unit
-        Of the FRF.
+        Unit of the FRF.
     """
 
     frequencies: NDArray[np.float64]

@@ -21,10 +21,11 @@ class MultivariateModeIndicator:
     Parameters
     ----------
     frequencies : (n_lines,), Hz
+        Frequencies of the lines.
     values : (n_lines, n_references)
-        Rising along the second axis; the first column is the indicator of the clearest mode.
+        Eigenvalues, rising along the second axis; the first column is the indicator of the clearest mode.
     references
-        Degrees of freedom of the side with fewer of them; of a single one the ordinary mode indicator function.
+        Degrees of freedom of the side with fewer of them; with a single one it is the ordinary mode indicator function.
     """
 
     frequencies: NDArray[np.float64]

@@ -8,14 +8,14 @@ from foundation import Band, InputError
 
 
 def indicated_lines(frf: Frf, band: Band | None) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Frequencies above 0 Hz and values of the valid lines inside ``band``.
+    """Give frequencies above 0 Hz and values of the valid lines inside ``band``.
 
     Parameters
     ----------
     frf
-        Any quantity.
-    band
-        Hz; None: all lines.
+        FRF of any quantity.
+    band : Hz
+        Lowest and highest frequency; None: all lines.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """Poles that somebody picks: the file that offers candidates, the file that names the choice, and the fit of it."""
 
-from .candidate_groups import CandidateGroup, candidate_groups
+from .offered_groups import CandidateGroup, candidate_groups
 from .picked_fit import fit_picked_poles
 from .poles_file import read_picked_poles, read_pole_groups, write_pole_candidates
 

@@ -37,15 +37,15 @@ def fit_picked_poles(
     Parameters
     ----------
     frf
-        Receptance, mobility, accelerance or a transfer.
-    band
-        Hz.
+        FRF to fit: receptance, mobility, accelerance or a transfer.
+    band : Hz
+        Lowest and highest frequency of the fit.
     poles : (n_modes,), rad/s
-        With positive imaginary part.
+        Poles to keep, with positive imaginary part.
     refine
-        Refine poles and vectors from there. The count of modes stays; kept poles have no error bars.
+        Whether poles and vectors are refined from there. The count of modes stays; kept poles have no error bars.
     max_order
-        Of the stabilisation chart; None: from the number of lines and references.
+        Highest order of the stabilisation chart; None: from the number of lines and references.
 
     Returns
     -------

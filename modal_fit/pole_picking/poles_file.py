@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from foundation import Band, FileFormatError, InputError, mistake_in_words, writing_whole_file
 
-from .candidate_groups import CandidateGroup
+from .offered_groups import CandidateGroup
 
 FORMAT, FORMAT_VERSION = "millfrf.poles", 1
 _STRICT = ConfigDict(extra="forbid", frozen=True)
@@ -154,15 +154,15 @@ def write_pole_candidates(
     Parameters
     ----------
     path
-        ``.json``.
+        File to write, ``.json``.
     groups
-        Of :func:`candidate_groups`.
-    band
-        Hz.
+        Candidates, from :func:`candidate_groups`.
+    band : Hz
+        Lowest and highest frequency of the fit.
     stabilisation
         The chart as lists, for a picker to draw.
     provenance
-        Where the candidates come from.
+        Sources and versions behind the candidates.
 
     Raises
     ------

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from acquisition import read_uff_sets
 from foundation import FileFormatError
 
-from ..modal_model import ModalModel
+from ..models.modal_model import ModalModel
 from .mode_sets import NORMAL, ModeSet
 from .shapes import poles_of, shapes_of
 
@@ -23,7 +23,7 @@ Notes = list[str]
 
 
 def foreign_model(path: Path, sets: Sequence[ModeSet]) -> tuple[ModalModel, tuple[str, ...]]:
-    """The model of all modes of a file, with what it does not say.
+    """Build the model of all modes of a file, and say what the file leaves open.
 
     Every degree of freedom that moves is a response and, by reciprocity, an excitation. With modal mass m (normal
     modes) or modal A a (complex ones) the residues are ``phi phi^T / (2 i m w_d)`` and ``phi phi^T / a`` (Ewins, Modal
@@ -33,9 +33,9 @@ def foreign_model(path: Path, sets: Sequence[ModeSet]) -> tuple[ModalModel, tupl
     Parameters
     ----------
     path
-        For messages, and for the file's units.
+        Path of the file, for messages and for the file's units.
     sets
-        Its modes.
+        Mode shapes of the file.
 
     Returns
     -------

@@ -33,20 +33,22 @@ class ModeSet:
     Parameters
     ----------
     place
-        Of the data set in the file, counted from 1.
+        Place of the data set in the file, counted from 1.
     texts
-        Five identification lines.
+        The five identification lines.
     analysis
-        2: normal mode; 3, 7: complex mode of first or second order.
+        Code of the analysis. 2: normal mode; 3, 7: complex mode of first or second order.
     motion
-        8: displacement; 11: velocity; 12: acceleration; other numbers: not said.
+        Code of the motion. 8: displacement; 11: velocity; 12: acceleration; other numbers: not said.
     parameters : (n_parameters,)
-        Normal: frequency (Hz), modal mass, viscous damping ratio, hysteretic damping. Complex: real and imaginary
-        part of the eigenvalue (rad/s), of modal A and of modal B. Zeros where the file holds fewer.
+        Numbers of the mode. Normal: frequency (Hz), modal mass, viscous damping ratio, hysteretic damping. Complex:
+        real and imaginary part of the eigenvalue (rad/s), of modal A and of modal B. Zeros where the file holds fewer.
     nodes : (n_nodes,), int
+        Numbers of the nodes that move.
     values : (n_nodes, n_axes), complex
+        Motion of each node along each axis.
     axes
-        ``X, Y, Z``, with rotations behind them, or ``S``.
+        Names of the axes: ``X, Y, Z``, with rotations behind them, or ``S``.
     """
 
     place: int

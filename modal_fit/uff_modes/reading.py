@@ -5,7 +5,7 @@ from pathlib import Path
 
 from foundation import FileFormatError
 
-from ..modal_model import ModalModel
+from ..models.modal_model import ModalModel
 from .foreign import foreign_model
 from .groups import vector_labels
 from .mode_sets import ModeSet, read_mode_sets

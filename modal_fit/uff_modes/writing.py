@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from estimation import is_uff_number, uff_node_numbers
 from foundation import DegreeOfFreedom, InputError, writing_whole_file
 
-from ..modal_model import ModalModel
+from ..models.modal_model import ModalModel
 from .groups import group_set
 from .mode_sets import COMPLEX_FIRST
 from .reading import SEPARATOR, SIDES
@@ -33,9 +33,9 @@ def write_modes_uff(path: str | os.PathLike[str], model: ModalModel) -> None:
     Parameters
     ----------
     path
-        ``.uff`` or ``.unv``.
+        File to write, ``.uff`` or ``.unv``.
     model
-        With translations and rotations as degrees of freedom.
+        Modal model with translations and rotations as degrees of freedom.
 
     Raises
     ------

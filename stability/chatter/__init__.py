@@ -1,8 +1,8 @@
 """Was a recorded cut stable?"""
 
 from .classify import classify_cut
-from .cut_spectrum import CutSpectrum, cut_spectrum
 from .fitted_depth import ModelledCut
+from .judged_spectrum import CutSpectrum, cut_spectrum
 from .motion import Evidence, gather_evidence
 from .verdict import ChatterVerdict, ForeignTone
 

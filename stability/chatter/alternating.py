@@ -25,16 +25,16 @@ _PAIR = 2  # teeth of which an eccentric spindle makes one cut more and one less
 
 
 def of_alternation(evidence: Evidence, known: Knowledge, verdict: ChatterVerdict) -> ChatterVerdict:
-    """The verdict on what alternates from tooth to tooth, whose lines are orders of the spindle.
+    """Give the verdict on motion that alternates from tooth to tooth, whose lines are orders of the spindle.
 
     Parameters
     ----------
     evidence
-        Of the recording.
+        Evidence gathered from the recording.
     known
-        Runout, chip and, where there is one, model decide.
+        What is known of the cut; runout, chip and, where there is one, model decide.
     verdict
-        Returned as it is where nothing alternates.
+        Verdict so far; it is returned as it is where nothing alternates.
     """
     runout, motion = known.runout, known.motion
     size = alternation(evidence.late)

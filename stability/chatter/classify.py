@@ -45,29 +45,31 @@ def classify_cut(
     Parameters
     ----------
     samples : (n_samples, n_channels)
-        From the time the tool is fully in the cut.
-    sample_rate
-        Samples a second, Hz.
-    spindle_speed
-        rad/s, within 1 %; it may drift by 1 %.
+        Forces or vibration from the time the tool is fully in the cut, in the SI units of the channels.
+    sample_rate : Hz
+        Samples a second.
+    spindle_speed : rad/s
+        Stated spindle speed, right within 1 %; it may drift by 1 %.
     teeth
         Number of teeth.
-    runout
-        Radial offset of the spindle's axis, m; 0: all teeth cut equal chips; infinite: it may have any size. With an
-        even number of teeth runout has the lines of period doubling: where they do not grow, and the chip does not
-        change by more than runout explains, the verdict is ``inconclusive`` instead of ``period-doubling``. NaN: not
-        stated; period doubling is then told with a warning where it is large.
+    runout : m
+        Radial offset of the spindle's axis; 0: all teeth cut equal chips; infinite: it may have any size. With an even
+        number of teeth runout has the lines of period doubling: where they do not grow, and the chip does not change by
+        more than runout explains, the verdict is ``inconclusive`` instead of ``period-doubling``. NaN: not stated;
+        period doubling is then told with a warning where it is large.
     derivatives : (n_channels,)
-        2 for a channel of acceleration, 1 for velocity, 0 for displacement or force; empty: 0.
-    natural_frequencies
-        Of the structure, Hz. With them the line nearest to a mode gives the frequency; empty: that of largest motion.
-    chip
-        Thickest chip of the cut without vibration, m; NaN: not known.
+        Number of times each channel is differentiated: 2 for acceleration, 1 for velocity, 0 for displacement or force;
+        empty: 0.
+    natural_frequencies : Hz
+        Natural frequencies of the structure. With them the line nearest to a mode gives the frequency; empty: the line
+        of largest motion does.
+    chip : m
+        Thickest chip of the cut without vibration; NaN: not known.
     tool
         Channels that hold the tool's motion across its axis, in m and s; empty: all. Only used with ``chip``.
     modelled
-        Cutter, structure and channels of the tip: with them an even number of teeth with runout is judged by the depth
-        of cut that the motion speaks for. The verdict is then no test of the model.
+        Cutter, structure and channels of the tip. With them an even number of teeth with runout is judged by the depth
+        of cut at which the model moves like the recording. The verdict is then no test of the model.
 
     Raises
     ------

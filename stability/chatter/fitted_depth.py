@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from cutting import MillingProcess
 from modal_fit import ModalModel
 
-from ..tool_receptance import tool_receptance
+from ..milling_loop.tip_receptance import tool_receptance
 from .motion import Evidence
 from .swept_force import angles_of, swept_force
 
@@ -37,11 +37,11 @@ class ModelledCut:
     Parameters
     ----------
     process
-        With feed and runout; only equal pitch, straight edges of 90 degrees and no process damping can be told.
+        Milling process with feed and runout; equal pitch, straight edges of 90 degrees and no process damping.
     model
-        Of the structure at the tool's tip.
+        Modal model of the structure at the tool's tip.
     columns
-        Channels of the tip's motion in X and Y.
+        Numbers of the channels of the tip's motion in X and Y.
     signs
         -1 for a channel that counts positive against its axis, else 1.
     """

@@ -35,18 +35,18 @@ def of_suspect(
     known: Knowledge,
     verdict: ChatterVerdict,
 ) -> ChatterVerdict:
-    """Whether lines that may be chatter are.
+    """Decide whether lines that may be chatter are chatter.
 
     Parameters
     ----------
     family
-        The lines.
+        Family of lines that is judged.
     evidence
-        Of the recording.
+        Evidence gathered from the recording.
     known
-        Modes and chip decide.
+        What is known of the cut; modes and chip decide.
     verdict
-        Completed with what is found of the lines.
+        Verdict so far, which is completed with what is found of the lines.
     """
     motion = known.motion
     course = course_of(evidence.revolutions, family.lines[0].order)

@@ -22,7 +22,7 @@ def angles_of(process: MillingProcess) -> int:
 
 
 def swept_force(process: MillingProcess, motion: Real) -> Real:
-    """Force on the tool over depth and K_tc, from a motion that repeats with the revolution.
+    """Give the force on the tool over depth and K_tc, from a motion that repeats with the revolution.
 
     A tooth takes what stands between its path and the surface that earlier teeth left; a tooth that does not reach the
     surface leaves it, one feed nearer (Insperger & Stepan, Semi-Discretization for Time-Delay Systems, section 5.3).
@@ -30,9 +30,9 @@ def swept_force(process: MillingProcess, motion: Real) -> Real:
     Parameters
     ----------
     process
-        Cutter with feed and runout; equal pitch, straight edges, 90 degrees.
-    motion : (n_angles, 2)
-        Of the tool in X and Y, m, over one revolution that begins when tooth 0 stands at immersion 0.
+        Cutter with feed and runout; equal pitch, straight edges, edge angle 90 degrees.
+    motion : (n_angles, 2), m
+        Motion of the tool in X and Y over one revolution that begins when tooth 0 stands at immersion 0.
 
     Returns
     -------

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..multipliers import multipliers
+from ..floquet.floquet_multipliers import multipliers
 from .fitted_depth import ModelledCut, fitted_depth
 from .motion import Evidence
 from .verdict import STABLE, ChatterVerdict
@@ -15,18 +15,18 @@ _LARGEST = 10.0  # largest depth that is believed over the best; a wider range t
 def told_by_model(
     evidence: Evidence, cut: ModelledCut, derivatives: tuple[int, ...], doubled: ChatterVerdict
 ) -> ChatterVerdict | None:
-    """The verdict on motion that alternates, where the cut's stability does not hang on the error of its depth.
+    """Give the verdict on motion that alternates, where the error of the depth does not change the cut's stability.
 
     Parameters
     ----------
     evidence
-        Of the recording.
+        Evidence gathered from the recording.
     cut
         Cutter, structure and channels of the tip.
     derivatives : (n_channels,)
-        2 for acceleration, 1 for velocity, 0 for displacement.
+        Number of times each channel is differentiated: 2 for acceleration, 1 for velocity, 0 for displacement.
     doubled
-        The verdict of period doubling.
+        The verdict of period doubling so far.
 
     Returns
     -------

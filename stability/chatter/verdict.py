@@ -15,12 +15,12 @@ class ForeignTone:
 
     Parameters
     ----------
-    frequency
-        Of the line, Hz.
+    frequency : Hz
+        Frequency of the tone.
     share
-        Root mean square over the motion's, in the channel where it is largest.
+        Root mean square of the tone over that of the motion, in the channel where it is largest.
     name
-        What it is, for example ``mains (3 x 50 Hz)``.
+        Words for the tone's source, for example ``mains (3 x 50 Hz)``.
     """
 
     frequency: float
@@ -30,7 +30,7 @@ class ForeignTone:
 
 @dataclass(frozen=True)
 class ChatterVerdict:
-    """What a recording of a cut says.
+    """Verdict on a recording of a cut: stable or chattering, and why.
 
     Parameters
     ----------
@@ -41,8 +41,8 @@ class ChatterVerdict:
     growth
         Size of the strongest line that is not foreign in the last eighth over that in the first; NaN without such a
         line.
-    frequency
-        Of the line with the largest motion, Hz, not folded; NaN if the cut does not chatter.
+    frequency : Hz
+        Frequency of the line with the largest motion, not folded; NaN if the cut does not chatter.
     p_value
         Probability that the recording's own noise has a line as strong as the strongest that is not foreign; 1 if
         there is none.
@@ -50,12 +50,12 @@ class ChatterVerdict:
         Root mean square of the lines of chatter over that of the motion, in the channel where it is largest.
     foreign
         Tones that are neither the spindle's nor chatter.
-    spindle_speed
-        Found from the recording, rad/s.
+    spindle_speed : rad/s
+        Spindle speed found from the recording.
     drift
-        Change of the spindle's speed from begin to end over its mean.
+        Change of the spindle's speed from beginning to end, over its mean.
     reason
-        One sentence.
+        One sentence that says why the verdict is as it is.
     warnings
         Doubts, one sentence each.
     """

@@ -11,7 +11,7 @@ import pytest
 
 from acquisition import Block, Channel, DeviceTimeout, Disconnected, Recording, StreamDescription, record
 from acquisition.drivers.can_bus import CanFeed, CanSignal, DbcDecoder
-from acquisition.feeds import WithFeeds
+from acquisition.sources.feeds import WithFeeds
 from foundation import FileFormatError, InputError
 
 can = pytest.importorskip("can")

@@ -17,8 +17,9 @@ import pytest
 from scipy.io import savemat, wavfile
 from scipy.sparse import coo_array
 
-from acquisition import HOST_AXIS, Channel, Events, Recording, RecordingWriter, StreamDescription, guarded_reading
+from acquisition import HOST_AXIS, Channel, Events, Recording, RecordingWriter, StreamDescription
 from acquisition.conversion.array_file import open_arrays
+from acquisition.file_safety import guarded_reading
 from estimation import write_frf_uff
 from foundation import FileFormatError
 from modal_fit import write_modes_uff

@@ -13,7 +13,7 @@ import pytest
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from foundation import MillfrfError
 from millfrf.__main__ import run
-from millfrf.chain.acquire import acquire, open_session
+from millfrf.chain.measuring.record_session import acquire, open_session
 
 RunWithDaqmx = Callable[..., subprocess.CompletedProcess[str]]
 SESSION = """

@@ -13,8 +13,8 @@ from acquisition import Block, Channel, DeviceError, DeviceTimeout, Disconnected
 from acquisition.drivers.amplifier import Amplifier, Command
 from acquisition.drivers.modbus_drive import ModbusFeed, Register
 from acquisition.drivers.tachometer_line import TachometerFeed
-from acquisition.events import Events
-from acquisition.feeds import WithFeeds
+from acquisition.sources.events import Events
+from acquisition.sources.feeds import WithFeeds
 from foundation import InputError
 
 if sys.platform == "win32":

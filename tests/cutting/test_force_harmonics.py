@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cutting import MillingProcess, force_harmonics
-from cutting.tooth_force import tooth_force
+from cutting.one_tooth import tooth_force
 from foundation import InputError
 
 

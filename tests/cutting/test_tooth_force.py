@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cutting import MillingProcess
-from cutting.tooth_force import engaged_share, rigid_chip_thickness, rigid_force, tooth_force, wrapped_immersion
+from cutting.one_tooth import engaged_share, rigid_chip_thickness, rigid_force, tooth_force, wrapped_immersion
 from foundation import InputError
 
 QUARTER, HALF = math.pi / 2, math.pi

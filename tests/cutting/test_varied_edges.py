@@ -19,7 +19,7 @@ from cutting import (
     read_cutting_process,
     turn_harmonics,
 )
-from cutting.tooth_force import rigid_force
+from cutting.one_tooth import rigid_force
 from foundation import FileFormatError, InputError
 
 

@@ -24,7 +24,7 @@ from estimation import (
     principal_inputs,
     virtual_coherence,
 )
-from estimation.independence import independent_lines
+from estimation.spectra.independence import independent_lines
 from foundation import InputError
 from modal_fit import ModalModel
 

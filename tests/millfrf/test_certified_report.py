@@ -11,7 +11,7 @@ from millfrf.report import collect
 from millfrf.report.lobes_check import checked_lobes
 from millfrf.report.page import ReportOptions, report_text
 from millfrf.report.recommendation import recommendation
-from millfrf.report.stability_section import stability_findings
+from millfrf.report.sections.stability import stability_findings
 from modal_fit import ModalModel, write_modal_model
 from stability import certified_lobes, multipliers, write_lobes, zero_order
 

@@ -11,7 +11,7 @@ import pytest
 from acquisition import record
 from cutting import MillingProcess
 from millfrf.__main__ import run
-from millfrf.chain.chatter_file import read_cuts
+from millfrf.chain.cuts.chatter_file import read_cuts
 from modal_fit import write_modal_model
 from replay_data import MillingCell, dynamometer, table_one_model, tip_accelerometers
 from stability import cut_spectrum, gather_evidence

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 
 from foundation import InputError
-from millfrf.concealment import ConcealOptions, run_concealed
-from millfrf.concealment_table import concealment_table, direction_error, judgement
-from millfrf.seal import PADDED, open_seal, seal
-from replay_data.concealed_effect import FOREIGN, ConcealedEffect
+from millfrf.demonstration.concealment import ConcealOptions, run_concealed
+from millfrf.demonstration.concealment_result import concealment_table, direction_error, judgement
+from millfrf.demonstration.seal import PADDED, open_seal, seal
+from replay_data.concealment.concealed_effect import FOREIGN, ConcealedEffect
 
 CONTENT = {"name": "backlash", "direction": [0.6, 0.0, 0.8], "parameters": {"half_gap_m": 1e-5}}
 

@@ -11,7 +11,7 @@ import pytest
 
 from estimation import read_frf
 from millfrf.chain.diagnose import diagnose_files
-from millfrf.demonstration import (
+from millfrf.demonstration.whole_chain import (
     FIT_BAND,
     SUBSPACE_BAND,
     DemoOptions,

@@ -9,7 +9,7 @@ from scipy.fft import irfft, rfft
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from millfrf.__main__ import run
-from millfrf.report.next_tests import next_test
+from millfrf.report.diagnoses.next_tests import next_test
 from mismatch.inference.diagnosis import VERDICTS
 from mismatch.physics import answer_name, library
 from modal_fit import ModalModel, write_modal_model

@@ -7,8 +7,8 @@ import pytest
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from foundation import InputError
-from millfrf.chain.fit import fit_recordings
-from millfrf.chain.fit_options import FitOptions
+from millfrf.chain.fitting.fit import fit_recordings
+from millfrf.chain.fitting.fit_options import FitOptions
 from modal_fit import ModalModel
 
 RATE, SAMPLES = 1024.0, 16384

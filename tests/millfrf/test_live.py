@@ -228,7 +228,7 @@ segment_s = 0.5
 def test_without_any_browser_a_live_recording_ends_by_its_duration(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("millfrf.chain.acquire_live._LINGER", 0.1)
+    monkeypatch.setattr("millfrf.chain.measuring.live_session._LINGER", 0.1)
     (tmp_path / "s.toml").write_text("duration_s = 1.0\n" + SESSION)
     out = tmp_path / "a.h5"
     assert run(["acquire", str(tmp_path / "s.toml"), "--out", str(out), "--live", "--at-once"]) == 0

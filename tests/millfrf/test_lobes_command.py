@@ -9,7 +9,7 @@ import pytest
 from cutting import MillingProcess, write_cutting_process
 from estimation import write_frf
 from millfrf.__main__ import DONE, run
-from millfrf.chain.lobes import lobes_summary, mode_coupling_line
+from millfrf.chain.cuts.lobes import lobes_summary, mode_coupling_line
 from modal_fit import write_modal_model
 from replay_data import table_one_model
 from stability import StabilityLobes, certified_lobes, read_lobes

@@ -4,7 +4,7 @@ from math import pi
 
 import numpy as np
 
-from millfrf.report.stability_section import advice_table
+from millfrf.report.sections.stability import advice_table
 from stability import StabilityLobes
 
 

@@ -9,10 +9,21 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from mismatch import Diagnosis, Hypothesis, LabError, ModelShape, Trial, band_of, predict_lines, windowed_lines
-from mismatch.inference.diagnosis import Improvement
+from mismatch import (
+    Hypothesis,
+    LabError,
+    ModelShape,
+    StructureDetails,
+    StructureDiagnosis,
+    Trial,
+    band_of,
+    predict_lines,
+    windowed_lines,
+)
+from mismatch.inference import Diagnosis, Improvement, Remainder
 from mismatch.models.fitting import Fit
 from mismatch.noise.noise_model import KNOTS, NoiseModel
+from mismatch.records.compared_band import compared_band
 from modal_fit import ModalModel
 
 
@@ -73,7 +84,7 @@ def trial_of() -> Callable[[ModalModel, str, float, int], Trial]:
 
 
 @pytest.fixture(scope="package")
-def hand_made() -> Callable[[ModalModel, list[Trial]], Diagnosis]:
+def hand_made() -> Callable[[ModalModel, list[Trial]], StructureDiagnosis]:
     """Makes diagnoses without diagnosing."""
     return _hand_made
 
@@ -91,7 +102,7 @@ def _trial(model: ModalModel, name: str, level: float, seed: int) -> Trial:
     return Trial(name, RATE, force, response + NOISE * rng.normal(size=(n, 2)), np.array([2, 2]), channels)
 
 
-def _hand_made(model: ModalModel, trials: list[Trial]) -> Diagnosis:
+def _hand_made(model: ModalModel, trials: list[Trial]) -> StructureDiagnosis:
     """A diagnosis whose two fits are the true linear model with the true noise."""
     lines = tuple(windowed_lines(trial, band_of(model, RATE), 1.0) for trial in trials)
     shape = ModelShape(model, LabError())
@@ -100,4 +111,8 @@ def _hand_made(model: ModalModel, trials: list[Trial]) -> Diagnosis:
     hypothesis = Hypothesis(shape, np.zeros(shape.size))
     fitted = Fit(hypothesis, (noise,) * len(lines), 0.0, 0.0, 0.0, 1e-6 * np.eye(shape.size))
     gain = Improvement(trials[len(trials) // 2].name, 0.3, 0.2, 0.1, 0.09, 0.01, (0.2, 0.4))
-    return Diagnosis("none", (), (), (), gain, 0.0, fitted, fitted, lines, (hypothesis, hypothesis))
+    nothing = Remainder(0.0, 0.0)
+    details = StructureDetails(
+        fitted, fitted, lines, lines, (hypothesis, hypothesis), compared_band(model, trials[0].rate)
+    )
+    return Diagnosis("structure", "none", (), (), (), gain, nothing, nothing, {}, details)

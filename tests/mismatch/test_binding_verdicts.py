@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, Concealed, forces, linear_acceleration, trial
 
-from millfrf.report.diagnosis_answers import named, verdict_sentence
-from mismatch import Diagnosis, Hypothesis, LabError, ModelShape, Trial, band_of, diagnose, windowed_lines
-from mismatch.adapters.structure.acceptance import LEAST_EVIDENCE
-from mismatch.adapters.structure.confirmed import helps
+from millfrf.report.diagnoses.diagnosis_answers import named, verdict_sentence
+from mismatch import Hypothesis, LabError, ModelShape, StructureDiagnosis, Trial, band_of, diagnose, windowed_lines
+from mismatch.adapters.structure.confirmation import helps
 from mismatch.adapters.structure.held_out import block_powers
-from mismatch.inference.diagnosis import AcceptedCause, Improvement
-from mismatch.inference.verdict import MOST_LEFT, MOST_OF_RESPONSE, leaves_too_much, share_left, verdict_of
+from mismatch.adapters.structure.structure_verdict import verdict_of_structure
+from mismatch.inference import AcceptedCause, Improvement, Settings, VerdictSettings, leaves_too_much, share_left
 from mismatch.location.recording_errors import recording_errors
 from mismatch.models.fitting import Fit, fit
 from mismatch.physics import library
@@ -24,7 +23,7 @@ TONE = 11.37
 
 
 @pytest.fixture(scope="module")
-def with_tone(model: ModalModel) -> Diagnosis:
+def with_tone(model: ModalModel) -> StructureDiagnosis:
     """A steady tone of a tenth to a half of the response, from a machine nearby."""
     rng, made = np.random.default_rng(21), []
     for name, level in (("low", 20.0), ("high", 60.0)):
@@ -35,7 +34,7 @@ def with_tone(model: ModalModel) -> Diagnosis:
     return diagnose(model, made)
 
 
-def test_the_p_value_of_a_tone_agrees_with_its_error(with_tone: Diagnosis) -> None:
+def test_the_p_value_of_a_tone_agrees_with_its_error(with_tone: StructureDiagnosis) -> None:
     """The error falls, and so the test says that it falls: both are of the recording as it was measured."""
     gain = with_tone.improvement
     assert [cause.name for cause in with_tone.physics] == ["unmeasured_excitation"]
@@ -46,7 +45,7 @@ def test_the_p_value_of_a_tone_agrees_with_its_error(with_tone: Diagnosis) -> No
     assert gain.interval[0] <= gain.after / gain.before <= gain.interval[1]
 
 
-def test_a_tone_is_told_with_its_frequency(with_tone: Diagnosis) -> None:
+def test_a_tone_is_told_with_its_frequency(with_tone: StructureDiagnosis) -> None:
     cause = with_tone.physics[0]
     assert cause.parameters["frequency_hz"] == pytest.approx(TONE, abs=0.01)
     assert set(cause.parameters) == set(cause.standard_errors)
@@ -55,7 +54,7 @@ def test_a_tone_is_told_with_its_frequency(with_tone: Diagnosis) -> None:
     assert shown in verdict_sentence(with_tone)
 
 
-def test_errors_of_the_held_out_recording_are_told_once(with_tone: Diagnosis) -> None:
+def test_errors_of_the_held_out_recording_are_told_once(with_tone: StructureDiagnosis) -> None:
     gain = with_tone.improvement
     (held,) = (one for one in recording_errors(with_tone) if one.held_out)
     assert held.recording == gain.held_out
@@ -64,8 +63,8 @@ def test_errors_of_the_held_out_recording_are_told_once(with_tone: Diagnosis) ->
     assert held.noise == pytest.approx(gain.noise_floor, rel=1e-9)
 
 
-def test_powers_in_blocks_sum_to_that_of_the_lines(with_tone: Diagnosis) -> None:
-    lines = with_tone.lines[0]
+def test_powers_in_blocks_sum_to_that_of_the_lines(with_tone: StructureDiagnosis) -> None:
+    lines = with_tone.details.recordings[0]
     whole = float(np.sum(np.abs(lines.measured) ** 2))
     assert block_powers(lines, lines.measured).sum() == pytest.approx(whole, rel=1e-9)
 
@@ -88,12 +87,12 @@ def _fit(misfit: float, score: float | None = None) -> Fit:
         (_gain(0.526, 0.48, 0.491, 0.3, 0.98, 2000.0), 60000.0, False),  # the error rises over that of a refit
         (_gain(0.5, 0.2, 0.19, 0.1, 0.4, 900.0), 1000.0, False),  # it falls by chance
         (_gain(0.5, 0.2, 0.1, 0.1, 1e-6, 2.0), 1000.0, False),  # likelier nowhere but where it was fitted
-        (_gain(0.17, 0.015, 0.016, 0.015, 0.6, 0.0), LEAST_EVIDENCE / 2, True),  # a gain error: as good as any refit
-        (_gain(0.015, 0.015, 0.016, 0.015, 0.6, 0.0), LEAST_EVIDENCE / 2, False),  # no better than the nominal model
+        (_gain(0.17, 0.015, 0.016, 0.015, 0.6, 0.0), 10.0, True),  # a gain error: as good as any refit
+        (_gain(0.015, 0.015, 0.016, 0.015, 0.6, 0.0), 10.0, False),  # no better than the nominal model
     ],
 )
 def test_what_a_held_out_recording_must_confirm(gain: Improvement, gained: float, told: bool) -> None:
-    assert helps(gain, _fit(-gained), _fit(0.0)) is told
+    assert helps(gain, _fit(-gained), _fit(0.0), Settings()) is told
 
 
 @pytest.mark.parametrize(
@@ -109,32 +108,39 @@ def test_a_cause_that_the_labs_belief_tells_need_not_predict_better_than_a_refit
 ) -> None:
     """A gain 1.67 times too high, 5 % noise. Before: let go of, and the modes were blamed."""
     gain = _gain(0.3422, 0.060647, 0.060607, 0.0606, 0.09, evidence)
-    assert helps(gain, _fit(-20.9, -score), _fit(0.0)) is told
+    assert helps(gain, _fit(-20.9, -score), _fit(0.0), Settings()) is told
 
 
 def test_what_an_answer_may_leave() -> None:
-    assert not leaves_too_much(_gain(0.3, 0.2, 0.1, 0.1, 0.0, 99.0))
-    assert leaves_too_much(_gain(0.799, 0.943, 0.558, 0.25, 0.0, 99.0))
-    assert leaves_too_much(_gain(0.9, 0.5, MOST_OF_RESPONSE + 0.01, 0.3, 0.0, 99.0))  # noise, or not: nothing shows it
+    limits = VerdictSettings()
+    assert not leaves_too_much(_gain(0.3, 0.2, 0.1, 0.1, 0.0, 99.0), limits)
+    assert leaves_too_much(_gain(0.799, 0.943, 0.558, 0.25, 0.0, 99.0), limits)
+    assert leaves_too_much(
+        _gain(0.9, 0.5, limits.most_of_response + 0.01, 0.3, 0.0, 99.0), limits
+    )  # noise, or not: nothing shows it
     half = _gain(0.2, 0.2, 0.1, 0.05, 0.0, 99.0)
     assert share_left(half) == pytest.approx(0.2)
-    assert share_left(half) > MOST_LEFT
-    assert leaves_too_much(half)
+    assert share_left(half) > limits.most_left
+    assert leaves_too_much(half, limits)
 
 
 def test_a_quarter_of_the_response_left_is_not_none(
     small_model: ModalModel,
     trial_of: Callable[[ModalModel, str, float, int], Trial],
-    hand_made: Callable[[ModalModel, list[Trial]], Diagnosis],
+    hand_made: Callable[[ModalModel, list[Trial]], StructureDiagnosis],
 ) -> None:
     known = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1)])
-    left = leftover(known.final.hypothesis, list(known.lines))
+    left = leftover(known.details.final.hypothesis, list(known.details.recordings))
     good, bad = _gain(0.1, 0.1, 0.1, 0.1, 1.0, 0.0), _gain(0.5, 0.5, 0.5, 0.5, 1.0, 0.0)
-    assert verdict_of(known.final, [], left, left, good) == "none"
-    assert verdict_of(known.final, [], left, left, bad) == "unexplained"
+
+    def verdict_of(causes: list[AcceptedCause], gain: Improvement) -> str:
+        return verdict_of_structure(known.details.final.hypothesis, causes, (left, left), gain, VerdictSettings())
+
+    assert verdict_of([], good) == "none"
+    assert verdict_of([], bad) == "unexplained"
     tone = [AcceptedCause("unmeasured_excitation", {}, {"frequency_hz": 9.0}, {"frequency_hz": 0.1}, 99.0)]
-    assert verdict_of(known.final, tone, left, left, good) == "explained"
-    assert verdict_of(known.final, tone, left, left, bad) == "partly explained"
+    assert verdict_of(tone, good) == "explained"
+    assert verdict_of(tone, bad) == "partly explained"
 
 
 def test_impossible_numbers_are_said_to_be_so() -> None:
@@ -197,5 +203,5 @@ def test_accepted_numbers_are_those_of_the_improved_model(model: ModalModel, lin
     found = diagnose(model, wrong)
     causes = [cause for cause in found.physics if cause.name == "gain_error"]
     assert len(causes) == 1
-    held = [cause for cause in found.final.hypothesis.causes if cause.physics.name == "gain_error"]
+    held = [cause for cause in found.details.final.hypothesis.causes if cause.physics.name == "gain_error"]
     assert causes[0].parameters["gain_minus_one"] == pytest.approx(float(held[0].values[0]), rel=1e-9)

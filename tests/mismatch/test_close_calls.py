@@ -7,10 +7,12 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, Concealed, forces, late, trial
 
-from mismatch import Diagnosis, Hypothesis, Trial, diagnose
-from mismatch.adapters.structure.acceptance import LEAST_EVIDENCE, Option, worth_it
+from mismatch import StructureDiagnosis, Trial, diagnose
+from mismatch.adapters.structure.acceptance import worth_it
 from mismatch.faults.tones import find_tone
+from mismatch.inference import EvidenceSettings, Proposal
 from mismatch.models.fitting import Fit
+from mismatch.physics.missing_mode import PHYSICS as MISSING_MODE
 from modal_fit import ModalModel
 
 
@@ -44,32 +46,33 @@ def test_laws_tried_in_vain_are_tried_again_behind_a_delay(model: ModalModel) ->
 def test_a_narrow_mode_must_outdo_chance_in_all_its_places(
     small_model: ModalModel,
     trial_of: Callable[[ModalModel, str, float, int], Trial],
-    hand_made: Callable[[ModalModel, list[Trial]], Diagnosis],
+    hand_made: Callable[[ModalModel, list[Trial]], StructureDiagnosis],
     half_power_bandwidth: float,
     named: bool,
 ) -> None:
     """Of modes 0.1 Hz wide four hundred fit into the band, of modes 6 Hz wide seven."""
     known = hand_made(small_model, [trial_of(small_model, "low", 20.0, 1), trial_of(small_model, "high", 60.0, 2)])
-    base = known.base
+    base = known.details.base
     pole = -np.pi * half_power_bandwidth + 2j * np.pi * 20.0
-    shape = base.hypothesis.shape.with_mode(pole, small_model.right[0], small_model.left[0])
-    gained = LEAST_EVIDENCE + 5.0
-    fitted = Fit(Hypothesis(shape, np.zeros(shape.size)), base.noises, -200.0, 0.0, -gained, 1e-6 * np.eye(shape.size))
-    assert worth_it(Option("missing_mode", {}, fitted), base, base, list(known.lines)) is named
+    hypothesis = base.hypothesis.with_mode(pole, small_model.right[0], small_model.left[0], MISSING_MODE)
+    gained = EvidenceSettings().least + 5.0
+    fitted = Fit(hypothesis, base.noises, -200.0, 0.0, -gained, 1e-6 * np.eye(hypothesis.size))
+    proposal = Proposal("missing_mode", {}, fitted, gained)
+    assert worth_it(proposal, base, base, list(known.details.recordings), EvidenceSettings()) is named
 
 
 def test_the_gain_of_a_tone_is_that_of_its_own_line(
     small_model: ModalModel,
     trial_of: Callable[[ModalModel, str, float, int], Trial],
-    hand_made: Callable[[ModalModel, list[Trial]], Diagnosis],
+    hand_made: Callable[[ModalModel, list[Trial]], StructureDiagnosis],
 ) -> None:
     """A tone in the middle of a line leaves nothing on the lines beside it, which look as if they stood out as much."""
     made = [trial_of(small_model, "low", 20.0, 1), trial_of(small_model, "high", 60.0, 2)]
-    lines = hand_made(small_model, made).lines[0]
+    lines = hand_made(small_model, made).details.recordings[0]
     frequency = float(lines.frequencies[len(lines.frequencies) // 3])
     wave = 0.02 * np.cos(2 * np.pi * frequency * np.arange(len(made[0].response)) / made[0].rate)
     humming = hand_made(small_model, [replace(one, response=one.response + wave[:, None]) for one in made])
-    found = find_tone(humming.base, list(humming.lines))
+    found = find_tone(humming.details.base, list(humming.details.recordings))
     assert found is not None
     assert found.frequency == pytest.approx(frequency, abs=0.2 / 40.0)
     # a line of a wave of amplitude a over n samples has the power a^2 n / 4, two channels, two recordings

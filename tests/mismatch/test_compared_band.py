@@ -61,10 +61,10 @@ def test_a_model_is_compared_in_its_band(shaken: list[Trial], tmp_path: Path) ->
     found = diagnose(textbook, shaken)
     assert found.verdict == "none", [cause.name for cause in found.physics]
     assert found.improvement.after < 1.2 * found.improvement.noise_floor
-    assert all(BAND[0] <= one.frequencies[0] and one.frequencies[-1] <= BAND[1] for one in found.lines)
-    assert found.band is not None
-    assert found.band.edges == BAND
-    assert "model holds" in found.band.sentence
+    assert all(BAND[0] <= one.frequencies[0] and one.frequencies[-1] <= BAND[1] for one in found.details.recordings)
+    assert found.details.band is not None
+    assert found.details.band.edges == BAND
+    assert "model holds" in found.details.band.sentence
     assert found.doubts == ()
     write_diagnosis(tmp_path / "diagnosis.json", replace(found, located={}))
     content = json.loads((tmp_path / "diagnosis.json").read_text())

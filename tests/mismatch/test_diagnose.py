@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, Concealed, Law, forces, late, linear_acceleration, trial
 
-from mismatch import Diagnosis, Settings, Trial, diagnose
-from mismatch.inference.diagnosis_file import improved_model_of, write_diagnosis
-from mismatch.models.prediction import predict
+from mismatch import Settings, StructureDiagnosis, Trial, diagnose, improved_model_of, predict, write_diagnosis
 from mismatch.physics import library
 from modal_fit import ModalModel, read_modal_model, write_modal_model
 
@@ -67,7 +65,7 @@ def test_a_delay_is_found_and_ends_in_files(model: ModalModel, tmp_path: Path) -
     _round_trip(found, made[1], model, tmp_path)
 
 
-def _round_trip(found: Diagnosis, recording: Trial, model: ModalModel, folder: Path) -> None:
+def _round_trip(found: StructureDiagnosis, recording: Trial, model: ModalModel, folder: Path) -> None:
     write_diagnosis(folder / "diagnosis.json", found)
     content = json.loads((folder / "diagnosis.json").read_text())
     assert content["format"] == "millfrf.diagnosis"

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.signal import firwin, lfilter
 
 from mismatch import Hypothesis, LabError, ModelShape, Trial, band_of, diagnose, predict_lines, windowed_lines
-from mismatch.adapters.structure.acceptance import NOISE_LIKE
+from mismatch.inference import VerdictSettings
 from mismatch.records.true_forces import without_force_noise
 from mismatch.records.windowed_lines import WindowedLines
 from mismatch.remainder.leftover import leftover
@@ -119,5 +119,6 @@ def test_force_that_swells_from_little_leaves_nothing(small_model: ModalModel) -
     shape = ModelShape(small_model, LabError())
     known = Hypothesis(shape, np.zeros(shape.size))
     only = windowed_lines(replace(lines.trial, force=lines.signal(lines.force_lines)), band_of(small_model, RATE), 1.0)
-    assert leftover(known, [only]).share > 10 * NOISE_LIKE
-    assert leftover(known, [lines]).share < NOISE_LIKE
+    noise_like = VerdictSettings().noise_like
+    assert leftover(known, [only]).share > 10 * noise_like
+    assert leftover(known, [lines]).share < noise_like

@@ -11,7 +11,7 @@ import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 
 from mismatch import Hypothesis, JointMotion, LabError, ModelShape, Trial, WindowedLines, band_of, windowed_lines
-from mismatch.adapters.structure.form_spread import with_form_spread
+from mismatch.adapters.structure.form_errors import with_form_spread
 from mismatch.models.fitting import Fit, fit
 from mismatch.models.hypothesis import Cause
 from mismatch.physics import library

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from mismatch.adapters.structure.acceptance import LEAST_EVIDENCE, Option, plainest
+from mismatch.adapters.structure.acceptance import plainest
+from mismatch.inference import EvidenceSettings, Proposal
 from mismatch.joints.joint_law import JointMotion
 from mismatch.models.fitting import Fit
 from mismatch.models.hypothesis import Hypothesis
@@ -49,17 +50,19 @@ def test_they_are_reported_under_the_name_of_the_cause() -> None:
 @pytest.mark.parametrize(("worse", "chosen"), [(0.4, "plain"), (0.6, "long")])
 def test_of_equal_forms_the_one_with_fewer_numbers_is_told(model: ModalModel, worse: float, chosen: str) -> None:
     """As good is what lies within half the least evidence."""
+    as_good = EvidenceSettings().as_good
 
-    def option(name: str, added: int, score: float) -> Option:
+    def option(name: str, added: int, score: float) -> Proposal[Fit]:
         shape = ModelShape(model, LabError())
         for _ in range(added):
             shape = shape.with_mode(model.poles[0] * 2, model.right[0], model.left[0])
         here = Hypothesis(shape, np.zeros(shape.size))
-        return Option(name, {"form": "long" if added else "plain"}, Fit(here, (), 0.0, 0.0, score, np.zeros((1, 1))))
+        fitted = Fit(here, (), 0.0, 0.0, score, np.zeros((1, 1)))
+        return Proposal(name, {"form": "long" if added else "plain"}, fitted, -score)
 
-    options = [option("gap", 1, -500.0), option("gap", 0, -500.0 + worse * LEAST_EVIDENCE), option("other", 0, -499.0)]
-    best = plainest(options)
+    options = [option("gap", 1, -500.0), option("gap", 0, -500.0 + 2 * worse * as_good), option("other", 0, -499.0)]
+    best = plainest(options, as_good)
     assert best is not None
     assert best.location["form"] == chosen
     assert best.name == "gap"
-    assert plainest([]) is None
+    assert plainest([], as_good) is None

@@ -3,14 +3,16 @@
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from mismatch import Diagnosis, Trial
+from mismatch import StructureDiagnosis, Trial
 from mismatch.location.family_wise import holm
-from mismatch.location.locate import locate
+from mismatch.location.locate import located
+from mismatch.location.residual_view import residual_view
 from mismatch.location.spindle_orders import SpindleSpeed
 from modal_fit import ModalModel
 
@@ -18,7 +20,11 @@ RATE, NOISE = 128.0, 0.02
 LEVELS = (1.0, 2.0, 4.0)
 
 MakeTrial = Callable[[ModalModel, str, float, int], Trial]
-MakeDiagnosis = Callable[[ModalModel, list[Trial]], Diagnosis]
+MakeDiagnosis = Callable[[ModalModel, list[Trial]], StructureDiagnosis]
+
+
+def locate(diagnosis: StructureDiagnosis, speeds: dict[str, SpindleSpeed] | None = None) -> dict[str, Any]:
+    return located(residual_view(diagnosis.details, diagnosis.verdict == "unexplained"), speeds or {})
 
 
 def with_residual(trial: Trial, channel: int, extra: np.ndarray) -> Trial:
@@ -87,7 +93,7 @@ def test_order_of_the_spindle(small_model: ModalModel, quiet: list[Trial], hand_
     runout = 2 * NOISE * np.sin(2 * np.pi * 3 * 4.0 * time)
     diagnosis = hand_made(small_model, [with_residual(trial, 0, runout) for trial in quiet])
     speeds = {trial.name: SpindleSpeed(np.zeros(1), np.array([240.0])) for trial in quiet}
-    assert {row["order"] for row in locate(diagnosis, None, speeds)["spindle_orders"]} == {3}
+    assert {row["order"] for row in locate(diagnosis, speeds)["spindle_orders"]} == {3}
     assert locate(diagnosis)["spindle_orders_note"]
 
 
@@ -102,8 +108,9 @@ def test_noise_is_not_believed_where_something_stayed_unexplained(
     small_model: ModalModel, quiet: list[Trial], hand_made: MakeDiagnosis
 ) -> None:
     honest = hand_made(small_model, grown(quiet, 1.0))
-    noises = tuple(replace(one, responses=one.responses + np.log(100.0)) for one in honest.final.noises)
-    fooled = replace(honest, final=replace(honest.final, noises=noises))
+    noises = tuple(replace(one, responses=one.responses + np.log(100.0)) for one in honest.details.final.noises)
+    final = replace(honest.details.final, noises=noises)
+    fooled = replace(honest, details=replace(honest.details, final=final))
     assert locate(fooled)["frequency_bands"] == []
     first = locate(replace(fooled, verdict="unexplained"))["frequency_bands"][0]
     assert first["low_hz"] < 10 < first["high_hz"]

@@ -8,7 +8,7 @@ import pytest
 
 from mismatch import Hypothesis, JointLaw, LabError, ModelShape, Trial, band_of, windowed_lines
 from mismatch import physics as physics_folder
-from mismatch.adapters.structure.reporting_numbers import accepted_cause
+from mismatch.adapters.structure.told_causes import accepted_cause
 from mismatch.joints.joint_law import POINTS
 from mismatch.joints.joint_simulation import driven_force, joint_response
 from mismatch.models.fitting import Fit
@@ -109,7 +109,7 @@ def test_every_cause_is_a_short_file_with_its_source() -> None:
 
 TOY = """
 import numpy as np
-from mismatch.joint_law import JointLaw
+from mismatch.joints.joint_law import JointLaw
 from mismatch.physics import Parameter
 
 

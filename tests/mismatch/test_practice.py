@@ -5,9 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mismatch import diagnose, read_trial, read_trials
-from mismatch.inference.diagnosis_file import improved_model_of
-from mismatch.models.prediction import predict
+from mismatch import diagnose, improved_model_of, predict, read_trial, read_trials
 from modal_fit import read_modal_model
 
 

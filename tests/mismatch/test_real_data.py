@@ -8,8 +8,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from millfrf.chain.fit import fit_recordings
-from millfrf.chain.fit_options import FitOptions
+from millfrf.chain.fitting.fit import fit_recordings
+from millfrf.chain.fitting.fit_options import FitOptions
 from mismatch import diagnose, read_trials
 
 pytestmark = pytest.mark.shared_data
@@ -35,7 +35,7 @@ def test_silverbox_is_a_hardening_spring_and_its_arrowhead_is_simulated_freely(s
     assert strongest.name == "stiffness_hardening"
     assert strongest.parameters["exponent"] == pytest.approx(3.0, abs=0.05)
     before = silverbox.free_run_errors(nominal, signals)
-    after = silverbox.free_run_errors(silverbox.improved_model(found.final.hypothesis), signals)
+    after = silverbox.free_run_errors(silverbox.improved_model(found.details.final.hypothesis), signals)
     assert all(after[part] < 0.1 * before[part] for part in before)
     assert after["arrowhead"] < 1.0  # mV; a neural state-space encoder is given as about 6
 
@@ -89,5 +89,5 @@ def test_no_confident_wrong_answer_on_an_aircraft(shared_data: Path, band: tuple
     assert found.verdict == "unexplained"
     assert found.physics == ()
     assert found.leftover > 0.9
-    assert found.band is not None
-    assert found.band.edges == band
+    assert found.details.band is not None
+    assert found.details.band.edges == band

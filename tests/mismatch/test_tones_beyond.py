@@ -6,8 +6,9 @@ from concealed_recordings import RATE, forces, linear_acceleration, structure, t
 from numpy.typing import NDArray
 
 from mismatch import Hypothesis, LabError, ModelShape
-from mismatch.faults.tones import NEAR, TONE_CONTRAST, Tone, above_neighbours
+from mismatch.faults.tones import NEAR, Tone, above_neighbours
 from mismatch.faults.tones_beyond import tones_beyond
+from mismatch.inference import FAULTS
 from mismatch.records.trial import Trial, band_of
 from mismatch.records.windowed_lines import WindowedLines, windowed_lines
 
@@ -72,4 +73,4 @@ def test_the_ends_of_a_band_stand_out_no_more_than_its_middle() -> None:
     """White noise, 200 lines a time: a weak last line must not make its neighbours look strong."""
     rng = np.random.default_rng(11)
     highest = [above_neighbours(rng.exponential(size=200), NEAR) for _ in range(1000)]
-    assert max(float(one.max()) for one in highest) < TONE_CONTRAST / 2
+    assert max(float(one.max()) for one in highest) < FAULTS.contrast / 2

@@ -8,10 +8,10 @@ from cutting import MillingProcess
 from estimation import BandDecimator, BandRecord
 from foundation import InputError
 from modal_fit import SubspaceFit, fit_subspace, frequency_and_damping_errors
-from modal_fit.likelihood_model import Setting, gauge_directions, jacobian, prediction, transfer
-from modal_fit.linear_start import linear_start
-from modal_fit.out_of_band import out_of_band_basis
-from modal_fit.record_spectra import record_spectra
+from modal_fit.maximum_likelihood.likelihood_model import Setting, gauge_directions, jacobian, prediction, transfer
+from modal_fit.maximum_likelihood.linear_start import linear_start
+from modal_fit.maximum_likelihood.whole_records import record_spectra
+from modal_fit.models.out_of_band import out_of_band_basis
 from replay_data import LinearSweep, MillingCell, default_structure, milling_sensors
 
 RPM = 2 * np.pi / 60

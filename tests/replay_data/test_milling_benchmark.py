@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from cutting import MillingProcess
-from cutting.tooth_force import tooth_offsets
+from cutting.one_tooth import tooth_offsets
 from modal_fit import ModalModel
-from replay_data.material import material_named
-from replay_data.milling_loop import empty_memory, mill, prepare_cut
-from replay_data.modal_integrator import discretise
 from replay_data.robot_structure import TOOL_TIP
+from replay_data.simulation.material import material_named
+from replay_data.simulation.milling_loop import empty_memory, mill, prepare_cut
+from replay_data.simulation.modal_integrator import discretise
 
 STEPS_PER_TOOTH = 512
 

@@ -186,7 +186,7 @@ def test_compensated_path_meets_the_nominal_one(tmp_path: Path) -> None:
     place = mechanism.transforms(q)[mechanism.index("E")]
     phase = np.linspace(0, 2 * np.pi, 8)
     positions = place[:3, 3] + 0.05 * np.column_stack([np.cos(phase) - 1, np.sin(phase), 0 * phase])
-    from robot_model.mechanism import rotation_vector
+    from robot_model.kinematics.mechanism import rotation_vector
 
     path = ToolPath(
         positions,

@@ -12,9 +12,9 @@ from cutting import MillingProcess
 from estimation import read_frf
 from foundation import apart
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from millfrf.robot.depth_map import depth_limits
-from millfrf.robot.posture_maps import depth_over_places, depth_over_redundancy
-from millfrf.robot.robot_lobes import at_the_tip
+from millfrf.robot.lobes.depth_map import depth_limits
+from millfrf.robot.lobes.posture_maps import depth_over_places, depth_over_redundancy
+from millfrf.robot.lobes.robot_lobes import at_the_tip
 from modal_fit import read_modal_model
 from replay_data import MillingCell
 from robot_model import modal_model_at, read_planar_robot, read_spatial_robot, rigid_model, tool_down

@@ -7,16 +7,9 @@ from benchmarks_of_literature import HALF_DOWN, RPM, benchmark_cut, one_degree_o
 from cutting import MillingProcess
 from modal_fit import ModalModel
 from replay_data import table_one_model
-from stability import (
-    StabilityLobes,
-    certified,
-    certified_lobes,
-    collocation,
-    multipliers,
-    nyquist_limits,
-    zero_order,
-)
-from stability.stability_limits import StabilityLimits
+from stability import StabilityLobes, certified_lobes, collocation, multipliers, nyquist_limits, zero_order
+from stability.certification import certified
+from stability.lobes.stability_limits import StabilityLimits
 
 SLOT = MillingProcess(4, 0.0127, np.pi / 2, 700e6, 0.17, 0.33, 0.0, np.pi, 1e-4)
 SPEEDS = np.array([510.0, 528.0, 545.0]) * RPM
@@ -63,7 +56,7 @@ def test_what_no_second_discretisation_confirms_is_a_lower_bound(monkeypatch: py
     right = collocation(table_one_model(), SLOT, SPEEDS[:1], 0.024)
     wrong = _with_limits(right, np.array([np.inf]))
     monkeypatch.setattr(certified, "lowest_limits", lambda *_: wrong)
-    monkeypatch.setattr("stability.second_look._confirmed", lambda *_: False)
+    monkeypatch.setattr("stability.certification.second_look._confirmed", lambda *_: False)
     lobes = certified_lobes(table_one_model(), SLOT, SPEEDS[:1], 0.024)
     assert lobes.status == ("lower-bound",)
     assert 0.9 * right.depth_limits[0] < lobes.depth_limits[0] < right.depth_limits[0]

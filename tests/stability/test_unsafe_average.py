@@ -17,7 +17,7 @@ from millfrf.__main__ import run
 from millfrf.report import collect
 from millfrf.report.lobes_check import checked_lobes
 from millfrf.report.recommendation import recommendation
-from millfrf.report.stability_section import stability_findings
+from millfrf.report.sections.stability import stability_findings
 from modal_fit import ModalModel, write_modal_model
 from stability import (
     certified_lobes,

@@ -15,7 +15,7 @@ from stability import (
     semi_discretisation,
     zero_order,
 )
-from stability.varied_limits import varied_limits
+from stability.solvers.varied_limits import varied_limits
 
 RPM = np.pi / 30
 LABELS = ("T:+X", "T:+Y", "T:+Z")

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from benchmarks.blind_trial.effects.change import Change, Effect, Scene, Signals
-from benchmarks.blind_trial.excitation import RATE
+from ..excitation import RATE
+from .change import Change, Effect, Scene, Signals
 
 FORCES, ACCELERATIONS = ("fx", "fy", "fz"), ("ax", "ay", "az")
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.blind_trial.excitation import Test
-from benchmarks.blind_trial.integrator import Element
-from benchmarks.blind_trial.structures import Structure
+from ..excitation import Test
+from ..integrator import Element
+from ..structures import Structure
 
 Signals = NDArray[np.float64]
 Chain = Callable[[Signals, np.random.Generator], Signals]

@@ -2,9 +2,9 @@
 
 from typing import Any
 
-from benchmarks.blind_trial import laws
-from benchmarks.blind_trial.effects.change import Change, Effect, Scene, fixed
-from benchmarks.blind_trial.integrator import Element
+from .. import laws
+from ..integrator import Element
+from .change import Change, Effect, Scene, fixed
 
 
 def coulomb(scene: Scene, family: str, dial: float) -> Change:

@@ -4,10 +4,10 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.blind_trial import laws
-from benchmarks.blind_trial.effects.change import Change, Effect, Scene, fixed
-from benchmarks.blind_trial.excitation import BEFORE, DURATION, RATE, Test
-from benchmarks.blind_trial.integrator import Element
+from .. import laws
+from ..excitation import BEFORE, DURATION, RATE, Test
+from ..integrator import Element
+from .change import Change, Effect, Scene, fixed
 
 _HARDENING = {"cubic": laws.CUBIC, "power_2.5": laws.POWER, "saturating": laws.SATURATING, "bumper": laws.BUMPER}
 _SOFTENING = {"saturating": laws.SATURATING, "rational": laws.RATIONAL, "root": laws.ROOT}

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from benchmarks.blind_trial.effects.change import Change, Effect, Scene, Signals
-from benchmarks.blind_trial.excitation import RATE
+from ..excitation import RATE
+from .change import Change, Effect, Scene, Signals
 
 
 def missing_mode(scene: Scene, family: str, dial: float) -> Change:

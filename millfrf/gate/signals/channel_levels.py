@@ -6,7 +6,7 @@ import numpy as np
 
 from acquisition import Channel, Stream
 
-from ...tables import Table
+from ...tables.result_tables import Table
 from .extremes import Extreme
 
 NEAR_FULL_SCALE = 0.999
@@ -26,7 +26,7 @@ class ChannelLevel:
     Parameters
     ----------
     channel
-        Whose samples these are.
+        Channel whose samples these are.
     """
 
     channel: Channel

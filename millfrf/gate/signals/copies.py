@@ -16,7 +16,7 @@ class Copies:
     Parameters
     ----------
     names
-        Of the channels, along the columns.
+        Names of the channels, along the columns.
     same, proportional
         Pairs of column numbers that are still equal (or opposite), or in a fixed ratio; None before the first block.
     """

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from robot_model import SpatialRobot, housing_node, modes_at
-from robot_model.spatial_modes import modal_damping
+from robot_model.spatial.spatial_modes import modal_damping
 
 from ...inference import LabError
 from ...records.windowed_lines import WindowedLines

@@ -1,149 +1,142 @@
-"""When a fitted cause is worth accepting, and when so much is left that none is named."""
+"""When a fitted cause of a structure is worth accepting, and when its law is not what its name means."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...inference import EvidenceSettings, Proposal
 from ...models.fitting import Fit, fit
 from ...models.hypothesis import Cause, Hypothesis
-from ...physics import ChainPhysics, LimitedPhysics
+from ...physics import ChainPhysics, LimitedPhysics, ModePhysics
 from ...records.windowed_lines import WindowedLines
-from ...remainder.leftover import Leftover
 
 Real = NDArray[np.float64]
 
-LEAST_EVIDENCE = 20.0
-"""Gain in score below which nothing is accepted: odds of some twenty thousand to one."""
-
-NOISE_LIKE = 0.05
-"""Share of a residual that may seem to move with the signal by chance, hum or force noise."""
-
-EXPLAINED = 0.95
-"""Share of what moved with the signal that causes must have taken away, if what is left is not noise-like."""
-
-HELD_OUT = 10.0
-"""Gain in misfit on a held-out recording below which a cause that mends the residual is let go again."""
-
-CLEAR = 4.0
-"""Standard errors by which a cause's number must differ from none."""
-
-SMALL = 0.01
-"""Evidence of a further cause, as a share of what the first ones had, below which it may mend the form of their law."""
-
-AFTER_A_LAW = 0.1
-"""The same once a joint's law was accepted, whose form is never quite the true one."""
-
-UNCLEAR = 5.0
-"""Times the evidence that a linear cause needs whose number does not stand out of its error."""
-
 TO_REST = 60
-"""Iterations at most for modes to make up for a cause that is taken away."""
+"""Steps at most for modes to make up for a cause that is taken away."""
 
 
-@dataclass(frozen=True)
-class Option:
-    """A fitted candidate."""
+def impossible(proposal: Proposal[Fit], clear: float) -> str:
+    """Why the numbers of the last cause cannot be, beyond their errors; empty where they can.
 
-    name: str
-    location: dict[str, Any]
-    fitted: Fit
-
-
-def gains(option: Option, current: Fit) -> bool:
-    """Whether an option has the least evidence that counts."""
-    return option.fitted.score <= current.score - LEAST_EVIDENCE
-
-
-def impossible(option: Option) -> str:
-    """Why the numbers of an option's last cause cannot be, beyond their errors; empty where they can."""
-    causes = option.fitted.hypothesis.causes
-    if option.name == "missing_mode" or not causes:
-        return ""
-    cause = causes[-1]
+    Parameters
+    ----------
+    proposal
+        A fitted cause.
+    clear
+        Standard errors by which a number must be wrong.
+    """
+    cause = proposal.fitted.hypothesis.causes[-1]
     said: Callable[[Real, Real], str] | None = getattr(cause.physics, "impossible", None)
     if said is None:
         return ""
-    first = option.fitted.hypothesis.size - cause.size
-    spread = np.sqrt(np.maximum(np.diag(option.fitted.covariance)[first : first + len(cause.values)], 0.0))
     steps = np.array([parameter.unit_step for parameter in cause.physics.parameters])
-    return said(cause.values, CLEAR * spread * steps)
+    return said(cause.values, clear * _spread(proposal.fitted, cause) * steps)
 
 
-def plainest(options: list[Option]) -> Option | None:
-    """The option with the best score, or the form of the same cause that is as good with fewer numbers."""
-    best = min(options, key=lambda option: option.fitted.score, default=None)
-    if best is None:
-        return None
-    line = best.fitted.score + LEAST_EVIDENCE / 2
-    forms = [option for option in options if option.name == best.name and option.fitted.score < line]
-    return min(forms, key=lambda option: (option.fitted.hypothesis.size, option.fitted.score))
+def possible_gains(proposals: Sequence[Proposal[Fit]], settings: EvidenceSettings) -> list[Proposal[Fit]]:
+    """Causes with possible numbers and the least evidence that counts, most evidence first.
 
-
-def unexplained(hypothesis: Hypothesis, left: Leftover, before: Leftover) -> bool:
-    """Whether too much still moves with the signal for the causes found, if any.
-
-    A law that had to be held within what its name means may leave nothing: it is another law.
+    Parameters
+    ----------
+    proposals
+        Fitted causes.
+    settings
+        Thresholds.
     """
-    if left.share <= NOISE_LIKE:
-        return False
-    return left.power > (1 - EXPLAINED) * before.power or any(_strained(cause) for cause in hypothesis.causes)
+    good = [one for one in proposals if one.evidence >= settings.least and not impossible(one, settings.clear)]
+    return sorted(good, key=lambda one: -one.evidence)
 
 
-def _strained(cause: Cause) -> bool:
-    """Whether the data ask of a law what its name excludes."""
-    limited = cause.physics
-    return (
-        isinstance(limited, LimitedPhysics)
+def plainest(proposals: Sequence[Proposal[Fit]], as_good: float) -> Proposal[Fit] | None:
+    """The cause with most evidence, or the form of the same cause that is as good with fewer numbers.
+
+    Parameters
+    ----------
+    proposals
+        Fitted causes, most evidence first.
+    as_good
+        Evidence by which a form may be worse.
+    """
+    if not proposals:
+        return None
+    best = proposals[0]
+    forms = [one for one in proposals if one.name == best.name and one.evidence > best.evidence - as_good]
+    return min(forms, key=lambda one: (one.fitted.hypothesis.size, one.fitted.score))
+
+
+def strained(hypothesis: Hypothesis) -> bool:
+    """Whether the data ask of a law what its name excludes.
+
+    Parameters
+    ----------
+    hypothesis
+        A fitted hypothesis with its causes.
+    """
+    return any(
+        isinstance(cause.physics, LimitedPhysics)
         and cause.motion is not None
-        and limited.strained(cause.values, cause.motion)
+        and cause.physics.strained(cause.values, cause.motion)
+        for cause in hypothesis.causes
     )
 
 
-def evidence_needed(current: Fit, base: Fit) -> float:
+def evidence_needed(current: Fit, base: Fit, settings: EvidenceSettings) -> float:
     """Gain in score that a further cause needs: a small one may only mend the form of those found.
 
     Parameters
     ----------
     current
-        With the causes found so far.
+        The fit with the causes found so far.
     base
-        Without any.
+        The fit without any.
+    settings
+        Thresholds.
     """
-    a_law = any(cause.direction is not None for cause in current.hypothesis.causes)
-    share = AFTER_A_LAW if a_law else SMALL
-    return max(LEAST_EVIDENCE, share * (base.score - current.score))
+    share = settings.small_after_law if current.hypothesis.laws else settings.small
+    return max(settings.least, share * (base.score - current.score))
 
 
-def worth_it(option: Option, current: Fit, base: Fit, lines: list[WindowedLines]) -> bool:
-    """Enough evidence; and if it lies in the lab's belief alone, most of what the belief found odd.
+def worth_it(
+    proposal: Proposal[Fit], current: Fit, base: Fit, lines: list[WindowedLines], settings: EvidenceSettings
+) -> bool:
+    """Whether a cause has enough evidence; of evidence in the lab's belief alone, most of what was odd must go.
 
     It must then be more likely, too, than that the lab was wrong in nothing but all dampings, or all frequencies.
+
+    Parameters
+    ----------
+    proposal
+        The cause, fitted until it rests.
+    current, base
+        Fits with the causes found so far, and without any.
+    lines
+        Recordings.
+    settings
+        Thresholds.
     """
-    gain = current.score - option.fitted.score
-    needed = evidence_needed(current, base)
-    if option.name == "missing_mode":
-        needed, clear = needed + _places_of_a_mode(option.fitted, lines), _mode_measured(option.fitted)
+    fitted, needed = proposal.fitted, evidence_needed(current, base, settings)
+    if isinstance(fitted.hypothesis.causes[-1].physics, ModePhysics):
+        needed, clear = needed + _places_of_a_mode(fitted, lines), _mode_measured(fitted, settings.clear)
     else:
-        clear = _measured(option.fitted)
-        needed *= 1.0 if clear else UNCLEAR
-    if gain < needed or not (clear or _is_missed(option, lines, needed)):
+        clear = _measured(fitted, settings.clear)
+        needed *= 1.0 if clear else settings.unclear
+    if proposal.evidence < needed or not (clear or _is_missed(fitted, lines, needed)):
         return False
-    if current.misfit - option.fitted.misfit > LEAST_EVIDENCE:
+    if current.misfit - fitted.misfit > settings.least:
         return True
-    size = current.hypothesis.shape.size
-    odd = max(current.deviation - size, 1.0)
-    if current.deviation - option.fitted.deviation <= 0.6 * odd:
+    odd = max(current.deviation - current.hypothesis.shape.size, 1.0)
+    if current.deviation - fitted.deviation <= settings.mends_belief * odd:
         return False
-    return gain > _plainer_gain(current, lines)
+    return proposal.evidence > _plainer_gain(current, lines)
 
 
 def _plainer_gain(current: Fit, lines: list[WindowedLines]) -> float:
     """What the score would gain if nothing were believed of the dampings, or of the frequencies."""
     shape = current.hypothesis.shape
-    rows = shape.modal_rows(current.hypothesis.u)[: len(shape.nominal.poles) - shape.added]
+    rows = shape.modal_rows(current.hypothesis.u)[: shape.believed]
     cost = float(np.log(2 * sum(one.measured.size for one in lines)))
     return max(float(np.sum(rows[:, k] ** 2 - cost)) for k in (0, 1))
 
@@ -155,36 +148,40 @@ def _places_of_a_mode(fitted: Fit, lines: list[WindowedLines]) -> float:
     return 2 * float(np.log(max(band / (-float(pole.real) / np.pi), 1.0)))
 
 
-def _is_missed(option: Option, lines: list[WindowedLines], needed: float) -> bool:
+def _is_missed(fitted: Fit, lines: list[WindowedLines], needed: float) -> bool:
     """Whether modes, from where they are with a cause of the measuring chain, cannot make up for it.
 
     A delay is taken up by real modes to first order: its number has a wide error, and still it is not none.
     """
-    fitted, hypothesis = option.fitted, option.fitted.hypothesis
-    if option.name == "missing_mode" or not isinstance(hypothesis.causes[-1].physics, ChainPhysics):
+    hypothesis = fitted.hypothesis
+    if not isinstance(hypothesis.causes[-1].physics, ChainPhysics):
         return False
     without = replace(hypothesis, causes=hypothesis.causes[:-1])
     return fit(lines, without, fitted.noises, iterations=TO_REST).score - fitted.score > needed
 
 
-def _mode_measured(fitted: Fit) -> bool:
+def _mode_measured(fitted: Fit, clear: float) -> bool:
     """Whether the damping of the mode added last stands out of its error: else no resonance was seen."""
     shape = fitted.hypothesis.shape
     place = shape.per_mode * (len(shape.nominal.poles) - 1) + 1
-    return float(np.sqrt(np.maximum(fitted.covariance[place, place], 0.0))) * shape.lab.damping < 1 / CLEAR
+    return float(np.sqrt(np.maximum(fitted.covariance[place, place], 0.0))) * shape.lab.damping < 1 / clear
 
 
-def _measured(fitted: Fit) -> bool:
+def _measured(fitted: Fit, clear: float) -> bool:
     """Whether any number of the last cause stands out of its own error: else the gain came from elsewhere."""
     cause = fitted.hypothesis.causes[-1]
-    first = fitted.hypothesis.size - cause.size
-    spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[first : first + len(cause.values)], 0.0))
     absent = cause.physics.start(fitted.hypothesis.shape.nominal) if isinstance(cause.physics, ChainPhysics) else None
-    clear = []
-    for k, (parameter, error) in enumerate(zip(cause.physics.parameters, spread, strict=True)):
+    stands_out = []
+    for k, (parameter, error) in enumerate(zip(cause.physics.parameters, _spread(fitted, cause), strict=True)):
         if parameter.logarithmic:
-            clear.append(error * parameter.unit_step < 1 / CLEAR)
+            stands_out.append(error * parameter.unit_step < 1 / clear)
         else:
             zero = 0.0 if absent is None else float(absent[k])
-            clear.append(abs(float(cause.values[k]) - zero) > CLEAR * error * parameter.unit_step)
-    return any(clear) if isinstance(cause.physics, ChainPhysics) else clear[0]
+            stands_out.append(abs(float(cause.values[k]) - zero) > clear * error * parameter.unit_step)
+    return any(stands_out) if isinstance(cause.physics, ChainPhysics) else stands_out[0]
+
+
+def _spread(fitted: Fit, cause: Cause) -> Real:
+    """Standard errors of the coordinates of the last cause's numbers, (n_parameters,)."""
+    first = fitted.hypothesis.size - cause.size
+    return np.sqrt(np.maximum(np.diag(fitted.covariance)[first : first + len(cause.values)], 0.0))

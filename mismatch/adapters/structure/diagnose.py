@@ -1,88 +1,76 @@
-"""The diagnosis: plain faults, linear refit, one cause after the other, and a decision that may be to abstain."""
+"""The diagnosis of a structure: faults, a linear refit, one cause after the other, and a verdict that binds."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from modal_fit import ModalModel
 
-from ...faults.fault_repair import repair_plain_faults, with_tones_settled
-from ...inference.diagnosis import AcceptedCause, Candidate, Diagnosis
-from ...inference.verdict import verdict_of
+from ...faults.fault_repair import repair_faults, with_tones_settled
+from ...inference import (
+    AcceptedCause,
+    Candidate,
+    Diagnosis,
+    EvidenceSettings,
+    Progress,
+    Remainder,
+    Search,
+    Settings,
+    search,
+)
+from ...location.locate import located
+from ...location.residual_view import residual_view
+from ...location.spindle_orders import SpindleSpeed
+from ...location.structure_details import StructureDetails, StructureDiagnosis
 from ...models.fitting import Fit, fit
 from ...models.hypothesis import Hypothesis
 from ...models.linear_part import with_linear_part
-from ...models.model_shape import LabError, ModelShape
-from ...physics import ChainPhysics, JointPhysics, Physics, library
+from ...models.model_shape import ModelShape
+from ...physics import is_fault, library
 from ...records.compared_band import compared_band
 from ...records.trial import Trial
 from ...records.true_forces import without_force_noise
 from ...records.windowed_lines import WindowedLines, windowed_lines
 from ...remainder.beyond_model import beyond_model
-from ...remainder.leftover import Leftover, leftover
-from ...screening.search_round import Round, fitted_options
-from .acceptance import LEAST_EVIDENCE, Option, gains, impossible, plainest, worth_it
-from .confirmed import confirmed
-from .form_spread import with_form_spread
-from .held_out import Recordings, held_out_improvement, scored
-from .pruning import pruned
-from .reporting_numbers import accepted_cause, accepted_mode, modal_deviation, with_final_numbers
-from .settling import settled
-
-Real = NDArray[np.float64]
-Progress = Callable[[str], None]
-
-MOST_CAUSES = 3
+from ...remainder.leftover import leftover
+from .comparison import StructureComparison
+from .confirmation import confirmed
+from .form_errors import with_form_spread
+from .held_out import HeldOut, Recordings, held_out_improvement, scored
+from .structure_verdict import verdict_of_structure
+from .told_causes import modal_deviation, told_causes
 
 FIRST_FIT = 30
 """Steps at most of the modal parameters: a nominal model may be far off."""
-
-AGAIN = 0.7
-"""Of what moved with the signal when joint laws were tried in vain: they are tried again when no more is left, or when
-nothing else explains more."""
 
 MOSTLY = 0.5
 """Share of a force's power that must be left when its noise is taken out."""
 
 
-@dataclass(frozen=True)
-class Settings:
-    """How a diagnosis is made.
-
-    Parameters
-    ----------
-    lab
-        What a lab's own fit is usually off.
-    causes
-        By name; None: the whole library.
-    """
-
-    lab: LabError = field(default_factory=LabError)
-    causes: dict[str, Physics] | None = None
-
-
 def diagnose(
-    model: ModalModel, trials: Sequence[Trial], settings: Settings | None = None, watch: Progress | None = None
-) -> Diagnosis:
+    model: ModalModel,
+    recordings: Sequence[Trial],
+    settings: Settings | None = None,
+    progress: Progress | None = None,
+    *,
+    speeds: Mapping[str, SpindleSpeed] | None = None,
+) -> StructureDiagnosis:
     """Find what a model leaves out of recordings.
 
     Parameters
     ----------
     model
         Nominal receptances.
-    trials
-        Recordings, any order.
+    recordings
+        Forces and responses of the model's degrees of freedom, in any order.
     settings
-        None: defaults.
-    watch
-        Told what is being done.
-
-    Returns
-    -------
-    Diagnosis
+        Thresholds and causes; None: the usual ones.
+    progress
+        Called with a short text when a new stage begins.
+    speeds
+        Spindle speed by the recording's name, where it is known.
 
     Raises
     ------
@@ -91,59 +79,59 @@ def diagnose(
     """
     # matrices are small: threads inside the linear algebra only get in each other's way
     with threadpool_limits(1, user_api="blas"):
-        return _diagnosed(model, trials, settings or Settings(), watch or (lambda text: None))
+        return _diagnosed(model, recordings, settings or Settings(), progress or (lambda text: None), speeds or {})
 
 
-def _diagnosed(model: ModalModel, trials: Sequence[Trial], settings: Settings, tell: Progress) -> Diagnosis:
+def _diagnosed(
+    model: ModalModel,
+    recordings: Sequence[Trial],
+    settings: Settings,
+    progress: Progress,
+    speeds: Mapping[str, SpindleSpeed],
+) -> StructureDiagnosis:
     """One step after the other."""
-    causes = settings.causes if settings.causes is not None else library()
     decay = float((-model.poles.real).min())
-    bands = [compared_band(model, trial.rate) for trial in trials]
-    lines = [windowed_lines(trial, band.edges, decay) for trial, band in zip(trials, bands, strict=True)]
-    tell("modal parameters")
-    nominal = Hypothesis(ModelShape(model, settings.lab), np.zeros(ModelShape(model, settings.lab).size))
-    base = fit(lines, nominal, iterations=FIRST_FIT)
-    lines, base = _with_true_forces(lines, base)
-    tell("tones and clipping")
-    whole = lines
-    lines, base, faults = repair_plain_faults(lines, base)
-    search = _search(lines, base, faults, causes, tell)
-    tell("held-out recording")
-    recordings = Recordings(lines, whole)
-    (steps, accepted), rejected, held_out = confirmed(recordings, search.steps, search.accepted)
-    current, candidates = steps[-1], search.candidates + rejected
-    tell("what is left")
-    told = with_form_spread(current, lines)
-    accepted = with_tones_settled(current, whole, with_final_numbers(told, accepted), decay)
-    elsewhere = held_out.linear, held_out.improved
-    held_out = scored(recordings, elsewhere, current.noises, accepted)
-    deviation = _deviation(lines, told)
-    if deviation is not None:
-        accepted.append(deviation)
-    left = leftover(current.hypothesis, lines)
-    verdict = verdict_of(current, accepted, left, search.before, held_out.improvement)
-    if verdict == "unexplained":
-        candidates += [Candidate(one.name, one.evidence, "rejected", one.location) for one in accepted]
-        accepted, current, left = [], base, search.before
-        held_out = held_out_improvement(Recordings(whole, whole), base.hypothesis, base.noises)
+    bands = [compared_band(model, one.rate) for one in recordings]
+    lines = [windowed_lines(one, band.edges, decay) for one, band in zip(recordings, bands, strict=True)]
+    progress("modal parameters")
+    shape = ModelShape(model, settings.lab)
+    base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=FIRST_FIT)
+    measured, base = _with_true_forces(lines, base, settings.evidence)
+    progress("tones and clipping")
+    mended, base, faults = repair_faults(measured, base, settings)
+    before = leftover(base.hypothesis, mended)
+    comparison = StructureComparison(mended, settings.causes or library(), settings, before)
+    found = search(comparison, base, progress)
+    progress("held-out recording")
+    both = Recordings(mended, measured)
+    found, held_out = confirmed(comparison, both, found, faults)
+    progress("what is left")
+    answer = _answer(comparison, both, found, held_out, faults, decay)
+    progress("where the mismatch sits")
+    band = max(bands, key=lambda band: band.high)
+    elsewhere = answer.held_out.linear, answer.held_out.improved
+    details = StructureDetails(base, answer.final, tuple(mended), tuple(measured), elsewhere, band)
+    view = residual_view(details, answer.verdict == "unexplained", recordings)
+    candidates = sorted([*found.candidates, *answer.rejected], key=lambda one: -one.evidence)
     return Diagnosis(
-        verdict,
-        tuple(accepted),
-        tuple(sorted(candidates, key=lambda one: -one.evidence)),
-        search.equivalents if accepted else (),
-        held_out.improvement,
-        left.share,
-        base,
-        current,
-        tuple(lines),
-        (held_out.linear, held_out.improved),
-        band=max(bands, key=lambda band: band.high),
-        doubts=beyond_model(base.hypothesis, lines),
-        measured=tuple(whole),
+        "structure",
+        answer.verdict,
+        answer.causes,
+        tuple(candidates),
+        found.equivalents if answer.causes else (),
+        answer.held_out.improvement,
+        before,
+        answer.left,
+        located(view, speeds),
+        replace(details, view=view),
+        doubts=beyond_model(base.hypothesis, mended),
+        content={"compared_band": asdict(band)},
     )
 
 
-def _with_true_forces(lines: list[WindowedLines], base: Fit) -> tuple[list[WindowedLines], Fit]:
+def _with_true_forces(
+    lines: list[WindowedLines], base: Fit, settings: EvidenceSettings
+) -> tuple[list[WindowedLines], Fit]:
     """Forces as measured, with the noise that the first fit found taken out, or with that of their quietest lines.
 
     The likelihood chooses, and must gain as much as a cause: hum on the responses hides how noisy the forces are, and
@@ -156,7 +144,7 @@ def _with_true_forces(lines: list[WindowedLines], base: Fit) -> tuple[list[Windo
         if all(_mostly_kept(one, before) for one, before in zip(weighed, lines, strict=True)):
             found.append((weighed, fit(weighed, base.hypothesis, base.noises)))
     best = min(found, key=lambda pair: pair[1].score)
-    return best if best[1].score < base.score - LEAST_EVIDENCE else found[0]
+    return best if best[1].score < base.score - settings.least else found[0]
 
 
 def _mostly_kept(lines: WindowedLines, before: WindowedLines) -> bool:
@@ -166,90 +154,52 @@ def _mostly_kept(lines: WindowedLines, before: WindowedLines) -> bool:
 
 
 @dataclass(frozen=True)
-class _Search:
-    """The search for causes: fits without any, with the first, and so on."""
+class _Answer:
+    """What is told: verdict, causes, the fit that holds them, what is left, errors held out, causes turned down."""
 
-    steps: list[Fit]
-    accepted: list[AcceptedCause]
-    candidates: list[Candidate]
-    equivalents: tuple[str, ...]
-    before: Leftover
-
-
-def _search(
-    lines: list[WindowedLines], base: Fit, faults: list[AcceptedCause], causes: dict[str, Physics], tell: Progress
-) -> _Search:
-    """One cause after the other, while each is worth it."""
-    current, accepted, steps = base, list(faults), [base]
-    candidates: list[Candidate] = []
-    equivalents: tuple[str, ...] = ()
-    moving = before = leftover(base.hypothesis, lines)
-    in_vain = np.inf
-    while len(steps) <= MOST_CAUSES:
-        tell(f"causes, round {len(steps)}")
-        spared = moving.power >= AGAIN * in_vain
-        one = fitted_options(lines, current, base, _linear(causes) if spared else causes, (moving, before))
-        candidates += one.weighed
-        if spared and _best(one, current) is None:
-            one = fitted_options(lines, current, base, _laws(causes), (moving, before))
-            candidates += one.weighed
-        best = _best(one, current)
-        if best is None:
-            break
-        best = replace(best, fitted=settled(lines, best.fitted))
-        if not worth_it(best, current, base, lines):
-            break
-        line = best.fitted.score + LEAST_EVIDENCE / 2
-        rivals = [
-            option.name
-            for option in one.options
-            if option.name != best.name and option.fitted.score < line and not impossible(option)
-        ]
-        equivalents = equivalents or tuple(dict.fromkeys(rivals))
-        accepted.append(_describe(best, current))
-        failed = one.sighted and not any(_gaining_law(option, current) for option in one.options)
-        current = best.fitted
-        if failed and all(cause.direction is None for cause in current.hypothesis.causes):
-            in_vain = moving.power
-        moving = leftover(current.hypothesis, lines)
-        steps.append(current)
-    tell("causes made needless")
-    steps, accepted, rejected = pruned(lines, steps, accepted)
-    return _Search(steps, accepted, candidates + rejected, equivalents, before)
+    verdict: str
+    causes: tuple[AcceptedCause, ...]
+    final: Fit
+    left: Remainder
+    held_out: HeldOut
+    rejected: tuple[Candidate, ...] = ()
 
 
-def _best(one: Round, current: Fit) -> Option | None:
-    best = plainest([option for option in one.options if not impossible(option)])
-    return best if best is not None and gains(best, current) else None
-
-
-def _gaining_law(option: Option, current: Fit) -> bool:
-    """Whether a joint's law gained something, though another cause may have gained more."""
-    causes = option.fitted.hypothesis.causes
-    return bool(causes) and causes[-1].direction is not None and gains(option, current)
-
-
-def _linear(causes: dict[str, Physics]) -> dict[str, Physics]:
-    return {name: one for name, one in causes.items() if isinstance(one, ChainPhysics)}
-
-
-def _laws(causes: dict[str, Physics]) -> dict[str, Physics]:
-    return {name: one for name, one in causes.items() if isinstance(one, JointPhysics)}
+def _answer(
+    comparison: StructureComparison,
+    both: Recordings,
+    found: Search[Fit],
+    held_out: HeldOut,
+    faults: list[AcceptedCause],
+    decay: float,
+) -> _Answer:
+    """The verdict on the causes that a search found; under ``unexplained`` none of them is told."""
+    settings, current = comparison.settings, found.current
+    spread = with_form_spread(current, both.mended)
+    named = [*faults, *told_causes(spread, found.accepted)]
+    causes = with_tones_settled(current, both.measured, named, decay, settings.faults)
+    faults = [cause for cause in causes if is_fault(cause.name)]
+    held_out = scored(both, (held_out.linear, held_out.improved), current.noises, faults, settings.proof)
+    deviation = _deviation(both.mended, spread)
+    causes += [] if deviation is None else [deviation]
+    left = leftover(current.hypothesis, both.mended)
+    verdict = verdict_of_structure(
+        current.hypothesis, causes, (comparison.before, left), held_out.improvement, settings.verdict
+    )
+    if verdict != "unexplained":
+        return _Answer(verdict, tuple(causes), current, left, held_out)
+    rejected = tuple(Candidate(one.name, one.evidence, "rejected", one.location) for one in causes)
+    base, measured = found.base, Recordings(both.measured, both.measured)
+    held_out = held_out_improvement(measured, base.hypothesis, base.noises, (), settings.proof)
+    return _Answer(verdict, (), base, comparison.before, held_out, rejected)
 
 
 def _deviation(lines: list[WindowedLines], current: Fit) -> AcceptedCause | None:
     """Modal parameters that are off by more than a lab's error, and not by the linear part of a joint's law."""
     found = modal_deviation(current)
     causes = current.hypothesis.causes
-    if found is None or all(cause.direction is None for cause in causes):
+    if found is None or not current.hypothesis.laws:
         return found
     freed = tuple(with_linear_part(cause) if cause.direction is not None else cause for cause in causes)
     again = fit(lines, replace(current.hypothesis, causes=freed), current.noises, iterations=20)
     return found if modal_deviation(again) is not None else None
-
-
-def _describe(option: Option, current: Fit) -> AcceptedCause:
-    evidence = current.score - option.fitted.score
-    if option.name == "missing_mode":
-        return accepted_mode(option.fitted, evidence)
-    return accepted_cause(option.fitted, option.location, evidence)

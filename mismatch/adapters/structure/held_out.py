@@ -1,25 +1,21 @@
-"""What a hypothesis is worth on a recording that it was not fitted to."""
+"""What a hypothesis about a structure is worth on a recording that it was not fitted to."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft
-from scipy.stats import wilcoxon
 
-from ...faults.shown_faults import FAULTS, with_faults
-from ...inference.diagnosis import AcceptedCause, Improvement
-from ...inference.process_pool import in_processes
+from ...faults.shown_faults import residual_lines
+from ...inference import AcceptedCause, Improvement, ProofSettings, in_processes, ratio_interval
 from ...models.fitting import Fit, fit
-from ...models.hypothesis import Hypothesis, predict_lines
+from ...models.hypothesis import Hypothesis
 from ...models.misfit import least_misfit, through_structure
 from ...noise.noise_model import NoiseModel, whitening
 from ...records.windowed_lines import WindowedLines
-from .acceptance import HELD_OUT
-from .pruning import zero_of
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -28,10 +24,7 @@ BLOCK = 2.0
 """Length of a block for the test of significance, s."""
 
 ITERATIONS = 30
-"""At most: without the causes the modes may have far to go."""
-
-DRAWS = 1000
-"""Of the bootstrap over blocks."""
+"""Steps at most: without the causes the modes may have far to go."""
 
 
 @dataclass(frozen=True)
@@ -53,12 +46,12 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class Recordings:
-    """The same recordings twice.
+    """The same recordings twice, weakest first.
 
     Parameters
     ----------
     mended
-        Without tones, clipped samples put back: what causes are fitted to. Weakest first.
+        Without tones, clipped samples put back: what causes are fitted to.
     measured
         As they were measured: what errors are counted on.
     """
@@ -77,7 +70,11 @@ class Recordings:
 
 
 def held_out_improvement(
-    recordings: Recordings, final: Hypothesis, noises: tuple[NoiseModel, ...], causes: Sequence[AcceptedCause] = ()
+    recordings: Recordings,
+    final: Hypothesis,
+    noises: tuple[NoiseModel, ...],
+    faults: Sequence[AcceptedCause],
+    settings: ProofSettings,
 ) -> HeldOut:
     """Fit on all recordings but one, compare errors on that one as it was measured.
 
@@ -90,43 +87,58 @@ def held_out_improvement(
     final
         What was found on all of them; its numbers are fitted anew on the others.
     noises
-        From the fit on all.
-    causes
-        Accepted ones; of them the plain faults, which are no part of ``final``, are put into what it predicts.
+        Noise of every recording from the fit on all.
+    faults
+        Faults of the recordings, which are put into what ``final`` predicts.
+    settings
+        Thresholds.
     """
-    nominal = zero_of(final.shape)
     mended, measured = recordings.others(recordings.mended), recordings.others(recordings.measured)
-    tasks = [partial(fit, measured, nominal, iterations=ITERATIONS)]
-    if final.causes or final.shape.added or any(a is not b for a, b in zip(mended, measured, strict=True)):
+    tasks = [partial(fit, measured, final.nominal, iterations=ITERATIONS)]
+    if final.causes or any(a is not b for a, b in zip(mended, measured, strict=True)):
         tasks.append(partial(fit, mended, final, iterations=ITERATIONS))
     fitted: list[Fit] = in_processes(tasks)
-    return scored(recordings, (fitted[0].hypothesis, fitted[-1].hypothesis), noises, causes)
+    return scored(recordings, (fitted[0].hypothesis, fitted[-1].hypothesis), noises, faults, settings)
 
 
 def scored(
     recordings: Recordings,
     elsewhere: tuple[Hypothesis, Hypothesis],
     noises: tuple[NoiseModel, ...],
-    causes: Sequence[AcceptedCause],
+    faults: Sequence[AcceptedCause],
+    settings: ProofSettings,
 ) -> HeldOut:
-    """Errors, and what is tested on them, of modal parameters alone and of the whole, both fitted to the others."""
+    """Errors, and what is tested on them, of modal parameters alone and of the whole, both fitted to the others.
+
+    Parameters
+    ----------
+    recordings
+        Mended and as measured.
+    elsewhere
+        Modal parameters alone, and the whole hypothesis.
+    noises
+        Noise of every recording from the fit on all.
+    faults
+        Faults of the recordings.
+    settings
+        Thresholds.
+    """
     linear, improved = elsewhere
     here, kept = recordings.measured[recordings.kept], recordings.kept
-    faults = [cause for cause in causes if cause.name in FAULTS]
     rests = [
-        residual_lines(zero_of(improved.shape), here),
+        residual_lines(improved.nominal, here),
         residual_lines(linear, here),
         residual_lines(improved, here, faults),
     ]
     covariance = noises[kept].covariance(here.frequencies, through_structure(improved, here))
     power = float(np.sum(np.abs(here.measured) ** 2))
     before, refitted, after = (float(np.sqrt(np.sum(np.abs(rest) ** 2) / power)) for rest in rests)
-    whole = improved is not linear
+    whole, several = improved is not linear, len(recordings.mended) > 1
     evidence = 0.0
-    if len(recordings.mended) > 1 and whole:
+    if several and whole:
         mended = recordings.mended[kept]
         evidence = least_misfit(linear, mended) - least_misfit(improved, mended)
-    against = "refitted" if whole and (faults or evidence > HELD_OUT) else "nominal"
+    against = "refitted" if whole and (faults or evidence > settings.gain) else "nominal"
     rival = rests[1] if against == "refitted" else rests[0]
     improvement = Improvement(
         here.trial.name,
@@ -134,37 +146,47 @@ def scored(
         refitted,
         after,
         float(np.sqrt(np.sum(np.trace(covariance, axis1=1, axis2=2).real) / power)),
-        chance_of_no_gain(here, covariance, rival, rests[2]) if len(recordings.mended) > 1 else 1.0,
-        _interval(block_powers(here, rests[0]), block_powers(here, rests[2])),
+        chance_of_no_gain(here, covariance, rival, rests[2], settings) if several else 1.0,
+        ratio_interval(block_powers(here, rests[0]), block_powers(here, rests[2])),
         evidence,
         against,
     )
     return HeldOut(improvement, linear, improved)
 
 
-def residual_lines(hypothesis: Hypothesis, lines: WindowedLines, faults: Sequence[AcceptedCause] = ()) -> Complex:
-    """What a hypothesis, with plain faults, leaves of a recording, (n_lines, n_responses)."""
-    predicted = predict_lines(hypothesis, lines)
-    if not faults:
-        return lines.measured - predicted.response
-    signal = np.asarray(irfft(predicted.spectrum, n=lines.padded, axis=0)[: len(lines.trial.force)])
-    return lines.measured - lines.cut(with_faults(signal, lines.trial, lines.start, [asdict(one) for one in faults]))
+def chance_of_no_gain(
+    lines: WindowedLines, covariance: Complex, rival: Complex, final: Complex, settings: ProofSettings
+) -> float:
+    """p-value over blocks of time that the final residual is no smaller than a rival's.
 
+    Both are whitened by the same noise, so that a quiet channel counts as much as a loud one.
 
-def chance_of_no_gain(lines: WindowedLines, covariance: Complex, rival: Complex, final: Complex) -> float:
-    """p-value of a paired test over blocks of time that the final residual is no smaller than a rival's.
-
-    Both are whitened by the same noise (V: (n_lines, n_responses, n_responses)), so that a quiet channel counts as much
-    as a loud one (Wilcoxon's signed ranks).
+    Parameters
+    ----------
+    lines
+        The recording.
+    covariance : (n_lines, n_responses, n_responses)
+        Covariance of its noise.
+    rival, final : (n_lines, n_responses)
+        Residual lines of both hypotheses.
+    settings
+        Names the paired test.
     """
     white = whitening(covariance)
-    powers = [block_powers(lines, np.einsum("kij,kj->ki", white, rest)) for rest in (rival, final)]
-    difference = powers[0] - powers[1]
-    return float(wilcoxon(difference, alternative="greater").pvalue) if difference.any() else 1.0
+    rival_power, power = (block_powers(lines, np.einsum("kij,kj->ki", white, rest)) for rest in (rival, final))
+    return settings.test(rival_power, power)
 
 
 def block_powers(lines: WindowedLines, rest: Complex) -> Real:
-    """Power of residual lines in blocks of time, (n_blocks,): their sum is that of the lines (Parseval)."""
+    """Power of residual lines in blocks of time, (n_blocks,): their sum is that of the lines (Parseval).
+
+    Parameters
+    ----------
+    lines
+        The recording.
+    rest : (n_lines, n_responses)
+        Residual lines.
+    """
     spectrum = np.zeros((len(lines.window) // 2 + 1, rest.shape[1]), dtype=complex)
     spectrum[lines.band] = rest
     signal = irfft(spectrum, n=len(lines.window), axis=0)
@@ -172,15 +194,13 @@ def block_powers(lines: WindowedLines, rest: Complex) -> Real:
 
 
 def block_slices(lines: WindowedLines) -> list[slice]:
-    """Blocks of time of the part of a recording that is compared."""
+    """Blocks of time of the part of a recording that is compared.
+
+    Parameters
+    ----------
+    lines
+        The recording.
+    """
     count = max(2, round(len(lines.window) / lines.trial.rate / BLOCK))
     edges = np.linspace(0, len(lines.window), count + 1).astype(int)
     return [slice(int(a), int(b)) for a, b in pairwise(edges)]
-
-
-def _interval(before: Real, after: Real) -> tuple[float, float]:
-    """95 % bootstrap interval of the ratio of errors over blocks."""
-    draw = np.random.default_rng(0).integers(0, len(before), (DRAWS, len(before)))
-    ratio = np.sqrt(after[draw].sum(axis=1) / before[draw].sum(axis=1))
-    low, high = np.quantile(ratio, [0.025, 0.975])
-    return float(low), float(high)

@@ -8,11 +8,11 @@ from scipy.fft import irfft
 
 from modal_fit import ModalModel
 
-from ..faults.shown_faults import with_faults
-from ..records.trial import Trial, band_of
-from ..records.windowed_lines import windowed_lines
-from .hypothesis import predict_lines
-from .model_terms import hypothesis_of
+from ...faults.shown_faults import with_faults
+from ...models.hypothesis import predict_lines
+from ...models.model_terms import hypothesis_of
+from ...records.trial import Trial, band_of
+from ...records.windowed_lines import windowed_lines
 
 Real = NDArray[np.float64]
 

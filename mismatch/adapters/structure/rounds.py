@@ -1,52 +1,25 @@
-"""One round of the search: everything is screened, what promises most is fitted."""
+"""One round of the search in a structure: everything is screened, what promises most is fitted."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..adapters.structure.acceptance import NOISE_LIKE, SMALL, Option, evidence_needed, gains, impossible, unexplained
-from ..inference.diagnosis import Candidate
-from ..inference.process_pool import in_processes
-from ..models.fitting import Fit
-from ..physics import ChainPhysics, JointPhysics, Physics, answer_name
-from ..records.windowed_lines import WindowedLines
-from ..remainder.leftover import Leftover, leftover
-from .chain_screening import ScreenedChain, screen_chains
-from .joint_candidates import SightedLaws, joint_options, sighted_laws
-from .linear_candidates import channel_of, linear_options
-from .linear_floor import noise_floor
-from .missing_mode import SightedMode, find_mode
-
-WITHIN_REACH = 0.5
-"""Screened gain of a cause, as a share of the evidence it needs, from which it is fitted."""
-
-FAR_AHEAD = 100.0
-"""Screened gain of a joint's law over that of any linear cause from which laws are fitted first."""
+from ...inference import Candidate, Proposal, Remainder, Round, Settings, in_processes
+from ...models.fitting import Fit
+from ...physics import ChainPhysics, JointPhysics, ModePhysics, Physics, answer_name
+from ...records.windowed_lines import WindowedLines
+from ...remainder.leftover import leftover
+from ...screening.chain_screening import ScreenedChain, screen_chains
+from ...screening.joint_candidates import SightedLaws, joint_candidates, sighted_laws
+from ...screening.linear_candidates import channel_of, linear_candidates
+from ...screening.linear_floor import noise_floor
+from ...screening.missing_mode import SightedMode, find_mode
+from .acceptance import evidence_needed, impossible, possible_gains, strained
 
 
 @dataclass(frozen=True)
-class Round:
-    """What a round found.
-
-    Parameters
-    ----------
-    options
-        Fitted candidates.
-    weighed
-        All candidates, screened and fitted.
-    sighted
-        Whether joint laws were tried along a direction.
-    """
-
-    options: list[Option]
-    weighed: list[Candidate]
-    sighted: bool
-
-
-def fitted_options(
-    lines: list[WindowedLines], current: Fit, base: Fit, causes: dict[str, Physics], moving: tuple[Leftover, Leftover]
-) -> Round:
-    """Screen everything, fit what promises most.
+class Standing:
+    """Where the search stands when a round begins.
 
     Parameters
     ----------
@@ -54,76 +27,129 @@ def fitted_options(
         Recordings.
     current, base
         Fits with the causes found so far, and with none.
-    causes
-        By name.
-    moving
+    moving, before
         What of the residual moves with the signal, under ``current`` and under ``base``.
+    settings
+        Thresholds.
     """
-    laws = [p for p in causes.values() if isinstance(p, JointPhysics)]
-    much = moving[0].share > NOISE_LIKE and moving[0].power > 3 * SMALL * moving[1].power
-    chains, mode, sighted = _screened(lines, current, causes, laws if much else [])
+
+    lines: list[WindowedLines]
+    current: Fit
+    base: Fit
+    moving: Remainder
+    before: Remainder
+    settings: Settings
+
+    def is_left(self, left: Remainder) -> bool:
+        """Whether more is left than noise and the form of a law make."""
+        small = self.settings.evidence.small
+        return left.share > self.settings.verdict.noise_like and left.size > 3 * small * self.before.size
+
+
+@dataclass(frozen=True)
+class StructureRound(Round[Fit]):
+    """A round that says whether joint laws were tried along a direction and gained nothing."""
+
+    laws_failed: bool = False
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """What a round fitted and weighed.
+
+    Parameters
+    ----------
+    proposals
+        Fitted causes.
+    candidates
+        All causes, screened and fitted.
+    sighted
+        Whether joint laws were tried along a direction.
+    """
+
+    proposals: list[Proposal[Fit]]
+    candidates: list[Candidate]
+    sighted: bool
+
+
+def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
+    """Screen all causes, and fit those that promise most.
+
+    Parameters
+    ----------
+    standing
+        Where the search stands.
+    causes
+        Causes to weigh, by name.
+    """
+    lines, current, settings = standing.lines, standing.current, standing.settings
+    laws = [physics for physics in causes.values() if isinstance(physics, JointPhysics)]
+    much = standing.is_left(standing.moving)
+    chains, mode, sighted = _screened(standing, causes, laws if much else [])
     weighed = [Candidate(answer_name(one.cause.physics), one.gain, "screened", channel_of(one.cause)) for one in chains]
-    weighed.append(Candidate("missing_mode", mode.gain, "screened"))
-    least = WITHIN_REACH * evidence_needed(current, base)
-    options: list[Option] = []
-    if sighted.gain > FAR_AHEAD * max([one.gain for one in chains] + [mode.gain, 0.0]):
-        options = joint_options(lines, current, sighted, least)
-    if not _explains(_best(options, current), lines, moving[1]):
-        tried = bool(options)
-        options += linear_options(lines, current, chains, mode, least)
-        if not tried and _joints_are_due(_best(options, current), current, moving, lines):
-            sighted = sighted if much else sighted_laws(lines, current, laws)
-            best = _best(options, current)
-            gained = current.score - best.fitted.score if best is not None else 0.0
-            options += joint_options(lines, current, sighted, least, gained)
+    weighed += [Candidate(mode.physics.name, mode.gain, "screened")] if mode is not None else []
+    least = settings.search.within_reach * evidence_needed(current, standing.base, settings.evidence)
+    proposals: list[Proposal[Fit]] = []
+    linear = max([one.gain for one in chains] + [mode.gain if mode is not None else 0.0, 0.0])
+    if sighted.gain > settings.search.laws_first * linear:
+        proposals = joint_candidates(lines, current, sighted, settings, least)
+    if not _explains(proposals, standing):
+        tried = bool(proposals)
+        proposals += linear_candidates(lines, current, chains, mode, settings.screening, least)
+        if not tried and _joints_are_due(proposals, standing):
+            sighted = sighted if much else sighted_laws(lines, current, laws, settings)
+            best = possible_gains(proposals, settings.evidence)
+            gained = best[0].evidence if best else 0.0
+            proposals += joint_candidates(lines, current, sighted, settings, least, gained)
     weighed += sighted.weighed
-    weighed += [_weighed(one, current) for one in options]
-    return Round(options, weighed, sighted.gain > 0)
+    weighed += [_candidate(one, settings.evidence.clear) for one in proposals]
+    return Weighed(proposals, weighed, sighted.gain > 0)
 
 
 def _screened(
-    lines: list[WindowedLines], current: Fit, causes: dict[str, Physics], laws: list[JointPhysics]
-) -> tuple[list[ScreenedChain], SightedMode, SightedLaws]:
+    standing: Standing, causes: Mapping[str, Physics], laws: list[JointPhysics]
+) -> tuple[list[ScreenedChain], SightedMode | None, SightedLaws]:
     """What every cause promises, without a fit: linear ones not found yet, a further mode, joint laws."""
+    lines, current = standing.lines, standing.current
     own_noise, hypothesis = noise_floor(current, lines), current.hypothesis
-    physics = [p for p in causes.values() if isinstance(p, ChainPhysics)]
+    chains = [physics for physics in causes.values() if isinstance(physics, ChainPhysics)]
+    modes = [physics for physics in causes.values() if isinstance(physics, ModePhysics)]
     makers: list[Callable[[], Any]] = [
-        lambda: sighted_laws(lines, current, laws) if laws else SightedLaws((), ()),
-        lambda: find_mode(own_noise, hypothesis),
-        lambda: screen_chains(own_noise, hypothesis, physics),
+        lambda: sighted_laws(lines, current, laws, standing.settings) if laws else SightedLaws((), ()),
+        lambda: find_mode(own_noise, hypothesis, modes[0]) if modes else None,
+        lambda: screen_chains(own_noise, hypothesis, chains),
     ]
-    sighted, mode, chains = in_processes(makers)
+    sighted, mode, screened = in_processes(makers)
     taken = {(cause.physics.name, cause.place) for cause in hypothesis.causes}
-    return [one for one in chains if (one.cause.physics.name, one.cause.place) not in taken], mode, sighted
+    return [one for one in screened if (one.cause.physics.name, one.cause.place) not in taken], mode, sighted
 
 
-def _weighed(one: Option, current: Fit) -> Candidate:
-    """A fitted option as it is told; one whose numbers cannot be says so."""
-    reason = impossible(one)
-    place = one.location | ({"impossible": reason} if reason else {})
-    return Candidate(one.name, current.score - one.fitted.score, "impossible" if reason else "fitted", place)
+def _candidate(one: Proposal[Fit], clear: float) -> Candidate:
+    """A fitted cause as it is told; one whose numbers cannot be says so."""
+    reason = impossible(one, clear)
+    place = {**one.location, "impossible": reason} if reason else one.location
+    return Candidate(one.name, one.evidence, "impossible" if reason else "fitted", place)
 
 
-def _best(options: list[Option], current: Fit) -> Option | None:
-    best = min((one for one in options if not impossible(one)), key=lambda one: one.fitted.score, default=None)
-    return best if best is not None and gains(best, current) else None
-
-
-def _explains(best: Option | None, lines: list[WindowedLines], before: Leftover) -> bool:
-    """Whether an option leaves too little that moves with the signal to look further."""
-    if best is None:
+def _explains(proposals: list[Proposal[Fit]], standing: Standing) -> bool:
+    """Whether the best cause leaves too little that moves with the signal to look further."""
+    best = possible_gains(proposals, standing.settings.evidence)
+    if not best:
         return False
-    return not unexplained(best.fitted.hypothesis, leftover(best.fitted.hypothesis, lines), before)
+    hypothesis, limits = best[0].fitted.hypothesis, standing.settings.verdict
+    left = leftover(hypothesis, standing.lines)
+    if left.share <= limits.noise_like:
+        return True
+    return left.size <= (1 - limits.explained) * standing.before.size and not strained(hypothesis)
 
 
-def _joints_are_due(
-    best: Option | None, current: Fit, moving: tuple[Leftover, Leftover], lines: list[WindowedLines]
-) -> bool:
+def _joints_are_due(proposals: list[Proposal[Fit]], standing: Standing) -> bool:
     """Whether joint laws are tried beside linear causes: none was found, a mode may imitate them, or much is left."""
-    if best is None and not current.hypothesis.causes:
-        return True
+    best = possible_gains(proposals, standing.settings.evidence)
+    if not best:
+        return not standing.current.hypothesis.has_added_physics or standing.is_left(standing.moving)
+    hypothesis = best[0].fitted.hypothesis
     # modes are many-sided: a joint that drifts or rubs is imitated by a few of them
-    if best is not None and best.name == "missing_mode":
+    if isinstance(hypothesis.causes[-1].physics, ModePhysics):
         return True
-    left = leftover(best.fitted.hypothesis, lines) if best is not None else moving[0]
-    return left.share > NOISE_LIKE and left.power > 3 * SMALL * moving[1].power
+    return standing.is_left(leftover(hypothesis, standing.lines))

@@ -18,7 +18,7 @@ _BEGIN = 8  # share of the recording, one over this, in which the entry may stil
 
 @dataclass(frozen=True)
 class Envelope:
-    """Size and phase over time of lines that belong together.
+    """Size and phase, over time, of lines that belong together.
 
     Parameters
     ----------
@@ -26,8 +26,8 @@ class Envelope:
         Standard deviation of the power over its mean: 1 for noise through a mode, whose envelope is normally
         distributed, small for a limit cycle.
     coherence
-        Of the strongest line with all others together, 0 to 1: what the teeth modulate has side lines that vary with
-        it; a foreign tone among lines of noise has not.
+        Coherence, 0 to 1, of the strongest line with all others together: side lines that the teeth make vary with it;
+        a foreign tone among lines of noise has no such side lines.
     """
 
     fluctuation: float
@@ -44,11 +44,11 @@ def envelope_of(revolutions: Revolutions, family: Family, spectrum: Spectrum) ->
     Parameters
     ----------
     revolutions
-        The whole recording.
+        The whole recording, cut into revolutions.
     family
-        Two lines or more.
+        Family of two lines or more.
     spectrum
-        With the noise floor.
+        Spectrum of the residual, with its noise floor.
     """
     teeth = revolutions.teeth
     power = np.array([float((line.amplitude**2).sum()) for line in family.lines])

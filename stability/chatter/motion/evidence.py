@@ -25,19 +25,19 @@ class Evidence:
     Parameters
     ----------
     track
-        Angle of the spindle.
+        Angle of the spindle over time.
     revolutions
-        The whole recording, channels of like size.
+        The whole recording, with channels scaled to like size.
     late
-        Its second half, which is judged.
+        Second half of the recording, which is judged.
     spectrum
-        Of what does not repeat in the second half.
+        Spectrum of what does not repeat with the revolution in the second half.
     families
         Lines that stand out, gathered by the tooth passing, strongest first.
     order_p_value
         Probability that noise alone looks as much like orders of the spindle as the recording.
-    sample_rate
-        Samples a second, Hz.
+    sample_rate : Hz
+        Samples a second.
     scales : (n_channels,)
         Standard deviation of the samples of each channel, by which the evidence's were divided.
     """
@@ -76,11 +76,11 @@ def gather_evidence(samples: Real, sample_rate: float, spindle_speed: float, tee
     Parameters
     ----------
     samples : (n_samples, n_channels)
-        Channels that hold no motion are left out.
-    sample_rate
-        Samples a second, Hz.
-    spindle_speed
-        rad/s, within 1 %.
+        Samples of the recording; channels that hold no motion are left out.
+    sample_rate : Hz
+        Samples a second.
+    spindle_speed : rad/s
+        Stated spindle speed, right within 1 %.
     teeth
         Number of teeth.
     """

@@ -24,9 +24,9 @@ class Family:
     Parameters
     ----------
     lines
-        Strongest first.
+        Lines of the family, strongest first.
     share
-        Root mean square over the motion's, in the channel where it is largest.
+        Root mean square of the lines over that of the motion, in the channel where it is largest.
     place
         Distance from the nearest multiple of the tooth passing, in orders of the spindle, 0 to half the teeth.
     """
@@ -53,18 +53,18 @@ def folded(order: float, teeth: int) -> float:
 
 
 def families_of(lines: tuple[Line, ...], teeth: int, resolution: float, size: Real) -> tuple[Family, ...]:
-    """Lines gathered by their place between two multiples of the tooth passing, families with most power first.
+    """Gather lines by their place between two multiples of the tooth passing; families with most power come first.
 
     Parameters
     ----------
     lines
-        Strongest first.
+        Lines of the spectrum, strongest first.
     teeth
         Number of teeth.
     resolution
-        Orders between two lines of the spectrum.
+        Distance between two lines of the spectrum, in orders of the spindle.
     size : (n_channels,)
-        Root mean square of the motion.
+        Root mean square of the motion in each channel.
     """
     left = list(lines)
     found = []
@@ -86,7 +86,7 @@ def largest_motion(lines: tuple[Line, ...], derivative: tuple[int, ...], natural
     Parameters
     ----------
     lines
-        Of one family.
+        Lines of one family.
     derivative : (n_channels,)
         2 for acceleration, 1 for velocity, 0 for displacement.
     natural

@@ -27,9 +27,9 @@ def irregular_change(spectrum: Spectrum, motion: ToolMotion, tones: Real) -> flo
     Parameters
     ----------
     spectrum
-        Of what does not repeat.
+        Spectrum of what does not repeat with the revolution.
     motion
-        Channels and chip.
+        Channels of the tool's motion, and the thickest chip.
     tones : (n_tones,)
         Orders of foreign tones, which do not count.
     """

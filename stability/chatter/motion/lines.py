@@ -19,16 +19,16 @@ _FLOOR_BINS = 60  # at least, over which the floor's median is taken
 
 @dataclass(frozen=True)
 class Line:
-    """A line that is no order of the spindle.
+    """A line of the spectrum that is not an order of the spindle.
 
     Parameters
     ----------
     order
-        Frequency over the spindle's.
-    frequency
-        Of the line, Hz.
+        Frequency of the line over the spindle's.
+    frequency : Hz
+        Frequency of the line.
     amplitude : (n_channels,)
-        Root mean square, in the unit of the samples.
+        Root mean square of the line in each channel, in the unit of the samples.
     p_value
         Probability that noise with the recording's own local floor has a line as strong anywhere in the spectrum.
     sharpness

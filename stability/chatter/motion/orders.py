@@ -21,9 +21,9 @@ class Revolutions:
     Parameters
     ----------
     samples : (n_revolutions, n_places, n_channels)
-        At equal angles; the number of places is a multiple of the number of teeth.
-    frequency
-        Mean frequency of the spindle, Hz.
+        Samples at equal angles of the spindle; the number of places is a multiple of the number of teeth.
+    frequency : Hz
+        Mean frequency of the spindle.
     teeth
         Number of teeth.
     """

@@ -30,8 +30,8 @@ class SpindleTrack:
     ----------
     coefficients : (4,)
         Revolutions at the time t (s): ``c0 t + c1 t^2 + c2 t^3 + c3 t^4``, c0 in Hz.
-    duration
-        s.
+    duration : s
+        Time that the track covers.
     """
 
     coefficients: Real
@@ -66,11 +66,11 @@ def track_spindle(data: Real, sample_rate: float, stated: float) -> SpindleTrack
     Parameters
     ----------
     data : (n_samples, n_channels)
-        Without mean, channels of like size.
-    sample_rate
-        Samples a second, Hz.
-    stated
-        Revolutions a second, within 1 %.
+        Samples without mean, channels scaled to like size.
+    sample_rate : Hz
+        Samples a second.
+    stated : Hz
+        Stated frequency of the spindle, right within 1 %.
     """
     data, sample_rate = _thinned(data, sample_rate, stated)
     floors = _floors(data, sample_rate, stated)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from acquisition import record
-from millfrf.demonstration import CUTTER, IMMERSIONS, SWEEP_DEPTH
+from millfrf.demonstration.whole_chain import CUTTER, IMMERSIONS, SWEEP_DEPTH
 from replay_data import LinearSweep, MillingCell, default_structure, milling_sensors
 
 RPM = math.pi / 30

@@ -9,7 +9,7 @@ import pytest
 from foundation import Band
 from millfrf.__main__ import DONE, run
 from millfrf.chain import compute_lobes, speed_axis
-from millfrf.demonstration import CUTTER, cutting_text
+from millfrf.demonstration.whole_chain import CUTTER, cutting_text
 from modal_fit import ModalModel, write_modal_model
 from replay_data import default_structure, tip_model
 from stability import read_lobes

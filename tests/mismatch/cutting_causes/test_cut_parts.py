@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from cutting import MillingProcess, damping_matrices, edge_matrices, read_cutting_process, write_cutting_process
-from cutting.tooth_force import rigid_force
+from cutting.one_tooth import rigid_force
 from foundation import InputError
 from mismatch.adapters.cut import CutRecording, SpindleLaw
 from mismatch.adapters.cut import physics as physics_folder

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cutting import MillingProcess
-from cutting.tooth_force import specific_forces
+from cutting.one_tooth import specific_forces
 
 from ..physics import CutPhysics, ToothView
 from .cut_view import CutView
@@ -21,7 +21,7 @@ def computed_force(process: MillingProcess, depth: float, view: CutView, acting:
 
     ``Ft = a (Ktc h + Kte / sin(gamma))`` and alike radial and axial (Mohammadi & Ahmadi, Eqs. 1 to 3), with
     ``h = min_k (k f sin(phi) sin(gamma) + e_0 - e_k)``, not below zero, where ``e_k`` is how far the edges that causes
-    displace stood out ``k`` tooth passings ago; turned into X, Y, Z as :func:`cutting.tooth_force.tooth_force` does.
+    displace stood out ``k`` tooth passings ago; turned into X, Y, Z as :func:`cutting.one_tooth.tooth_force` does.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from independent_robot import SPRINGS, Lump, OtherRobot, receptance
 from numpy.typing import NDArray
 from payload_information import Recorded, mass_errors
 
-from millfrf.robot.diagnosis_words import describe, summary
+from millfrf.robot.diagnosis.diagnosis_words import describe, summary
 from mismatch import Trial
 from mismatch.adapters.robot import (
     PosedRecording,

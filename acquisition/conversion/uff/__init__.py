@@ -1,0 +1,1 @@
+"""Data sets of Universal File Format files, read line by line or with pyuff."""

@@ -1,0 +1,1 @@
+"""Estimators of the FRF: least squares, errors in variables, local polynomials."""

@@ -1,0 +1,195 @@
+"""H2, Hv and instrumental-variable FRFs: for noise on the excitation, and for excitation that the response drives."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import InputError
+
+from ..frf_matrix.frf import Frf, FrfCovariance
+from ..frf_matrix.quantities import frf_quantity
+from ..spectra.coherence import multiple_coherence
+from ..spectra.independence import RANK_TOLERANCE, input_independence
+from ..spectra.spectral_matrix import CrossSpectra
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+def h2(spectra: CrossSpectra) -> Frf:
+    """``H = S_xx S_fx^+``: unbiased by noise on the excitations, biased up by noise on the responses.
+
+    For several inputs the right inverse ``S_fx^H (S_fx S_fx^H)^-1`` is taken, so that there must be at least as many
+    responses as excitations (Ewins, Modal Testing, 2nd ed., section 3.9).
+
+    Raises
+    ------
+    InputError
+        Fewer responses than excitations, or inputs dependent on every line.
+    """
+    n_responses, n_excitations = len(spectra.responses), len(spectra.excitations)
+    if n_responses < n_excitations:
+        raise InputError(
+            f"H2 needs as many responses as excitations; {n_responses} responses for {n_excitations} excitations. "
+            "Use H1 or Hv"
+        )
+    valid = _independent_lines(spectra)
+    s_fx = spectra.cross_spectra.conj().transpose(0, 2, 1)
+    values = np.zeros_like(spectra.cross_spectra)
+    adjoint = s_fx.conj().transpose(0, 2, 1)
+    regular = valid & (np.linalg.matrix_rank(_balanced(s_fx), tol=None) == n_excitations)
+    values[regular] = (spectra.output_spectra @ adjoint)[regular] @ np.linalg.inv((s_fx @ adjoint)[regular])
+    return _frf(spectra, values, regular, spectra.input_spectra)
+
+
+def hv(spectra: CrossSpectra, response_noise: Real | None = None, excitation_noise: Real | None = None) -> Frf:
+    """Total least squares: for each response, the eigenvector of the smallest eigenvalue of its scaled spectral matrix.
+
+    With noise spectra known up to a common factor, the matrix of ``(x_p, f)`` is scaled by their roots; the
+    eigenvector v of its smallest eigenvalue gives ``H_pq = -conj(v_q / v_0)`` in the scaled quantities (Rocklin,
+    Crowley & Vold, IMAC 1985). H1 and H2 are its limits without excitation or response noise.
+
+    Parameters
+    ----------
+    spectra
+        Spectra of one test, or of several summed by :func:`sum_tests`.
+    response_noise : (n_responses,), or None
+        Relative noise power of each response; None: its mean power, that is, noise in equal shares.
+    excitation_noise : (n_excitations,), or None
+        Relative noise power of each excitation; None: its mean power.
+
+    Raises
+    ------
+    InputError
+        Noise powers that are not positive, or inputs dependent on every line.
+    """
+    valid = _independent_lines(spectra)
+    responses = _powers(spectra.output_spectra, response_noise, "response")
+    excitations = _powers(spectra.input_spectra, excitation_noise, "excitation")
+    n = len(excitations)
+    values = np.zeros_like(spectra.cross_spectra)
+    for p in range(len(responses)):
+        scale = np.sqrt(np.concatenate([responses[p : p + 1], excitations]))
+        matrix = np.empty((len(values), n + 1, n + 1), dtype=complex)
+        matrix[:, 0, 0] = spectra.output_spectra[:, p, p]
+        matrix[:, 0, 1:] = spectra.cross_spectra[:, p]
+        matrix[:, 1:, 0] = spectra.cross_spectra[:, p].conj()
+        matrix[:, 1:, 1:] = spectra.input_spectra
+        vector = np.linalg.eigh(matrix / np.outer(scale, scale))[1][:, :, 0]
+        safe = np.where(np.abs(vector[:, :1]) > 0, vector[:, :1], 1.0)
+        values[:, p] = -(vector[:, 1:] / safe).conj() * scale[0] / scale[1:]
+    values[~valid] = 0.0
+    return _frf(spectra, values, valid, spectra.input_spectra)
+
+
+def instrumental_variable(spectra: CrossSpectra, instruments: Sequence[str]) -> Frf:
+    """``H = S_xr S_rr^-1 S_rf (S_fr S_rr^-1 S_rf)^-1``: unbiased where force noise and response are correlated.
+
+    In the cut, regeneration feeds the response back into the force; what moves the structure without being
+    measured (a disturbance) then sits in both, and H1 tends towards the inverse of the feedback. An instrument r is
+    something that drives the force but that the disturbance does not reach: the spindle's angle, a commanded signal
+    (Pintelon & Schoukens, System Identification, 2nd ed., section 2.6; Wellstead 1981).
+
+    Parameters
+    ----------
+    spectra
+        Made with the instruments among the excitation channels.
+    instruments
+        Names of those channels; the other excitations are the forces.
+
+    Raises
+    ------
+    InputError
+        A name that is not there, fewer instruments than forces, or instruments that do not drive the forces.
+    """
+    names = [channel.name for channel in spectra.excitations]
+    missing = [name for name in instruments if name not in names]
+    if missing:
+        raise InputError(f"no excitation channel {missing[0]!r} to serve as instrument; there are {', '.join(names)}")
+    r = [names.index(name) for name in instruments]
+    f = [number for number in range(len(names)) if number not in r]
+    if not f or len(r) < len(f):
+        raise InputError(f"{len(r)} instruments for {len(f)} forces; give at least as many instruments as forces")
+    s_rr, s_fr = spectra.input_spectra[:, r][:, :, r], spectra.input_spectra[:, f][:, :, r]
+    s_ff = spectra.input_spectra[:, f][:, :, f]
+    inverse = np.linalg.pinv(s_rr, rcond=1e-10, hermitian=True)
+    projected = s_fr @ inverse @ s_fr.conj().transpose(0, 2, 1)
+    reached = np.linalg.svd(_relative(projected, s_ff), compute_uv=False, hermitian=True)[:, -1]
+    valid = (reached > RANK_TOLERANCE) & (spectra.n_segments >= len(r))
+    if not valid.any():
+        raise InputError("the instruments do not drive the forces on any line; choose others or average more")
+    s_xr = spectra.cross_spectra[:, :, r]
+    values = np.zeros((len(valid), len(spectra.responses), len(f)), dtype=complex)
+    numerator = s_xr @ inverse @ s_fr.conj().transpose(0, 2, 1)
+    values[valid] = numerator[valid] @ np.linalg.inv(projected[valid])
+    return _frf(_without(spectra, f), values, valid, projected)
+
+
+def _without(spectra: CrossSpectra, kept: Sequence[int]) -> CrossSpectra:
+    """The spectra with some of the excitations only."""
+    return replace(
+        spectra,
+        input_spectra=spectra.input_spectra[:, kept][:, :, kept],
+        cross_spectra=spectra.cross_spectra[:, :, kept],
+        excitations=tuple(spectra.excitations[number] for number in kept),
+    )
+
+
+def _independent_lines(spectra: CrossSpectra) -> NDArray[np.bool_]:
+    valid = input_independence(spectra).independent
+    if not valid.any():
+        n = len(spectra.excitations)
+        raise InputError(
+            f"the {n} inputs are dependent on every line: give at least {n} tests with different immersions, "
+            "or shorter segments"
+        )
+    return valid
+
+
+def _powers(spectra: Complex, given: Real | None, role: str) -> Real:
+    power = np.real(np.einsum("kii->ki", spectra)).mean(axis=0) if given is None else np.asarray(given, dtype=float)
+    if power.shape != (spectra.shape[1],) or not (np.isfinite(power).all() and (power > 0).all()):
+        raise InputError(f"{role} noise powers {power.tolist()} must be {spectra.shape[1]} positive numbers")
+    return power
+
+
+def _balanced(matrix: Complex) -> Complex:
+    """Rows scaled to unit length, so that rank does not depend on units."""
+    length = np.linalg.norm(matrix, axis=2, keepdims=True)
+    return np.asarray(matrix / np.where(length > 0, length, 1.0))
+
+
+def _relative(matrix: Complex, to: Complex) -> Complex:
+    """Scaled by the roots of the diagonal of ``to``."""
+    root = np.sqrt(np.real(np.einsum("kii->ki", to)))
+    safe = np.where(root > 0, root, 1.0)
+    return np.asarray(matrix / safe[:, :, None] / safe[:, None, :])
+
+
+def _frf(spectra: CrossSpectra, values: Complex, valid: NDArray[np.bool_], driving: Complex) -> Frf:
+    """With the covariance that the equation error ``X - H F`` gives, over ``driving`` (what excites independently)."""
+    quantity, unit = frf_quantity(spectra.responses, spectra.excitations)
+    averages, n = spectra.effective_averages, len(spectra.excitations)
+    covariance = None
+    if averages > n + 0.5:
+        mixed = values @ spectra.cross_spectra.conj().transpose(0, 2, 1)
+        error = spectra.output_spectra - mixed - mixed.conj().transpose(0, 2, 1)
+        error = error + values @ spectra.input_spectra @ values.conj().transpose(0, 2, 1)
+        error = (error + error.conj().transpose(0, 2, 1)) / 2 * averages / (averages - n)
+        inverse = np.zeros_like(driving)
+        inverse[valid] = np.linalg.inv(driving[valid])
+        error[~valid] = 0.0
+        covariance = FrfCovariance(error, inverse.conj() / averages)
+    return Frf(
+        spectra.frequencies,
+        values,
+        tuple(channel.degree_of_freedom for channel in spectra.responses),
+        tuple(channel.degree_of_freedom for channel in spectra.excitations),
+        quantity,
+        unit,
+        valid,
+        multiple_coherence(spectra),
+        covariance,
+    )

@@ -1,0 +1,1 @@
+"""FRFs of Universal File Format files, with their coherences and units."""

@@ -1,0 +1,1 @@
+"""Averaged spectra of recordings: windows, stacking, coherence, independence of inputs, and usable samples."""

@@ -1,0 +1,232 @@
+"""`SpectralAccumulator`: Welch's averaged spectra, fed block by block, in memory that does not grow."""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from acquisition import Channel
+from foundation import InputError
+
+from .spectral_matrix import CrossSpectra, SpectralSettings
+from .windows import check_settings, effective_averages, hop_length, window_samples
+
+_BATCH_BYTES = 20 << 20  # of segments transformed at once
+_MOST_SEGMENTS = 16
+_WORKERS = 2
+_PRODUCT_BYTES = 1 << 20  # of products of lines at once
+
+
+class SpectralAccumulator:
+    """Sums windowed cross spectra over segments as samples arrive.
+
+    ``S_uv[k] = 2 / (fs sum w^2) * mean over segments of U_k conj(V_k)``, one-sided; lines 0 and Nyquist are not
+    doubled (Welch 1967; Bendat & Piersol, Random Data, 4th ed., section 11.5). Known input delays of the channels are
+    taken out of the result.
+
+    Parameters
+    ----------
+    excitations, responses
+        Channels along the columns of what ``add`` gets.
+    sample_rate : Hz
+        Samples a second.
+    settings
+        Settings of the spectra: segment length, overlap, window, detrending.
+
+    Raises
+    ------
+    InputError
+        Settings that cannot be used, or no channels.
+    """
+
+    def __init__(
+        self,
+        excitations: Sequence[Channel],
+        responses: Sequence[Channel],
+        sample_rate: float,
+        settings: SpectralSettings,
+    ) -> None:
+        check_settings(settings)
+        if not excitations or not responses:
+            raise InputError("spectra need at least one excitation and one response channel; name them")
+        self.excitations, self.responses = tuple(excitations), tuple(responses)
+        self.sample_rate, self.settings = sample_rate, settings
+        self.n_segments = 0
+        self._window = window_samples(settings)
+        self._hop = hop_length(settings)
+        width = len(self.excitations) + len(self.responses)
+        self._batch = max(1, min(_MOST_SEGMENTS, _BATCH_BYTES // (8 * settings.segment_length * width)))
+        self._sum = np.zeros((settings.segment_length // 2 + 1, width, width), dtype=complex)
+        self._held = np.empty((width, 0))
+        self._held_usable = np.empty(0, dtype=bool)
+        self.n_excluded = 0
+
+    def add(
+        self,
+        excitation_samples: NDArray[np.floating],
+        response_samples: NDArray[np.floating],
+        usable: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Take the next samples, (n, n_excitations) and (n, n_responses), any number of them.
+
+        Segments that hold a sample which is not ``usable`` (n,) are left out and counted in ``n_excluded``.
+
+        Raises
+        ------
+        InputError
+            Unequal lengths, wrong numbers of columns, or samples that are not finite.
+        """
+        shapes = (np.shape(excitation_samples), np.shape(response_samples))
+        n = shapes[0][0]
+        if shapes != ((n, len(self.excitations)), (n, len(self.responses))):
+            raise InputError(
+                f"samples of shapes {shapes[0]} and {shapes[1]}, expected (n, {len(self.excitations)}) and "
+                f"(n, {len(self.responses)}) of one length"
+            )
+        fresh = np.empty((self._held.shape[0], n))
+        fresh[: len(self.excitations)] = np.asarray(excitation_samples).T
+        fresh[len(self.excitations) :] = np.asarray(response_samples).T
+        if usable is not None:
+            fresh[:, ~usable] = 0.0
+        if not np.isfinite(fresh.sum()):
+            row = int(np.argmin(np.isfinite(fresh).all(axis=1)))
+            name = (*self.excitations, *self.responses)[row].name
+            raise InputError(f"channel {name} holds NaN or infinity; mend or convert the recording")
+        samples = np.concatenate([self._held, fresh], axis=1) if self._held.shape[1] else fresh
+        trusted = np.concatenate([self._held_usable, np.ones(n, dtype=bool) if usable is None else usable])
+        ready = self._n_complete(samples.shape[1])
+        taken = ready - ready % self._batch  # whole batches: the sums are read and written once for each
+        self._add_batches(samples, trusted, taken)
+        self._held = samples[:, taken * self._hop :].copy()
+        self._held_usable = trusted[taken * self._hop :]
+
+    def _n_complete(self, n_samples: int) -> int:
+        length = self.settings.segment_length
+        return (n_samples - length) // self._hop + 1 if n_samples >= length else 0
+
+    def _add_batches(self, samples: NDArray[np.float64], trusted: NDArray[np.bool_], n_segments: int) -> None:
+        for first in range(0, n_segments, self._batch):
+            self._add_segments(samples, trusted, first, min(first + self._batch, n_segments))
+
+    def _add_segments(self, samples: NDArray[np.float64], trusted: NDArray[np.bool_], first: int, last: int) -> None:
+        """Transform segments first..last-1 of the channel-major ``samples`` and add the products of trusted ones."""
+        view = np.lib.stride_tricks.sliding_window_view(samples, self.settings.segment_length, axis=1)
+        segments = view[:, first * self._hop : (last - 1) * self._hop + 1 : self._hop]
+        if not trusted.all():
+            chosen = np.lib.stride_tricks.sliding_window_view(trusted, self.settings.segment_length)
+            whole = chosen[first * self._hop : (last - 1) * self._hop + 1 : self._hop].all(axis=1)
+            segments = segments[:, whole]
+        self.n_segments += segments.shape[1]
+        self.n_excluded += last - first - segments.shape[1]
+        if segments.shape[1] == 0:
+            return
+        windowed = _detrended(segments, self.settings.detrend)
+        windowed *= self._window
+        lines = fft.rfft(windowed, axis=2, overwrite_x=True, workers=_WORKERS)
+        step = max(1, _PRODUCT_BYTES // (16 * len(lines) ** 2))
+
+        def add_products(start: int) -> None:
+            part = np.ascontiguousarray(lines[:, :, start : start + step].transpose(2, 0, 1))
+            self._sum[start : start + step] += part @ part.conj().transpose(0, 2, 1)
+
+        with ThreadPoolExecutor(_WORKERS) as pool:  # numpy lets go of the interpreter inside the products
+            list(pool.map(add_products, range(0, len(self._sum), step)))
+
+    def result(self) -> CrossSpectra:
+        """The spectra of what came so far; more samples may follow.
+
+        Raises
+        ------
+        InputError
+            Fewer samples than one segment, or none that is usable.
+        """
+        self._add_remainder()
+        return self._spectra(np.asarray(self._sum * self._scale()[:, None, None], dtype=np.complex128))
+
+    def finish(self) -> CrossSpectra:
+        """The spectra, in the accumulator's own memory: nothing can be added afterwards.
+
+        Raises
+        ------
+        InputError
+            Fewer samples than one segment, or none that is usable.
+        """
+        self._add_remainder()
+        total, self._sum = self._sum, np.empty((0, 0, 0), dtype=complex)
+        scale = self._scale(len(total))
+        step = max(1, _PRODUCT_BYTES // (16 * max(1, total.shape[1]) ** 2))
+        for start in range(0, len(total), step):
+            total[start : start + step] *= scale[start : start + step, None, None]
+        return self._spectra(total)
+
+    def _add_remainder(self) -> None:
+        """Segments that wait for their batch to fill."""
+        ready = self._n_complete(self._held.shape[1])
+        self._add_batches(self._held, self._held_usable, ready)
+        self._held = self._held[:, ready * self._hop :].copy()
+        self._held_usable = self._held_usable[ready * self._hop :]
+        if self.n_segments == 0 and self.n_excluded:
+            raise InputError(
+                f"all {self.n_excluded} segments hold overload, clipping or dropped samples; record again with a "
+                "lower gain, or use shorter segments"
+            )
+        if self.n_segments == 0:
+            raise InputError(
+                f"record is shorter than one segment of {self.settings.segment_length} samples "
+                f"({self.settings.segment_length / self.sample_rate:g} s); use shorter segments or a longer record"
+            )
+
+    def _scale(self, n_lines: int | None = None) -> NDArray[np.float64]:
+        scale = np.full(len(self._sum) if n_lines is None else n_lines, 2.0)
+        scale[0] = 1.0
+        if self.settings.segment_length % 2 == 0:
+            scale[-1] = 1.0
+        return scale / (self.sample_rate * float(self._window @ self._window) * self.n_segments)
+
+    def _spectra(self, mean: NDArray[np.complex128]) -> CrossSpectra:
+        n = len(self.excitations)
+        lines = np.fft.rfftfreq(self.settings.segment_length, 1 / self.sample_rate)
+        frequencies = np.asarray(lines, dtype=np.float64)
+        take_out_delays(mean, frequencies, (*self.excitations, *self.responses))
+        return CrossSpectra(
+            frequencies=frequencies,
+            input_spectra=mean[:, :n, :n],
+            cross_spectra=mean[:, n:, :n],
+            output_spectra=mean[:, n:, n:],
+            excitations=self.excitations,
+            responses=self.responses,
+            n_segments=self.n_segments,
+            effective_averages=effective_averages(self.settings, self.n_segments),
+            settings=self.settings,
+            sample_rate=self.sample_rate,
+            n_excluded=self.n_excluded,
+        )
+
+
+def take_out_delays(
+    spectra: NDArray[np.complex128], frequencies: NDArray[np.float64], channels: Sequence[Channel]
+) -> None:
+    """Turn the phases of spectra (n_lines, n, n), in place, to those of channels without their input delays.
+
+    ``S_uv exp(2 pi i f (tau_u - tau_v))``: being late by tau turns a channel's lines by ``exp(-2 pi i f tau)``.
+    """
+    delays = np.array([channel.input_delay_s or 0.0 for channel in channels])
+    if np.ptp(delays) == 0:
+        return
+    turned = np.exp(2j * np.pi * frequencies[:, None] * (delays - delays.min()))
+    for row in range(len(channels)):  # row by row: no second array of this size
+        spectra[:, row, :] *= turned[:, row, None] * turned.conj()
+
+
+def _detrended(segments: NDArray[np.float64], kind: str) -> NDArray[np.float64]:
+    """A copy with mean or least-squares line taken off the last axis."""
+    if kind == "none":
+        return segments.copy()
+    centred: NDArray[np.float64] = segments - segments.mean(axis=-1, keepdims=True)
+    if kind == "constant":
+        return centred
+    ramp = np.arange(segments.shape[-1]) - (segments.shape[-1] - 1) / 2
+    centred -= ((centred @ ramp) / float(ramp @ ramp))[..., None] * ramp
+    return centred

@@ -1,0 +1,9 @@
+"""What all results share: equality by value, a short text, a small HTML table, drawing, and optional libraries."""
+
+from .drawing import drawing
+from .equality import same_values
+from .optional import optional_library
+from .result import Result
+from .summary import Summary, counted, listed
+
+__all__ = ["Result", "Summary", "counted", "drawing", "listed", "optional_library", "same_values"]

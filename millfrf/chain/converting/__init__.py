@@ -1,0 +1,1 @@
+"""Between this project's files and those of other programs."""

@@ -1,0 +1,130 @@
+"""FRFs and modal models between this project's files and the Universal File Format."""
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from estimation import (
+    ImportedFrf,
+    import_frf,
+    import_geometry,
+    read_frf,
+    write_frf,
+    write_frf_uff,
+    write_geometry,
+)
+from foundation import writing_whole_file
+from modal_fit import ModalModel, import_modes_uff, read_modal_model, write_modal_model, write_modes_uff
+
+from ...gate import check_frf
+from ...provenance import add_to_json, sources, versions
+
+UFF_SUFFIXES = (".uff", ".unv")
+
+Files = Sequence[str | os.PathLike[str]]
+
+
+@dataclass(frozen=True)
+class Told:
+    """What a conversion has to say: what it inferred, and what one may doubt, which is stored with the result."""
+
+    inferred: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+
+def is_uff_conversion(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> bool:
+    """Whether one side is a UFF file, or a geometry is to be written."""
+    suffixes = [Path(path).suffix.lower() for path in (source, target)]
+    return suffixes[1] == ".toml" or any(suffix in UFF_SUFFIXES for suffix in suffixes)
+
+
+def convert_uff(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> Told:
+    """A geometry where the target is ``.toml``, a modal model where either side is ``.json``, else an FRF.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be used, or an FRF that :mod:`millfrf.gate` refuses; nothing is written.
+    """
+    suffixes = [Path(path).suffix.lower() for path in (source, target)]
+    if suffixes[1] == ".toml":
+        return convert_geometry(source, target)
+    if ".json" in suffixes:
+        return _convert_modes(source, target)
+    found = import_frf([source]) if suffixes[0] in UFF_SUFFIXES else ImportedFrf(read_frf(source))
+    return write_imported(target, found, [source])
+
+
+def _convert_modes(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> Told:
+    if Path(target).suffix.lower() in UFF_SUFFIXES:
+        model = read_modal_model(source)
+        write_modes_uff(target, model)
+        return Told((), _left_out(model, Path(source).name))
+    model, doubts = import_modes_uff(Path(source))
+    with writing_whole_file(target) as temporary:
+        write_modal_model(temporary, model)
+        add_to_json(temporary, made_of([source], Told((), doubts)))
+    return Told((), doubts)
+
+
+def convert_geometry(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> Told:
+    """Nodes, local axes and lines of a UFF, CSV or TOML file as TOML.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be used; nothing is written.
+    """
+    geometry, doubts = import_geometry(source)
+    write_geometry(target, geometry)
+    return Told((), doubts)
+
+
+def write_imported(target: str | os.PathLike[str], found: ImportedFrf, files: Files) -> Told:
+    """Ask the gate about an FRF from another program, and write it by suffix, with its sources and doubts.
+
+    Parameters
+    ----------
+    target
+        File to write: ``.h5``, ``.uff`` or ``.unv``.
+    found
+        FRF that was read, with what was inferred.
+    files
+        Files from which it was read.
+
+    Raises
+    ------
+    InputError
+        The gate refuses it, or it cannot be written.
+    """
+    name = Path(files[0]).name if len(files) == 1 else f"{len(files)} files"
+    told = Told(found.inferred, (*found.doubts, *check_frf(found.frf, name)))
+    if Path(target).suffix.lower() in UFF_SUFFIXES:
+        write_frf_uff(target, found.frf)
+    else:
+        write_frf(target, found.frf, title=f"from {name}", provenance=json.dumps(made_of(files, told)))
+    return told
+
+
+def made_of(files: Files, told: Told) -> dict[str, Any]:
+    """Provenance of something that was converted."""
+    said = {"inferred": list(told.inferred), "warnings": list(told.doubts)}
+    return {"step": "convert", "sources": sources(files), **said, "versions": versions()}
+
+
+def _left_out(model: ModalModel, name: str) -> tuple[str, ...]:
+    """What a UFF file of modes has no place for."""
+    lost = [
+        what
+        for what, there in (
+            ("residuals", model.residuals is not None),
+            ("error bars", model.covariance is not None),
+            ("the delay", bool(model.delay)),
+            ("terms of a diagnosis", bool(model.physics)),
+        )
+        if there
+    ]
+    return (f"{name}: UFF has no place for {', '.join(lost)}",) if lost else ()

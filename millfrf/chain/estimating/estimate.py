@@ -1,0 +1,215 @@
+"""From recordings to an FRF file: spectra test by test, stacked, with the sensors' high-pass taken out."""
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+
+from acquisition import Recording
+from estimation import (
+    CrossSpectra,
+    Frf,
+    correct_high_pass,
+    cross_spectra,
+    h1,
+    h1_side_by_side,
+    h2,
+    hv,
+    input_independence,
+    instrumental_variable,
+    known_band,
+    settings_for,
+    sum_tests,
+    write_frf,
+)
+from foundation import InputError
+
+from ...gate import (
+    Segmentation,
+    check_inputs,
+    check_local_frf,
+    check_recordings,
+    check_sample_rates,
+    driven_lines,
+    gain_of,
+)
+from ...progress import Watch, silent
+from ...provenance import sources, versions
+from .estimate_options import INSTRUMENTAL, LOCAL, TITLES, Estimate, EstimateOptions, check_options
+from .instruments import channels_with_instruments, only_inputs
+from .local_estimate import band_records, judging_spectra, local_frf
+
+SPECTRAL: dict[str, Callable[[CrossSpectra], Frf]] = {"h1": h1, "h2": h2, "hv": hv}
+
+
+def spectra_of_tests(
+    paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, watch: Watch = silent
+) -> tuple[CrossSpectra, ...]:
+    """Spectra of each recording on the lines that are wanted.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be used, or sample rates that differ.
+    """
+    if not paths:
+        raise InputError("no recording given; name at least one")
+    rates = [_sample_rate(path, options.stream) for path in paths]
+    for path, rate in zip(paths, rates, strict=True):
+        if rate != rates[0]:
+            raise InputError(
+                f"{Path(path).name} was sampled at {rate:g} Hz, {Path(paths[0]).name} at {rates[0]:g} Hz; "
+                "stack tests of one sample rate"
+            )
+    return tuple(_spectra(path, options, watch) for path in paths)
+
+
+def estimate_recordings(
+    paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, watch: Watch = silent
+) -> Estimate:
+    """FRF over one or many recordings.
+
+    Raises
+    ------
+    InputError
+        A file or option that cannot be used, or inputs that are dependent wherever they have power: fewer tests than
+        inputs, or tests that are too much alike.
+    """
+    check_options(options)
+    if options.estimator == LOCAL:
+        return _local_estimate(paths, options, watch)
+    forces, taken = options.excitations, options
+    if options.estimator == INSTRUMENTAL and paths:
+        names = (options.excitations, options.responses)
+        forces, responses = channels_with_instruments(paths[0], options.stream, names, options.instruments)
+        taken = replace(options, excitations=(*forces, *options.instruments), responses=responses)
+    doubts = check_recordings(
+        paths,
+        stream=taken.stream,
+        excitations=taken.excitations,
+        responses=taken.responses,
+        excluding=taken.exclude,
+        segments=Segmentation(taken.segment, taken.overlap, taken.window),
+        watch=watch,
+    )
+    tests = spectra_of_tests(paths, taken, watch)
+    total = sum_tests(tests)
+    if options.estimator == INSTRUMENTAL:
+        tests = tuple(only_inputs(test, forces) for test in tests)
+        doubts += [*_rate_doubts(paths, tests), *check_inputs(only_inputs(total, options.instruments))]
+        frf = instrumental_variable(total, options.instruments)
+    else:
+        doubts += [*_rate_doubts(paths, tests), *check_inputs(total)]
+        frf = SPECTRAL[options.estimator](total) if options.stack == "sum" else h1_side_by_side(tests)
+    if total.n_excluded:
+        doubts.append(
+            f"{total.n_excluded} of {total.n_excluded + total.n_segments} segments hold overload, clipping or dropped "
+            "samples and were left out"
+        )
+    return _finished(frf, tests, doubts)
+
+
+def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, watch: Watch) -> Estimate:
+    """By local polynomials over whole records; the inputs are judged by spectra as everywhere."""
+    assert options.band is not None
+    names = (options.excitations, options.responses)
+    doubts = check_recordings(
+        paths, stream=options.stream, excitations=names[0], responses=names[1], segments=None, watch=watch
+    )
+    records = band_records(paths, names, options.stream, options.band[1], watch)
+    tests = tuple(lines_of(test, options.band) for test in judging_spectra(records, options.band))
+    doubts += [*_rate_doubts(paths, tests), *check_inputs(sum_tests(tests))]
+    frf = local_frf(records, options.band, watch)
+    return _finished(frf, tests, [*doubts, *check_local_frf(frf, len(records))])
+
+
+def _rate_doubts(paths: Sequence[str | os.PathLike[str]], tests: Sequence[CrossSpectra]) -> list[str]:
+    gains = [gain_of(test, Path(path).name, test.sample_rate) for test, path in zip(tests, paths, strict=True)]
+    return check_sample_rates(gains)
+
+
+def _finished(frf: Frf, tests: tuple[CrossSpectra, ...], doubts: Sequence[str]) -> Estimate:
+    """Without the sensors' high-pass, and with the band in which it is known."""
+    total = sum_tests(tests)
+    frf = correct_high_pass(frf, [channel.high_pass_hz for channel in total.responses])
+    driven = np.interp(frf.frequencies, total.frequencies, driven_lines(total).astype(float)) >= 0.5
+    frf = replace(frf, band=known_band(frf, driven))
+    return Estimate(frf, tests, input_independence(total), tuple(doubts))
+
+
+def write_estimate(
+    path: str | os.PathLike[str],
+    estimate: Estimate,
+    recordings: Sequence[str | os.PathLike[str]],
+    options: EstimateOptions,
+) -> None:
+    """Write the FRF with its provenance: recordings, settings, averages, warnings, versions."""
+    first = estimate.tests[0]
+    length = first.settings.segment_length / first.sample_rate
+    judged_by = {"segment": length} if options.estimator == LOCAL else {}  # it has no segments of its own
+    provenance = {
+        "step": "estimate",
+        "sources": sources(recordings),
+        "options": asdict(options) | judged_by,
+        "settings": asdict(first.settings),
+        "sample_rate_hz": first.sample_rate,
+        "excitation_channels": [channel.name for channel in first.excitations],
+        "response_channels": [channel.name for channel in first.responses],
+        "n_tests": sum(test.n_tests for test in estimate.tests),
+        "n_segments": sum(test.n_segments for test in estimate.tests),
+        "effective_averages": sum(test.effective_averages for test in estimate.tests),
+        "warnings": list(estimate.warnings),
+        "versions": versions(),
+    }
+    count = f"{len(recordings)} recording{'s' if len(recordings) != 1 else ''}"
+    title = f"{TITLES.get(options.estimator, options.estimator.upper())} of {count}"
+    write_frf(path, estimate.frf, title=title, provenance=json.dumps(provenance))
+
+
+def _sample_rate(path: str | os.PathLike[str], stream: str | None) -> float:
+    with Recording(path) as recording:
+        return recording.stream(stream).sample_rate
+
+
+def _spectra(path: str | os.PathLike[str], options: EstimateOptions, watch: Watch) -> CrossSpectra:
+    with Recording(path) as recording:
+        source = recording.stream(options.stream)
+        settings = settings_for(source.sample_rate, options.segment, overlap=options.overlap, window=options.window)
+        with watch(f"spectra of {Path(path).name}", source.n_samples) as update:
+            spectra = cross_spectra(
+                recording,
+                settings,
+                stream=options.stream,
+                excitations=options.excitations or None,
+                responses=options.responses or None,
+                exclude_unusable=options.exclude,
+                progress=update,
+            )
+    return spectra if options.band is None else lines_of(spectra, options.band)
+
+
+def lines_of(spectra: CrossSpectra, band: tuple[float, float]) -> CrossSpectra:
+    """The lines of spectra inside a band (Hz).
+
+    Raises
+    ------
+    InputError
+        None lies inside.
+    """
+    low, high = band
+    f = spectra.frequencies
+    inside = (f >= low) & (f <= high)
+    if not inside.any():
+        raise InputError(
+            f"no line lies between {low:g} and {high:g} Hz (the spectra have 0 to {f[-1]:g} Hz); widen --band"
+        )
+    return replace(
+        spectra,
+        frequencies=f[inside],
+        input_spectra=spectra.input_spectra[inside],
+        cross_spectra=spectra.cross_spectra[inside],
+        output_spectra=spectra.output_spectra[inside],
+    )

@@ -1,0 +1,129 @@
+"""From an FRF file, or straight from recordings, to a modal model file."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from acquisition import Recording
+from estimation import BandRecord, Frf, band_record, choose_channels, widest_band
+from foundation import InputError, writing_whole_file
+from modal_fit import (
+    ModalFit,
+    SubspaceFit,
+    fit_polyreference,
+    fit_subspace,
+    write_modal_model,
+)
+
+from ...gate import check_frf_for_fit, check_recordings, check_records, fit_doubts
+from ...progress import Watch, silent
+from ...provenance import add_to_json, sources, versions
+from .fit_options import (
+    KEPT_ABOVE,
+    POLYREFERENCE,
+    SUBSPACE,
+    SUBSPACE_ORDER,
+    FitOptions,
+    chart_to_json,
+)
+from .pole_picking import check_picking, fit_picked
+
+
+def fit_model(frf: Frf, options: FitOptions, watch: Watch = silent, name: str = "the FRF") -> ModalFit:
+    """Fit a modal model to an FRF; ``name`` is that of its file, for messages.
+
+    Raises
+    ------
+    InputError
+        A method that needs recordings, a band without enough lines, an FRF that :mod:`millfrf.gate` refuses, or picked
+        poles that cannot be.
+    MillfrfError
+        No stable pole was found.
+    """
+    if options.method != POLYREFERENCE:
+        raise InputError(f"method {options.method!r} does not fit an FRF; use {POLYREFERENCE}, or give recordings")
+    check_picking(options)
+    doubts = check_frf_for_fit(frf, options.band, name)
+    with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
+        if options.poles is None:
+            fit = fit_polyreference(frf, options.band, max_order=options.max_order, n_modes=options.n_modes)
+        else:
+            fit = fit_picked(frf, options)
+    poor = fit_doubts(fit.reduced_chi_square, fit.relative_error, fit.warnings)
+    return replace(fit, warnings=(*doubts, *fit.warnings, *poor))
+
+
+def fit_recordings(paths: Sequence[str | os.PathLike[str]], options: FitOptions, watch: Watch = silent) -> SubspaceFit:
+    """Fit a modal model to recordings of one set-up, without spectra in between.
+
+    Raises
+    ------
+    InputError
+        A method that needs an FRF, recordings that cannot be stacked, or dependent inputs.
+    MillfrfError
+        No stable pole was found.
+    """
+    if options.method != SUBSPACE:
+        raise InputError(f"method {options.method!r} does not fit recordings; use {SUBSPACE}, or estimate an FRF first")
+    if options.poles is not None or options.refine:
+        raise InputError("--poles picks poles of an FRF; estimate one from these recordings first")
+    doubts = check_recordings(
+        paths, stream=options.stream, excitations=options.excitations, responses=options.responses, watch=watch
+    )
+    records = [_band_record(path, options, watch) for path in paths]
+    doubts += check_records(
+        [record for record, _ in records],
+        options.band,
+        [Path(path).name for path in paths],
+        [rate for _, rate in records],
+    )
+    with watch(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
+        fit = fit_subspace(
+            [record for record, _ in records],
+            options.band,
+            max_order=options.max_order or SUBSPACE_ORDER,
+            n_modes=options.n_modes,
+        )
+    return replace(fit, warnings=(*doubts, *fit.warnings, *fit_doubts(fit.reduced_chi_square, None)))
+
+
+def _band_record(path: str | os.PathLike[str], options: FitOptions, watch: Watch) -> tuple[BandRecord, float]:
+    with Recording(path) as recording:
+        stream = recording.stream(options.stream)
+        channels = choose_channels(stream, options.excitations or None, options.responses or None)
+        with watch(f"reading {Path(path).name}", stream.n_samples) as update:
+            highest = max(options.band[1], min(KEPT_ABOVE * options.band[1], widest_band(stream.sample_rate)))
+            made = band_record(recording, highest, *channels, stream=options.stream, progress=update)
+    return made, stream.sample_rate
+
+
+def write_fit(
+    path: str | os.PathLike[str],
+    fit: ModalFit | SubspaceFit,
+    inputs: Sequence[str | os.PathLike[str]],
+    options: FitOptions,
+) -> None:
+    """Write the model with its provenance: files, band, quality, stabilisation chart, warnings, versions."""
+    provenance = {
+        "step": "fit",
+        "sources": sources(inputs),
+        "method": options.method,
+        "status": fit.status if isinstance(fit, ModalFit) else None,
+        "picked_poles": None if options.poles is None else sources([options.poles])[0],
+        "max_order": options.max_order or (int(fit.chart.orders.max()) if len(fit.chart.orders) else None),
+        "band_hz": list(fit.band),
+        "reduced_chi_square": None if np.isnan(fit.reduced_chi_square) else fit.reduced_chi_square,
+        "relative_error": fit.relative_error.tolist() if isinstance(fit, ModalFit) else None,
+        "warnings": list(fit.warnings),
+        "dropped": [
+            {"frequency_hz": g.frequency, "damping_ratio": g.damping_ratio, "reason": g.reason} for g in fit.dropped
+        ],
+        "stabilisation": chart_to_json(fit.chart),
+        "versions": versions(),
+    }
+    with writing_whole_file(path) as temporary:
+        write_modal_model(temporary, fit.model)
+        add_to_json(temporary, provenance)

@@ -1,0 +1,1 @@
+"""Before and during a measurement: plan, check of the signals, recording."""

@@ -1,0 +1,119 @@
+"""Recording with the live page: signals are shown at once, recorded from Start to Stop."""
+
+import os
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+from acquisition import Source
+from acquisition.session import Session
+from acquisition.sources.events import announced_events
+from acquisition.sources.feeds import WithFeeds
+from foundation import MillfrfError
+
+from ...live import LiveControl, LiveMonitor, LiveServer, LiveSettings
+from ...live.control import MARKS
+from ...live.server import LOOPBACK
+from .record_session import OpenedSession, Tally, acquire, interrupts
+
+_LINGER = 3.0  # s in which open pages learn how it ended
+
+
+def live_settings(session: Session) -> LiveSettings:
+    """What the page estimates, from the session's tables ``live``, ``plan``, ``cutting``, ``tool`` and ``cut``."""
+    teeth = _number(session.cutting, "teeth") or _number(session.tool, "teeth")
+    return LiveSettings(
+        session.band_hz,
+        session.live.segment_s,
+        session.live.frf_error,
+        _number(session.plan, "frf_error_m_per_n") or None,
+        session.live.bands,
+        int(teeth),
+        _number(session.cut, "spindle_speed_rpm"),
+    )
+
+
+def _number(table: dict[str, Any], key: str) -> float:
+    value = table.get(key, 0)
+    return float(value) if isinstance(value, int | float) else 0.0
+
+
+def acquire_live(
+    opened: OpenedSession,
+    out: str | os.PathLike[str],
+    *,
+    address: str = LOOPBACK,
+    port: int = 0,
+    at_once: bool = False,
+    say: Callable[[str], object] = str,
+) -> Tally | None:
+    """Show a session's signals on a page and record them from Start to Stop.
+
+    Parameters
+    ----------
+    opened
+        Session whose devices are set up, from `open_session`.
+    out
+        New file to write.
+    address, port
+        Network address and port of the page.
+    at_once
+        Whether to record without waiting for Start.
+    say
+        Function that is told the page's address.
+
+    Returns
+    -------
+    Tally or None
+        None where it was stopped before it was started.
+
+    Raises
+    ------
+    InputError, DeviceError, DiskFull
+        The file is closed and holds what came before.
+    """
+    replayed = announced_events(opened.source)
+    control = LiveControl(MARKS if MARKS not in replayed else f"{MARKS}_while_replaying")
+    monitor = LiveMonitor(opened.source.streams, live_settings(opened.session))
+    try:
+        with LiveServer(monitor, control, address, port) as server:
+            say(f"live page: {server.url}")
+            try:
+                if not at_once and not _preview(opened.source, monitor, control):
+                    return None
+                control.start()
+                monitor.restart()
+                source = WithFeeds(opened.source, [control])
+                stop = _stopping(control)
+                tally = acquire(replace(opened, source=source), out, watchers=[monitor], stop=stop)
+                control.ended(f"Wrote {os.fspath(out)}: {tally.summary()}")
+            except MillfrfError as error:
+                control.ended(f"Ended by an error: {error}")
+                raise
+            finally:
+                with suppress(KeyboardInterrupt):  # the file is closed: whoever is in a hurry loses nothing
+                    time.sleep(_LINGER)
+            return tally
+    finally:
+        monitor.close()
+
+
+def _preview(source: Source, monitor: LiveMonitor, control: LiveControl) -> bool:
+    """Show what comes, and keep nothing, until Start (True) or Stop or Ctrl-C (False)."""
+    with interrupts() as interrupted:
+        try:
+            source.open()
+            while control.state == "waiting" and not interrupted():
+                taken = source.read()
+                if taken is None:
+                    break
+                monitor(taken)
+        finally:
+            source.close()
+        return not interrupted() and control.state != "stopping"
+
+
+def _stopping(control: LiveControl) -> Callable[[], bool]:
+    return lambda: control.state == "stopping"

@@ -1,0 +1,196 @@
+"""From a session file to a recording: the source it describes, recorded until it ends or is stopped."""
+
+import math
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from acquisition import Block, DeviceError, DiskFull, Events, Paced, Source, record
+from acquisition.session import Session, build_source
+from acquisition.session.read import session_from_text, session_text
+from acquisition.session.tables import SimulatedDevice
+from foundation import MillfrfError
+
+Watcher = Callable[[Block | Events], None]
+
+
+@dataclass(frozen=True)
+class OpenedSession:
+    """A session with its source, set up but not yet running.
+
+    Parameters
+    ----------
+    session, source
+        What was read and what it describes.
+    """
+
+    session: Session
+    source: Source
+
+
+@dataclass
+class Tally:
+    """What was recorded, counted as it comes.
+
+    Parameters
+    ----------
+    samples
+        Rows by stream.
+    events
+        Values by series.
+    longest_gap
+        Longest time between two blocks of a stream beyond the block's own duration, s: how long this computer or the
+        device held the recording up.
+    """
+
+    rates: dict[str, float]
+    samples: dict[str, int] = field(default_factory=dict)
+    events: dict[str, int] = field(default_factory=dict)
+    longest_gap: float = 0.0
+    _last: dict[str, float] = field(default_factory=dict)
+
+    def __call__(self, taken: Block | Events) -> None:
+        """Count one block or event."""
+        if isinstance(taken, Events):
+            self.events[taken.series] = self.events.get(taken.series, 0) + len(taken.times)
+            return
+        now = time.monotonic()
+        if taken.stream in self._last:
+            beyond = now - self._last[taken.stream] - len(taken.samples) / self.rates[taken.stream]
+            self.longest_gap = max(self.longest_gap, beyond)
+        self._last[taken.stream] = now
+        self.samples[taken.stream] = self.samples.get(taken.stream, 0) + len(taken.samples)
+
+    def seconds(self) -> float:
+        """Of the longest stream."""
+        return max((n / self.rates[name] for name, n in self.samples.items()), default=0.0)
+
+    def summary(self) -> str:
+        """One line."""
+        streams = ", ".join(f"{name}: {n} samples" for name, n in self.samples.items()) or "no samples"
+        events = ", ".join(f"{name}: {n} events" for name, n in self.events.items())
+        said = f"{streams}{'; ' if events else ''}{events}; {self.seconds():.2f} s"
+        return f"{said}, longest delay {1e3 * self.longest_gap:.0f} ms"
+
+
+def open_session(path: str | os.PathLike[str]) -> OpenedSession:
+    """Read a session and set its device up.
+
+    Raises
+    ------
+    InputError
+        The file has a mistake.
+    DeviceError
+        The device cannot be set up.
+    """
+    text = session_text(path)
+    session = session_from_text(text, os.fspath(path))
+    sampled = _simulated(session) if isinstance(session.device, SimulatedDevice) else None
+    return OpenedSession(session, build_source(session, text, Path(path).parent, sampled))
+
+
+def _simulated(session: Session) -> Source:
+    """The simulated cell, milling in real time."""
+    from replay_data import MillingCell, default_structure, milling_sensors
+
+    from ...demonstration.whole_chain import CUTTER
+
+    device = session.device
+    assert isinstance(device, SimulatedDevice)
+    cell = MillingCell(
+        default_structure(),
+        CUTTER,
+        1e-3,
+        device.spindle_speed_rpm * math.pi / 30,
+        session.duration_s or 3600.0,
+        sample_rate=device.sample_rate_hz,
+        sensors=milling_sensors(device.noise, device.noise),
+        seed=device.seed,
+        block_length=max(64, round(0.1 * device.sample_rate_hz)),
+        oversampling=max(2, math.ceil(8192 / device.sample_rate_hz)),
+    )
+    return Paced(cell, device.speed)
+
+
+def acquire(
+    opened: OpenedSession,
+    out: str | os.PathLike[str],
+    *,
+    watchers: Sequence[Watcher] = (),
+    stop: Callable[[], bool] = lambda: False,
+    progress: Callable[[int], None] | None = None,
+) -> Tally:
+    """Record a session; Ctrl-C, ``stop`` and the session's duration end it in order.
+
+    Parameters
+    ----------
+    opened
+        Session whose devices are set up, from `open_session`.
+    out
+        New file to write.
+    watchers
+        Functions that are shown every block and event after it was written.
+    stop
+        Function that is asked before every block; True ends the recording.
+    progress
+        Function that is called with the number of samples written.
+
+    Raises
+    ------
+    InputError, DeviceError, DiskFull, MillfrfError
+        The file is closed and holds what came before; the last where it was interrupted twice.
+    """
+    tally = Tally({stream.name: stream.sample_rate for stream in opened.source.streams})
+    duration = opened.session.duration_s or math.inf
+
+    def watch(taken: Block | Events) -> None:
+        tally(taken)
+        for watcher in watchers:
+            watcher(taken)
+
+    try:
+        with interrupts() as interrupted:
+            record(
+                opened.source,
+                out,
+                watch=watch,
+                progress=progress,
+                stop=lambda: interrupted() or stop() or tally.seconds() >= duration,
+            )
+    except (DeviceError, DiskFull) as error:
+        error.args = (f"{error}; {_kept(tally, out)}",)
+        raise
+    except KeyboardInterrupt as error:
+        raise MillfrfError(f"stopped at once; {_kept(tally, out)}") from error
+    return tally
+
+
+def _kept(tally: Tally, out: str | os.PathLike[str]) -> str:
+    """What a recording that ended too early holds."""
+    return f"{os.fspath(out)} holds the {tally.seconds():.2f} s before"
+
+
+@contextmanager
+def interrupts() -> Iterator[Callable[[], bool]]:
+    """Ctrl-C and SIGTERM as a question that is asked between blocks; a second Ctrl-C interrupts at once."""
+    asked = False
+
+    def ask(number: int, frame: object) -> None:
+        nonlocal asked
+        if asked:
+            raise KeyboardInterrupt
+        asked = True
+
+    try:
+        before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    except ValueError:  # not the main thread: signals are somebody else's
+        before = {}
+    try:
+        yield lambda: asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

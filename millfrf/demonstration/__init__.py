@@ -1,0 +1,1 @@
+"""The demonstration on the simulated cell: the whole chain, and the blind diagnosis of a concealed effect."""

@@ -1,0 +1,81 @@
+"""Options that several commands share, and small readers of what a user typed."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from foundation import InputError
+
+Band = Annotated[tuple[float, float] | None, typer.Option("--band", metavar="LO HI", help="Frequency band, Hz.")]
+Output = Annotated[Path, typer.Option("--out", metavar="FILE", help="File to write.")]
+Stream = Annotated[str | None, typer.Option("--stream", help="Sample clock; needed where a recording has several.")]
+
+
+def names(given: Sequence[str] | None) -> tuple[str, ...]:
+    """Names given one by one or with commas.
+
+    Examples
+    --------
+    >>> names(["fx,fy", "fz"])
+    ('fx', 'fy', 'fz')
+    """
+    return tuple(name.strip() for text in given or () for name in text.split(",") if name.strip())
+
+
+def check_band(band: tuple[float, float] | None) -> tuple[float, float] | None:
+    """Refuse a band that is empty or negative.
+
+    Raises
+    ------
+    InputError
+        With the band and the remedy.
+    """
+    if band is not None and not 0 <= band[0] < band[1]:
+        raise InputError(f"band {band[0]:g} to {band[1]:g} Hz is empty; give --band LO HI with 0 <= LO < HI")
+    return band
+
+
+def check_shares(option: str, given: tuple[float, ...], example: tuple[float, ...]) -> None:
+    """Refuse errors that are no shares, such as percent.
+
+    Raises
+    ------
+    InputError
+        With the values and an example.
+    """
+    if not all(0 < share < 1 for share in given):
+        typed, right = (" ".join(f"{share:g}" for share in shares) for shares in (given, example))
+        raise InputError(
+            f"{option} {typed}: give {len(given)} positive shares below 1 (0.12 is 12 %), for example {right}"
+        )
+
+
+def check_output(path: Path, suffixes: Sequence[str], inputs: Sequence[Path] = ()) -> None:
+    """Refuse a name that cannot be written, before anything is computed.
+
+    Parameters
+    ----------
+    path
+        Name of the output as it was typed.
+    suffixes
+        Suffixes that the command writes.
+    inputs
+        Files that the command reads, none of which it may overwrite.
+
+    Raises
+    ------
+    InputError
+        A folder that is not there, a suffix that says another format, or one of the inputs.
+    """
+    if path.suffix.lower() not in suffixes:
+        raise InputError(
+            f"cannot write {path}: this command writes {' or '.join(suffixes)}; change the suffix of --out"
+        )
+    if not path.parent.is_dir():
+        raise InputError(f"cannot write {path}: folder {path.parent} does not exist; create it first")
+    if path.is_dir():
+        raise InputError(f"cannot write {path}: it is a folder; give a file name")
+    if any(one.exists() and path.exists() and path.samefile(one) for one in inputs):
+        raise InputError(f"{path} is the input itself; choose another --out")

@@ -1,0 +1,133 @@
+"""Read the files of a report and find out which belongs to which."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from acquisition import Recording
+from cutting import MillingProcess
+from estimation import Frf, read_frf
+from foundation import InputError
+from modal_fit import ModalModel, read_modal_model
+from stability import StabilityLobes, read_lobes
+
+from ..chain.cuts.chatter_file import KeptCut, read_cuts
+from ..file_kinds import CHATTER, CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
+from ..gate import Given, check_belonging, read_checked_cutting
+from ..provenance import read_provenance, sha256
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """A file of the report.
+
+    Parameters
+    ----------
+    path, kind
+        Path of the file, and its kind.
+    sha256
+        SHA-256 hash of its bytes.
+    provenance
+        Sources and versions that the file states; empty where it states none.
+    """
+
+    path: Path
+    kind: str
+    sha256: str
+    provenance: dict[str, Any]
+
+    @property
+    def label(self) -> str:
+        """File name without suffix and kind, words apart."""
+        return self.path.stem.replace("_", " ").removeprefix("lobes ")
+
+    def made_from(self, other: "SourceFile") -> bool:
+        """Whether ``other`` is among the files this one was made from, by its bytes."""
+        return any(source.get("sha256") == other.sha256 for source in self.provenance.get("sources", []))
+
+
+@dataclass(frozen=True)
+class Collected:
+    """All files of a report, read (recordings stay on disk).
+
+    Parameters
+    ----------
+    files
+        All files, in the order given.
+    recordings, frfs, models, lobes, cutting, chatter
+        Contents by kind, each with the file it came from.
+    doubts
+        Files that do not belong together, and FRFs that look wrong; one sentence each.
+    """
+
+    files: tuple[SourceFile, ...]
+    recordings: tuple[SourceFile, ...] = ()
+    frfs: tuple[tuple[SourceFile, Frf], ...] = ()
+    models: tuple[tuple[SourceFile, ModalModel], ...] = ()
+    lobes: tuple[tuple[SourceFile, StabilityLobes], ...] = ()
+    cutting: tuple[tuple[SourceFile, MillingProcess], ...] = field(default=())
+    doubts: tuple[str, ...] = ()
+    chatter: tuple[tuple[SourceFile, tuple[KeptCut, ...]], ...] = ()
+
+    def model_of(self, file: SourceFile, frf: Frf) -> tuple[SourceFile, ModalModel] | None:
+        """The model fitted to an FRF, or else one of the same degrees of freedom."""
+        fitted = [pair for pair in self.models if pair[0].made_from(file) and pair[1].responses == frf.responses]
+        alike = [
+            pair for pair in self.models if (pair[1].responses, pair[1].excitations) == (frf.responses, frf.excitations)
+        ]
+        return next(iter(fitted + alike), None)
+
+    def frf_of(self, model: SourceFile) -> Frf | None:
+        """The FRF a model was fitted to, or one made from the same recordings."""
+        fitted = [frf for file, frf in self.frfs if model.made_from(file)]
+        alike = [frf for file, frf in self.frfs if _sources(file) & _sources(model)]
+        return next(iter(fitted + alike), None)
+
+    def recordings_of(self, frf: SourceFile) -> tuple[SourceFile, ...]:
+        """The recordings an FRF was estimated from, those that are among the files."""
+        return tuple(file for file in self.recordings if frf.made_from(file))
+
+
+def _sources(file: SourceFile) -> set[str]:
+    return {source.get("sha256", "") for source in file.provenance.get("sources", [])}
+
+
+def collect(paths: Sequence[str | os.PathLike[str]]) -> Collected:
+    """Read every file.
+
+    Raises
+    ------
+    InputError
+        No file, or one that cannot be used.
+    """
+    if not paths:
+        raise InputError("no file given; name recordings, FRFs, models, lobes, verdicts or a cutting file")
+    files = tuple(_source(Path(path)) for path in paths)
+
+    def chosen(kind: str) -> tuple[SourceFile, ...]:
+        return tuple(file for file in files if file.kind == kind)
+
+    for file in chosen(RECORDING):
+        Recording(file.path).close()
+    frfs = tuple((file, read_frf(file.path)) for file in chosen(FRF))
+    doubts = check_belonging([Given(file.path.name, file.kind, file.sha256, file.provenance) for file in files])
+    return Collected(
+        files,
+        chosen(RECORDING),
+        frfs,
+        tuple((file, read_modal_model(file.path)) for file in chosen(MODEL)),
+        tuple((file, read_lobes(file.path)) for file in chosen(LOBES)),
+        tuple((file, read_checked_cutting(file.path)[0]) for file in chosen(CUTTING)),
+        tuple(doubts),
+        tuple((file, read_cuts(file.path)) for file in chosen(CHATTER)),
+    )
+
+
+def _source(path: Path) -> SourceFile:
+    kind = kind_of(path)
+    stored = read_provenance(path) if kind in (FRF, MODEL, LOBES, CHATTER) else {}
+    if kind == CUTTING:
+        stored = {"warnings": read_checked_cutting(path)[1]}
+    return SourceFile(path, kind, sha256(path), stored)

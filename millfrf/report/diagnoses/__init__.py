@@ -1,0 +1,1 @@
+"""Report pages of the diagnoses: structure, robot, and cutting process."""

@@ -1,0 +1,111 @@
+"""The page that a cutting diagnosis leaves behind."""
+
+import os
+from datetime import UTC, datetime
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from figures import as_data_uri, cut_orders_figure, cut_turn_figure, house_style
+from foundation import writing_whole_file
+from mismatch.adapters.cut import SIGNIFICANT, CutDiagnosis
+from mismatch.adapters.cut.force.force_coefficients import NAMES
+
+from ...provenance import versions
+from ...tables.result_tables import Table
+from ..section import Picture, Section
+
+
+def write_cut_report(path: str | os.PathLike[str], found: CutDiagnosis, cut_name: str, summary: list[str]) -> None:
+    """Write one HTML page, figures inside, that needs no other file and no network.
+
+    Parameters
+    ----------
+    path
+        File of the page.
+    found
+        Diagnosis of the cut.
+    cut_name
+        Name of the cut, for the title.
+    summary
+        Verdict, a sentence on it, and a line for each finding.
+    """
+    environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
+    names = ", ".join(lines.recording.name for lines in found.setting.lines)
+    text = environment.get_template("diagnosis.html.j2").render(
+        title=f"{cut_name} against {names}",
+        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
+        verdict=f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",
+        answers=[("What was found", summary[2:])],
+        warnings=_warnings(found),
+        sections=[_around_the_turn(found), _by_order(found), _coefficients(found), _candidates(found)],
+        versions=versions(),
+    )
+    with writing_whole_file(path) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8")
+
+
+def _warnings(found: CutDiagnosis) -> list[str]:
+    warnings = [
+        f"Coefficients are taken to be off by {100 * found.setting.belief.error:g} %, each spectral line of a right "
+        f"computed force by {100 * found.setting.force_error:g} %; what is smaller is not named."
+    ]
+    warnings.append(
+        f"A cause is told if it lowers the error of the force on blocks held out with p < {SIGNIFICANT:g}. Its ± is "
+        "one standard error: the fit's own, the spread between halves of the blocks and between bands of frequency, "
+        "and the largest shift with another cause free."
+    )
+    warnings += [f"{one.name} chatters: {one.reason}." for one in found.chatter if one.unstable]
+    if any(one.stage.startswith("not weighed") for one in found.candidates):
+        warnings.append("Not every cause could be weighed; see the table of candidates.")
+    if any(lines.recording.motion and lines.recording.motion.origin == "model" for lines in found.setting.lines):
+        warnings.append("The tip's motion was computed by a model from the measured forces, not measured.")
+    return warnings
+
+
+def _around_the_turn(found: CutDiagnosis) -> Section:
+    with house_style():
+        picture = as_data_uri(cut_turn_figure(found))
+    caption = (
+        f"Force on the tool around the turn of the spindle in {found.setting.lines[0].recording.name}, mean of all "
+        "turns, without its constant part, in the band that is compared (its upper end makes the ripple). Below: "
+        "measured less computed."
+    )
+    return Section("Around the turn", (), (), (Picture(picture, caption, "Measured and computed force"),))
+
+
+def _by_order(found: CutDiagnosis) -> Section:
+    with house_style():
+        picture = as_data_uri(cut_orders_figure(found))
+    caption = "Amplitude of the force and of what is left of it; teeth of equal chips give multiples of their number."
+    better = found.improvement
+    columns: tuple[str, ...] = ("as computed", "coefficients refitted", "noise")
+    numbers: tuple[float, ...] = (better.before, better.refitted, better.noise_floor)
+    if found.final.freed:
+        columns, numbers = (*columns[:2], "with causes", "noise"), (*numbers[:2], better.after, better.noise_floor)
+    row = tuple(f"{100 * number:.3g}" for number in numbers)
+    table = Table("Error on blocks of time that were not fitted (% of the force)", columns, (row,))
+    return Section("By spindle order", (), (table,), (Picture(picture, caption, "Error by spindle order"),))
+
+
+def _coefficients(found: CutDiagnosis) -> Section:
+    belief, fitted = found.setting.belief, found.final
+    stated, _ = belief.told(np.zeros(6), np.zeros(6))
+    values, errors = belief.told(fitted.attempt.deviations, np.sqrt(np.diag(fitted.covariance)[:6]))
+    rows = tuple(
+        (name, f"{stated[name]:.4g}", f"{values[name]:.4g} ± {errors[name]:.2g}", f"{deviation:+.2f}")
+        for name, deviation in zip(NAMES, fitted.attempt.deviations, strict=True)
+    )
+    columns = ("coefficient", "stated", "refitted", "off by (lab's errors)")
+    return Section("Coefficients", (), (Table("Force coefficients, refitted with the causes", columns, rows),))
+
+
+def _candidates(found: CutDiagnosis) -> Section:
+    rows = tuple((one.name, one.stage, f"{one.evidence:.1f}") for one in found.candidates)
+    table = Table(
+        "Evidence of each cause, beside those accepted before it", ("cause", "how far it was taken", "evidence"), rows
+    )
+    return Section("What was weighed", (), (table,))

@@ -1,0 +1,88 @@
+"""The page that an engineer reads after a diagnosis."""
+
+import os
+from collections.abc import Callable
+from datetime import UTC, datetime
+from functools import partial
+from importlib.resources import files
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from cutting import MillingProcess
+from foundation import writing_whole_file
+from mismatch import StructureDiagnosis
+from mismatch.inference.process_pool import in_processes
+
+from ...provenance import versions
+from ..section import Section
+from .diagnosis_answers import answers, verdict_sentence, warnings
+from .diagnosis_lobes import diagnosis_lobes_section
+from .diagnosis_sections import (
+    candidate_section,
+    growth_section,
+    held_out_section,
+    if_possible,
+    law_section,
+    location_section,
+    number_section,
+)
+
+
+def write_diagnosis_report(
+    path: str | os.PathLike[str],
+    diagnosis: StructureDiagnosis,
+    model_name: str = "",
+    process: MillingProcess | None = None,
+) -> None:
+    """Write one HTML page, figures inside, that needs no other file and no network.
+
+    Parameters
+    ----------
+    path
+        File of the page.
+    diagnosis
+        Diagnosis of a structure, with its fits and maps.
+    model_name
+        Name of the nominal model, for the title.
+    process
+        Milling process for the lobes; None: one that is assumed.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+    """
+    text = report_text(diagnosis, model_name, process)
+    with writing_whole_file(path) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8")
+
+
+def _drawn_sections(diagnosis: StructureDiagnosis, process: MillingProcess | None) -> list[Section]:
+    """Sections with figures, drawn side by side, the longest first."""
+    makers: list[Callable[[], Section]] = [
+        lambda: if_possible(lambda: held_out_section(diagnosis), "On data that was not fitted"),
+        partial(location_section, diagnosis),
+        lambda: if_possible(lambda: diagnosis_lobes_section(diagnosis, process), "What it does to the lobes"),
+        lambda: if_possible(lambda: law_section(diagnosis), "The measured force of the joint"),
+        partial(growth_section, diagnosis),
+    ]
+    held_out, location, lobes, law, growth = in_processes(makers)
+    return [law, held_out, lobes, location, growth]
+
+
+def report_text(diagnosis: StructureDiagnosis, model_name: str = "", process: MillingProcess | None = None) -> str:
+    """The page as text."""
+    sections = (number_section(diagnosis), *_drawn_sections(diagnosis, process), candidate_section(diagnosis))
+    names = ", ".join(one.trial.name for one in diagnosis.details.recordings)
+    environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
+    return environment.get_template("diagnosis.html.j2").render(
+        title=f"{model_name or 'Nominal model'} against {names}",
+        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
+        verdict=verdict_sentence(diagnosis),
+        answers=answers(diagnosis),
+        warnings=warnings(diagnosis),
+        sections=[section for section in sections if not section.empty],
+        versions=versions(),
+    )

@@ -1,0 +1,158 @@
+"""Tables and figures of a diagnosis."""
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from figures import as_data_uri, channel_map_figure, growth_figure, law_figure, spectra_figure, time_map_figure
+from foundation import InputError
+from mismatch import Candidate, StructureDiagnosis
+from mismatch.location.free_form_law import free_form_laws
+from mismatch.location.held_out_spectra import held_out_spectra
+from mismatch.location.locate import significant_cells
+from mismatch.location.recording_errors import recording_errors
+
+from ...tables.result_tables import Table
+from ..section import Picture, Section
+from .diagnosis_answers import number, place, words
+
+MOST_CANDIDATES = 15
+
+
+def location_section(diagnosis: StructureDiagnosis) -> Section:
+    """Maps of the residual."""
+    view = diagnosis.details.view
+    assert view is not None
+    located = diagnosis.located
+    level = 100 * located["family_wise_level"]
+    mask = significant_cells(located, view.before.ratio.shape)
+    maps = _picture(
+        channel_map_figure(view, mask),
+        "Residual power over noise power by frequency and channel, a column a recording. Dots: more than noise "
+        f"leaves, at {level:.0f} % for all {located['tests']} cells of all maps together (F tests, Holm).",
+        "Residual by frequency and channel",
+    )
+    times = _picture(
+        time_map_figure(view), "The same over time and frequency, all channels together.", "Residual by time"
+    )
+    return Section("Where the residual sits", (), (), (maps, times))
+
+
+def growth_section(diagnosis: StructureDiagnosis) -> Section:
+    """How the residual grows with the level."""
+    growth = diagnosis.located["growth"]
+    if "residual" not in growth or len(diagnosis.details.recordings) < 2:
+        return Section("Growth with the level")
+    caption = (
+        "Residual with the power of the noise taken off, relative to the response averaged over all recordings, "
+        "against force; bars are two standard errors. Thin lines: slopes of typical omissions."
+    )
+    return Section(
+        "Growth with the level", (), (), (_picture(growth_figure(growth), caption, "Growth of the residual"),)
+    )
+
+
+def law_section(diagnosis: StructureDiagnosis) -> Section:
+    """The measured force of the joint."""
+    title = "The measured force of the joint"
+    laws = free_form_laws(diagnosis)
+    sentences = tuple(
+        "The force that the linear model lacks along the found direction, from the recordings alone and with no law "
+        f"assumed; {words(found.name)} gives {100 * found.explained:.1f} % of its power."
+        for found in laws
+    )
+    caption = (
+        "Force that the joint takes beyond the linear model, in bins over all recordings, with bands of two standard "
+        "errors; (a) against deflection, rising and falling; (b) against velocity. Lines: the accepted law, driven by "
+        "the same motion and averaged alike."
+    )
+    pictures = tuple(_picture(law_figure(found), caption, f"Force of the joint: {words(found.name)}") for found in laws)
+    return Section(title, sentences, (), pictures)
+
+
+def held_out_section(diagnosis: StructureDiagnosis) -> Section:
+    """Errors and spectra on the recording that was held out."""
+    rows = tuple(
+        (
+            f"{one.recording}{' (held out)' if one.held_out else ''}",
+            f"{one.force:.4g}",
+            *(f"{100 * error:.3g}" for error in (one.nominal, one.refitted, one.final, one.noise)),
+            f"{one.final / one.noise:.3g}",
+        )
+        for one in recording_errors(diagnosis)
+    )
+    columns = (
+        "recording",
+        "force, rms (N)",
+        "nominal (%)",
+        "refitted (%)",
+        "final (%)",
+        "noise (%)",
+        "final over noise",
+    )
+    without = "Error as a share of the response, all channels together"
+    if len(diagnosis.details.recordings) > 1:
+        without += f"; fitted without {diagnosis.improvement.held_out}"
+    table = Table(without, columns, rows)
+    spectra = held_out_spectra(diagnosis)
+    caption = (
+        f"{spectra.recording}: measured and predicted response, and what each model leaves of it, fitted to the other "
+        "recordings only. Grey: noise, with what the noise of the forces becomes in the structure."
+    )
+    picture = _picture(spectra_figure(spectra), caption, "Spectra of the held-out recording")
+    return Section("On data that was not fitted", (), (table,), (picture,))
+
+
+def number_section(diagnosis: StructureDiagnosis) -> Section:
+    """Parameters of each accepted cause with standard errors."""
+    rows = []
+    for cause in diagnosis.physics:
+        for name, value in cause.parameters.items():
+            shown = number(value, cause.standard_errors.get(name))
+            rows.append((words(cause.name), name, shown, place(diagnosis, cause)))
+    columns = ("cause", "parameter", "value ± standard error", "place")
+    return Section(
+        "Numbers", (), (Table("Parameters of the accepted causes (SI units)", columns, tuple(rows)),) if rows else ()
+    )
+
+
+def candidate_section(diagnosis: StructureDiagnosis) -> Section:
+    """What was weighed."""
+    accepted = {cause.name: cause.evidence for cause in diagnosis.physics}
+    rows, seen = [], set()
+    for one in sorted(diagnosis.candidates, key=lambda one: (one.stage != "fitted", -one.evidence)):
+        key = (one.name, one.stage, str(one.location) if "channel" in one.location else "")
+        if key in seen or not np.isfinite(one.evidence):
+            continue
+        seen.add(key)
+        told = one.name in accepted and one.stage == "fitted"
+        evidence = accepted[one.name] if told else one.evidence
+        rows.append((words(one.name), one.stage, f"{evidence:.0f}", _short_place(one), "accepted" if told else ""))
+    sentence = (
+        "Screened: gain in misfit to first order, before a fit. Fitted: gain in evidence after all numbers were fitted "
+        "anew and the joint simulated freely; the larger, the better. Of each cause the best round is shown; of an "
+        "accepted one the evidence it was accepted with. Impossible: fitted, but with numbers that nothing real has."
+    )
+    table = Table(
+        "Causes that were weighed", ("cause", "stage", "evidence", "place", ""), tuple(rows[:MOST_CANDIDATES])
+    )
+    return Section("What was weighed", (sentence,), (table,) if rows else ())
+
+
+def _short_place(one: Candidate) -> str:
+    if "direction" in one.location:
+        return "(" + ", ".join(f"{value:.2f}" for value in one.location["direction"]) + ")"
+    return str(one.location.get("impossible", one.location.get("channel", "")))
+
+
+def _picture(figure: Figure, caption: str, alternative: str) -> Picture:
+    return Picture(as_data_uri(figure), caption, alternative)
+
+
+def if_possible(make: Callable[[], Section], title: str) -> Section:
+    """A section, or the reason why it is missing: one figure must not cost a report."""
+    try:
+        return make()
+    except (InputError, np.linalg.LinAlgError) as error:
+        return Section(title, (f"Not shown: {error}",))

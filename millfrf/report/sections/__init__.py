@@ -1,0 +1,1 @@
+"""Sections and folded parts of the modal-fitting report."""

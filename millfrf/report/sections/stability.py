@@ -1,0 +1,168 @@
+"""The section on stability: lobes and what they are worth, their band, a recommended cut, where advice differs."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cutting import MillingProcess
+from figures import LobesBand, as_data_uri, lobes_figure
+from stability import StabilityLobes
+
+from ...tables.result_tables import Table
+from ..collection import Collected
+from ..lobes_check import CheckedLobes, checked_lobes, lobes_warnings
+from ..recommendation import recommendation
+from ..section import Picture, Section
+
+DIFFERS = 0.1
+"""Relative difference of two depth limits that counts as different advice."""
+
+
+@dataclass(frozen=True)
+class StabilityFindings:
+    """The section on stability, and what of it stands at the head of the page.
+
+    Parameters
+    ----------
+    section
+        Figure, tables, sentences.
+    brief
+        One sentence each.
+    warnings
+        One sentence each.
+    """
+
+    section: Section
+    brief: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+def stability_findings(collected: Collected) -> StabilityFindings:
+    """All lobes in one figure and one table, held against the certified limits; the most exact ones lead."""
+    if not collected.lobes:
+        return StabilityFindings(Section("Stability lobes"))
+    checked = checked_lobes(collected)
+    curves = dict(one.headline for one in checked)
+    advised = recommendation(checked[0])
+    sentences = [_cutter(file.path.name, process) for file, process in collected.cutting]
+    sentences += [_method(one) for one in checked] + list(advised.sentences)
+    tables = [_lobes_table(curves)]
+    (first_name, first), *others = curves.items()
+    for name, lobes in others:
+        table = advice_table(first, lobes, first_name, name)
+        if table.rows:
+            tables.append(table)
+        else:
+            sentences.append(f"{first_name} and {name} advise the same within {100 * DIFFERS:.0f} % at every speed.")
+    drawn = curves | {f"{one.file.label}, as given": one.given for one in checked if one.wrong}
+    caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
+    band = None
+    if advised.band is not None:
+        low, high = advised.band.low, np.minimum(advised.band.high, 1.5 * checked[0].max_depth)
+        band = LobesBand(first.spindle_speeds_rpm, low, high)
+        drawn_speeds = advised.band.basis.count("samples")
+        caption += f" Light band: 95 % interval of {first_name}"
+        caption += f"; at {drawn_speeds} speeds from draws of its errors." if drawn_speeds else ", to first order."
+    picture = Picture(as_data_uri(lobes_figure(drawn, band=band)), caption, "Stability lobes")
+    section = Section("Stability lobes", tuple(sentences), tuple(tables), (picture,))
+    warnings = (*lobes_warnings(checked, collected), *advised.warnings)
+    return StabilityFindings(section, _brief(first_name, first), warnings)
+
+
+def lobes_section(collected: Collected) -> Section:
+    """The section alone; see :func:`stability_findings`."""
+    return stability_findings(collected).section
+
+
+def _brief(name: str, lobes: StabilityLobes) -> tuple[str, ...]:
+    if not np.isfinite(lobes.depth_limits).any():
+        return ()
+    lowest = int(np.nanargmin(lobes.depth_limits))
+    kind = ", period doubling" if lobes.bifurcations[lowest] == "period-doubling" else ""
+    return (
+        f"{name}: the lowest depth limit is {1e3 * lobes.depth_limits[lowest]:.2f} mm at "
+        f"{lobes.spindle_speeds_rpm[lowest]:.0f} rpm, chatter at {lobes.chatter_frequencies[lowest]:.2f} Hz{kind}.",
+    )
+
+
+def _method(one: CheckedLobes) -> str:
+    """Which method a file's limits are of, and what they are worth."""
+    status = {name: one.given.status.count(name) for name in dict.fromkeys(one.given.status)}
+    counted = ", ".join(f"{count} {name}" for name, count in status.items())
+    if one.structure is None:
+        return f"{one.file.path.name}: {one.method}; limits by status: {counted}."
+    worth = "not those of the cut" if one.wrong else "the certified ones"
+    return (
+        f"{one.file.path.name}: {one.method}, of {one.structure[0].path.name}; its limits are {worth} (by status: "
+        f"{counted})."
+    )
+
+
+def advice_table(first: StabilityLobes, second: StabilityLobes, first_name: str, second_name: str) -> Table:
+    """Ranges of spindle speed in which two depth limits differ by more than a tenth, with the largest difference."""
+    low, high = (f(first.spindle_speeds) for f in (np.min, np.max))
+    inside = (second.spindle_speeds >= low) & (second.spindle_speeds <= high)
+    speeds = second.spindle_speeds[inside]
+    ours = np.interp(speeds, first.spindle_speeds, np.nan_to_num(first.depth_limits, posinf=1e3))
+    theirs = np.nan_to_num(second.depth_limits[inside], posinf=1e3)
+    known = ~np.isnan(np.interp(speeds, first.spindle_speeds, first.depth_limits)) & ~np.isnan(
+        second.depth_limits[inside]
+    )
+    ratio = np.where(known, theirs, 1.0) / np.where(known, ours, 1.0)
+    differs = np.abs(np.log(ratio)) > np.log(1 + DIFFERS)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], differs.astype(int), [0]])))
+    rows = []
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        worst = start + int(np.argmax(np.abs(np.log(ratio[start:stop]))))
+        rpm = speeds * 30 / math.pi
+        rows.append(
+            (
+                f"{rpm[start]:.0f} to {rpm[stop - 1]:.0f}",
+                f"{rpm[worst]:.0f}",
+                _depth(ours[worst]),
+                _depth(theirs[worst]),
+                f"{100 * (ratio[worst] - 1):+.0f} %" if ratio[worst] < 100 else "no limit",
+            )
+        )
+    columns = ("speeds (rpm)", "worst at (rpm)", f"{first_name} (mm)", f"{second_name} (mm)", "difference")
+    return Table(f"Where {second_name} advises otherwise than {first_name}", columns, tuple(rows))
+
+
+def _depth(metres: float) -> str:
+    return f"{1e3 * metres:.2f}" if metres < 100 else "no limit"
+
+
+def _cutter(name: str, p: MillingProcess) -> str:
+    return (
+        f"Cutter of {name}: {p.teeth} teeth, {1e3 * p.diameter:g} mm, edge angle {np.degrees(p.edge_angle):g}°, "
+        f"Ktc {p.ktc / 1e6:g} MPa, krc {p.krc:g}, kac {p.kac:g}, immersion {np.degrees(p.start_angle):g}° to "
+        f"{np.degrees(p.exit_angle):g}°, feed {1e3 * p.feed_per_tooth:g} mm a tooth."
+    )
+
+
+def _lobes_table(curves: dict[str, StabilityLobes], most: int = 12) -> Table:
+    """Depth limits at up to twelve speeds of the first curve, the others at the same speeds."""
+    first = next(iter(curves.values()))
+    rpm = first.spindle_speeds_rpm
+    chosen = np.unique(np.linspace(0, len(rpm) - 1, min(most, len(rpm))).round().astype(int))
+    columns = ["spindle speed (rpm)"]
+    columns += [f"{name} (mm)" for name in curves]
+    columns += ["chatter frequency (Hz)", "type", "status"]
+    rows = []
+    for k in chosen:
+        depths = [_depth_at(lobes.spindle_speeds_rpm, lobes.depth_limits, rpm[k]) for lobes in curves.values()]
+        frequency = first.chatter_frequencies[k]
+        shown = f"{frequency:.2f}" if np.isfinite(frequency) else ""
+        rows.append((f"{rpm[k]:.0f}", *depths, shown, first.bifurcations[k], first.status[k]))
+    return Table("", tuple(columns), tuple(rows))
+
+
+def _depth_at(rpm: np.ndarray, depths: np.ndarray, wanted: float) -> str:
+    """Depth in mm at the nearest speed, empty where none is near."""
+    nearest = int(np.argmin(np.abs(rpm - wanted)))
+    if abs(rpm[nearest] - wanted) > 0.5:
+        return ""
+    if np.isnan(depths[nearest]):
+        return "not resolved"
+    return f"{1e3 * depths[nearest]:.3f}" if np.isfinite(depths[nearest]) else "no limit"

@@ -1,0 +1,1 @@
+"""`millfrf robot diagnose`: the command, its run, and its words."""

@@ -1,0 +1,139 @@
+"""From a robot's file and recordings in several postures to a folder with the diagnosis, models and a report."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import InputError
+from mismatch import LabError
+from mismatch.adapters.robot import (
+    PosedRecording,
+    diagnose_robot,
+    posed_channels,
+    read_posed,
+)
+from mismatch.inference import write_diagnosis
+from modal_fit import write_modal_model
+from robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot, tool_down
+
+from ...gate import RECORD_AGAIN, check_channels
+from ...options import check_band
+from ...progress import bar
+from ...report.diagnoses.robot_diagnosis_page import write_robot_report
+from ...result_folder import refuse_file
+from ..postures import Asked, posture_of, spatial
+from .diagnosis_words import summary
+
+Real = NDArray[np.float64]
+
+LOWEST, HIGHEST = 0.4, 1.3
+"""Band that is compared where none is given: from so many times the first mode to so many times the fourth."""
+
+
+@dataclass(frozen=True)
+class Asking:
+    """Options of a robot's diagnosis as they were typed; None where left out."""
+
+    poses: tuple[str, ...]
+    feed: float | None
+    band: tuple[float, float] | None
+    sensor: tuple[float, float, float] | None
+    payload_at: tuple[float, float, float] | None
+    rigid_links: bool
+    error: LabError
+    stream: str | None
+
+
+def diagnose_robot_files(robot: str, paths: Sequence[Path], out: Path, asking: Asking) -> list[str]:
+    """Diagnose, write ``robot_diagnosis.json``, ``model_<recording>.json`` and ``report.html``; lines that sum it up.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be used together, or a folder that cannot be made.
+    """
+    refuse_file(out)
+    case = spatial(read_robot(robot))
+    _refuse_unlike(paths, asking)
+    doubts = _doubts(paths, asking.stream)
+    recordings = _recordings(case, paths, asking)
+    with bar("diagnosing"):
+        found = diagnose_robot(
+            case.robot,
+            recordings,
+            rigid_links=asking.rigid_links,
+            payload_at=_place(asking.payload_at),
+            sensor=_place(asking.sensor),
+            error=asking.error,
+        )
+    found = replace(found, doubts=tuple(doubts))
+    out.mkdir(parents=True, exist_ok=True)
+    write_diagnosis(out / "robot_diagnosis.json", found)
+    improved, offset = found.details.improved_robot()
+    for recording in recordings:
+        modes = modes_at(improved, recording.q + offset)
+        top = 3 * float(recording.spectrum.frequencies[-1])
+        model = model_of_modes(modes, improved, axes=recording.axes, highest_frequency=top)
+        write_modal_model(out / f"model_{recording.name}.json", model)
+    lines = summary(found)
+    with bar("writing the report"):
+        write_robot_report(out / "report.html", found, case.name, lines)
+    lines += [f"warning: {doubt}" for doubt in doubts]
+    return [*lines, f"wrote {out / 'robot_diagnosis.json'}, {out / 'report.html'} and a model for each recording"]
+
+
+def _doubts(paths: Sequence[Path], stream: str | None) -> list[str]:
+    """Judge each recording alone: a force that rests in one posture tells nothing there of the robot."""
+    return [
+        doubt
+        for path in paths
+        for doubt in check_channels([path], posed_channels, stream, watch=bar, remedy=RECORD_AGAIN)
+    ]
+
+
+def _refuse_unlike(paths: Sequence[Path], asking: Asking) -> None:
+    """One posture a recording, one name a recording, and all of them there."""
+    if len(asking.poses) != len(paths):
+        raise InputError(
+            f"{len(asking.poses)} postures for {len(paths)} recordings; give --pose once for each, in the same order"
+        )
+    names = [path.stem for path in paths]
+    if len(set(names)) < len(names):
+        raise InputError(f"recordings need different names to tell their results apart, not {', '.join(names)}")
+    for path in paths:
+        if not path.is_file():
+            raise InputError(f"no file {path}; check the name")
+
+
+def _recordings(case: SpatialCase, paths: Sequence[Path], asking: Asking) -> list[PosedRecording]:
+    axes = np.eye(3) if asking.feed is None else tool_down([0.0, 0.0, 0.0], np.radians(asking.feed)).axes
+    postures = [close_loops(case.robot.mechanism, _driven(case, pose)) for pose in asking.poses]
+    band = check_band(asking.band) or _band(case, postures)
+    recordings = []
+    for path, q in zip(paths, postures, strict=True):
+        model = model_of_modes(modes_at(case.robot, q), case.robot, highest_frequency=band[1])
+        if not len(model.poles):
+            raise InputError(f"{path.name}: the robot has no damped mode below {band[1]:g} Hz; raise --band LO HI")
+        recordings.append(read_posed(path, q, model, band, axes=axes, stream=asking.stream))
+    return recordings
+
+
+def _driven(case: SpatialCase, pose: str) -> Real:
+    """Driven joint values of a name, or of degrees with commas."""
+    asked = Asked(joints=pose) if "," in pose else Asked(pose=pose)
+    return posture_of(case, asked)[0]
+
+
+def _band(case: SpatialCase, postures: Sequence[Real]) -> tuple[float, float]:
+    frequencies = [modes_at(case.robot, q).frequencies for q in postures]
+    return (
+        LOWEST * min(float(one[0]) for one in frequencies),
+        HIGHEST * max(float(one[min(3, len(one) - 1)]) for one in frequencies),
+    )
+
+
+def _place(given: tuple[float, float, float] | None) -> Real | None:
+    return None if given is None else np.array(given)

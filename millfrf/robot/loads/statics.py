@@ -1,0 +1,97 @@
+"""`millfrf robot stiffness`: compliance of a posture, deflection under a force, weight and payload."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from foundation import writing_whole_file
+from robot_model import PlanarCase, PostureResult, SpatialCase, in_posture, read_robot, shown_values
+
+from ...options import check_output
+from ...provenance import versions
+from ...tables.result_tables import Table, show
+from ..asked_loads import Loads, check_positive
+from ..postures import Asked, mechanism_of, posture_of
+from ..results import warn
+from .carried import carried_wrench, largest_together
+
+Real = NDArray[np.float64]
+
+
+def show_stiffness(
+    robot: str, asked: Asked, force: float, loads: Loads, links: bool = False, out: Path | None = None
+) -> None:
+    """Compliance table, principal directions, deflection under the force, under weight, and under both."""
+    check_positive("force", force, "newtons", 1e6)
+    if out is not None:
+        check_output(out, (".json",))
+    case = read_robot(robot)
+    driven, axes = posture_of(case, asked)
+    result = in_posture(case, driven, axes, links=links)
+    names = [label.split(":")[1] for label in result.labels]
+    rows = tuple((name, *(f"{v:.3e}" for v in row)) for name, row in zip(names, result.compliance, strict=True))
+    posture = shown_values(mechanism_of(case), driven)
+    show(Table(f"Compliance at the tool (m/N, rad/N m), posture {posture}", ("", *names), rows))
+    moving = [i for i, name in enumerate(names) if "R" not in name]
+    compliance = result.compliance[np.ix_(moving, moving)]
+    values, directions = np.linalg.eigh(compliance)
+    for value, direction in zip(values[::-1], directions.T[::-1], strict=True):
+        parts = ", ".join(f"{names[i][1:]} {d:+.2f}" for i, d in zip(moving, direction, strict=True))
+        typer.echo(f"{1e-6 / value:8.3f} N/um along ({parts})")
+    typer.echo(f"largest deflection under {force:g} N: {1e3 * force * values[-1]:.3f} mm")
+    parts_of_sag = _sags(case, driven, axes, result, loads)
+    sag = _show_sags(parts_of_sag, [names[i] for i in moving], len(names))
+    together = largest_together(sag[moving], force * compliance)
+    if sag.any():
+        typer.echo(f"largest deflection under weight and {force:g} N together: {1e3 * together:.3f} mm")
+    warn(result)
+    if out is None:
+        return
+    found = {
+        "largest_deflection_m": float(force * values[-1]),
+        "deflection_under_m_rad": {what: moved.tolist() for what, moved in parts_of_sag},
+        "largest_deflection_together_m": float(together),
+    }
+    _write(out, robot, posture, result, force, found)
+
+
+def _sags(
+    case: PlanarCase | SpatialCase, driven: Real, axes: Real | None, result: PostureResult, loads: Loads
+) -> list[tuple[str, Real]]:
+    """Deflections under own weight and payload over the tool's degrees of freedom, with their names."""
+    parts = []
+    if result.own_weight is not None:
+        parts.append(("the robot's own weight (links and bodies of its file)", result.own_weight))
+    if loads.payload.mass:
+        carried = result.compliance @ carried_wrench(case, driven, axes, loads.payload)
+        parts.append((f"a payload of {loads.payload.mass:g} kg", carried))
+    return parts
+
+
+def _show_sags(parts: list[tuple[str, Real]], names: list[str], size: int) -> Real:
+    """Print them; return their sum."""
+    for what, moved in parts:
+        cells = ", ".join(f"{name[1:]} {1e3 * value:+.3f}" for name, value in zip(names, moved, strict=False))
+        typer.echo(f"deflection under {what}: {1e3 * np.linalg.norm(moved[: len(names)]):.3f} mm ({cells})")
+    return np.sum([moved for _, moved in parts], axis=0) if parts else np.zeros(size)
+
+
+def _write(out: Path, robot: str, posture: str, result: PostureResult, force: float, found: dict[str, object]) -> None:
+    content = {
+        "format": "millfrf.robot_stiffness",
+        "format_version": 1,
+        "robot": robot,
+        "posture": posture,
+        "degrees_of_freedom": list(result.labels),
+        "compliance": result.compliance.tolist(),
+        "force_n": force,
+        **found,
+        "warnings": list(result.warnings),
+        "versions": versions(),
+    }
+    with writing_whole_file(out) as temporary:
+        temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
+    typer.echo(f"wrote {out}")

@@ -1,0 +1,119 @@
+"""Lobes of a robot's posture, and depth limits over its redundancy, from the command line."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import typer
+
+from figures import lobes_figure, save_figure
+from foundation import InputError
+from modal_fit import ModalModel, Residuals
+from robot_model import in_posture, read_robot
+from stability import with_residual_flexibility, write_lobes
+
+from ...chain.cuts.lobes import compute_lobes, lobes_summary, speed_axis
+from ...gate import check_depth, check_speed, check_speeds, lowest_frequency, read_checked_cutting
+from ...options import check_output
+from ...progress import bar
+from ..postures import Asked, cut_place, posture_of, spatial
+from ..results import RPM, say_doubts
+from .posture_maps import depth_over_redundancy, write_posture_map
+
+TIP = ("TCP:+X", "TCP:+Y", "TCP:+Z")
+
+
+def at_the_tip(model: ModalModel) -> ModalModel:
+    """The model over X, Y and Z of the tip; a direction that it does not have (Y of a planar robot) is rigid."""
+    if model.responses == TIP:
+        return model
+    places = [model.responses.index(label) if label in model.responses else -1 for label in TIP]
+
+    def picked(vectors: np.ndarray) -> np.ndarray:
+        return np.column_stack([np.zeros(len(vectors)) if i < 0 else vectors[:, i] for i in places])
+
+    known, residuals = with_residual_flexibility(model).residuals, None
+    if known is not None:
+        upper, lower = (picked(picked(part).T).T for part in (known.upper, known.lower))
+        residuals = Residuals(upper, lower)
+    return ModalModel(model.poles, picked(model.right), picked(model.left), TIP, TIP, residuals=residuals)
+
+
+def write_lobes_in_posture(
+    robot: str,
+    asked: Asked,
+    cutting: Path,
+    speeds: tuple[float, float, int] | None,
+    max_depth: float,
+    method: str,
+    out: Path,
+    picture: Path | None = None,
+) -> None:
+    """Lobes of one posture, in the axes of the cut."""
+    check_output(out, (".csv",))
+    if picture is not None:
+        check_output(picture, (".png", ".pdf", ".svg"))
+    if speeds is None:
+        raise InputError("give --speeds LO HI N for lobes, or --angles LO HI N with --speed RPM for a posture map")
+    case = read_robot(robot)
+    driven, axes = posture_of(case, asked)
+    result = in_posture(case, driven, axes)
+    process, doubts = read_checked_cutting(cutting)
+    doubts += check_depth(max_depth, process)
+    doubts += check_speeds(speeds, process, lowest_frequency(result.known_model().natural_frequencies))
+    found = compute_lobes(at_the_tip(result.known_model()), process, speed_axis(*speeds), max_depth, method, bar)
+    found = replace(found, warnings=(*doubts, *result.warnings, *found.warnings))
+    write_lobes(out, found)
+    for warning in found.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    typer.echo(f"wrote {out}: {lobes_summary(found, max_depth)}")
+    if picture is not None:
+        save_figure(lobes_figure({found.method: found}), picture)
+        typer.echo(f"wrote {picture}")
+
+
+def write_map_over_redundancy(
+    robot: str,
+    asked: Asked,
+    cutting: Path,
+    angles: tuple[float, float, int],
+    speed: float | None,
+    max_depth: float,
+    out: Path,
+    drawn: tuple[Path | None, float | None] = (None, None),
+) -> None:
+    """Depth limit over the redundancy angle, and the best posture; ``drawn``: a picture, and a depth in it, m."""
+    check_output(out, (".csv",))
+    picture, depth = drawn
+    if picture is not None:
+        check_output(picture, (".png", ".pdf", ".svg"))
+    if depth is not None and not depth > 0:
+        raise InputError(f"--depth {depth!r} m must be positive")
+    if speed is None or not speed > 0:
+        raise InputError("a posture map is at one spindle speed: give --speed RPM")
+    if angles[2] < 1 or not max_depth > 0:
+        raise InputError(f"{angles[2]} angles up to a depth of {max_depth!r} m: both must be positive")
+    case = spatial(read_robot(robot))
+    process, doubts = read_checked_cutting(cutting)
+    doubts += [*check_depth(max_depth, process), *check_speed(speed, process)]
+    say_doubts(doubts)
+    axis = np.radians(np.linspace(*angles))
+    with bar("posture map"):
+        found = depth_over_redundancy(
+            case.robot, cut_place(asked), axis, process, speed * RPM, max_depth, asked.redundancy
+        )
+    best = found.best()
+    write_posture_map(out, found, doubts)
+    typer.echo(
+        f"wrote {out}: {found.reached.sum()} of {len(axis)} angles reached; best {1e3 * found.values[best]:.3g} mm at "
+        f"{np.degrees(axis[best]):.1f} deg, worst {1e3 * np.nanmin(found.values):.3g} mm"
+    )
+    if depth is not None:
+        stable = found.reached & (found.values > depth)
+        typer.echo(f"a cut of {1e3 * depth:g} mm is stable at {stable.sum()} of {found.reached.sum()} angles")
+    if picture is not None:
+        from ..posture_figure import draw_posture_map
+
+        what = "the robot about the tool" if asked.redundancy == "tool" else "tool and table about the feed"
+        draw_posture_map(picture, found, max_depth, depth, what)
+        typer.echo(f"wrote {picture}")

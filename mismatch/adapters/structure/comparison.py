@@ -1,0 +1,100 @@
+"""The comparison of a modal model with recordings, as the search sees it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from ...inference import Proposal, Remainder, Round, Search, Settings, equivalents_of
+from ...models.fitting import Fit, fit
+from ...models.refinement import settled
+from ...physics import JointPhysics, Physics
+from ...records.windowed_lines import WindowedLines
+from ...remainder.leftover import leftover
+from .acceptance import evidence_needed, impossible, plainest, possible_gains, worth_it
+from .rounds import Standing, StructureRound, Weighed, weigh
+
+PRUNING = 20
+"""Steps at most of a fit without one of its causes."""
+
+
+@dataclass(frozen=True)
+class StructureComparison:
+    """Recordings, causes and thresholds.
+
+    Parameters
+    ----------
+    lines
+        Recordings, mended.
+    causes
+        Causes that are weighed, by name.
+    settings
+        Thresholds.
+    before
+        What of the residual moves with the signal without any cause.
+    """
+
+    lines: list[WindowedLines]
+    causes: Mapping[str, Physics]
+    settings: Settings
+    before: Remainder
+
+    def finished(self, search: Search[Fit]) -> bool:
+        """Never before a round finds nothing: a small cause may hide behind a large one."""
+        return False
+
+    def round(self, search: Search[Fit]) -> Round[Fit]:
+        """Screen and fit causes; where joint laws failed before, they are tried again only if much has gone since."""
+        current = search.current
+        moving = leftover(current.hypothesis, self.lines) if search.accepted else self.before
+        standing = Standing(self.lines, current, search.base, moving, self.before, self.settings)
+        spared = self._laws_failed_at(search) * self.settings.search.laws_again <= moving.size
+        linear = {name: one for name, one in self.causes.items() if not isinstance(one, JointPhysics)}
+        weighed = weigh(standing, linear if spared else self.causes)
+        candidates = tuple(weighed.candidates)
+        if spared and not possible_gains(weighed.proposals, self.settings.evidence):
+            laws = {name: one for name, one in self.causes.items() if name not in linear}
+            weighed = weigh(standing, laws)
+            candidates += tuple(weighed.candidates)
+        chosen = self._chosen(weighed, search)
+        equivalents = () if chosen is None else self._equivalents(weighed, chosen)
+        failed = weighed.sighted and not any(
+            one.fitted.hypothesis.causes[-1].direction is not None and one.evidence >= self.settings.evidence.least
+            for one in weighed.proposals
+        )
+        return StructureRound(tuple(weighed.proposals), chosen, candidates, equivalents, failed)
+
+    def without(self, search: Search[Fit], place: int) -> Fit:
+        """The last step fitted without one of its causes."""
+        last = search.current
+        return fit(self.lines, last.hypothesis.without(place), last.noises, iterations=PRUNING)
+
+    def needed(self, current: Fit, base: Fit) -> float:
+        """Evidence that a further cause needs beside those of ``current``."""
+        return evidence_needed(current, base, self.settings.evidence)
+
+    def _chosen(self, weighed: Weighed, search: Search[Fit]) -> Proposal[Fit] | None:
+        """The plainest form of the best cause, fitted until it rests, if it is worth it."""
+        evidence = self.settings.evidence
+        best = plainest(possible_gains(weighed.proposals, evidence), evidence.as_good)
+        if best is None:
+            return None
+        rested = settled(self.lines, best.fitted)
+        best = replace(best, fitted=rested, evidence=search.current.score - rested.score)
+        return best if worth_it(best, search.current, search.base, self.lines, evidence) else None
+
+    def _equivalents(self, weighed: Weighed, chosen: Proposal[Fit]) -> tuple[str, ...]:
+        evidence = self.settings.evidence
+        possible = [one for one in weighed.proposals if not impossible(one, evidence.clear)]
+        return equivalents_of(possible, chosen, evidence.as_good)
+
+    def _laws_failed_at(self, search: Search[Fit]) -> float:
+        """Power that moved with the signal when joint laws last failed; infinite where they did not."""
+        if search.current.hypothesis.laws:
+            return float("inf")
+        failed = [
+            step
+            for step, one in zip(search.steps, search.rounds, strict=False)
+            if isinstance(one, StructureRound) and one.laws_failed
+        ]
+        if not failed:
+            return float("inf")
+        return leftover(failed[-1].hypothesis, self.lines).size

@@ -1,0 +1,119 @@
+"""Causes that a recording confirms to which they were not fitted; the others are let go of."""
+
+from functools import partial
+
+from ...faults.shown_faults import residual_lines
+from ...inference import AcceptedCause, Improvement, Search, Settings, in_processes, released
+from ...models.fitting import Fit, fit
+from ...models.misfit import least_misfit, through_structure
+from .comparison import StructureComparison
+from .held_out import ITERATIONS, HeldOut, Recordings, chance_of_no_gain, held_out_improvement
+
+
+def confirmed(
+    comparison: StructureComparison, recordings: Recordings, found: Search[Fit], faults: list[AcceptedCause]
+) -> tuple[Search[Fit], HeldOut]:
+    """Let go of causes until those left lower the error of the recording held out, together and each beside the rest.
+
+    Parameters
+    ----------
+    comparison
+        Thresholds and how fits without a cause are made.
+    recordings
+        Mended and as measured.
+    found
+        Where the search ended.
+    faults
+        Faults of the recordings.
+
+    Returns
+    -------
+    found, held_out
+        With fewer causes, or as it was; and what is left is worth on the recording held out.
+    """
+    while True:
+        last = found.current
+        held_out = held_out_improvement(recordings, last.hypothesis, last.noises, faults, comparison.settings.proof)
+        if not found.accepted or len(recordings.mended) == 1:
+            return found, held_out
+        gone = _idle(comparison, recordings, found, held_out)
+        if gone is None:
+            return found, held_out
+        place, less = gone
+        found = released(found, place, less, "not confirmed", found.accepted[place].evidence)
+
+
+def helps(gain: Improvement, current: Fit, base: Fit, settings: Settings) -> bool:
+    """Whether the causes together lower the error of the held-out recording.
+
+    Causes that gained little where they were fitted but stand nearer to the lab's belief than a general refit need not
+    predict better than that; they must predict better than the nominal model, and no worse than the refit where they
+    gained more than chance. (A sensor's gain is a refit of shapes to the last digit: only that the lab was not off by
+    so much in every mode speaks for it.)
+
+    Parameters
+    ----------
+    gain
+        Errors on the recording held out.
+    current, base
+        Fits with and without the causes.
+    settings
+        Thresholds.
+    """
+    if base.misfit - current.misfit < settings.evidence.least:
+        return gain.after < gain.before
+    if by_belief(base, current, settings) and gain.after < gain.before and gain.evidence > 0:
+        return True
+    proof = settings.proof
+    return gain.evidence > proof.gain and gain.after < gain.refitted and gain.p_value < proof.significance
+
+
+def by_belief(without: Fit, whole: Fit, settings: Settings) -> bool:
+    """Whether hardly any of the evidence for what ``whole`` has and ``without`` has not is a better misfit.
+
+    Parameters
+    ----------
+    without, whole
+        Fits without and with a cause.
+    settings
+        Thresholds.
+    """
+    least = max(settings.evidence.least, settings.proof.belief_alone * (without.score - whole.score))
+    return without.misfit - whole.misfit < least
+
+
+def _idle(
+    comparison: StructureComparison, recordings: Recordings, found: Search[Fit], held_out: HeldOut
+) -> tuple[int, Fit] | None:
+    """Place of a cause that the held-out recording does not confirm, and the fit on all recordings without it."""
+    last, count = found.current, len(found.accepted)
+    if not helps(held_out.improvement, last, found.base, comparison.settings):
+        return count - 1, found.steps[-2]
+    if count == 1:
+        return None
+    others = recordings.others(recordings.mended)
+    tasks = [partial(fit, others, held_out.improved.without(k), iterations=ITERATIONS) for k in range(count)]
+    whole = fit(others, held_out.improved, iterations=0)
+    for k, less in enumerate(in_processes(tasks)):
+        if _missed(comparison, recordings, (whole, less), last, held_out):
+            continue
+        if k == count - 1:
+            return k, found.steps[-2]
+        again = fit(recordings.mended, last.hypothesis.without(k), last.noises, iterations=ITERATIONS)
+        return k, again
+    return None
+
+
+def _missed(
+    comparison: StructureComparison, recordings: Recordings, fits: tuple[Fit, Fit], last: Fit, held_out: HeldOut
+) -> bool:
+    """Whether the held-out recording misses a cause: with it (first fit) the error is less than without (second)."""
+    (whole, less), settings = fits, comparison.settings
+    if by_belief(less, whole, settings):
+        return less.score - whole.score > comparison.needed(less, less)
+    here = recordings.mended[recordings.kept]
+    rest, without = residual_lines(held_out.improved, here), residual_lines(less.hypothesis, here)
+    covariance = last.noises[recordings.kept].covariance(here.frequencies, through_structure(last.hypothesis, here))
+    gain = least_misfit(less.hypothesis, here) - least_misfit(held_out.improved, here)
+    chance = chance_of_no_gain(here, covariance, without, rest, settings.proof)
+    return gain > settings.proof.gain and chance < settings.proof.significance

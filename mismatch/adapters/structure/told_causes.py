@@ -1,0 +1,125 @@
+"""Fitted coordinates told as causes: parameters with standard errors, in the units of files."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...inference import AcceptedCause, Proposal
+from ...models.fitting import Fit, modes_are_odd
+from ...models.hypothesis import Cause, direction_of, held_values
+from ...physics import ModePhysics, answer_name
+from ...physics.modal_parameters import PHYSICS as BELIEF
+
+Real = NDArray[np.float64]
+
+
+def accepted_cause(fitted: Fit, location: Mapping[str, Any], evidence: float, place: int = -1) -> AcceptedCause:
+    """One cause of a fit, the last if not told, with its numbers and their standard errors (to first order)."""
+    causes = fitted.hypothesis.causes
+    cause, place = causes[place], place % len(causes)
+    first = fitted.hypothesis.size - sum(one.size for one in causes[place:])
+    covariance = fitted.covariance[first : first + cause.size, first : first + cause.size]
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    parameters, errors = {}, {}
+    # beyond a limit that the motion sets a number changes nothing, and its error says so
+    for parameter, value, error in zip(cause.physics.parameters, held_values(cause), spread, strict=False):
+        parameters[parameter.name] = float(value)
+        errors[parameter.name] = float(error * parameter.unit_step * (abs(value) if parameter.logarithmic else 1.0))
+    derived, their_errors = _derived(cause, covariance)
+    parameters, errors = parameters | derived, errors | their_errors
+    return AcceptedCause(answer_name(cause.physics), dict(location), parameters, errors, evidence)
+
+
+def told_causes(fitted: Fit, accepted: Sequence[Proposal[Fit]]) -> list[AcceptedCause]:
+    """Accepted causes with the numbers, errors and directions of the final fit, which is that of the improved model.
+
+    Parameters
+    ----------
+    fitted
+        The fit with all accepted causes.
+    accepted
+        In the order found, which is that of the hypothesis.
+    """
+    told = []
+    for place, (one, cause) in enumerate(zip(accepted, fitted.hypothesis.causes, strict=True)):
+        if isinstance(cause.physics, ModePhysics):
+            told.append(accepted_mode(fitted, cause.physics, one.evidence))
+        else:
+            location = one.location if cause.direction is None else direction_of(cause)
+            told.append(accepted_cause(fitted, location, one.evidence, place))
+    return told
+
+
+def _derived(cause: Cause, covariance: Real) -> tuple[dict[str, float], dict[str, float]]:
+    """Numbers that a laboratory knows better than those of the equation, if the physics has a ``derived``."""
+    numbers: Callable[[Real], dict[str, float]] | None = getattr(cause.physics, "derived", None)
+    if numbers is None:
+        return {}, {}
+    here, at = numbers(cause.values), cause.coordinates()
+    count = len(cause.values)
+    slopes: dict[str, Real] = {name: np.zeros(count) for name in here}
+    for k in range(count):
+        step = 1e-4 * max(1.0, abs(float(at[k])))
+        aside = [numbers(cause.moved(at + sign * step * np.eye(len(at))[k]).values) for sign in (1, -1)]
+        for name in here:
+            slopes[name][k] = (aside[0].get(name, here[name]) - aside[1].get(name, here[name])) / (2 * step)
+    own = covariance[:count, :count]
+    return here, {name: float(np.sqrt(np.maximum(slope @ own @ slope, 0.0))) for name, slope in slopes.items()}
+
+
+def accepted_mode(fitted: Fit, physics: ModePhysics, evidence: float) -> AcceptedCause:
+    """The mode added last to a fit: frequency, damping ratio and shape at the responses.
+
+    Parameters
+    ----------
+    fitted
+        The fit with the mode.
+    physics
+        The cause that added it.
+    evidence
+        Gain in score.
+    """
+    shape, model = fitted.hypothesis.shape, fitted.hypothesis.model
+    first = shape.per_mode * (len(model.poles) - 1)
+    spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[first : first + 2], 0.0))
+    frequency, damping = float(model.natural_frequencies[-1]), float(model.damping_ratios[-1])
+    right = np.abs(model.right[-1]) / np.abs(model.right[-1]).max()
+    place = {"shape": dict(zip(model.responses, [round(float(x), 4) for x in right], strict=True))}
+    return AcceptedCause(
+        physics.name,
+        place,
+        {"frequency_hz": frequency, "damping_ratio": damping},
+        {
+            "frequency_hz": float(spread[0]) * shape.lab.frequency * frequency,
+            "damping_ratio": float(spread[1]) * shape.lab.damping * damping,
+        },
+        evidence,
+    )
+
+
+def modal_deviation(fitted: Fit) -> AcceptedCause | None:
+    """The modal parameters as a cause, where the refit lies farther from the nominal model than a lab's own error.
+
+    Parameters
+    ----------
+    fitted
+        The final fit.
+    """
+    if not modes_are_odd(fitted):
+        return None
+    shape = fitted.hypothesis.shape
+    count = shape.believed
+    rows = shape.modal_rows(fitted.hypothesis.u)[:count]
+    spread = np.sqrt(shape.modal_rows(np.diag(fitted.covariance)))[:count]
+    model, nominal = fitted.hypothesis.model, shape.nominal
+    modes = [k for k in range(count) if np.sum(rows[k] ** 2) > shape.per_mode + 3 * np.sqrt(2 * shape.per_mode)]
+    parameters, errors = {}, {}
+    for k in range(count):
+        parameters[f"frequency_{k + 1}_hz"] = float(model.natural_frequencies[k])
+        errors[f"frequency_{k + 1}_hz"] = float(spread[k, 0] * shape.lab.frequency * nominal.natural_frequencies[k])
+        parameters[f"damping_ratio_{k + 1}"] = float(model.damping_ratios[k])
+        errors[f"damping_ratio_{k + 1}"] = float(spread[k, 1] * shape.lab.damping * nominal.damping_ratios[k])
+    beyond = float(np.sum(rows**2)) - count * (shape.per_mode - 2)
+    return AcceptedCause(BELIEF.name, {"modes": [k + 1 for k in modes]}, parameters, errors, beyond)

@@ -1,0 +1,26 @@
+"""Frequencies, dampings and shapes of the nominal model that are farther off than a laboratory's own error."""
+
+import numpy as np
+
+from .protocol import Parameter
+
+
+class ModalParameters:
+    """The structure has changed since its modal test, or the test was wrong.
+
+    ``|u|^2`` of n believed numbers has the mean n and the variance 2 n for errors of the usual size; it is odd four
+    standard deviations above.
+    """
+
+    name = "modal_parameters"
+    equation = "H(u), |u|^2 > n + 4 sqrt(2 n)"
+    source = "Ewins, Modal Testing, 2nd ed., section 1.5 (scatter between laboratories)"
+    parameters: tuple[Parameter, ...] = ()
+    confusable_with = ("gain_error", "axis_misalignment", "missing_mode")
+
+    def odd(self, deviation: float, count: int) -> bool:
+        """Whether ``|u|^2`` of that many believed numbers is larger than errors of the usual size make it."""
+        return bool(deviation >= count + 4 * np.sqrt(2 * count))
+
+
+PHYSICS = ModalParameters()

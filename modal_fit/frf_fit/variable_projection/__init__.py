@@ -1,0 +1,1 @@
+"""Variable projection on the measured lines: linear unknowns eliminated, poles and left vectors refined."""

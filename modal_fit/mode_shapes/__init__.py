@@ -1,7 +1,0 @@
-"""Mode shapes of a model, measured: likeness of modes, and how far each is from a real one."""
-
-from .complexity import mode_complexity
-from .mode_reciprocity import ModeReciprocity, mode_reciprocity
-from .shape_summary import ModeShapes, mode_shapes
-
-__all__ = ["ModeReciprocity", "ModeShapes", "mode_complexity", "mode_reciprocity", "mode_shapes"]

@@ -1,0 +1,1 @@
+"""`ModalModel` and what is computed from it: files, error bars, shape measures, synthesis, comparison."""

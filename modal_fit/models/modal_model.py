@@ -1,0 +1,264 @@
+"""`ModalModel`: poles, left and right vectors, and the terms that stand for modes out of band."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimation import Frf
+from foundation import Band, InputError, Result, Summary, checked_band, counted, drawing, listed, optional_library
+
+from .mode_errors import ModeErrors
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Residuals(Result):
+    """What the modes outside the band leave inside it.
+
+    ``upper + lower / (i w)^2 + sum_k residues[k] / (i w - poles[k]) + conjugate``, on receptance. The two
+    real matrices are the textbook's (Ewins, Modal Testing, 2nd ed., section 4.5); the optional terms at
+    fixed poles outside the band carry the curvature that a near out-of-band mode leaves, which else
+    goes into the damping of the modes inside. They stay bounded outside the band, as powers of w do not.
+
+    Parameters
+    ----------
+    upper : (n_responses, n_excitations)
+        Residual flexibility of the modes above the band, m/N.
+    lower : (n_responses, n_excitations)
+        Residual inertia of those below, m/N (rad/s)^2 (1/kg).
+    poles : (n_terms,), rad/s, or None
+        Fixed poles outside the band; they are no modes of the structure.
+    residues : (n_terms, n_responses, n_excitations), or None
+        Full-rank residue matrices at ``poles``.
+
+    Raises
+    ------
+    InputError
+        Only one of ``poles`` and ``residues`` is given, or their lengths differ.
+    """
+
+    upper: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    poles: NDArray[np.complex128] | None = None
+    residues: NDArray[np.complex128] | None = None
+
+    def __post_init__(self) -> None:
+        n_poles = None if self.poles is None else len(self.poles)
+        n_residues = None if self.residues is None else len(self.residues)
+        if n_poles != n_residues:
+            raise InputError(f"residuals: {n_poles} poles but {n_residues} residue matrices; give one for each")
+
+    def receptance(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Evaluate on the imaginary axis ``s = 2 pi i f``, shape (n_frequencies, n_responses, n_excitations).
+
+        Raises
+        ------
+        InputError
+            ``s`` holds 0 and there is a lower residual: it is infinite there.
+        """
+        if self.lower.any() and (s == 0).any():
+            raise InputError("the model has a lower residual, infinite at 0 Hz; ask for frequencies above 0")
+        inverse_square = np.divide(1.0, s**2, out=np.zeros_like(s), where=s != 0)
+        values = self.upper + inverse_square[:, None, None] * self.lower
+        if self.poles is not None and self.residues is not None:
+            values = values + np.einsum("kn,npq->kpq", 1 / (s[:, None] - self.poles), self.residues)
+            values = values + np.einsum("kn,npq->kpq", 1 / (s[:, None] - self.poles.conj()), self.residues.conj())
+        return np.asarray(values)
+
+    def _summary(self) -> Summary:
+        terms = 0 if self.poles is None else len(self.poles)
+        parts = [name for name in ("upper", "lower") if getattr(self, name).any()]
+        return Summary(f"Residuals: {' and '.join(parts) or 'no'} residual, {terms} terms at poles outside the band")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ModalModel(Result):
+    """Modal model of a linear structure that need not be reciprocal.
+
+    ``H(w)[p, q] = sum_r right[r, p] left[r, q] / (i w - pole[r]) + conjugate term + residuals``
+    (Mohammadi & Ahmadi, Eq. 15; Ewins, Modal Testing, 2nd ed., section 2.7). No conjugate on ``left``.
+
+    Parameters
+    ----------
+    poles : (n_modes,), rad/s
+        Poles with positive imaginary part: the upper half of the conjugate pairs.
+    right : (n_modes, n_responses)
+        Right vectors (mode shapes at the responses).
+    left : (n_modes, n_excitations)
+        Left vectors (participation of the excitations). Right times left has the unit of the FRF times rad/s.
+    responses, excitations
+        Degrees of freedom along the axes, ``node:direction``.
+    quantity, unit
+        Quantity and unit of the FRF that the model gives: ``receptance`` in ``m/N``, or ``transfer`` in any unit.
+    residuals
+        Out-of-band terms, or None.
+    covariance : (n_parameters, n_parameters) or None
+        Covariance of the real numbers Re poles, Im poles, Re right, Im right, Re left, Im left, each laid out row by
+        row (mode by mode), in SI units.
+    physics
+        Terms ``{name, location, parameters}`` that a diagnosis added; empty for a linear model.
+    delay : s
+        Pure delay of the measuring chain: the whole expression is multiplied by ``exp(-i w delay)``. Only a
+        ``transfer`` has one, whose input passes converters and amplifiers; a structure has none.
+    band : (2,), Hz, or None
+        Lowest and highest frequency between which the model holds, as a rule those of its fit; None: not known. Whoever
+        uses the model outside says so.
+    errors
+        Standard errors of frequencies and damping ratios by their source; None: only ``covariance`` is known.
+
+    Raises
+    ------
+    InputError
+        Shapes that do not agree, values that are not finite, or a pole in the lower half plane.
+    """
+
+    poles: NDArray[np.complex128]
+    right: NDArray[np.complex128]
+    left: NDArray[np.complex128]
+    responses: tuple[str, ...]
+    excitations: tuple[str, ...]
+    quantity: str = "receptance"
+    unit: str = "m/N"
+    residuals: Residuals | None = None
+    covariance: NDArray[np.float64] | None = None
+    physics: tuple[dict[str, Any], ...] = ()
+    delay: float = 0.0
+    band: Band | None = None
+    errors: ModeErrors | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "band", checked_band(self.band, "modal model"))
+        n_modes = len(self.poles)
+        if self.delay and self.quantity != "transfer":
+            raise InputError(
+                f"modal model: a {self.quantity} has no delay ({self.delay:g} s given); only a transfer has"
+            )
+        for name, array, labels in (("right", self.right, self.responses), ("left", self.left, self.excitations)):
+            if array.shape != (n_modes, len(labels)):
+                raise InputError(
+                    f"modal model: {name} vectors have shape {array.shape}, expected {(n_modes, len(labels))} "
+                    "(n_modes, n_dof)"
+                )
+        for name, array in (("poles", self.poles), ("right", self.right), ("left", self.left)):
+            if not np.isfinite(array).all():
+                raise InputError(f"modal model: {name} hold NaN or infinity; fit again or mend the file")
+        if self.errors is not None and self.errors.noise.shape != (n_modes, 2):
+            raise InputError(f"modal model: errors of {len(self.errors.noise)} modes, poles of {n_modes}; fit again")
+        if n_modes and self.poles.imag.min() < 0:
+            raise InputError(
+                f"modal model: pole {self.poles[self.poles.imag.argmin()]:.4g} has a negative imaginary part; "
+                "give the upper half of each conjugate pair"
+            )
+
+    @property
+    def natural_frequencies(self) -> NDArray[np.float64]:
+        """Undamped natural frequencies |pole| / 2 pi, Hz, shape (n_modes,)."""
+        return np.abs(self.poles) / (2 * np.pi)
+
+    @property
+    def damping_ratios(self) -> NDArray[np.float64]:
+        """zeta = -Re(pole) / |pole|, shape (n_modes,)."""
+        return -self.poles.real / np.abs(self.poles)
+
+    def receptance(self, frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Evaluate H on ``frequencies`` (Hz); shape (n_frequencies, n_responses, n_excitations), in ``unit``.
+
+        Raises
+        ------
+        InputError
+            A frequency of zero where the model has a lower residual (it is infinite there).
+        """
+        return self.at(2j * np.pi * np.asarray(frequencies, dtype=float))
+
+    def at(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Evaluate H anywhere in the Laplace plane (rad/s); shape (n_values, n_responses, n_excitations)."""
+        direct = np.einsum("kr,rp,rq->kpq", 1 / (s[:, None] - self.poles), self.right, self.left, optimize=True)
+        conjugate = np.einsum(
+            "kr,rp,rq->kpq", 1 / (s[:, None] - self.poles.conj()), self.right.conj(), self.left.conj(), optimize=True
+        )
+        values = np.asarray(direct + conjugate, dtype=complex)
+        if self.residuals is not None:
+            values += self.residuals.receptance(s)
+        return values * np.exp(-s * self.delay)[:, None, None] if self.delay else values
+
+    def frf(self, frequencies: NDArray[np.float64]) -> Frf:
+        """The model's FRF as an :class:`estimation.Frf`, valid on every line."""
+        axis = np.asarray(frequencies, dtype=float)
+        valid = np.ones(len(axis), dtype=bool)
+        return Frf(
+            axis,
+            self.receptance(axis),
+            self.responses,
+            self.excitations,
+            self.quantity,
+            self.unit,
+            valid,
+            band=self.band,
+        )
+
+    def standard_errors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+        """Standard errors of natural frequencies (Hz) and damping ratios, each (n_modes,); None where none is known.
+
+        Its :class:`ModeErrors` are taken where the model has them, else its covariance, which holds the noise alone:
+        ``f = |p| / 2 pi`` and ``zeta = -Re p / |p|`` are linearised at each pole ``p``.
+        """
+        if self.errors is not None:
+            return self.errors.frequency, self.errors.damping
+        if self.covariance is None:
+            return None
+        n, size = len(self.poles), np.abs(self.poles)
+        a, b = self.poles.real / size, self.poles.imag / size
+        blocks = self.covariance[: 2 * n, : 2 * n].reshape(2, n, 2, n)
+        own = np.einsum("irjr->rij", blocks)  # covariance of real and imaginary part of each pole
+        slopes = np.stack([[a / (2 * np.pi), b / (2 * np.pi)], [-(b**2) / size, a * b / size]])
+        variances = np.einsum("kir,rij,kjr->kr", slopes, own, slopes)
+        frequency, damping = np.sqrt(np.maximum(variances, 0.0))
+        return frequency, damping
+
+    def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
+        """Draw the FRF that the model gives and return the axes; see :func:`figures.draw_model` for the choices."""
+        return drawing("draw_model")(self, axes, **choices)
+
+    def to_frame(self) -> "pandas.DataFrame":
+        """One row a mode: natural frequency (Hz), damping ratio and, where they are known, their standard errors.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        columns = {"natural_frequency_hz": self.natural_frequencies, "damping_ratio": self.damping_ratios}
+        errors = self.standard_errors()
+        if errors is not None:
+            columns |= {"natural_frequency_error_hz": errors[0], "damping_ratio_error": errors[1]}
+        pd = optional_library("pandas", "ModalModel.to_frame")
+        return pd.DataFrame(columns, index=pd.RangeIndex(1, len(self.poles) + 1, name="mode"))
+
+    def _summary(self) -> Summary:
+        frequencies, damping = self.natural_frequencies, 100 * self.damping_ratios
+        band = "" if self.band is None else f", holds in {self.band[0]:.4g} to {self.band[1]:.4g} Hz"
+        modes = [f"{f:.4g} Hz {zeta:.3g} %" for f, zeta in zip(frequencies, damping, strict=True)]
+        terms = "" if self.residuals is None else "; with out-of-band terms"
+        terms += f"; physics {listed([str(term.get('name')) for term in self.physics])}" if self.physics else ""
+        columns: tuple[str, ...] = ("mode", "frequency (Hz)", "damping ratio (%)")
+        cells = [[f"{f:.5g}" for f in frequencies], [f"{zeta:.3g}" for zeta in damping]]
+        errors = self.standard_errors()
+        if errors is not None:
+            columns = (*columns[:2], "± 2 standard errors", columns[2], "± 2 standard errors")
+            spread = [[f"{2 * error:.2g}" for error in errors[0]], [f"{200 * error:.2g}" for error in errors[1]]]
+            cells = [cells[0], spread[0], cells[1], spread[1]]
+        return Summary(
+            f"ModalModel: {counted(len(self.poles), 'mode')}, {self.quantity} in {self.unit}{band}",
+            (
+                f"modes {listed(modes) or 'none'}{terms}",
+                f"responses {listed(self.responses)}",
+                f"excitations {listed(self.excitations)}",
+            ),
+            columns,
+            tuple((str(r + 1), *row) for r, row in enumerate(zip(*cells, strict=True))),
+        )

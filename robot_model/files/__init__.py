@@ -1,0 +1,1 @@
+"""Robots as data: TOML files of planar and spatial robots, checked where they enter."""

@@ -1,0 +1,288 @@
+"""Robots in space from their files."""
+
+import os
+from dataclasses import dataclass
+from math import hypot, inf, radians
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from foundation import InputError
+
+from ..finite_elements.modal_damping import rayleigh_constants
+from ..finite_elements.section import Material, Section, hollow_circle
+from ..kinematics.joint_values import LARGEST_TRAVEL, named_values
+from ..kinematics.mechanism import Frame, Mechanism
+from ..spatial.robot_check import check_tip
+from ..spatial.spatial_robot import ElasticJoint, Link, LumpedBody, SpatialRobot
+from .robot_files import Table, read_as
+
+
+class _Head(Table):
+    name: str
+    kind: str
+    tip_node: int
+    tool_frame: str
+    gravity_m_per_s2: float = Field(0.0, ge=0, le=30)
+    up: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    repeatability_m: float | None = Field(None, gt=0, le=0.01)
+
+
+class _Frame(Table):
+    name: str
+    antecedent: str
+    motion: str = "revolute"
+    active: bool = True
+    gamma_deg: float = 0.0
+    b_m: float = 0.0
+    alpha_deg: float = 0.0
+    d_m: float = 0.0
+    theta_deg: float = 0.0
+    r_m: float = 0.0
+    limits_deg: tuple[float, float] | None = None
+    limits_m: tuple[float, float] | None = None
+
+
+class _Joint(Table):
+    frame: str
+    nodes: tuple[int, int]
+    radial_n_per_m: float | None = Field(None, gt=0)
+    axial_n_per_m: float | None = Field(None, gt=0)
+    tilting_nm_per_rad: float | None = Field(None, gt=0)
+    turning_nm_per_rad: float | None = Field(None, gt=0)
+
+
+class _Tube(Table):
+    outer_m: float
+    inner_m: float = 0.0
+    young_pa: float = Field(gt=0)
+    shear_pa: float = Field(gt=0)
+    density_kg_per_m3: float = Field(gt=0)
+    theory: str = "timoshenko"
+
+
+class _Link(Table):
+    nodes: tuple[int, int]
+    tube: _Tube | None = None
+    elements: int = Field(1, ge=1)
+    frame: str | None = None
+    angles_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class _Point(Table):
+    node: int
+    frame: str
+    at_m: tuple[float, float, float]
+
+
+class _Body(Table):
+    node: int
+    frame: str
+    mass_kg: float = Field(gt=0)
+    centre_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    inertia_kg_m2: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+class _Damping(Table):
+    """Either two ratios at two frequencies (Rayleigh), or one ratio for all modes."""
+
+    frequencies_hz: tuple[float, float] | None = None
+    ratios: tuple[float, float] | None = None
+    ratio: float | None = Field(None, ge=0, lt=1)
+
+
+class _Closure(Table):
+    frames: tuple[str, str]
+
+
+class _Pose(Table):
+    """``driven`` in degrees, of prismatic joints in metres; ``driven_deg`` is its older name and is read alike."""
+
+    name: str
+    driven: list[float] | None = None
+    driven_deg: list[float] | None = None
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    robot: _Head
+    frames: list[_Frame]
+    closures: list[_Closure] = []
+    joints: list[_Joint]
+    links: list[_Link] = []
+    points: list[_Point] = []
+    bodies: list[_Body] = []
+    damping: _Damping | None = None
+    poses: list[_Pose] = []
+
+
+@dataclass(frozen=True)
+class SpatialCase:
+    """A robot in space as its file describes it.
+
+    Parameters
+    ----------
+    name
+        Name of the robot.
+    robot
+        The robot as a structure and mechanism.
+    poses
+        Driven joint values by name, rad and (prismatic joints) m.
+    repeatability : m
+        Pose repeatability after ISO 9283 (RP: radius of the sphere); None: the file does not tell it.
+    """
+
+    name: str
+    robot: SpatialRobot
+    poses: dict[str, NDArray[np.float64]]
+    repeatability: float | None = None
+
+
+def read_spatial_robot(robot: str | os.PathLike[str]) -> SpatialCase:
+    """Read a robot of kind ``spatial``, by path or by name.
+
+    Raises
+    ------
+    InputError
+        No such robot, or frames and nodes that do not fit together.
+    FileFormatError
+        Not a robot in space, or a key unknown, missing or of the wrong type.
+    """
+    content = read_as(_File, robot, "spatial")
+    try:
+        return _case(content)
+    except InputError as error:
+        raise InputError(f"{robot}: {error}") from error
+
+
+def _case(content: _File) -> SpatialCase:
+    nodes = [row.node for row in content.points]
+    for node in nodes:
+        if nodes.count(node) > 1:
+            raise InputError(f"[[points]] place node {node} twice; place it once")
+    frames = tuple(_frame(row) for row in content.frames)
+    closures = tuple(closure.frames for closure in content.closures)
+    spatial = SpatialRobot(
+        mechanism=Mechanism(frames, content.robot.tool_frame, closures),
+        joints=tuple(ElasticJoint(row.frame, row.nodes, _stiffness(row)) for row in content.joints),
+        links=tuple(_link(row) for row in content.links),
+        bodies=tuple(_body(row) for row in content.bodies),
+        points={row.node: (row.frame, np.array(row.at_m)) for row in content.points},
+        tip=content.robot.tip_node,
+        rayleigh=_rayleigh(content.damping),
+        damping_ratio=None if content.damping is None else content.damping.ratio,
+        gravity=content.robot.gravity_m_per_s2,
+        up=_upwards(content.robot.up),
+    )
+    check_tip(spatial)
+    poses = _poses(content, spatial.mechanism)
+    return SpatialCase(content.robot.name, spatial, poses, content.robot.repeatability_m)
+
+
+def _upwards(given: tuple[float, float, float]) -> tuple[float, float, float]:
+    length = hypot(*given)
+    if not length > 0:
+        raise InputError(f"up = {list(given)} has no direction; give the base frame's axis against weight: [0, 0, 1]")
+    return given[0] / length, given[1] / length, given[2] / length
+
+
+def _poses(content: _File, mechanism: Mechanism) -> dict[str, NDArray[np.float64]]:
+    typed = []
+    for pose in content.poses:
+        given = [values for values in (pose.driven, pose.driven_deg) if values is not None]
+        if len(given) != 1:
+            raise InputError(f"posture {pose.name!r}: give driven = [...] once: degrees, prismatic joints in metres")
+        typed.append((pose.name, given[0]))
+    return named_values(mechanism, typed)
+
+
+def _rayleigh(damping: _Damping | None) -> tuple[float, float]:
+    if damping is None:
+        return (0.0, 0.0)
+    if damping.ratio is not None:
+        if damping.ratios is not None or damping.frequencies_hz is not None:
+            raise InputError("damping: give one ratio, or frequencies_hz and ratios (two each), not both")
+        return (0.0, 0.0)
+    if damping.frequencies_hz is None or damping.ratios is None:
+        raise InputError("damping: give frequencies_hz and ratios (two each), or one ratio")
+    if not all(0 <= ratio < 1 for ratio in damping.ratios):
+        raise InputError(f"damping: ratios = {list(damping.ratios)} must be 0 or more and below 1; 4 % is 0.04")
+    return rayleigh_constants(damping.frequencies_hz, damping.ratios)
+
+
+def _frame(row: _Frame) -> Frame:
+    lower, upper = _limits(row)
+    return Frame(
+        row.name,
+        row.antecedent,
+        row.motion,
+        row.active,
+        radians(row.gamma_deg),
+        row.b_m,
+        radians(row.alpha_deg),
+        row.d_m,
+        radians(row.theta_deg),
+        row.r_m,
+        lower,
+        upper,
+    )
+
+
+def _limits(row: _Frame) -> tuple[float, float]:
+    """Limits in rad or m, by the frame's motion."""
+    if row.motion == "prismatic":
+        given, wrong, right = row.limits_m, row.limits_deg, "limits_m"
+    else:
+        given, wrong, right = row.limits_deg, row.limits_m, "limits_deg"
+    if wrong is not None or (given is not None and row.motion == "fixed"):
+        remedy = "leave its limits out" if row.motion == "fixed" else f"give {right}"
+        raise InputError(f"frame {row.name}: limits {list(wrong or given or ())} of a {row.motion} frame; {remedy}")
+    if given is None:
+        return (-inf, inf)
+    if row.motion == "revolute":
+        return radians(given[0]), radians(given[1])
+    if max(map(abs, given)) > LARGEST_TRAVEL:
+        raise InputError(f"frame {row.name}: limits_m = {list(given)}: give metres, at most {LARGEST_TRAVEL:g}")
+    return given
+
+
+def _stiffness(row: _Joint) -> NDArray[np.float64]:
+    """A stiffness that is not given is infinite: the joint is rigid in that direction."""
+    radial, axial, tilting, turning = (
+        inf if value is None else value
+        for value in (row.radial_n_per_m, row.axial_n_per_m, row.tilting_nm_per_rad, row.turning_nm_per_rad)
+    )
+    return np.array([radial, radial, axial, tilting, tilting, turning])
+
+
+def _link(row: _Link) -> Link:
+    if row.frame is None and any(row.angles_deg):
+        raise InputError(f"link {list(row.nodes)}: angles_deg turn a frame; give its name too, frame = ...")
+    if row.tube is None and row.elements > 1:
+        raise InputError(
+            f"link {list(row.nodes)}: elements = {row.elements} of a rigid link; give it a tube, or leave it"
+        )
+    section = None if row.tube is None else _section(row.tube)
+    delta, eta, kappa = (radians(angle) for angle in row.angles_deg)
+    return Link(row.nodes, section, row.elements, row.frame, (delta, eta, kappa))
+
+
+def _section(tube: _Tube) -> Section:
+    if tube.theory not in ("timoshenko", "euler-bernoulli"):
+        raise InputError(f"beam theory {tube.theory!r} is none of timoshenko, euler-bernoulli")
+    material = Material(tube.young_pa, tube.shear_pa, tube.density_kg_per_m3)
+    return hollow_circle(tube.outer_m, tube.inner_m, material, timoshenko=tube.theory == "timoshenko")
+
+
+def _body(row: _Body) -> LumpedBody:
+    inertia = sorted(row.inertia_kg_m2)
+    if inertia[0] < 0:
+        raise InputError(f"body at node {row.node}: inertia_kg_m2 = {list(row.inertia_kg_m2)} must be 0 or more")
+    if inertia[2] > (1 + 1e-6) * (inertia[0] + inertia[1]) and inertia[0] > 0:
+        raise InputError(
+            f"body at node {row.node}: inertia_kg_m2 = {list(row.inertia_kg_m2)}: no body has one moment of inertia "
+            "that is larger than the other two together; check units and axes"
+        )
+    return LumpedBody(row.node, row.frame, row.mass_kg, np.array(row.centre_m), np.diag(row.inertia_kg_m2))

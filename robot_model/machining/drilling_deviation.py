@@ -1,0 +1,167 @@
+"""How far a robot gives way while it drills: joint compliance, position gain, and maps over the work area."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cutting import DrillingLoad
+from foundation import InputError
+
+from ..finite_elements.constrained_statics import tip_compliance
+from ..finite_elements.gravity import gravity_torques
+from ..kinematics.loop_closure import tool_jacobian
+from ..kinematics.spherical_wrist import wrist_solutions
+from ..spatial.spatial_robot import SpatialRobot, drive_stiffness, structure_at
+from ..spatial.weight import Payload, acceleration, payload_wrench, sag_at, static_response, tool_attitude
+from .redundancy import CutPlace, target_of
+
+Real = NDArray[np.float64]
+
+NO_PAYLOAD = Payload()
+
+
+def drilling_wrench(load: DrillingLoad, tool_axis: Real) -> Real:
+    """Force and moment on the robot, base frame, (6,): thrust pushes back along the tool, torque turns against it."""
+    return np.concatenate([-load.thrust * tool_axis, -load.torque * tool_axis])
+
+
+def joint_deformation(robot: SpatialRobot, q: Real, wrench: Real, position_gain: Real | None = None) -> Real:
+    """Compute small motions of the driven joints, rad (m): ``phi = tau / k`` plus the controller's ``tau / K_pos``.
+
+    ``tau = J^T W`` are the torques with which the process turns the joints; the simulated angles are
+    ``psi + Delta psi_Kpos + phi`` (Ferreras-Higuero et al., Eq. 41).
+
+    Parameters
+    ----------
+    robot
+        An open chain; the stiffness of its joints about (prismatic ones: along) their axes is taken.
+    q : (n_moving,), rad or m
+        Joint values of the posture.
+    wrench : (6,), N and N m
+        Force and moment on the tool, in the base frame.
+    position_gain : (n_active,), N m/rad or N/m, or None
+        Position gain of the controller; None: it holds the motor's angle whatever the torque.
+
+    Raises
+    ------
+    InputError
+        A robot with closed loops.
+    """
+    if robot.mechanism.closures:
+        raise InputError("this robot has closed loops; its deflection is tip_compliance @ wrench")
+    compliance = 1 / drive_stiffness(robot) + (
+        0 if position_gain is None else 1 / np.asarray(position_gain, dtype=float)
+    )
+    return np.asarray(compliance * (tool_jacobian(robot.mechanism, q).T @ wrench))
+
+
+def joint_deviation(robot: SpatialRobot, q: Real, wrench: Real, position_gain: Real | None = None) -> Real:
+    """``q_TCP - q_TCP_sim`` of Eq. 21: the tool's way from where it is to where it should be, m, shape (3,).
+
+    The tool is placed with the deformed angles, so large deformations are no error.
+    """
+    tool = robot.mechanism.index(robot.mechanism.tool)
+    moved = q + joint_deformation(robot, q, wrench, position_gain)
+    return np.asarray((robot.mechanism.transforms(q) - robot.mechanism.transforms(moved))[tool, :3, 3])
+
+
+@dataclass(frozen=True)
+class DeviationMap:
+    """Deviation under a drilling load over places of the tool.
+
+    Parameters
+    ----------
+    positions : (n, 3), m
+        Nominal places of the tool.
+    deviations : (n, 3), m
+        Nominal minus real place; NaN exactly where the place is not reached.
+    q : (n, 6), rad
+        Joint values at each place; NaN where it is not reached.
+    weight : (n, 3), m
+        Nominal minus real place under own weight and payload alone; NaN where the place is not reached or masses are
+        unknown.
+    reached : (n,), bool
+        Whether the robot reaches the place.
+    switches : (n,), bool
+        Whether the branch of the inverse kinematics is another than at the place before: a jump of the deviation is the
+        robot's, not the material's (Ferreras-Higuero et al., Fig. 13).
+    """
+
+    positions: Real
+    deviations: Real
+    weight: Real
+    q: Real
+    reached: NDArray[np.bool_]
+    switches: NDArray[np.bool_]
+
+
+def deviation_map(
+    robot: SpatialRobot,
+    places: list[CutPlace],
+    load: DrillingLoad,
+    *,
+    position_gain: Real | None = None,
+    links: bool = False,
+    payload: Payload = NO_PAYLOAD,
+) -> DeviationMap:
+    """Compute the deviation at each place, on the branch nearest to the posture at the place before.
+
+    Parameters
+    ----------
+    robot
+        Robot with a spherical wrist.
+    places
+        Tool axis and position of each hole.
+    load, position_gain
+        Drilling load, and the controller's position gain as in :func:`joint_deformation`.
+    links
+        Whether to add the compliance of links and of the joints' other directions: the whole elastic structure, linear.
+    payload
+        Load that the robot carries besides the bodies of its file.
+
+    Raises
+    ------
+    InputError
+        Links together with a position gain: that model holds the motors.
+    """
+    if links and position_gain is not None:
+        raise InputError("deviation map: give either links or a position gain")
+    n = len(places)
+    deviations, sags, postures = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full((n, 6), np.nan)
+    reached, switches = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
+    last: Real | None = None
+    for i, place in enumerate(places):
+        solutions = wrist_solutions(robot.mechanism, target_of(place))
+        if not len(solutions):
+            continue
+        q = solutions[0] if last is None else solutions[np.argmin(np.abs(solutions - last).max(axis=1))]
+        switches[i] = last is not None and np.abs(q - last).max() > 1.0
+        wrench = drilling_wrench(load, place.attitude[:, 2])
+        if links:
+            deviations[i] = -(tip_compliance(structure_at(robot, q)) @ wrench)[:3]
+        else:
+            deviations[i] = joint_deviation(robot, q, wrench, position_gain)
+        if robot.bodies:
+            sags[i] = -_sag(robot, q, payload, links)
+        postures[i], reached[i], last = q, True, q
+    positions = np.array([place.position for place in places]).reshape(n, 3)
+    return DeviationMap(positions, deviations, sags, postures, reached, switches)
+
+
+def sag_parts(robot: SpatialRobot, q: Real, payload: Payload = NO_PAYLOAD) -> Real:
+    """Displacement of the tool by each driven joint under own weight and payload, m, (3, n_active).
+
+    ``J_j tau_j / k_j`` with the torques of :func:`robot_model.gravity_torques`.
+    """
+    jacobian = tool_jacobian(robot.mechanism, q)
+    carried = jacobian.T @ payload_wrench(robot, tool_attitude(robot.mechanism, q), payload)
+    torques = gravity_torques(robot, q, structure_at(robot, q), acceleration(robot)) + carried
+    return np.asarray(jacobian[:3] * (torques / drive_stiffness(robot)))
+
+
+def _sag(robot: SpatialRobot, q: Real, payload: Payload, links: bool) -> Real:
+    """Displacement of the tool under own weight and payload, (3,), m: of joints alone, or of the whole structure."""
+    if links:
+        return sag_at(robot, q, static_response(robot, structure_at(robot, q)), payload)[:3]
+    return np.asarray(sag_parts(robot, q, payload).sum(axis=1))

@@ -1,0 +1,1 @@
+"""Planar robots: rigid links on joint springs, flexible links, and natural coordinates."""

@@ -1,0 +1,1 @@
+"""Robots in space: structure at a posture, modes, weight, a compliant tool, and natural coordinates."""

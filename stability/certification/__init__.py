@@ -1,0 +1,1 @@
+"""Depth limits that were verified with Floquet multipliers, and what is done where two methods disagree."""

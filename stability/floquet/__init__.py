@@ -1,0 +1,1 @@
+"""The tooth period as an operator, its Floquet multipliers, and the depths at which cuts grow."""

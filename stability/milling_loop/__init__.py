@@ -1,0 +1,1 @@
+"""The regenerative milling loop: tip receptance, delayed state equation, and which teeth cut when."""

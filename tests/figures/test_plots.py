@@ -1,0 +1,160 @@
+"""Results at a prompt and in a notebook: four lines, a table, equality, plots into axes, tables of other libraries."""
+
+import pickle
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+from acquisition import Channel
+from estimation import CrossSpectra, Frf, SpectralSettings
+from foundation import InputError, Result
+from modal_fit import ModalModel
+from stability import StabilityLobes
+
+SCRIPT = "<script>alert(1)</script>"
+
+
+@pytest.fixture(autouse=True)
+def _no_screen() -> Iterator[None]:
+    import matplotlib.pyplot as plt
+
+    with mpl.rc_context({"backend": "agg"}):
+        yield
+        plt.close("all")
+
+
+def _model() -> ModalModel:
+    poles = np.array([-3.0 + 105.0j, -10.0 + 330.0j])
+    right = np.array([[1e-3, 2e-4 + 1e-4j], [5e-4j, 1e-3]])
+    return ModalModel(poles, right, right, ("TCP:+X", "TCP:+Y"), ("TCP:+X", "TCP:+Y"), band=(5.0, 80.0))
+
+
+def _frf() -> Frf:
+    frf = _model().frf(np.linspace(5.0, 80.0, 151))
+    return replace(frf, multiple_coherence=np.full((151, 2), 0.9))
+
+
+def _lobes() -> StabilityLobes:
+    rpm = np.linspace(600, 2400, 5)
+    limits = np.array([1.0, 0.5, np.inf, 2.0, np.nan]) * 1e-3
+    kinds = ("hopf", "period-doubling", "none", "hopf", "none")
+    status = ("verified", "verified", "verified", "lower-bound", "unresolved")
+    chatter = np.array([18.0, 17.5, np.nan, 52.0, np.nan])
+    return StabilityLobes(rpm * np.pi / 30, limits, chatter, kinds, "collocation", ("doubt",), status)
+
+
+def _spectra() -> CrossSpectra:
+    f = np.linspace(0.0, 50.0, 26)
+    force = Channel("fx", "force", "N", "TCP", "+X")
+    motion = Channel("ax", "acceleration", "m/s^2", "TCP", "+X")
+    ones = np.ones((26, 1, 1), dtype=complex)
+    return CrossSpectra(f, 4 * ones, 2j * ones, ones, (force,), (motion,), 12, 7.5, SpectralSettings(256), 128.0)
+
+
+RESULTS: dict[str, Any] = {"Frf": _frf, "ModalModel": _model, "StabilityLobes": _lobes, "CrossSpectra": _spectra}
+
+
+@pytest.mark.parametrize("name", RESULTS)
+def test_a_result_tells_what_it_holds_and_survives_a_pickle(name: str) -> None:
+    one: Result = RESULTS[name]()
+    text = repr(one)
+    assert text.startswith(f"{name}: ")
+    assert 1 <= len(text.splitlines()) <= 4
+    assert max(len(line) for line in text.splitlines()) <= 160
+    assert "<table>" in one._repr_html_()
+    again = pickle.loads(pickle.dumps(one))
+    assert again == one
+    assert again is not one
+    assert repr(again) == text
+
+
+def test_equality_sees_every_array() -> None:
+    model = _model()
+    assert model != replace(model, poles=model.poles * (1 + 1e-12))
+    assert model != replace(model, band=(5.0, 81.0))
+    lobes = _lobes()
+    assert lobes != replace(lobes, depth_limits=lobes.depth_limits[::-1])
+    assert model != lobes
+
+
+def test_reprs_say_modes_limits_and_shape() -> None:
+    assert "16.72 Hz 2.86 %" in repr(_model())
+    assert "52.55 Hz 3.03 %" in repr(_model())
+    assert "lowest limit 0.5 mm at 1050 rpm, period-doubling, verified" in repr(_lobes())
+    assert "2 responses x 2 excitations" in repr(_frf())
+    assert "12 segments of 2 s, worth 7.5 averages" in repr(_spectra())
+
+
+def test_names_from_a_file_are_escaped_in_html() -> None:
+    model = replace(_model(), responses=(SCRIPT, "TCP:+Y"))
+    for one in (model, model.frf(np.array([10.0, 20.0]))):
+        assert "<script>" not in one._repr_html_()
+
+
+def test_plots_take_axes_and_give_them_back() -> None:
+    frf, model = _frf(), _model()
+    axes = frf.plot(response="TCP:+X", excitation="TCP:+X")
+    [measured] = axes.get_lines()
+    np.testing.assert_allclose(measured.get_ydata(), np.abs(frf.values[:, 0, 0]))
+    assert model.plot(axes, response="TCP:+X", excitation="TCP:+X") is axes
+    fitted = axes.get_lines()[-1]
+    assert fitted.get_label() == "model"
+    at_grid = np.abs(model.receptance(np.asarray(fitted.get_xdata()))[:, 0, 0])
+    np.testing.assert_allclose(fitted.get_ydata(), at_grid)
+    phase = frf.plot(part="phase", response="TCP:+Y", excitation="TCP:+X", color="red")
+    assert phase is not axes
+    assert phase.get_ylabel() == "Phase of receptance (deg)"
+    assert phase.get_lines()[0].get_color() == "red"
+
+
+def test_lobes_are_drawn_in_mm_over_rpm_with_gaps() -> None:
+    axes = _lobes().plot(label="mine")
+    line = axes.get_lines()[0]
+    np.testing.assert_allclose(line.get_ydata(), [1.0, 0.5, np.nan, 2.0, np.nan])
+    np.testing.assert_allclose(line.get_xdata(), [600, 1050, 1500, 1950, 2400])
+    assert _lobes().plot(axes, label="other") is axes
+    shown = axes.get_legend()
+    assert {"mine", "other", "unstable"} <= {text.get_text() for text in shown.get_texts()}
+    colours = {line.get_color() for line in axes.get_lines() if line.get_gid() == "limits"}
+    assert len(colours) == 2
+
+
+def test_spectra_are_drawn_with_their_unit() -> None:
+    axes = _spectra().plot()
+    assert axes.get_ylabel() == "Power spectral density (N²/Hz)"
+    np.testing.assert_allclose(axes.get_lines()[0].get_ydata(), 4.0)
+    assert _spectra().plot(side="responses").get_ylabel() == "Power spectral density ((m/s²)²/Hz)"
+
+
+def test_what_is_not_there_is_refused_with_what_is() -> None:
+    with pytest.raises(InputError, match="no response TCP:\\+Q; there are TCP:\\+X, TCP:\\+Y"):
+        _frf().plot(response="TCP:+Q")
+    with pytest.raises(InputError, match="unknown part 'angle' of an FRF; use one of magnitude, phase"):
+        _model().plot(part="angle")
+    with pytest.raises(InputError, match="unknown side"):
+        _spectra().plot(side="left")
+
+
+def test_an_frf_becomes_a_data_set_with_its_axes() -> None:
+    frf = _frf()
+    made = frf.to_xarray()
+    entry = made["receptance"].sel(response="TCP:+Y", excitation="TCP:+X")
+    np.testing.assert_array_equal(entry.values, frf.values[:, 1, 0])
+    np.testing.assert_array_equal(made["frequency"].values, frf.frequencies)
+    assert made["receptance"].attrs["unit"] == "m/N"
+    assert "coherence" not in made
+    spectra = _spectra().to_xarray()
+    assert complex(spectra["cross_spectra"].sel(response="ax", excitation_conj="fx")[3]) == 2j
+
+
+def test_modes_and_lobes_become_tables() -> None:
+    modes = _model().to_frame()
+    assert list(modes.index) == [1, 2]
+    np.testing.assert_allclose(modes["natural_frequency_hz"], _model().natural_frequencies)
+    table = _lobes().to_frame()
+    np.testing.assert_allclose(table["depth_limit_m"], _lobes().depth_limits)
+    assert list(table["bifurcation"]) == list(_lobes().bifurcations)
