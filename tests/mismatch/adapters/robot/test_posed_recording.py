@@ -6,6 +6,7 @@ from milled_robots import BAND, NOTHING, POSTURES, ROBOT, TIP, milled
 
 from foundation import InputError
 from mismatch.adapters.robot import diagnose_robot, posed
+from mismatch.adapters.robot.posed_recording import halves
 
 
 def test_recordings_that_do_not_fit_are_refused() -> None:
