@@ -6,8 +6,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.fft import irfft
 
-from mismatch.adapters.cut import CutDiagnosis
-from mismatch.adapters.cut.cut_fit import CutFit
+from mismatch.adapters.cut import CutDiagnosis, CutFit
 
 from ..style import COLOURS, legend_above, new_figure
 
@@ -20,12 +19,13 @@ BINS = 180
 
 def cut_turn_figure(found: CutDiagnosis) -> Figure:
     """Measured and computed force around the turn of the spindle, mean of all turns, and what is left, by channel."""
-    lines = found.setting.lines[0]
+    lines = found.details.cut.spectra[0]
     channels = lines.recording.channels
     figure = new_figure(34.0 + 30.0 * 2)
     panels = figure.subplots(2, len(channels), sharex=True, squeeze=False, height_ratios=(3, 2))
     measured = _around(found, lines.measured)
-    before, after = (_around(found, found.setting.shown(0, one.attempt)) for one in (found.nominal, shown_fit(found)))
+    fits = (found.details.nominal, shown_fit(found))
+    before, after = (_around(found, found.details.cut.predicted(0, one.hypothesis)) for one in fits)
     degrees = (np.arange(BINS) + 0.5) * 360 / BINS
     for column, label in enumerate(channels):
         top, low = panels[0, column], panels[1, column]
@@ -48,15 +48,15 @@ def cut_turn_figure(found: CutDiagnosis) -> Figure:
 
 def cut_orders_figure(found: CutDiagnosis) -> Figure:
     """Error of the computed force by spindle order, all channels and blocks together, before and after, over noise."""
-    lines, noise = found.setting.lines[0], found.setting.noise[0]
-    law = found.nominal.attempt.laws[0]
+    lines, noise = found.details.cut.spectra[0], found.details.cut.noise[0]
+    law = found.details.nominal.hypothesis.laws[0]
     orders = lines.frequencies / (law.speed / (2 * np.pi))
     figure = new_figure(62.0)
     axes: Axes = figure.subplots()
     scale = 2 / np.sqrt(lines.size)  # a sine's amplitude
     _draw(axes, orders, scale * _size(lines.measured), {"color": "0.75", "linewidth": 2.0, "label": "measured force"})
     look = {"color": COLOURS[2], "linestyle": (0, (4, 1.0)), "linewidth": 0.9, "label": "left, cutting file"}
-    _draw(axes, orders, scale * _size(_rest(found, found.nominal)), look)
+    _draw(axes, orders, scale * _size(_rest(found, found.details.nominal)), look)
     look = {"color": COLOURS[1], "linewidth": 0.9, "label": "left, improved"}
     _draw(axes, orders, scale * _size(_rest(found, shown_fit(found))), look)
     floor = scale * np.sqrt(noise.floor.sum(axis=1))
@@ -70,7 +70,7 @@ def cut_orders_figure(found: CutDiagnosis) -> Figure:
 
 def shown_fit(found: CutDiagnosis) -> CutFit:
     """What the improved cutting file stands for."""
-    return found.final
+    return found.details.final
 
 
 def _draw(axes: Axes, orders: Real, values: Real, look: dict[str, object]) -> None:
@@ -78,7 +78,7 @@ def _draw(axes: Axes, orders: Real, values: Real, look: dict[str, object]) -> No
 
 
 def _rest(found: CutDiagnosis, fitted: CutFit) -> Complex:
-    return np.asarray(found.setting.lines[0].measured - found.setting.shown(0, fitted.attempt))
+    return np.asarray(found.details.cut.spectra[0].measured - found.details.cut.predicted(0, fitted.hypothesis))
 
 
 def _size(lines: Complex) -> Real:
@@ -90,7 +90,7 @@ def _around(found: CutDiagnosis, shown: Complex) -> Real:
 
     Lines are windowed: the first and last eighth of each block, where the window falls, are left out.
     """
-    lines, law = found.setting.lines[0], shown_fit(found).attempt.laws[0]
+    lines, law = found.details.cut.spectra[0], shown_fit(found).hypothesis.laws[0]
     spectrum = np.zeros((lines.blocks, lines.size // 2 + 1, shown.shape[2]), dtype=complex)
     spectrum[:, lines.band] = shown
     signals = irfft(spectrum, n=lines.size, axis=1) * np.sqrt(lines.size * 0.9375)

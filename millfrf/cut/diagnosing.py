@@ -11,9 +11,9 @@ from foundation import InputError
 from mismatch.adapters.cut import (
     diagnose_cut,
     read_cut_recording,
-    write_cut_diagnosis,
     write_improved_cut,
 )
+from mismatch.inference import write_diagnosis
 from modal_fit import read_modal_model
 
 from ..gate import RECORD_AGAIN, check_depth, check_one_speed, check_recordings, read_checked_cutting
@@ -61,7 +61,7 @@ def diagnose_cut_files(cutting: Path, paths: Sequence[Path], out: Path, asking: 
             force_error=asking.force_error,
         )
     out.mkdir(parents=True, exist_ok=True)
-    write_cut_diagnosis(out / "diagnosis.json", found)
+    write_diagnosis(out / "diagnosis.json", found)
     write_improved_cut(out / "improved_cut.toml", found)
     lines = [*summary(found), *(f"warning: {doubt}" for doubt in doubts)]
     with bar("writing the report"):

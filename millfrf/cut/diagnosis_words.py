@@ -3,7 +3,7 @@
 import math
 
 from mismatch import AcceptedCause
-from mismatch.adapters.cut import COEFFICIENTS, NOISE_LIKE, CutDiagnosis
+from mismatch.adapters.cut import COEFFICIENTS, CutDiagnosis
 
 from ..tables.result_tables import with_error
 
@@ -17,18 +17,17 @@ def summary(found: CutDiagnosis) -> list[str]:
     lines = [f"verdict: {found.verdict}", _sentence(found), *(describe(cause) for cause in found.physics)]
     if found.equivalents:
         lines.append(f"cannot be told from: {', '.join(found.equivalents)}")
-    lines += [f"{one.name}: {one.kind}, {one.reason}" for one in found.chatter if one.unstable]
-    lines += [
-        f"chatter of {one.name} was not judged: {one.reason}" for one in found.chatter if one.kind == "not judged"
-    ]
+    chatter = found.details.chatter
+    lines += [f"{one.name}: {one.kind}, {one.reason}" for one in chatter if one.unstable]
+    lines += [f"chatter of {one.name} was not judged: {one.reason}" for one in chatter if one.kind == "not judged"]
     lines += [f"{one.name} was {one.stage}" for one in found.candidates if one.stage != "fitted"]
     lines.append(what_is_left(found))
-    changed = f", {100 * better.after:.3g} % with it" if found.final.freed else ""
+    changed = f", {100 * better.after:.3g} % with it" if found.details.final.freed else ""
     lines.append(
         f"error of the force on blocks of time held out: {100 * better.before:.3g} % as computed, "
         f"{100 * better.refitted:.3g} % with coefficients refitted{changed}; noise {100 * better.noise_floor:.3g} %"
     )
-    if found.final.freed:
+    if found.details.final.freed:
         lines.append(f"that the causes do not lower it has p = {better.p_value:.1g}")
     return lines
 
@@ -37,7 +36,7 @@ def what_is_left(found: CutDiagnosis) -> str:
     """What stands out of noise in the force that is shown, beside what may stand out."""
     return (
         f"left: {100 * found.leftover:.2g} % of the residual's power stands out of noise and usual error; "
-        f"none and explained: at most {100 * NOISE_LIKE:g} %"
+        f"none and explained: at most {100 * found.details.settings.verdict.noise_like:g} %"
     )
 
 
@@ -59,7 +58,7 @@ def told(name: str, value: float, error: float) -> str:
 
 
 def _sentence(found: CutDiagnosis) -> str:
-    shaken = [one for one in found.chatter if one.unstable]
+    shaken = [one for one in found.details.chatter if one.unstable]
     if shaken:
         names = f"the recording {shaken[0].name} chatters"
         if len(shaken) > 1:

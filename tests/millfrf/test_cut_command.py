@@ -44,9 +44,11 @@ def test_from_files_to_files(folder: Path, capsys: pytest.CaptureFixture[str]) -
     assert "verdict: explained" in text
     assert "runout: radial offset 15." in text or "runout: radial offset 14.9" in text
     content = json.loads((out / "diagnosis.json").read_text(encoding="utf-8"))
-    assert (content["format"], content["format_version"]) == ("millfrf.diagnosis", 1)
+    assert (content["format"], content["format_version"]) == ("millfrf.diagnosis", 2)
     assert {cause["name"] for cause in content["physics"]} == {"runout", "regenerative_feedback"}
-    assert set(content["physics"][0]) == {"name", "location", "parameters", "standard_errors", "evidence"}
+    keys = {"name", "location", "parameters", "standard_errors", "evidence", "error_parts"}
+    assert set(content["physics"][0]) == keys
+    assert content["compared"] == "cut"
     assert content["improvement"]["after"] < 0.05 * content["improvement"]["before"]
     assert content["cut"]["recordings"][0]["spindle_speed_rpm"] == pytest.approx(800, abs=0.01)
     improved = read_cutting_process(out / "improved_cut.toml")

@@ -10,8 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from figures import as_data_uri, cut_orders_figure, cut_turn_figure, house_style
 from foundation import writing_whole_file
-from mismatch.adapters.cut import SIGNIFICANT, CutDiagnosis
-from mismatch.adapters.cut.force.force_coefficients import NAMES
+from mismatch.adapters.cut import COEFFICIENT_NAMES, CutDiagnosis
 
 from ...provenance import versions
 from ...tables.result_tables import Table
@@ -33,7 +32,7 @@ def write_cut_report(path: str | os.PathLike[str], found: CutDiagnosis, cut_name
         Verdict, a sentence on it, and a line for each finding.
     """
     environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
-    names = ", ".join(lines.recording.name for lines in found.setting.lines)
+    names = ", ".join(spectra.recording.name for spectra in found.details.cut.spectra)
     text = environment.get_template("diagnosis.html.j2").render(
         title=f"{cut_name} against {names}",
         written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
@@ -49,30 +48,27 @@ def write_cut_report(path: str | os.PathLike[str], found: CutDiagnosis, cut_name
 
 
 def _warnings(found: CutDiagnosis) -> list[str]:
+    cut, proof = found.details.cut, found.details.settings.proof
     warnings = [
-        f"Coefficients are taken to be off by {100 * found.setting.belief.error:g} %, each spectral line of a right "
-        f"computed force by {100 * found.setting.force_error:g} %; what is smaller is not named."
+        f"Coefficients are taken to be off by {100 * cut.belief.error:g} %, each spectral line of a right computed "
+        f"force by {100 * cut.force_error:g} %; what is smaller is not named.",
+        f"A cause is told if it lowers the error of the force on blocks held out with p < {proof.significance:g}. Its "
+        "± is one standard error: the fit's own, the spread between halves of the blocks and between bands of "
+        "frequency, and the largest shift with another cause free.",
     ]
-    warnings.append(
-        f"A cause is told if it lowers the error of the force on blocks held out with p < {SIGNIFICANT:g}. Its ± is "
-        "one standard error: the fit's own, the spread between halves of the blocks and between bands of frequency, "
-        "and the largest shift with another cause free."
-    )
-    warnings += [f"{one.name} chatters: {one.reason}." for one in found.chatter if one.unstable]
+    warnings += found.doubts
     if any(one.stage.startswith("not weighed") for one in found.candidates):
         warnings.append("Not every cause could be weighed; see the table of candidates.")
-    if any(lines.recording.motion and lines.recording.motion.origin == "model" for lines in found.setting.lines):
-        warnings.append("The tip's motion was computed by a model from the measured forces, not measured.")
     return warnings
 
 
 def _around_the_turn(found: CutDiagnosis) -> Section:
     with house_style():
         picture = as_data_uri(cut_turn_figure(found))
+    name = found.details.cut.spectra[0].recording.name
     caption = (
-        f"Force on the tool around the turn of the spindle in {found.setting.lines[0].recording.name}, mean of all "
-        "turns, without its constant part, in the band that is compared (its upper end makes the ripple). Below: "
-        "measured less computed."
+        f"Force on the tool around the turn of the spindle in {name}, mean of all turns, without its constant part, in "
+        "the band that is compared (its upper end makes the ripple). Below: measured less computed."
     )
     return Section("Around the turn", (), (), (Picture(picture, caption, "Measured and computed force"),))
 
@@ -84,7 +80,7 @@ def _by_order(found: CutDiagnosis) -> Section:
     better = found.improvement
     columns: tuple[str, ...] = ("as computed", "coefficients refitted", "noise")
     numbers: tuple[float, ...] = (better.before, better.refitted, better.noise_floor)
-    if found.final.freed:
+    if found.details.final.freed:
         columns, numbers = (*columns[:2], "with causes", "noise"), (*numbers[:2], better.after, better.noise_floor)
     row = tuple(f"{100 * number:.3g}" for number in numbers)
     table = Table("Error on blocks of time that were not fitted (% of the force)", columns, (row,))
@@ -92,12 +88,12 @@ def _by_order(found: CutDiagnosis) -> Section:
 
 
 def _coefficients(found: CutDiagnosis) -> Section:
-    belief, fitted = found.setting.belief, found.final
+    belief, fitted = found.details.cut.belief, found.details.final
     stated, _ = belief.told(np.zeros(6), np.zeros(6))
-    values, errors = belief.told(fitted.attempt.deviations, np.sqrt(np.diag(fitted.covariance)[:6]))
+    values, errors = belief.told(fitted.hypothesis.deviations, np.sqrt(np.diag(fitted.covariance)[:6]))
     rows = tuple(
         (name, f"{stated[name]:.4g}", f"{values[name]:.4g} ± {errors[name]:.2g}", f"{deviation:+.2f}")
-        for name, deviation in zip(NAMES, fitted.attempt.deviations, strict=True)
+        for name, deviation in zip(COEFFICIENT_NAMES, fitted.hypothesis.deviations, strict=True)
     )
     columns = ("coefficient", "stated", "refitted", "off by (lab's errors)")
     return Section("Coefficients", (), (Table("Force coefficients, refitted with the causes", columns, rows),))

@@ -1,27 +1,26 @@
 """Which physics a computed cutting force leaves out: measured forces of a cut against those of a cutting process."""
 
-from .cut_diagnosis import FORCE_ERROR, NOISE_LIKE, diagnose_cut
-from .cut_diagnosis_file import cut_diagnosis_content, write_cut_diagnosis, write_improved_cut
-from .cut_held_out import SIGNIFICANT
-from .cut_results import COEFFICIENTS, CutDiagnosis
-from .recordings.cut_chatter import CutChatter
-from .recordings.cut_reading import read_cut_recording
-from .recordings.cut_recording import CutRecording, cut_recording
-from .recordings.spindle_law import SpindleLaw
+from .details import CutDetails, CutDiagnosis, write_improved_cut
+from .diagnose import diagnose_cut
+from .fits import CutFit
+from .force import COEFFICIENT_NAMES
+from .naming import COEFFICIENTS
+from .recordings import CutChatter, CutRecording, SpindleLaw, cut_recording, read_cut_recording
+from .settings import CUT, CutSettings
 
 __all__ = [
     "COEFFICIENTS",
-    "FORCE_ERROR",
-    "NOISE_LIKE",
-    "SIGNIFICANT",
+    "COEFFICIENT_NAMES",
+    "CUT",
     "CutChatter",
+    "CutDetails",
     "CutDiagnosis",
+    "CutFit",
     "CutRecording",
+    "CutSettings",
     "SpindleLaw",
-    "cut_diagnosis_content",
     "cut_recording",
     "diagnose_cut",
     "read_cut_recording",
-    "write_cut_diagnosis",
     "write_improved_cut",
 ]

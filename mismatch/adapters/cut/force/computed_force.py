@@ -9,7 +9,7 @@ from cutting import MillingProcess
 from cutting.one_tooth import specific_forces
 
 from ..physics import CutPhysics, ToothView
-from .cut_view import CutView
+from .tooth_views import CutView
 
 Real = NDArray[np.float64]
 
@@ -26,13 +26,13 @@ def computed_force(process: MillingProcess, depth: float, view: CutView, acting:
     Parameters
     ----------
     process
-        Coefficients, cutter and feed; its runout and process damping are causes, and not read here.
+        Coefficients, cutter and feed; runout and process damping are causes, and are not read here.
     depth
         Axial depth a, m.
     view
-        Teeth and motion.
+        Where the teeth stand at every instant, and how the tip moves.
     acting
-        Causes with their numbers.
+        Causes, each with its numbers (n_numbers,) in SI.
     """
     total = np.zeros((view.count, 3))
     cutting, edge = specific_forces(process)
@@ -52,7 +52,19 @@ def computed_force(process: MillingProcess, depth: float, view: CutView, acting:
 
 
 def chip_thickness(process: MillingProcess, tooth: ToothView, earlier: int, acting: Acting) -> Real:
-    """Thickness at the instants of one tooth, (m,), m."""
+    """Chip thickness at the instants of one tooth, (m,), m.
+
+    Parameters
+    ----------
+    process
+        Gives the feed per tooth.
+    tooth
+        The tooth that cuts.
+    earlier
+        Tooth passings that are looked back.
+    acting
+        Causes, each with its numbers (n_numbers,) in SI.
+    """
     feed = process.feed_per_tooth * tooth.sine * tooth.sine_edge
     own = sum(cause.advance(values, tooth, 0) for cause, values in acting)
     thinnest = np.full(len(feed), np.inf)

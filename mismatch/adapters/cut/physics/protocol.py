@@ -1,4 +1,4 @@
-"""What a hypothesis about left-out cutting physics has to say: `CutPhysics`, and the `ToothView` that it is given."""
+"""`CutPhysics`: what a cause of a wrong cutting force states about itself; `ToothView`: what it is given."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from cutting import MillingProcess
 
-from ....physics.protocol import Parameter
+from ....physics import Parameter
 
 Real = NDArray[np.float64]
 
@@ -20,22 +20,22 @@ class ToothView:
     Parameters
     ----------
     number, teeth
-        Of the tooth, and how many there are.
+        Number of the tooth, from 0, and how many teeth the cutter has.
     index : (m,)
-        Which instants of the recording.
+        Instants of the recording at which the tooth cuts.
     sine, cosine : (m,)
-        Of the immersion angle phi.
+        Sine and cosine of the immersion angle phi.
     sine_edge, cosine_edge
-        Of the edge angle gamma.
+        Sine and cosine of the edge angle gamma.
     share : (m,)
-        Of the instant's step that lies in the immersion, 0 to 1.
+        Share of the instant's step that lies in the immersion, 0 to 1.
     outward : (n_earlier + 1, m), m
         The tip's displacement along the direction in which chip thickness is counted: now, and when the tool stood at
-        the same angle one, two ... tooth passings earlier. Zero where no motion is known.
+        the same angle one, two ... tooth passings earlier. It is zero where no motion is known.
     velocity : (m,), m/s
-        Of the same, now.
+        The tip's velocity along the same direction, now.
     cutting_speed : (m,), m/s
-        Of the edge.
+        Speed of the edge along its path.
     """
 
     number: int
@@ -63,9 +63,9 @@ class CutPhysics(ABC):
     Attributes
     ----------
     name, equation, source
-        For people.
+        Name in files, the equation that it adds, and where the equation is published.
     moves
-        Whether it lives on the tip's motion, which must then be known.
+        Whether it depends on the tip's motion, which must then be known.
     """
 
     name = ""
@@ -74,33 +74,77 @@ class CutPhysics(ABC):
     moves = False
 
     def obstacle(self, process: MillingProcess) -> str:
-        """Why it cannot be weighed for this cutter; empty where it can."""
+        """Why it cannot be weighed for this cutter; empty where it can.
+
+        Parameters
+        ----------
+        process
+            The cutting file's process.
+        """
         return ""
 
     @abstractmethod
     def parameters(self, process: MillingProcess) -> tuple[Parameter, ...]:
-        """Its numbers, as they are fitted."""
+        """Its numbers, as they are fitted.
+
+        Parameters
+        ----------
+        process
+            The cutting file's process.
+        """
 
     def stated(self, process: MillingProcess) -> Real:
-        """The numbers that the cutting file states: what is computed before anything is blamed."""
+        """The numbers that the cutting file states: what is computed before any cause is named, (n_numbers,), SI.
+
+        Parameters
+        ----------
+        process
+            The cutting file's process.
+        """
         return np.zeros(len(self.parameters(process)))
 
     def advance(self, values: Real, tooth: ToothView, earlier: int) -> Real | float:
-        """How much further out than a rigid true edge the edge stands, m, that cuts ``earlier`` passings ago.
+        """How far an edge stands out of the edge of a rigid cutter that runs true, (m,), m.
 
-        ``earlier`` 0 is the tooth itself, 1 the one before it in the cut; the chip is
-        ``h = min_k (k f sin(phi) sin(gamma) + advance_0 - advance_k)``, not below zero.
+        The chip is ``h = min_k (k f sin(phi) sin(gamma) + advance_0 - advance_k)``, not below zero.
+
+        Parameters
+        ----------
+        values : (n_numbers,)
+            The cause's numbers, SI.
+        tooth
+            The tooth that cuts now.
+        earlier
+            Which edge: 0 is the tooth itself, ``k`` the tooth that stood at the same angle ``k`` passings ago.
         """
         return 0.0
 
     def force(self, values: Real, tooth: ToothView) -> Real | float:
-        """Force on the tool beside shearing and edge, (m, 3), N per metre of depth, while a chip is cut."""
+        """Force on the tool beside shearing and edge, (m, 3), N per metre of depth, while a chip is cut.
+
+        Parameters
+        ----------
+        values : (n_numbers,)
+            The cause's numbers, SI.
+        tooth
+            The tooth that cuts.
+        """
         return 0.0
 
     def told(
         self, values: Real, covariance: Real, process: MillingProcess
     ) -> tuple[dict[str, float], dict[str, float]]:
-        """Numbers and standard errors by name, SI, as they stand in files."""
+        """Numbers and standard errors by name, SI, as they stand in files.
+
+        Parameters
+        ----------
+        values : (n_numbers,)
+            The cause's numbers, SI.
+        covariance : (n_numbers, n_numbers)
+            Their covariance.
+        process
+            The cutting file's process.
+        """
         names = [parameter.name for parameter in self.parameters(process)]
         errors = np.sqrt(np.diag(covariance))
         return (
@@ -109,5 +153,13 @@ class CutPhysics(ABC):
         )
 
     def improved(self, process: MillingProcess, values: Real) -> MillingProcess:
-        """The cutting file's process with these numbers, where it has a place for them."""
+        """The cutting file's process with these numbers, where it has a place for them.
+
+        Parameters
+        ----------
+        process
+            The process so far.
+        values : (n_numbers,)
+            The cause's numbers, SI.
+        """
         return process

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from cutting import MillingProcess
 
-from ....physics.protocol import Parameter
+from ....physics import Parameter
 from .protocol import CutPhysics, ToothView
 
 Real = NDArray[np.float64]

@@ -35,13 +35,13 @@ class SpindleLaw:
     Parameters
     ----------
     middle
-        s, from the first sample.
+        Instant from which the law is counted, s after the first sample.
     angle
-        Of tooth 0 there, rad.
+        Angle of tooth 0 at this instant, rad.
     speed
-        There, rad/s.
+        Speed at this instant, rad/s.
     change
-        rad/s^2.
+        Change of the speed, rad/s^2.
 
     Examples
     --------
@@ -56,21 +56,47 @@ class SpindleLaw:
     change: float = 0.0
 
     def angles(self, times: Real) -> Real:
-        """rad, at ``times`` (n,), s."""
+        """Angle of tooth 0, (n,), rad.
+
+        Parameters
+        ----------
+        times : (n,)
+            Instants, s.
+        """
         t = times - self.middle
         return np.asarray(self.angle + self.speed * t + 0.5 * self.change * t**2)
 
     def speeds(self, times: Real) -> Real:
-        """rad/s."""
+        """Speed of the spindle, (n,), rad/s.
+
+        Parameters
+        ----------
+        times : (n,)
+            Instants, s.
+        """
         return np.asarray(self.speed + self.change * (times - self.middle))
 
     def lag(self, times: Real, turned: float) -> Real:
-        """Seconds s since the spindle stood ``turned`` rad less far, ``turned = speed s - change s^2 / 2``."""
+        """Seconds s since the spindle stood less far, ``turned = speed s - change s^2 / 2``, (n,).
+
+        Parameters
+        ----------
+        times : (n,)
+            Instants, s.
+        turned
+            Angle that the spindle has turned since, rad.
+        """
         speed = self.speeds(times)
         return np.asarray(2 * turned / (speed + np.sqrt(np.maximum(speed**2 - 2 * self.change * turned, 0.0))))
 
     def about(self, middle: float) -> "SpindleLaw":
-        """The same law, counted from another instant."""
+        """The same law, counted from another instant.
+
+        Parameters
+        ----------
+        middle
+            The other instant, s.
+        """
         at = np.array([middle])
         return SpindleLaw(middle, float(self.angles(at)[0]), float(self.speeds(at)[0]), self.change)
 
@@ -81,9 +107,9 @@ def stated_law(path: str | os.PathLike[str], speed: float | None = None) -> Spin
     Parameters
     ----------
     path
-        Recording.
+        File of the recording.
     speed
-        rad/s; None: as the recording says.
+        Spindle speed, rad/s; None: the one that the recording states.
 
     Raises
     ------
@@ -134,13 +160,14 @@ def found_law(force: Real, rate: float, stated: SpindleLaw, teeth: int) -> Spind
 
     Parameters
     ----------
-    force : (n, n_channels), N
+    force : (n, n_channels)
+        Measured forces, N.
     rate
-        Hz.
+        Sampling rate, Hz.
     stated
-        Where to look: two per cent around it.
+        Law around which the speed is sought, within two per cent.
     teeth
-        N.
+        Number of teeth N.
 
     Raises
     ------

@@ -31,9 +31,9 @@ class TipMotion:
     Parameters
     ----------
     displacement, velocity : (n_samples, 3)
-        X, Y, Z; m and m/s. Zero in a direction that was not measured.
+        Displacement (m) and velocity (m/s) along X, Y and Z; zero in a direction that was not measured.
     origin
-        ``measured`` or ``model``.
+        Where the motion is from: ``measured`` or ``model``.
     noise : (2, n_samples, 3)
         A draw of the noise that is in displacement and velocity; None where it is not known.
     """
@@ -57,6 +57,11 @@ def corner_of(rotation: float) -> float:
     """Frequency below which motion is left out, Hz: a tenth of the spindle's, 2 Hz at most.
 
     What is slower hardly changes from tooth to tooth, and integration would drown it in the sensor's noise.
+
+    Parameters
+    ----------
+    rotation
+        Spindle frequency, Hz.
     """
     return min(0.1 * rotation, CORNER)
 
@@ -72,10 +77,11 @@ def integrated(samples: Real, power: int, rate: float, corner: float) -> tuple[R
     Parameters
     ----------
     samples : (n, n_channels)
+        Samples of one quantity, SI.
     power
-        Derivatives that the samples are ahead of displacement.
+        How often displacement must be differentiated to give the samples.
     rate, corner
-        Hz.
+        Sampling rate and corner frequency, Hz.
     """
     spectrum, frequencies = _padded(samples - samples.mean(axis=0), rate, corner)
     trusted = spectrum * _true_part(spectrum, _quiet(spectrum, frequencies))
@@ -83,7 +89,19 @@ def integrated(samples: Real, power: int, rate: float, corner: float) -> tuple[R
 
 
 def integrated_noise(samples: Real, power: int, rate: float, corner: float, seed: int) -> tuple[Real, Real]:
-    """A draw of the noise that :func:`integrated` leaves in displacement and velocity."""
+    """A draw of the noise that :func:`integrated` leaves in displacement and velocity.
+
+    Parameters
+    ----------
+    samples : (n, n_channels)
+        Samples of one quantity, SI.
+    power
+        How often displacement must be differentiated to give the samples.
+    rate, corner
+        Sampling rate and corner frequency, Hz.
+    seed
+        Seed of the draw.
+    """
     spectrum, frequencies = _padded(samples - samples.mean(axis=0), rate, corner)
     drawn = _drawn(spectrum, frequencies, seed)
     return _motion(drawn / _s(frequencies)[:, None] ** power, frequencies, corner, len(samples))
@@ -92,7 +110,16 @@ def integrated_noise(samples: Real, power: int, rate: float, corner: float, seed
 def computed(model: ModalModel, force: Real, rate: float, corner: float) -> tuple[Real, Real]:
     """The same from a model of the tip's receptance, driven by the measured forces.
 
-    Noise of the forces would come back as motion that moves with them: lines are weighed as above.
+    Noise of the forces would come back as motion that moves with them: lines are weighed as in :func:`integrated`.
+
+    Parameters
+    ----------
+    model
+        Receptance of the tip.
+    force : (n, n_excitations)
+        Forces at the model's excitations, N.
+    rate, corner
+        Sampling rate and corner frequency, Hz.
     """
     spectrum, frequencies = _padded(force - force.mean(axis=0), rate, corner)
     spectrum = spectrum * _true_part(spectrum, _quiet(spectrum, frequencies))

@@ -1,0 +1,134 @@
+"""`MeasuredCut`: recordings of a cut with all that stays the same while hypotheses are compared."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..force import (
+    Belief,
+    CutView,
+    ForceNoise,
+    ForceSpectra,
+    computed_force,
+    fineness,
+    noise_of,
+    view_of,
+    whitened,
+)
+from ..recordings import SpindleLaw
+from .hypothesis import CutHypothesis
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class MeasuredCut:
+    """Recordings, cutter and depth.
+
+    Parameters
+    ----------
+    belief
+        Cutting process, and what its coefficients may be off.
+    depth
+        Axial depth, m.
+    spectra
+        Spectra of each recording.
+    force_error
+        Share by which each spectral line of a right computed force is still off.
+    noise
+        Noise of each recording; empty before it is known.
+    """
+
+    belief: Belief
+    depth: float
+    spectra: tuple[ForceSpectra, ...]
+    force_error: float
+    noise: tuple[ForceNoise, ...] = ()
+    _views: dict[tuple[int, SpindleLaw], CutView] = field(default_factory=dict, repr=False, compare=False)
+
+    def only(self, number: int) -> "MeasuredCut":
+        """The same with one of the recordings.
+
+        Parameters
+        ----------
+        number
+            Number of the recording, from 0.
+        """
+        one = slice(number, number + 1)
+        return replace(self, spectra=self.spectra[one], noise=self.noise[one], _views={})
+
+    def noisier(self) -> "MeasuredCut":
+        """The same with the noise of the tip's motion a second time."""
+        spectra = tuple(replace(one, recording=one.recording.noisier()) for one in self.spectra)
+        return replace(self, spectra=spectra, _views={})
+
+    def with_noise_of(self, hypothesis: CutHypothesis) -> "MeasuredCut":
+        """The same with the noise that a hypothesis leaves.
+
+        Parameters
+        ----------
+        hypothesis
+            A fit with all causes, so that little but noise is left.
+        """
+        predicted = [self.predicted(k, hypothesis) for k in range(len(self.spectra))]
+        noise = tuple(
+            noise_of(spectra, spectra.measured - one, one, self.force_error)
+            for spectra, one in zip(self.spectra, predicted, strict=True)
+        )
+        return replace(self, noise=noise)
+
+    def without_band(self, low: float, high: float) -> "MeasuredCut":
+        """The same with spectral lines of one band weighing nothing.
+
+        Parameters
+        ----------
+        low, high
+            Edges of the band as shares of the highest frequency of each recording; ``low`` itself is not in it.
+        """
+        noises = []
+        for spectra, noise in zip(self.spectra, self.noise, strict=True):
+            place = spectra.frequencies / spectra.frequencies[-1]
+            kept = ~((place > low) & (place <= high))
+            noises.append(replace(noise, whitener=noise.whitener * kept[:, None, None]))
+        return replace(self, noise=tuple(noises))
+
+    def _view(self, number: int, law: SpindleLaw) -> CutView:
+        """Teeth of one recording; the last few are kept."""
+        key = (number, law)
+        if key not in self._views:
+            if len(self._views) > 4 * len(self.spectra):
+                self._views.clear()
+            spectra = self.spectra[number]
+            fine = fineness(spectra.recording, float(spectra.frequencies[-1]))
+            self._views[key] = view_of(spectra.recording, self.belief.process, law, fine)
+        return self._views[key]
+
+    def predicted(self, number: int, hypothesis: CutHypothesis) -> Complex:
+        """Spectra of the computed force, (n_blocks, n_lines, n_axes), N.
+
+        Parameters
+        ----------
+        number
+            Number of the recording, from 0.
+        hypothesis
+            Numbers from which the force is computed.
+        """
+        view, spectra = self._view(number, hypothesis.laws[number]), self.spectra[number]
+        process = self.belief.process_at(hypothesis.deviations)
+        force = computed_force(process, self.depth, view, hypothesis.acting)
+        return spectra.of(force[:, list(spectra.recording.axes)], view.fine)
+
+    def residual(self, number: int, hypothesis: CutHypothesis) -> Complex:
+        """Measured less computed spectra, (n_blocks, n_lines, n_axes); whitened once the noise is known, else N.
+
+        Parameters
+        ----------
+        number
+            Number of the recording, from 0.
+        hypothesis
+            Numbers from which the force is computed.
+        """
+        rest = self.spectra[number].measured - self.predicted(number, hypothesis)
+        return whitened(self.noise[number], rest) if self.noise else rest

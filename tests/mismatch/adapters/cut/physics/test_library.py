@@ -1,0 +1,45 @@
+"""A cause is one file of the folder."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cutting import MillingProcess
+from mismatch.adapters.cut import CutRecording, SpindleLaw
+from mismatch.adapters.cut import physics as physics_folder
+from mismatch.adapters.cut.force import computed_force, view_of
+
+CUTTER = MillingProcess(3, 0.012, math.radians(70), 6e8, 0.3, 0.1, 0.3, 2.6, 1e-4)
+LAW = SpindleLaw(0.5, 0.2, 90.0)
+
+TOY = """
+import numpy as np
+from mismatch.adapters.cut.physics import CutPhysics
+from mismatch.physics import Parameter
+
+
+class Toy(CutPhysics):
+    name = "toy_drag"
+
+    def parameters(self, process):
+        return (Parameter("drag_n_per_m", "N/m", 1e3),)
+
+    def force(self, values, tooth):
+        return np.array([values[0], 0.0, 0.0])
+
+
+PHYSICS = Toy()
+"""
+
+
+def test_a_new_cause_is_one_file_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "toy_drag.py").write_text(TOY)
+    monkeypatch.setattr(physics_folder, "__path__", [*physics_folder.__path__, str(tmp_path)])
+    toy = physics_folder.library()["toy_drag"]
+    recording = CutRecording("r", 20000.0, np.zeros((20000, 3)), (0, 1, 2), None, LAW, 0.1)
+    view = view_of(recording, CUTTER, LAW, 1)
+    added = computed_force(CUTTER, 1e-3, view, [(toy, np.array([5e3]))]) - computed_force(CUTTER, 1e-3, view, ())
+    assert added[:, 0].max() >= 5.0 - 1e-9
+    assert toy.told(np.array([1.0]), np.eye(1), CUTTER) == ({"drag_n_per_m": 1.0}, {"drag_n_per_m": 1.0})

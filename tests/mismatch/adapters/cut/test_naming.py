@@ -1,0 +1,53 @@
+"""What is named carries the numbers of the truth, and errors whose parts add as squares."""
+
+import numpy as np
+import pytest
+from small_cut import PROCESS, small_cut, stated
+
+from mismatch.adapters.cut import COEFFICIENTS, CUT
+from mismatch.adapters.cut.comparison import UNCONFIRMED, CutComparison
+from mismatch.adapters.cut.fits import fit_cut, fit_turned
+from mismatch.adapters.cut.held_out import fit_halves
+from mismatch.adapters.cut.naming import accepted_causes, odd_coefficients, weighed_candidates
+from mismatch.inference import search
+
+
+def test_accepted_causes_hold_the_truth_within_errors_whose_parts_add_as_squares() -> None:
+    cut = small_cut(stated(runout=[12e-6], regenerative_feedback=[1.0]), noise=2.0, error=0.005)
+    base = fit_turned(cut, stated(), ())
+    found = search(CutComparison(cut, ("runout", "regenerative_feedback"), CUT), base, lambda stage: None)
+    final = found.current
+    causes = accepted_causes(cut, found, fit_halves(cut, final.hypothesis, final.freed))
+    assert [cause.name for cause in causes] == [one.name for one in found.accepted]
+    truth = {"radial_offset_m": 12e-6, "share": 1.0}
+    for cause in causes:
+        for name, value in cause.parameters.items():
+            assert abs(value - truth[name]) < 4 * cause.standard_errors[name]
+            parts = cause.error_parts[name]
+            assert set(parts) == {"fit", "spread", "form"}
+            assert np.sqrt(sum(part**2 for part in parts.values())) == pytest.approx(cause.standard_errors[name])
+
+
+def test_coefficients_are_named_from_three_laboratory_errors_on() -> None:
+    for off, named in ((2.5, False), (3.5, True)):
+        cut = small_cut(stated(np.array([off, 0.0, 0.0, 0.0, 0.0, 0.0])), noise=0.1)
+        found = odd_coefficients(cut, fit_cut(cut, stated()), CUT)
+        assert bool(found) == named
+        for cause in found:
+            assert cause.name == COEFFICIENTS
+            assert cause.location == {"coefficients": ["ktc_pa"]}
+            assert cause.parameters["ktc_pa"] == pytest.approx(PROCESS.ktc * np.exp(0.15 * off), rel=1e-3)
+
+
+def test_candidates_are_told_as_they_were_last_weighed() -> None:
+    cut = small_cut(stated(runout=[12e-6], regenerative_feedback=[1.0]))
+    names = ("process_damping", "runout", "regenerative_feedback")
+    base = fit_turned(cut, stated(), ())
+    found = search(CutComparison(cut, names, CUT), base, lambda stage: None)
+    told = {one.name: one for one in weighed_candidates(found, found.current)}
+    assert set(told) == set(names)
+    for one in found.accepted:
+        assert (told[one.name].evidence, told[one.name].stage) == (one.evidence, "fitted")
+    assert told["process_damping"].evidence == found.rounds[-1].proposals[0].evidence
+    unproven = {one.name: one.stage for one in weighed_candidates(found, base)}
+    assert unproven["runout"] == unproven["regenerative_feedback"] == UNCONFIRMED
