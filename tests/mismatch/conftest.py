@@ -9,9 +9,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from estimation import channels_of
+from estimation import BandRecording, channels_of
 from mismatch import (
-    BandRecording,
     Hypothesis,
     LabError,
     ModelShape,

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, Concealed, forces, late, trial
 
-from mismatch import BandRecording, StructureDiagnosis, diagnose
+from estimation import BandRecording
+from mismatch import StructureDiagnosis, diagnose
 from mismatch.adapters.structure.acceptance import worth_it
 from mismatch.faults.tones import find_tone
 from mismatch.inference import EvidenceSettings, Proposal

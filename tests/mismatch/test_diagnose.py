@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, Concealed, Law, forces, late, linear_acceleration, trial
 
-from mismatch import BandRecording, Settings, StructureDiagnosis, diagnose, improved_model_of, predict, write_diagnosis
+from estimation import BandRecording
+from mismatch import Settings, StructureDiagnosis, diagnose, improved_model_of, predict, write_diagnosis
 from mismatch.physics import library
 from modal_fit import ModalModel, read_modal_model, write_modal_model
 

@@ -7,17 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import firwin, lfilter
 
-from estimation import WindowedSpectrum, channels_of
-from mismatch import (
-    BandRecording,
-    Hypothesis,
-    LabError,
-    ModelShape,
-    band_of,
-    diagnose,
-    predict_lines,
-    windowed_spectrum,
-)
+from estimation import BandRecording, WindowedSpectrum, channels_of
+from mismatch import Hypothesis, LabError, ModelShape, band_of, diagnose, predict_lines, windowed_spectrum
 from mismatch.inference import VerdictSettings
 from mismatch.records.true_forces import without_force_noise
 from mismatch.remainder.leftover import leftover

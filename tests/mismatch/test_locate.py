@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from mismatch import BandRecording, StructureDiagnosis
+from estimation import BandRecording
+from mismatch import StructureDiagnosis
 from mismatch.location.family_wise import holm
 from mismatch.location.locate import located
 from mismatch.location.residual_view import residual_view

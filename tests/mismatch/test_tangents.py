@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation import WindowedSpectrum
-from mismatch import BandRecording, Hypothesis, LabError, ModelShape, band_of, predict_lines, windowed_spectrum
+from estimation import BandRecording, WindowedSpectrum
+from mismatch import Hypothesis, LabError, ModelShape, band_of, predict_lines, windowed_spectrum
 from mismatch.joints.joint_law import JointMotion
 from mismatch.joints.joint_simulation import driven_force
 from mismatch.models.hypothesis import Cause

@@ -11,7 +11,8 @@ from robot_model import Change
 
 from ...models.misfit import levels
 from ...noise.noise_model import fit_noise, whitening
-from .fit import RobotFit, fit_robot, start_cost
+from .fit import RobotFit, fit_robot
+from .fit_state import FitProblem
 from .posed_robot import Changes, PosedRobot
 from .receptance import predicted_spectrum, quick_spectrum
 from .settings import LIMITS
@@ -196,5 +197,6 @@ def fit_from(robot: PosedRobot, start: Changes, free: FreeFit) -> RobotFit:
         table[np.abs(table).max(axis=1) > LIMITS.strange] = 0.0
         seen.append(table.ravel())
     own = [np.zeros_like(u) for u in seen]
-    begin = min((seen, own), key=lambda u: start_cost(robot, start, free.whiteners, u))
+    problem = FitProblem(robot, free.whiteners)
+    begin = min((seen, own), key=lambda u: problem.state(start, u).cost)
     return fit_robot(robot, start, free.whiteners, start=begin)

@@ -3,11 +3,17 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mismatch import BandRecording
+from estimation import BandRecording
 from mismatch.adapters.robot import ROBOT as ROBOT_SETTINGS
 from mismatch.adapters.robot import PosedRecording, PosedRobot, posed
+from mismatch.adapters.robot.fit_state import FitProblem, FitState
+from mismatch.adapters.robot.posed_robot import Changes
+from mismatch.adapters.robot.receptance import RobotModes
 from robot_model import SpatialRobot, frf_at, read_spatial_robot
+
+Real = NDArray[np.float64]
 
 NAME = "kuka_kr90_r3100"
 ROBOT = read_spatial_robot(NAME).robot
@@ -62,3 +68,27 @@ def small_case(truth: SpatialRobot = ROBOT, count: int = 1, seconds: float = 6.0
     """The robot as modelled against short recordings of another, four modes of which may deviate."""
     recordings = tuple(in_postures(truth, count, seconds=seconds))
     return PosedRobot(ROBOT, False, recordings, np.zeros(3), ROBOT_SETTINGS.lab, (4,) * count)
+
+
+def white_noise(case: PosedRobot) -> list[NDArray[np.complex128]]:
+    """Whitening as if noise were three per cent of each response."""
+    made = []
+    for one in case.recordings:
+        level = 0.03 * np.sqrt(np.mean(np.abs(one.spectrum.measured) ** 2, axis=0))
+        shape = (len(one.spectrum.frequencies), len(level), len(level))
+        made.append(np.broadcast_to(np.diag(1 / level).astype(complex), shape))
+    return made
+
+
+def cost_at(
+    case: PosedRobot, changes: Changes, white: list[NDArray[np.complex128]], u: Real, reference: RobotModes
+) -> float:
+    """Cost at any point, the modes in the order and with the signs of a reference."""
+    modes = case.modes(changes)[0].aligned(reference)
+    return FitState(FitProblem(case, tuple(white)), changes, (modes,), (u,)).cost
+
+
+def shifted(changes: Changes, which: int, by: float) -> Changes:
+    """One number's coordinate shifted."""
+    change, number = changes[which]
+    return (*changes[:which], (change, change.from_fit(change.to_fit(number) + by)), *changes[which + 1 :])

@@ -6,6 +6,7 @@ from milled_robots import BAND, NOTHING, POSTURES, ROBOT, TIP, milled
 
 from foundation import InputError
 from mismatch.adapters.robot import diagnose_robot, posed
+from mismatch.adapters.robot.posed_recording import halves
 
 
 def test_recordings_that_do_not_fit_are_refused() -> None:
@@ -19,3 +20,20 @@ def test_recordings_that_do_not_fit_are_refused() -> None:
     housing = posed(trial, np.radians(POSTURES[0]), BAND, responses=("HOUSING:+X", "HOUSING:+Y", "HOUSING:+Z"))
     with pytest.raises(InputError, match="--sensor"):
         diagnose_robot(ROBOT, [housing])
+
+
+def test_halves_are_the_recording_cut_in_two() -> None:
+    recording = posed(milled(ROBOT, POSTURES[0], 0, seconds=12.0), np.radians(POSTURES[0]), BAND)
+    parts = halves(recording)
+    whole = recording.spectrum.recording
+    assert [one.name for one in parts] == ["posture 1, first half", "posture 1, second half"]
+    for name in ("force", "response"):
+        cut = [getattr(one.spectrum.recording, name) for one in parts]
+        assert (np.concatenate(cut) == getattr(whole, name)).all()
+    for one in parts:
+        assert (one.q == recording.q).all()
+        assert one.responses == recording.responses == TIP
+        assert recording.spectrum.frequencies[0] <= one.spectrum.frequencies[0]
+        assert one.spectrum.frequencies[-1] <= recording.spectrum.frequencies[-1]
+    with pytest.raises(InputError, match="50 are the least"):
+        halves(posed(milled(ROBOT, POSTURES[0], 0, seconds=2.5), NOTHING, BAND))

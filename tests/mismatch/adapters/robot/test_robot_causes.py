@@ -9,8 +9,8 @@ import pytest
 from milled_robots import NAME, POSTURES, RATE, ROBOT, heavy_elbow, in_postures, milled
 
 from acquisition import Channel, RecordingWriter, StreamDescription
+from estimation import BandRecording
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from mismatch import BandRecording
 from mismatch.adapters.robot import RobotDiagnosis, diagnose_robot, number_of, posed, standard_error_of
 from modal_fit import read_modal_model
 from robot_model import (

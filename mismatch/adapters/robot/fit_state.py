@@ -1,0 +1,205 @@
+"""Where a fit stands: the numbers of a hypothesis, the modes that they give, and all that follows for a descent."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robot_model import Companion
+
+from ...inference import plain_step
+from .posed_robot import Changes, PosedRobot
+from .receptance import RobotModes, predicted_spectrum, quick_spectrum
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+STEP = 1e-3
+"""Step of a change's coordinate for its derivative: ln of a factor, or rad."""
+
+
+def doubt_of(changes: Changes) -> float:
+    """``sum ((number - centre) / spread)^2`` over companions, of which something is believed.
+
+    Parameters
+    ----------
+    changes
+        Changes and companions with their numbers.
+    """
+    return float(
+        sum(((number - one.centre) / one.spread) ** 2 for one, number in changes if isinstance(one, Companion))
+    )
+
+
+@dataclass(frozen=True)
+class FitProblem:
+    """What stays the same in one fit, as a :class:`mismatch.inference.Problem`.
+
+    Parameters
+    ----------
+    robot, whiteners, belief
+        The robot with its recordings, their whitening W, and the precision of the belief that deviations are zero.
+    """
+
+    robot: PosedRobot
+    whiteners: tuple[Complex, ...]
+    belief: float = 1.0
+
+    def state(self, changes: Changes, deviations: Sequence[Real] | None = None) -> "FitState":
+        """The state at given numbers.
+
+        Parameters
+        ----------
+        changes
+            Changes with their numbers.
+        deviations
+            Deviations u of each recording, (n_deviations,); None: zero.
+        """
+        modes = tuple(self.robot.modes(changes))
+        u = tuple(deviations) if deviations is not None else tuple(np.zeros(one.size) for one in modes)
+        return FitState(self, changes, modes, u)
+
+    def cost(self, state: "FitState") -> float:
+        """Misfit and belief of a state."""
+        return state.cost
+
+    def normal_equations(self, state: "FitState") -> tuple[Real, Real]:
+        """Normal matrix and gradient at a state."""
+        return state.normal
+
+    def step(self, state: "FitState", matrix: Real, gradient: Real) -> Real:
+        """Step of the coordinates."""
+        return plain_step(matrix, gradient)
+
+    def moved(self, state: "FitState", step: Real) -> "FitState":
+        """The state after a step."""
+        return state.moved(step)
+
+    def settled(self, state: "FitState") -> "FitState":
+        """The state itself: its noise is known."""
+        return state
+
+
+@dataclass(frozen=True)
+class FitState:
+    """Where a fit stands, and all that follows from it.
+
+    Parameters
+    ----------
+    problem
+        What stays the same in the fit.
+    changes
+        Changes with their numbers.
+    modes
+        Modes that these give in each recording's posture.
+    deviations
+        Deviations u of the modes of each recording, (n_deviations,).
+    """
+
+    problem: FitProblem
+    changes: Changes
+    modes: tuple[RobotModes, ...]
+    deviations: tuple[Real, ...]
+
+    @cached_property
+    def seen(self) -> tuple[RobotModes, ...]:
+        """Modes of each recording, deviations included."""
+        error = self.problem.robot.error
+        return tuple(one.moved(u, error) for one, u in zip(self.modes, self.deviations, strict=True))
+
+    @cached_property
+    def rest(self) -> list[Complex]:
+        """Whitened residual of each recording, (n_lines, n_responses)."""
+        recordings = self.problem.robot.recordings
+        return [
+            np.einsum("kij,kj->ki", white, one.spectrum.measured - predicted_spectrum(modes, one.spectrum))
+            for modes, one, white in zip(self.seen, recordings, self.problem.whiteners, strict=True)
+        ]
+
+    @cached_property
+    def cost(self) -> float:
+        """Misfit and belief; infinite where the prediction is not finite."""
+        misfit = 2 * sum(float(np.sum(np.abs(one) ** 2)) for one in self.rest)
+        cost = misfit + self.problem.belief * float(sum(u @ u for u in self.deviations)) + doubt_of(self.changes)
+        return cost if np.isfinite(cost) else np.inf
+
+    @cached_property
+    def beside(self) -> list[list[RobotModes]]:
+        """Modes with one coordinate after the other a little off: one list a change, one entry a recording."""
+        result = []
+        for which, (change, number) in enumerate(self.changes):
+            changes = list(self.changes)
+            changes[which] = (change, change.from_fit(change.to_fit(number) + STEP))
+            pairs = zip(self.problem.robot.modes(tuple(changes)), self.modes, strict=True)
+            result.append([one.aligned(other) for one, other in pairs])
+        return result
+
+    def moved(self, step: Real) -> "FitState":
+        """The state after a step of the numbers' coordinates and then of all deviations.
+
+        The recordings fix the modes far better than the robot's numbers, so the step is taken linearly in the modes as
+        seen; deviations are what the new robot needs to show them. Taken linearly in u, it would leave a narrow valley.
+
+        Parameters
+        ----------
+        step : (n_coordinates,)
+            Change of the numbers' coordinates, then of the deviations.
+        """
+        count, error = len(self.changes), self.problem.robot.error
+        changes = tuple(
+            (change, change.from_fit(change.to_fit(number) + float(np.clip(part, -0.5, 0.5))))
+            for (change, number), part in zip(self.changes, step[:count], strict=True)
+        )
+        taken = [
+            change.to_fit(after) - change.to_fit(before)
+            for (change, before), (_, after) in zip(self.changes, changes, strict=True)
+        ]
+        fresh = self.problem.robot.modes(changes)
+        modes = tuple(one.aligned(other) for one, other in zip(fresh, self.modes, strict=True))
+        deviations, at = [], count
+        for which, (old, new, u) in enumerate(zip(self.modes, modes, self.deviations, strict=True)):
+            shown = u + np.clip(step[at : at + len(u)], -15.0, 15.0)
+            for part, aside in zip(taken, self.beside, strict=True):
+                shown = shown + part / STEP * old.deviations(aside[which], error)
+            deviations.append(new.deviations(old.moved(shown, error), error))
+            at += len(u)
+        return FitState(self.problem, changes, modes, tuple(deviations))
+
+    @cached_property
+    def normal(self) -> tuple[Real, Real]:
+        """Normal equations over the numbers' coordinates and all deviations, in this order."""
+        belief, count = self.problem.belief, len(self.changes)
+        size = count + sum(len(u) for u in self.deviations)
+        matrix, gradient = np.diag(np.full(size, belief)), np.zeros(size)
+        matrix[:count, :count] = 1e-6 * np.eye(count)
+        for place, (one, value) in enumerate(self.changes):
+            if isinstance(one, Companion):
+                slope = one.slope(value) / one.spread
+                matrix[place, place] += slope**2
+                gradient[place] -= slope * (value - one.centre) / one.spread
+        at = count
+        for which, u in enumerate(self.deviations):
+            turned, small = self._slopes(which), self.rest[which].ravel()
+            places = np.concatenate([np.arange(count), np.arange(at, at + len(u))])
+            matrix[np.ix_(places, places)] += 2 * (turned.real.T @ turned.real + turned.imag.T @ turned.imag)
+            gradient[places] += 2 * (turned.real.T @ small.real + turned.imag.T @ small.imag)
+            gradient[at : at + len(u)] -= belief * u
+            at += len(u)
+        return matrix, gradient
+
+    def _slopes(self, which: int) -> Complex:
+        """Whitened derivatives of one recording by the coordinates and its deviations, (n_values, n_coordinates)."""
+        error, spectrum = self.problem.robot.error, self.problem.robot.recordings[which].spectrum
+        base, modes = self.modes[which], self.seen[which]
+        slopes = modes.slopes(base, spectrum.frequencies, spectrum.force_here, error) * spectrum.kinematic[:, :, None]
+        here = quick_spectrum(modes, spectrum)
+        columns = []
+        for aside in (one[which] for one in self.beside):
+            # modes that may deviate are followed exactly, the others by differences: the valley is narrow
+            followed = slopes @ base.deviations(aside, error)
+            held = aside.moved(aside.deviations(modes, error), error)
+            columns.append(((followed + quick_spectrum(held, spectrum) - here) / STEP)[:, :, None])
+        turned = self.problem.whiteners[which] @ np.concatenate([*columns, slopes], axis=2)
+        return np.asarray(turned.reshape(self.rest[which].size, -1))
