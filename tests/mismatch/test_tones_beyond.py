@@ -5,12 +5,12 @@ import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 from numpy.typing import NDArray
 
+from estimation import WindowedSpectrum, windowed_spectrum
 from mismatch import Hypothesis, LabError, ModelShape
 from mismatch.faults.tones import NEAR, Tone, above_neighbours
 from mismatch.faults.tones_beyond import tones_beyond
 from mismatch.inference import FAULTS
 from mismatch.records.reading import BandRecording, band_of
-from mismatch.records.windowed_spectrum import WindowedSpectrum, windowed_spectrum
 
 TONE = 83.217
 LEVELS = (20.0, 40.0, 80.0)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from milled_robots import ROBOT, small_case
 
+from estimation import WindowedSpectrum
 from mismatch.adapters.robot.held_out import (
     HeldOutTest,
     block_errors,
@@ -19,7 +20,6 @@ from mismatch.adapters.robot.held_out import (
 from mismatch.adapters.robot.receptance import RobotModes, predicted_spectrum
 from mismatch.adapters.robot.settings import ROBOT as SETTINGS
 from mismatch.adapters.robot.start import free_fit
-from mismatch.records.windowed_spectrum import WindowedSpectrum
 from robot_model import possible_changes, with_joint_factor
 
 JOINT = next(one for one in possible_changes(ROBOT) if one.name == "joint 3 stiffness")
