@@ -24,7 +24,6 @@ from .screening.linear_floor import Floor, linear_floor
 
 __all__ = [
     "AcceptedCause",
-    "BandRecording",
     "Candidate",
     "Cause",
     "Diagnosis",

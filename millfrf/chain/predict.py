@@ -4,8 +4,7 @@ import os
 from pathlib import Path
 
 from acquisition import Recording, RecordingWriter, StreamDescription
-from mismatch import read_recording
-from mismatch.models.prediction import predict
+from mismatch import predict, read_recording
 from modal_fit import read_modal_model
 
 from ..gate import check_model_and_recordings, check_scales

@@ -6,7 +6,6 @@ from cutting import MillingProcess
 from figures import as_data_uri, lobes_figure
 from foundation import InputError
 from mismatch import Hypothesis, StructureDiagnosis
-from mismatch.adapters.structure.pruning import zero_of
 from mismatch.models.equivalent_receptance import equivalent_receptance
 from stability import StabilityLobes, zero_order
 
@@ -67,7 +66,7 @@ def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProce
 
 def _curves(diagnosis: StructureDiagnosis, cut: MillingProcess) -> dict[str, StabilityLobes]:
     final, lines = diagnosis.details.final.hypothesis, diagnosis.details.recordings
-    nominal = zero_of(final.shape)
+    nominal = final.nominal
     natural = nominal.model.natural_frequencies
     frequencies = np.linspace(natural.min() / 3, 3 * natural.max(), LINES)
     tooth = 2 * np.pi / cut.teeth
