@@ -52,7 +52,7 @@ def linear_trials() -> list[BandRecording]:
     made = []
     for name, level in (("low", 20.0), ("high", 60.0)):
         force = _MODULE.forces(rng, level, 24.0)
-        made.append(_MODULE.recording(name, force, _MODULE.linear_acceleration(_MODULE.structure(), force), rng))
+        made.append(_MODULE.trial(name, force, _MODULE.linear_acceleration(_MODULE.structure(), force), rng))
     return made
 
 
