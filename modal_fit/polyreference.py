@@ -135,7 +135,7 @@ def _minus_orders(group: PoleGroup) -> int:
 
 
 def status_warnings(fit: MatrixFit) -> tuple[str, ...]:
-    """What the refinement says of itself."""
+    """Give the warnings of the refinement."""
     if fit.status == NOT_REFINED:
         return (
             "the refinement does not hold on lines left out of it: the poles are those of the poly-reference method",
@@ -192,7 +192,7 @@ def fit_warnings(
     chi: float,
     error: NDArray[np.float64],
 ) -> tuple[str, ...]:
-    """What lines, misfit and poles of a fit let one doubt, one sentence each."""
+    """Give the doubts that lines, misfit and poles of a fit raise, one sentence each."""
     warnings = []
     asked = (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
     if inside.sum() < asked.sum():

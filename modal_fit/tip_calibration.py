@@ -204,7 +204,7 @@ def _scaled(residuals: Residuals, model: ModalModel, ratios: Complex) -> Residua
 def _covariance(
     model: ModalModel, hammer: ModalModel, chosen: NDArray[np.int64], ratios: Complex
 ) -> NDArray[np.float64] | None:
-    """In-process covariance carried through the ratios, plus the ratios' own: the two measurements are independent."""
+    """Carry the in-process covariance through the ratios and add the ratios' own: the measurements are independent."""
     if model.covariance is None:
         return None
     n_modes, n = model.right.shape

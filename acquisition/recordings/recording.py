@@ -50,7 +50,7 @@ class Stream:
 
     @property
     def start_time(self) -> float:
-        """Of the first sample, s."""
+        """Time of the first sample, s."""
         return self.description.start_time
 
     @property

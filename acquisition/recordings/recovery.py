@@ -17,7 +17,7 @@ _ROWS = 1 << 16
 
 @dataclass(frozen=True)
 class Recovered:
-    """What came back.
+    """Result of a recovery: the samples and events that came back.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What all results share: equality by value, a short text, a small HTML table, drawing, and optional libraries."""
+"""The common part of all results: equality by value, a short text, a small HTML table, drawing, optional libraries."""
 
 from .drawing import drawing
 from .equality import same_values

@@ -15,7 +15,7 @@ _CELL = "text-align:left;padding:1px 10px 1px 0"
 
 @dataclass(frozen=True)
 class Summary:
-    """What matters of a result.
+    """The few facts that matter of a result.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Summary:
     rows: tuple[tuple[str, ...], ...] = ()
 
     def text(self) -> str:
-        """At most four lines of text."""
+        """Write at most four lines of text."""
         return "\n  ".join((self.headline, *self.lines)[:MOST_LINES])
 
     def html(self) -> str:

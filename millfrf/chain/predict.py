@@ -1,4 +1,4 @@
-"""From a model and a recording to a recording of predicted responses."""
+"""The step from a model and a recording to a recording of predicted responses."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""From recordings of hammer tests to an FRF: one step after the other."""
+"""The step from recordings of hammer tests to an FRF: one part after the other."""
 
 import os
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""From whitened modes back to a `ModalModel`, with the covariance of poles and vectors."""
+"""The step from whitened modes back to a `ModalModel`, with the covariance of poles and vectors."""
 
 from dataclasses import replace
 
@@ -90,7 +90,7 @@ def transposed(model: ModalModel) -> ModalModel:
 def _covariance(
     modes: Modes, found: Elimination, lines: MeasuredLines, unknowns: Real, scale: float, back: Real
 ) -> Real:
-    """Of Re poles, Im poles, Re right, Im right, Re left, Im left, each mode by mode."""
+    """Give the covariance of Re poles, Im poles, Re right, Im right, Re left, Im left, each mode by mode."""
     n, n_responses = len(modes.poles), lines.values.shape[2]
     turned = _right_by_unknowns(modes, found, lines)  # (2n, n_responses, n_unknowns): real parts, then imaginary
     turned = np.einsum("up,apz->auz", back, turned)
@@ -142,7 +142,7 @@ def _widened(covariance: Real, modes: Modes, errors: ModeErrors) -> Real:
 
 
 def _sorting_index(modes: Modes, found: Elimination, order: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Where each parameter of the sorted model stands in the unsorted one."""
+    """Give the place in the unsorted model of each parameter of the sorted one."""
     n = len(order)
     pieces, first = [], 0
     for width in (1, found.error.shape[1], modes.left.shape[1]):

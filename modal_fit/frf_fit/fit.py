@@ -163,7 +163,7 @@ def _noise_power(noise: Real, lines: MeasuredLines) -> Real:
 
 
 def _left_over(lines: MeasuredLines, found: Elimination) -> NDArray[np.complex128]:
-    """What a fit leaves of the FRF matrix, in its own unit, (n_lines, n_responses, n_excitations)."""
+    """Give the residual of the FRF matrix in its own unit, (n_lines, n_responses, n_excitations)."""
     error = (found.error[: len(found.error) // 2] + 1j * found.error[len(found.error) // 2 :]).reshape(
         lines.values.shape
     )

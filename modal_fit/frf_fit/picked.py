@@ -46,7 +46,7 @@ def fit_picked(
 def _picked(
     frf: Frf, inside: NDArray[np.bool_], band: tuple[float, float], max_order: int, poles: Complex, *, refine: bool
 ) -> MatrixFit:
-    """On the side with more responses."""
+    """Fit picked poles on the side with more responses."""
     if len(frf.excitations) > len(frf.responses):
         turned = _picked(_exchanged(frf), inside, band, max_order, poles, refine=refine)
         return replace(turned, model=transposed(turned.model))
@@ -71,7 +71,7 @@ def _kept(frf: Frf, chart: StabilisationChart, modes: Modes, found: Elimination,
 
 
 def _refined(frf: Frf, chart: StabilisationChart, refined: Refined, lines: MeasuredLines) -> MatrixFit:
-    """With error bars, as an automatic fit; whoever asks for the refinement gets it, without a test on other lines."""
+    """Refine picked poles and give them error bars; no test on other lines may undo it, as the user asked for it."""
     modes, found = refined.modes, refined.elimination
     n_left = 2 * found.n_modes * (1 + lines.drive.shape[2])
     chi_square = _chi_square(found, lines, n_left + found.solution.size)

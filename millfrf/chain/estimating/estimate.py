@@ -1,4 +1,4 @@
-"""From recordings to an FRF file: spectra test by test, stacked, with the sensors' high-pass taken out."""
+"""The step from recordings to an FRF file: spectra of each test, stacked, without the sensors' high-pass."""
 
 import json
 import os
@@ -113,7 +113,7 @@ def estimate_recordings(
 
 
 def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, progress: Progress) -> Estimate:
-    """By local polynomials over whole records; the inputs are judged by spectra as everywhere."""
+    """Estimate by local polynomials over whole records; the inputs are judged by spectra as everywhere."""
     assert options.band is not None
     names = (options.excitations, options.responses)
     doubts = check_recordings(
@@ -132,7 +132,7 @@ def _rate_doubts(paths: Sequence[str | os.PathLike[str]], tests: Sequence[CrossS
 
 
 def _finished(frf: Frf, tests: tuple[CrossSpectra, ...], doubts: Sequence[str]) -> Estimate:
-    """Without the sensors' high-pass, and with the band in which it is known."""
+    """Take out the sensors' high-pass, and state the band in which the FRF is known."""
     total = sum_tests(tests)
     frf = correct_high_pass(frf, [channel.high_pass_hz for channel in total.responses])
     driven = np.interp(frf.frequencies, total.frequencies, driven_lines(total).astype(float)) >= 0.5

@@ -1,4 +1,4 @@
-"""From an FRF file, or straight from recordings, to a modal model file."""
+"""The step from an FRF file, or straight from recordings, to a modal model file."""
 
 import os
 from collections.abc import Sequence
