@@ -74,3 +74,17 @@ def counted(number: int, thing: str) -> str:
     ('1 mode', '3 modes')
     """
     return f"{number} {thing}" + ("" if number == 1 else "s")
+
+
+def doubts_line(warnings: Sequence[str]) -> tuple[str, ...]:
+    """A line with the number of warnings and the first one, cut at 100 characters; empty where there is none.
+
+    Examples
+    --------
+    >>> doubts_line(["the force is small"])
+    ('1 warning: the force is small',)
+    """
+    if not warnings:
+        return ()
+    first = warnings[0] if len(warnings[0]) <= 100 else f"{warnings[0][:97]}..."
+    return (f"{counted(len(warnings), 'warning')}: {first}",)

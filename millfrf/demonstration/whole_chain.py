@@ -257,7 +257,7 @@ def _record(source: Source, path: Path, progress: Progress) -> Path:
 
 def _estimate(path: Path, recordings: list[Path], options: EstimateOptions, progress: Progress) -> Frf:
     estimate = estimate_recordings(recordings, options, progress)
-    write_estimate(path, estimate, recordings, options)
+    write_estimate(path, estimate, recordings)
     return estimate.frf
 
 

@@ -1,4 +1,5 @@
 from .comparison import ModePair, compare_modes
+from .fit_summary import fit_summary
 from .modal_model import ModalModel, Residuals
 from .modal_model_file import read_modal_model, write_modal_model
 from .mode_errors import ModeErrors
@@ -25,6 +26,7 @@ __all__ = [
     "basis_with_poles",
     "compare_modes",
     "derived_covariance",
+    "fit_summary",
     "fixed_pole",
     "fixed_poles",
     "frequency_and_damping_errors",

@@ -109,7 +109,7 @@ def estimate_recordings(
             f"{total.n_excluded} of {total.n_excluded + total.n_segments} segments hold overload, clipping or dropped "
             "samples and were left out"
         )
-    return _finished(frf, tests, doubts)
+    return _finished(frf, tests, doubts, options)
 
 
 def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, progress: Progress) -> Estimate:
@@ -123,7 +123,7 @@ def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOp
     tests = tuple(lines_of(test, options.band) for test in judging_spectra(records, options.band))
     doubts += [*_rate_doubts(paths, tests), *check_inputs(sum_tests(tests))]
     frf = local_frf(records, options.band, progress)
-    return _finished(frf, tests, [*doubts, *check_local_frf(frf, len(records))])
+    return _finished(frf, tests, [*doubts, *check_local_frf(frf, len(records))], options)
 
 
 def _rate_doubts(paths: Sequence[str | os.PathLike[str]], tests: Sequence[CrossSpectra]) -> list[str]:
@@ -131,23 +131,22 @@ def _rate_doubts(paths: Sequence[str | os.PathLike[str]], tests: Sequence[CrossS
     return check_sample_rates(gains)
 
 
-def _finished(frf: Frf, tests: tuple[CrossSpectra, ...], doubts: Sequence[str]) -> Estimate:
+def _finished(frf: Frf, tests: tuple[CrossSpectra, ...], doubts: Sequence[str], options: EstimateOptions) -> Estimate:
     """Take out the sensors' high-pass, and state the band in which the FRF is known."""
     total = sum_tests(tests)
     frf = correct_high_pass(frf, [channel.high_pass_hz for channel in total.responses])
     driven = np.interp(frf.frequencies, total.frequencies, driven_lines(total).astype(float)) >= 0.5
     frf = replace(frf, band=known_band(frf, driven))
-    return Estimate(frf, tests, input_independence(total), tuple(doubts))
+    return Estimate(frf, tests, input_independence(total), tuple(doubts), options)
 
 
 def write_estimate(
     path: str | os.PathLike[str],
     estimate: Estimate,
     recordings: Sequence[str | os.PathLike[str]],
-    options: EstimateOptions,
 ) -> None:
     """Write the FRF with its provenance: recordings, settings, averages, warnings, versions."""
-    first = estimate.tests[0]
+    first, options = estimate.tests[0], estimate.options
     length = first.settings.segment_length / first.sample_rate
     judged_by = {"segment": length} if options.estimator == LOCAL else {}  # it has no segments of its own
     provenance = {
