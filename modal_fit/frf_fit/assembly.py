@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import Frf
+from estimation import Frf, FrfCovariance
 
 from ..models import ModalModel, ModeErrors, residuals_with_poles
 from .variable_projection import Elimination, MeasuredLines, Modes, Real, derivatives
@@ -60,6 +60,27 @@ def modal_model(
         covariance=covariance,
         band=lines.band,
         errors=errors.ordered(order),
+    )
+
+
+def exchanged_axes(frf: Frf) -> Frf:
+    """The transposed FRF matrix: responses and excitations change places.
+
+    Parameters
+    ----------
+    frf
+        The measured FRF matrix.
+    """
+    covariance = frf.covariance
+    return replace(
+        frf,
+        values=frf.values.transpose(0, 2, 1),
+        responses=frf.excitations,
+        excitations=frf.responses,
+        multiple_coherence=None,
+        coherence=None if frf.coherence is None else frf.coherence.transpose(0, 2, 1),
+        averages=None if frf.averages is None else frf.averages.T,
+        covariance=None if covariance is None else FrfCovariance(covariance.excitation, covariance.response),
     )
 
 

@@ -10,12 +10,13 @@ from estimation import Frf
 
 from ..models import ModeErrors
 from ..stabilisation import StabilisationChart
-from .assembly import modal_model, transposed
-from .fit import _STEPS, _TOLERANCE, REFINED, MatrixFit, _exchanged, _line_weights, _weighted
+from .assembly import exchanged_axes, modal_model, transposed
+from .matrix_fit import REFINED, STEPS, TOLERANCE, MatrixFit
 from .mode_selection import candidates
 from .spread import mode_errors, unknowns_covariance
 from .variable_projection import Complex, Elimination, MeasuredLines, Modes, Refined, eliminate, participations
 from .variable_projection import refine as refine_modes
+from .weighting import line_weights, weighted_lines
 
 KEPT = "picked poles"
 
@@ -48,16 +49,16 @@ def _picked(
 ) -> MatrixFit:
     """Fit picked poles on the side with more responses."""
     if len(frf.excitations) > len(frf.responses):
-        turned = _picked(_exchanged(frf), inside, band, max_order, poles, refine=refine)
+        turned = _picked(exchanged_axes(frf), inside, band, max_order, poles, refine=refine)
         return replace(turned, model=transposed(turned.model))
-    chart, _ = candidates(frf, band, max_order, _line_weights(frf, inside))
-    lines, reweigh = _weighted(frf, inside, band)
+    chart, _ = candidates(frf, band, max_order, line_weights(frf, inside))
+    lines, reweigh = weighted_lines(frf, inside, band)
     modes = Modes(poles, participations(poles, lines)).scaled()
     lines = reweigh(lines, eliminate(modes, lines))
     modes = Modes(poles, participations(poles, lines)).scaled()
     if not refine:
         return _kept(frf, chart, modes, eliminate(modes, lines), lines)
-    refined = refine_modes(modes, lines, steps=_STEPS, tolerance=_TOLERANCE)
+    refined = refine_modes(modes, lines, steps=STEPS, tolerance=TOLERANCE)
     return _refined(frf, chart, refined, lines)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, prev_fast_len, rfft
 
-from .band_recording import BandRecording
+from .reduced_recording import BandRecording
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
