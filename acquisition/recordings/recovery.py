@@ -9,8 +9,9 @@ from foundation import InputError, writing_whole_file
 
 from ..file_safety import is_being_written
 from ..sources import Events
-from .recording import Recording, Stream
+from .recording import Recording
 from .recording_writer import RecordingWriter
+from .stream import Stream
 
 _ROWS = 1 << 16
 
