@@ -1,5 +1,4 @@
 from .comparison import ModePair, compare_modes
-from .fit_summary import fit_summary
 from .modal_model import ModalModel, Residuals
 from .modal_model_file import read_modal_model, write_modal_model
 from .mode_errors import ModeErrors
@@ -13,6 +12,7 @@ from .out_of_band import (
     residuals_with_poles,
 )
 from .shape_measures import modal_assurance, phase_collinearity, phase_deviation, reciprocity_residual
+from .summary_of_fit import fit_summary
 from .synthesised import Synthesis, synthesis
 from .uncertainty import derived_covariance, frequency_and_damping_errors, pack_parameters, unpack_parameters
 
