@@ -22,6 +22,7 @@ from estimation import (
     instrumental_variable,
     known_band,
     settings_for,
+    spectra_for_judging,
     sum_tests,
     write_frf,
 )
@@ -40,7 +41,7 @@ from ...progress import Progress, silent
 from ...provenance import sources, versions
 from .estimate_options import INSTRUMENTAL, LOCAL, TITLES, Estimate, EstimateOptions, check_options
 from .instruments import channels_with_instruments, only_inputs
-from .local_estimate import band_records, judging_spectra, local_frf
+from .local_estimate import band_recordings, local_frf
 
 SPECTRAL: dict[str, Callable[[CrossSpectra], Frf]] = {"h1": h1, "h2": h2, "hv": hv}
 
@@ -113,17 +114,17 @@ def estimate_recordings(
 
 
 def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, progress: Progress) -> Estimate:
-    """Estimate by local polynomials over whole records; the inputs are judged by spectra as everywhere."""
+    """Estimate by local polynomials over whole recordings; the inputs are judged by spectra as everywhere."""
     assert options.band is not None
     names = (options.excitations, options.responses)
     doubts = check_recordings(
         paths, stream=options.stream, excitations=names[0], responses=names[1], segments=None, progress=progress
     )
-    records = band_records(paths, names, options.stream, options.band[1], progress)
-    tests = tuple(lines_of(test, options.band) for test in judging_spectra(records, options.band))
+    found = band_recordings(paths, names, options.stream, options.band[1], progress)
+    tests = tuple(lines_of(test, options.band) for test in spectra_for_judging(found))
     doubts += [*_rate_doubts(paths, tests), *check_inputs(sum_tests(tests))]
-    frf = local_frf(records, options.band, progress)
-    return _finished(frf, tests, [*doubts, *check_local_frf(frf, len(records))], options)
+    frf = local_frf(found, options.band, progress)
+    return _finished(frf, tests, [*doubts, *check_local_frf(frf, len(found))], options)
 
 
 def _rate_doubts(paths: Sequence[str | os.PathLike[str]], tests: Sequence[CrossSpectra]) -> list[str]:
