@@ -1,4 +1,4 @@
-"""What one column of samples is: its name, quantity, unit and place."""
+"""Description of one column of samples: its name, quantity, unit and place."""
 
 from dataclasses import asdict, dataclass, field
 from typing import Any

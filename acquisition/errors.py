@@ -1,4 +1,4 @@
-"""What may go wrong with a device or a disk while recording; each message names the device and the remedy."""
+"""Errors of a device or a disk while recording; each message names the device and the remedy."""
 
 from foundation import MillfrfError
 

@@ -32,7 +32,9 @@ def spectral_radii(
     immersion
         Start and exit angle, rad.
     speeds : (n_speeds,), rad/s
+        Spindle speeds of the grid.
     depths : (n_depths,), m
+        Axial depths of the grid.
     steps
         In a tooth period.
     """

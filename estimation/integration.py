@@ -5,6 +5,8 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
+from .band_recordings import kinematic_factor
+
 
 def displacement_from_acceleration(
     acceleration: NDArray[np.float64], sample_rate: float, low_cut: float
@@ -47,9 +49,9 @@ def displacement_from_acceleration(
     margin = min(n - 1, int(4 * sample_rate / low_cut))
     before, after = centred[margin:0:-1], centred[-2 : -margin - 2 : -1]
     padded = np.concatenate([before, centred, after])
-    f = np.fft.rfftfreq(len(padded), 1 / sample_rate)
+    f = np.asarray(np.fft.rfftfreq(len(padded), 1 / sample_rate), dtype=float)
     rise = np.clip((f / low_cut - 0.7) / 0.3, 0.0, 1.0)
-    gain = np.zeros_like(f)
-    gain[1:] = -0.5 * (1 - np.cos(np.pi * rise[1:])) / (2 * np.pi * f[1:]) ** 2
+    gain = np.zeros(len(f), dtype=complex)
+    gain[1:] = 0.5 * (1 - np.cos(np.pi * rise[1:])) / kinematic_factor(f[1:], np.array([2]), (0.0,))[:, 0]
     whole = np.fft.irfft(np.fft.rfft(padded, axis=0) * gain[:, None], len(padded), axis=0)
     return np.asarray(whole[margin : margin + n])

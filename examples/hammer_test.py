@@ -31,10 +31,11 @@ class Compared:
     Parameters
     ----------
     result
-        Of the taps.
+        Merged taps of the hammer test.
     samples : (n_samples, 2)
         Force and answer of the first recording.
     frequencies : (n_lines,), Hz
+        Frequencies of the lines that are compared.
     tapped, truth, shifted : (n_lines,)
         As measured; of the structure; of the structure at ``i w + 1/tau``, where the measured values stand.
     hann_frequencies, hann : (n_hann,)

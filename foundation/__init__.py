@@ -1,4 +1,4 @@
-"""What every room stands on: named errors, whole-file writing, units and degrees of freedom.
+"""Foundation of every room: named errors, whole-file writing, units and degrees of freedom.
 
 Nothing here knows about signals, models or the command line.
 """

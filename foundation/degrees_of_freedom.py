@@ -16,7 +16,7 @@ _PATTERN = re.compile(r"^(?P<node>[^:]+):(?P<sign>[+-])(?P<axis>R?[XYZ]|S)$")
 
 @dataclass(frozen=True)
 class DegreeOfFreedom:
-    """Where and along which signed axis a force acts or a motion is measured.
+    """A point and a signed axis along which a force acts or a motion is measured.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ class MillfrfError(Exception):
 
 
 class InputError(MillfrfError):
-    """What was given cannot be used: a wrong value, unit, length or option (exit code 2)."""
+    """Input that cannot be used: a wrong value, unit, length or option (exit code 2)."""
 
 
 class FileFormatError(InputError):

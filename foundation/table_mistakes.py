@@ -1,4 +1,4 @@
-"""What pydantic says of a wrong table, as one sentence of ours: the key, what it must be, what it is."""
+"""pydantic's complaints about a wrong table, as one sentence of ours: the key, what it must be, what it is."""
 
 import difflib
 from collections.abc import Iterable, Mapping

@@ -3,12 +3,13 @@
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
 import typer
 
-from foundation import InputError, MillfrfError
+from foundation import InputError, MillfrfError, MillfrfWarning
 
 from .commands import COMMANDS
 from .cut import cut_app
@@ -40,7 +41,9 @@ def run(arguments: Sequence[str]) -> int:
     """
     command = typer.main.get_command(app)
     try:
-        result = command.main(args=list(arguments), prog_name="millfrf", standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MillfrfWarning)  # each command prints the doubts of its result
+            result = command.main(args=list(arguments), prog_name="millfrf", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         return _fail(STOPPED, FAILED)
     except Exception as error:

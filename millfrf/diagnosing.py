@@ -1,4 +1,4 @@
-"""From a nominal model and recordings to a folder with the diagnosis and the improved model."""
+"""The step from a nominal model and recordings to a folder with the diagnosis and the improved model."""
 
 import os
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from .result_folder import refuse_file
 
 @dataclass(frozen=True)
 class DiagnosisFiles:
-    """What a diagnosis wrote, and lines that sum it up."""
+    """Files that a diagnosis wrote, and lines that sum it up."""
 
     diagnosis: StructureDiagnosis
     written: tuple[Path, ...]

@@ -1,4 +1,4 @@
-"""What a file is, by what it holds and not by its name."""
+"""Kind of a file, by its content and not by its name."""
 
 import csv
 import json

@@ -1,4 +1,4 @@
-"""What is in a file, and what looks wrong with it."""
+"""Look into a file: its content, and what is wrong with it."""
 
 import os
 from collections.abc import Callable
@@ -108,7 +108,7 @@ def _recording(path: str | os.PathLike[str], progress: Progress) -> Findings:
 
 
 def _text_table(name: str, values: tuple[np.ndarray, np.ndarray], texts: tuple[str, ...]) -> Table:
-    """When each mark was set, and its note."""
+    """Make the table of marks: the time of each, and its note."""
     rows = tuple((f"{time:.3f}", f"{value:g}", text) for time, value, text in zip(*values, texts, strict=True))
     return Table(name, ("time (s)", "number", "note"), rows)
 

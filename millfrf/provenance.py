@@ -1,4 +1,4 @@
-"""Where a result came from: stored with it, so that a report can say so without being told."""
+"""Origin of a result: it is stored with the result, so that a report can state it."""
 
 import hashlib
 import json
@@ -52,7 +52,7 @@ def add_to_json(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> 
 
 
 def read_provenance(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """What an FRF, a model, lobes or verdicts say of their making; empty where they say nothing that can be read."""
+    """Read the origin that an FRF, a model, lobes or verdicts state; empty where they state none that can be read."""
     try:
         if Path(path).suffix.lower() == ".csv":
             stored = _of_lobes(Path(path))
@@ -85,7 +85,7 @@ def of_chatter(
 
 
 def _of_lobes(path: Path) -> Any:
-    """From the line that `write_lobes` puts above the headings."""
+    """Read the origin from the line that `write_lobes` puts above the headings."""
     mark = "# provenance: "
     with path.open(encoding="utf-8", errors="replace") as file:
         for line in file:

@@ -1,4 +1,4 @@
-"""What the option parser says of a wrong command line, in our words and with what was typed."""
+"""Messages for a wrong command line, in our words and with what was typed."""
 
 import re
 from collections.abc import Sequence
@@ -32,7 +32,7 @@ def usage_in_words(said: str, arguments: Sequence[str]) -> str:
 
 
 def _values(option: str, arguments: Sequence[str]) -> list[str]:
-    """What was typed after an option, up to the next one."""
+    """Give the words that were typed after an option, up to the next one."""
     if option not in arguments:
         return []
     rest = list(arguments[arguments.index(option) + 1 :])

@@ -1,26 +1,30 @@
 """`fit_polyreference`: FRF matrix to modal model, with stabilisation, vectors, residuals and error bars."""
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf
-from foundation import InputError, MillfrfError
+from foundation import InputError, MillfrfError, Result, Summary
 
 from .frf_fit import NOT_REFINED, REFINED, MatrixFit, default_order, fit_matrix
 from .maximum_likelihood import RecordSpectra
-from .models import ModalModel
+from .models import ModalModel, fit_summary
 from .stabilisation import PoleGroup, StabilisationChart, choose_poles, matrix_fraction_poles, stabilisation_chart
 from .transfer_delay import transfer_delay
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Complex = NDArray[np.complex128]
 _NO_VIBRATION = 0.5  # damping ratio above which a pole is taken for a trend
 _DELAY_ROUNDS = 4  # the first poles are found with the delay still in
 
 
-@dataclass(frozen=True)
-class ModalFit:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModalFit(Result):
     """A modal model with the evidence for it.
 
     Parameters
@@ -52,6 +56,15 @@ class ModalFit:
     relative_error: NDArray[np.float64]
     warnings: tuple[str, ...]
     status: str = REFINED
+
+    def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
+        """Draw the FRF that the model gives and return the axes; see :func:`figures.draw_model` for the choices."""
+        return self.model.plot(axes, **choices)
+
+    def _summary(self) -> Summary:
+        chi_square = "not known" if np.isnan(self.reduced_chi_square) else f"{self.reduced_chi_square:.3g}"
+        note = f"fit of {self.band[0]:.4g} to {self.band[1]:.4g} Hz, reduced chi-square {chi_square}"
+        return fit_summary("ModalFit", self.model, (note,), self.warnings)
 
 
 def fit_polyreference(
@@ -135,7 +148,7 @@ def _minus_orders(group: PoleGroup) -> int:
 
 
 def status_warnings(fit: MatrixFit) -> tuple[str, ...]:
-    """What the refinement says of itself."""
+    """Give the warnings of the refinement."""
     if fit.status == NOT_REFINED:
         return (
             "the refinement does not hold on lines left out of it: the poles are those of the poly-reference method",
@@ -192,7 +205,7 @@ def fit_warnings(
     chi: float,
     error: NDArray[np.float64],
 ) -> tuple[str, ...]:
-    """What lines, misfit and poles of a fit let one doubt, one sentence each."""
+    """Give the doubts that lines, misfit and poles of a fit raise, one sentence each."""
     warnings = []
     asked = (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
     if inside.sum() < asked.sum():

@@ -3,24 +3,28 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from estimation import BandRecording
-from foundation import InputError, MillfrfError
+from foundation import InputError, MillfrfError, Result, Summary
 
 from .correlation_blocks import CorrelationBlocks, correlation_blocks
 from .maximum_likelihood import NoiseLevels, best_fit, modal_model_from, record_spectra
-from .models import ModalModel
+from .models import ModalModel, fit_summary
 from .stabilisation import OrderPoles, PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _BLOCK_ROWS = 25
 _SPARE_ROWS = 1.5  # observability matrix has so many times more rows than the highest order has states
 _SMOOTH = 2  # terms of the polynomial that stands for transients from outside the band
 
 
-@dataclass(frozen=True)
-class SubspaceFit:
+@dataclass(frozen=True, eq=False, repr=False)
+class SubspaceFit(Result):
     """A modal model from recordings, with the evidence for it.
 
     Parameters
@@ -49,6 +53,15 @@ class SubspaceFit:
     reduced_chi_square: float
     noise: NoiseLevels
     warnings: tuple[str, ...]
+
+    def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
+        """Draw the FRF that the model gives and return the axes; see :func:`figures.draw_model` for the choices."""
+        return self.model.plot(axes, **choices)
+
+    def _summary(self) -> Summary:
+        chi_square = "not known" if np.isnan(self.reduced_chi_square) else f"{self.reduced_chi_square:.3g}"
+        note = f"fit of {self.band[0]:.4g} to {self.band[1]:.4g} Hz, reduced chi-square {chi_square}"
+        return fit_summary("SubspaceFit", self.model, (note,), self.warnings)
 
 
 def fit_subspace(

@@ -1,22 +1,26 @@
 """Calibration of an in-process model from the sensor to the tool tip, by the shapes of two hammer FRFs."""
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf, FrfCovariance, to_receptance
-from foundation import InputError, MillfrfError, shared_band
+from foundation import InputError, MillfrfError, Result, Summary, counted, shared_band
 
-from .models import ModalModel, Residuals, derived_covariance, modal_assurance
+from .models import ModalModel, Residuals, derived_covariance, fit_summary, modal_assurance
 from .polyreference import ModalFit, fit_polyreference
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Complex = NDArray[np.complex128]
 _POOR = 0.3  # relative standard error above which a ratio is replaced
 
 
-@dataclass(frozen=True)
-class TipCalibration:
+@dataclass(frozen=True, eq=False, repr=False)
+class TipCalibration(Result):
     """An in-process model carried to the tool tip.
 
     Parameters
@@ -41,6 +45,15 @@ class TipCalibration:
     hammer_modes: NDArray[np.int64]
     hammer_fit: ModalFit
     warnings: tuple[str, ...]
+
+    def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
+        """Draw the FRF that the model gives and return the axes; see :func:`figures.draw_model` for the choices."""
+        return self.model.plot(axes, **choices)
+
+    def _summary(self) -> Summary:
+        nodes = dict.fromkeys(label.partition(":")[0] for label in self.model.responses)
+        note = (f"ratios of {counted(len(self.ratios), 'mode')} to {', '.join(nodes)}",)
+        return fit_summary("TipCalibration", self.model, note, self.warnings)
 
 
 def calibrate_to_tip(
@@ -204,7 +217,7 @@ def _scaled(residuals: Residuals, model: ModalModel, ratios: Complex) -> Residua
 def _covariance(
     model: ModalModel, hammer: ModalModel, chosen: NDArray[np.int64], ratios: Complex
 ) -> NDArray[np.float64] | None:
-    """In-process covariance carried through the ratios, plus the ratios' own: the two measurements are independent."""
+    """Carry the in-process covariance through the ratios and add the ratios' own: the measurements are independent."""
     if model.covariance is None:
         return None
     n_modes, n = model.right.shape

@@ -1,4 +1,4 @@
-"""What the milling cell and the hammer cell share: from a marching simulation to blocks of a measured stream."""
+"""The common part of milling cell and hammer cell: from a marching simulation to blocks of a measured stream."""
 
 import math
 from collections.abc import Sequence

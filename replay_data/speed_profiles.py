@@ -11,7 +11,7 @@ from foundation import InputError
 
 
 class SpeedProfile(Protocol):
-    """What a simulated spindle needs to know of its speed."""
+    """Interface of a spindle's speed over time."""
 
     @property
     def slowest(self) -> float:

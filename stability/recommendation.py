@@ -140,7 +140,7 @@ def certified_cut(
 
 @dataclass(frozen=True)
 class _Search:
-    """What limits inside a drift are computed and drawn of; ``first_order``: lessened by their errors before draws."""
+    """Limits inside a drift and draws of them; with ``first_order`` errors are taken off before draws."""
 
     structure: Frf | ModalModel
     process: MillingProcess

@@ -1,4 +1,4 @@
-"""What a conversion carries from any file to any other: streams with their samples, events and texts."""
+"""Content that a conversion carries from any file to any other: streams with their samples, events and texts."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field

@@ -67,7 +67,7 @@ def _elements(data: memoryview, order: str) -> Iterator[Element]:
 
 
 def _is_plain(kind: int, data: memoryview, order: str, file_size: int) -> bool:
-    """Of one element at the top."""
+    """Say whether one element at the top holds plain data."""
     if kind == _COMPRESSED:
         inflater = zlib.decompressobj()
         whole = inflater.decompress(data, _EXPANSION * file_size + _SPARE)

@@ -108,7 +108,7 @@ class Amplifier:
         return answer.decode("ascii", "replace").strip()
 
     def poll(self) -> list[Events]:
-        """No events; raises where the line has gone.
+        """Give no events; raise an error if the line has gone.
 
         Raises
         ------

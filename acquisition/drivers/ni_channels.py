@@ -1,4 +1,4 @@
-"""What is wired to a National Instruments input, and how it becomes a channel of a DAQmx task."""
+"""An input of National Instruments with its sensor, and how it becomes a channel of a DAQmx task."""
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -60,12 +60,12 @@ class NiInput:
 
     @property
     def full_scale(self) -> float:
-        """In the channel's unit."""
+        """Largest magnitude of the input, in the channel's unit."""
         return self.range_volts / abs(self.sensitivity)
 
     @property
     def scale(self) -> float:
-        """What the task's values are multiplied by: 1 where DAQmx scales, else SI units per V."""
+        """Factor for the task's values: 1 where DAQmx scales, else SI units per V."""
         return 1.0 if self.iepe_current else 1.0 / self.sensitivity
 
     def described(self, module_delay: float | None) -> Channel:

@@ -109,7 +109,7 @@ def _has_loose_text(part: h5py.Group) -> bool:
 
 @contextmanager
 def reporting_damage(path: Path) -> Iterator[None]:
-    """What the HDF5 library raises on damaged bytes, as one line."""
+    """Turn the errors that the HDF5 library raises on damaged bytes into one line."""
     try:
         yield
     except (KeyError, OSError, RuntimeError, ValueError, TypeError, AttributeError, OverflowError) as error:

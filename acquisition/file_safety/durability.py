@@ -1,4 +1,4 @@
-"""What lets a recording survive: a spare piece of disk, a sync each second, a lock that dies with its writer."""
+"""Means by which a recording survives: spare disk space, a sync each second, a lock that dies with its writer."""
 
 import contextlib
 import os

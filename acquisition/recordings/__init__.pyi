@@ -1,10 +1,11 @@
 from .aligner import Aligner, aligned_blocks, aligned_samples, rows_left_out
 from .event_series import EventSeries
 from .record_source import record
-from .recording import Recording, Stream
+from .recording import Recording
 from .recording_format import FORMAT, FORMAT_VERSION, check_format, stream_from_attributes
 from .recording_writer import RecordingWriter
 from .recovery import Recovered, recover
+from .stream import Stream
 
 __all__ = [
     "FORMAT",

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..sources import StreamDescription
-from .recording import Stream
+from .stream import Stream
 
 Real = NDArray[np.float64]
 

@@ -32,7 +32,7 @@ class EventSeries:
 
     @property
     def axis(self) -> EventAxis:
-        """In which clock the stored times are told.
+        """Clock in which the stored times are told.
 
         Raises
         ------

@@ -1,132 +1,28 @@
 """`Recording`: a recording file opened for reading; samples are read in blocks, never as a whole."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from types import TracebackType
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import FileFormatError, InputError
+from foundation import FileFormatError, InputError, Summary, counted
 
-from ..channel import Channel
-from ..file_safety import is_being_written, open_for_reading, reporting_damage, require_stored, whole_rows
-from ..sources import StreamDescription
+from ..file_safety import is_being_written, open_for_reading, reporting_damage, require_stored
 from .alignment import Alignment
 from .event_series import EventSeries
 from .recording_format import check_format, stream_from_attributes, text_attribute
+from .stream import Stream
 
-
-class Stream:
-    """Samples of one clock in an open recording.
-
-    Parameters
-    ----------
-    description
-        Name, rate and channels.
-    samples
-        The dataset ``(n_samples, n_channels)``; rows are read when asked for.
-    path
-        Path of the file, for messages.
-    """
-
-    def __init__(self, description: StreamDescription, samples: h5py.Dataset, path: Path) -> None:
-        self.description = description
-        self.path = path
-        self._samples = samples
-
-    @property
-    def name(self) -> str:
-        """Name of the clock."""
-        return self.description.name
-
-    @property
-    def sample_rate(self) -> float:
-        """Hz."""
-        return self.description.sample_rate
-
-    @property
-    def start_time(self) -> float:
-        """Of the first sample, s."""
-        return self.description.start_time
-
-    @property
-    def channels(self) -> tuple[Channel, ...]:
-        """One a column."""
-        return self.description.channels
-
-    @property
-    def n_samples(self) -> int:
-        """Rows stored."""
-        return int(self._samples.shape[0])
-
-    @property
-    def dtype(self) -> "np.dtype[np.floating]":
-        """How samples are stored: float32 or float64."""
-        stored: np.dtype[np.floating] = self._samples.dtype
-        return stored
-
-    @property
-    def duration(self) -> float:
-        """n_samples / sample_rate, s."""
-        return self.n_samples / self.sample_rate
-
-    def whole_rows(self, file_size: int) -> int:
-        """Leading rows whose bytes lie within a file of ``file_size`` bytes; fewer than n_samples in a cut file."""
-        with reporting_damage(self.path):
-            return whole_rows(self._samples, file_size)
-
-    def channels_of(self, quantity: str) -> tuple[Channel, ...]:
-        """The channels of one quantity, in column order."""
-        return tuple(channel for channel in self.channels if channel.quantity == quantity)
-
-    def columns(self, names: Sequence[str]) -> list[int]:
-        """Column numbers of named channels.
-
-        Raises
-        ------
-        InputError
-            A name that is not there; the message lists those that are.
-        """
-        there = [channel.name for channel in self.channels]
-        missing = [name for name in names if name not in there]
-        if missing:
-            raise InputError(
-                f"{self.path.name}: no channel {', '.join(missing)} in stream {self.name}; it has {', '.join(there)}"
-            )
-        return [there.index(name) for name in names]
-
-    def read(
-        self, start: int = 0, stop: int | None = None, channels: Sequence[str] | None = None
-    ) -> NDArray[np.float64]:
-        """Rows ``start`` to ``stop`` as float64, shape (n_samples, n_channels), SI units.
-
-        Raises
-        ------
-        InputError
-            An unknown channel.
-        FileFormatError
-            The file's bytes cannot be read there.
-        """
-        try:
-            rows = np.asarray(self._samples[start:stop], dtype=float)
-        except OSError as error:
-            raise FileFormatError(
-                f"{self.path}: samples {start} to {stop} of {self.name} cannot be read; the file is damaged"
-            ) from error
-        return rows if channels is None else rows[:, self.columns(channels)]
-
-    def blocks(
-        self, block_length: int = 1 << 16, channels: Sequence[str] | None = None
-    ) -> Iterator[NDArray[np.float64]]:
-        """All rows in order, at most ``block_length`` at a time."""
-        if channels is not None:
-            self.columns(channels)
-        for start in range(0, self.n_samples, block_length):
-            yield self.read(start, min(start + block_length, self.n_samples), channels)
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+    from matplotlib.axes import Axes
 
 
 class Recording:
@@ -262,3 +158,50 @@ class Recording:
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+    def plot(self, axes: "Axes | None" = None, *, stream: str | None = None, **choices: Any) -> "Axes":
+        """Draw the channels of one stream and return the axes; see :func:`figures.draw_stream` for the choices."""
+        return self.stream(stream).plot(axes, **choices)
+
+    def to_xarray(self, stream: str | None = None) -> "xarray.DataArray":
+        """All samples of one stream as an array; see :meth:`Stream.to_xarray`."""
+        return self.stream(stream).to_xarray()
+
+    def to_frame(self, stream: str | None = None) -> "pandas.DataFrame":
+        """All samples of one stream as a table; see :meth:`Stream.to_frame`."""
+        return self.stream(stream).to_frame()
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both read the same file."""
+        if not isinstance(other, Recording):
+            return NotImplemented
+        return self.path.resolve() == other.path.resolve()
+
+    def __hash__(self) -> int:
+        return hash(self.path.resolve())
+
+    def __reduce__(self) -> tuple[Callable[..., "Recording"], tuple[Path]]:
+        """Pickle the name of the file; the recording is opened anew where it is unpickled."""
+        return partial(Recording, accept_cut=self._accept_cut), (self.path,)
+
+    def __repr__(self) -> str:
+        return self._summary().text()
+
+    def _repr_html_(self) -> str:
+        return self._summary().html()
+
+    def _summary(self) -> Summary:
+        if not self._file:
+            return Summary(f"Recording: {self.path.name}, closed")
+        state = "" if self.complete is True else ", not closed in order"
+        parts = [stream.summary() for stream in self.streams.values()]
+        said = [text for text in (self.title, self.recorded_at) if text]
+        lines = [part.headline for part in parts] if len(parts) > 1 else [parts[0].headline, *parts[0].lines]
+        if len(lines) > 2:
+            lines = [lines[0], f"and {len(lines) - 1} more streams"]
+        return Summary(
+            f"Recording: {self.path.name}, {counted(len(self.streams), 'stream')}{state}",
+            (*([", ".join(said)] if said else []), *lines),
+            parts[0].columns,
+            tuple(row for part in parts for row in part.rows),
+        )

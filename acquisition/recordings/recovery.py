@@ -9,15 +9,16 @@ from foundation import InputError, writing_whole_file
 
 from ..file_safety import is_being_written
 from ..sources import Events
-from .recording import Recording, Stream
+from .recording import Recording
 from .recording_writer import RecordingWriter
+from .stream import Stream
 
 _ROWS = 1 << 16
 
 
 @dataclass(frozen=True)
 class Recovered:
-    """What came back.
+    """Result of a recovery: the samples and events that came back.
 
     Parameters
     ----------

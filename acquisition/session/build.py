@@ -1,4 +1,4 @@
-"""From a session to the source that it describes."""
+"""The step from a session file to the source that it describes."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a source that wraps another one passes on unchanged."""
+"""The parts that a source passes on unchanged when it wraps another one."""
 
 from .source import Source, StreamDescription
 

@@ -12,7 +12,7 @@ from foundation import InputError
 
 @dataclass(frozen=True)
 class EventAxis:
-    """In which clock the times of a series are told.
+    """Clock in which the times of a series are told.
 
     Parameters
     ----------

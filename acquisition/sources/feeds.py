@@ -24,7 +24,7 @@ class EventFeed(Protocol):
         """Start."""
 
     def poll(self) -> list[Events]:
-        """What came since the last call, without waiting; raises what went wrong."""
+        """Give the events since the last call, without waiting; raise an error of the receiver."""
 
     def close(self) -> None:
         """Stop and release the device; harmless when not open."""

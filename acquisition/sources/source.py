@@ -52,7 +52,7 @@ class StreamDescription:
 
     @property
     def common_delay(self) -> float:
-        """By which the samples of its least delayed channel come late, s; events are put on that channel's axis."""
+        """Delay of the least delayed channel's samples, s; events are put on that channel's axis."""
         return min(channel.input_delay_s or 0.0 for channel in self.channels)
 
 
@@ -83,7 +83,7 @@ class Block:
 
 @runtime_checkable
 class Source(Protocol):
-    """What a driver is: opened, read until None, closed. Drivers need not share a base class."""
+    """Interface of a driver: opened, read until None, closed. Drivers need not share a base class."""
 
     @property
     def title(self) -> str:

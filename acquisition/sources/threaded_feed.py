@@ -1,4 +1,4 @@
-"""What feeds with a receiving thread have in common: connect, receive, hand over, release."""
+"""The common part of feeds with a receiving thread: connect, receive, hand over, release."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -47,7 +47,7 @@ class ThreadedFeed(ABC):
         self._receiver.start(self._receive)
 
     def poll(self) -> list[Events]:
-        """What came since the last call.
+        """Give the events since the last call.
 
         Raises
         ------

@@ -44,7 +44,7 @@ class CaseSpec:
     nominal_off
         Error of the nominal model in units of a lab's usual one.
     condition
-        Of the measurement, or the kind of control.
+        Condition of the measurement, or the kind of control.
     """
 
     index: int

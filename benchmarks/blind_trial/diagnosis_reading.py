@@ -25,7 +25,7 @@ class Answer:
     names, equivalents
         Causes accepted, and those it cannot tell from them.
     direction : (3,) or None
-        Of the first accepted cause that has one.
+        Direction of the first accepted cause that has one.
     parameters
         Name to value and standard error, of all accepted causes.
     removed

@@ -39,8 +39,8 @@ class Cut:
         Spindle speed at its beginning and end, rev/s.
     immersion
         Start and exit angle, rad.
-    turn
-        Of the feed direction in the XY plane, rad.
+    turn : rad
+        Angle of the feed direction in the XY plane.
     roughness
         Standard deviation of the material's state: about 0.1 for solid, 0.6 and more for porous.
     """

@@ -25,13 +25,13 @@ class Element:
     Parameters
     ----------
     code
-        Of the law, see :mod:`laws`.
+        Number of the law, see :mod:`laws`.
     parameters
         Up to six, in the law's order.
     sense, act : (3,)
         Direction of the deflection it feels, and of the force it gives.
     schedule : (n,) at 512 Hz, or None
-        Of laws that change with time.
+        Course of laws that change with time.
     """
 
     code: int

@@ -20,8 +20,8 @@ class Limits:
 
     Parameters
     ----------
-    seconds
-        Of the processor, so that a busy machine judges no engine; six times as long (and a minute) by the clock.
+    seconds : s
+        Time of the processor, so that a busy machine judges no engine; six times as long (and a minute) by the clock.
     megabytes
         That its work may address beyond imports and the FRFs.
     python

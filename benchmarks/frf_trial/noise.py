@@ -20,7 +20,7 @@ class Noise:
     Parameters
     ----------
     variance : (n_lines, n_responses, n_excitations)
-        E|dH|^2.
+        Expected squared error of each FRF, ``E|dH|^2``.
     response, excitation
         Covariance in product form as told, or None.
     averages

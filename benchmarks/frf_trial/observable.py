@@ -36,7 +36,7 @@ class Visibility:
     Parameters
     ----------
     energy
-        Of its own part over the noise, for each complex number that a mode of rank one has.
+        Energy of its own part over the noise, for each complex number that a mode of rank one has.
     peak
         Contribution over noise (standard deviation) at the resonance that one FRF of ten reaches.
     """
@@ -53,14 +53,16 @@ class Visibility:
 def visibility(
     structure: Structure, mode: int, frequencies: Real, inside: NDArray[np.bool_], variance: Real, derivative: int
 ) -> Visibility:
-    """Of one mode on the band's lines.
+    """Compute how far one mode stands above the noise on the band's lines.
 
     Parameters
     ----------
     frequencies : (n_lines,), Hz
+        Frequencies of the lines.
     inside : (n_lines,), bool
+        Whether a line lies in the band.
     variance : (n_lines, n_responses, n_excitations)
-        Of the noise on the quantity that is ``derivative`` times differentiated.
+        Variance of the noise on the quantity that is ``derivative`` times differentiated.
     """
     lines = _window(frequencies, inside, structure.frequencies[mode], structure.bandwidths[mode])
     s, poles = 2j * np.pi * frequencies[lines], structure.poles

@@ -18,8 +18,10 @@ class Problem:
 
     Parameters
     ----------
-    frequencies : (n_lines,), Hz, increasing in equal steps
-    values : (n_lines, n_responses, n_excitations), complex, in the unit of ``quantity``
+    frequencies : (n_lines,), Hz
+        Frequencies of the lines, increasing in equal steps.
+    values : (n_lines, n_responses, n_excitations), complex
+        Measured FRF matrix in the unit of ``quantity``.
     quantity
         ``receptance``, ``mobility`` or ``accelerance``.
     band
@@ -27,10 +29,11 @@ class Problem:
     responses, excitations
         Labels ``node:direction``.
     response_covariance : (n_lines, n_responses, n_responses) or None
+        Covariance of the responses on each line.
     excitation_covariance : (n_lines, n_excitations, n_excitations) or None
         ``E[dH[p, q] conj(dH[u, v])] = response[p, u] excitation[q, v]``; both or neither.
     coherence : (n_lines, n_responses, n_excitations) or None
-        Of each FRF by itself, as one excitation at a time gives it.
+        Coherence of each FRF by itself, as one excitation at a time gives it.
     averages : (n_responses, n_excitations), int, or None
         Behind each FRF that has a coherence; 0 where that is not known.
     """
@@ -78,8 +81,8 @@ class Answer:
         ``ok``, or why there is no answer: ``failed`` (an exception, its line in ``said``), ``too slow``, ``killed``.
     said
         Warnings and messages, one sentence each.
-    seconds
-        Of the processor for the engine's work, without imports and reading.
+    seconds : s
+        Processor time of the engine's work, without imports and reading.
     peak_mb
         Highest resident memory of the process.
     base_mb

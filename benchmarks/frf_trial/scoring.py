@@ -29,7 +29,7 @@ class Match:
     frequency_ratio, damping_ratio
         Errors over their stated standard errors, or None where none is stated.
     assurance
-        Of the vectors over the responses, or None.
+        Modal assurance (MAC) of the vectors over the responses, or None.
     """
 
     frequency: float

@@ -28,8 +28,8 @@ class Spectrum:
         Index of the lower mode of each close pair.
     n_far
         How many of the highest modes are far above the band.
-    band
-        Hz.
+    band : Hz
+        Lowest and highest frequency of the band.
     step, top
         Line spacing and highest line, Hz.
     """

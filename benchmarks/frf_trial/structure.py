@@ -19,6 +19,7 @@ class Structure:
     Parameters
     ----------
     poles : (n_modes,), rad/s
+        Poles in the upper half plane.
     right : (n_modes, n_responses), left : (n_modes, n_excitations)
         Mass-normalised vectors, 1/sqrt(kg).
     rigid : (n_responses, n_excitations)

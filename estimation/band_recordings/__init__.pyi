@@ -1,4 +1,3 @@
-from .band_recording import BandRecording, band_recording, before_force_high_pass
 from .channel_matching import MatchedChannel, channel_at, channels_in_words, channels_of, matched_channels, names_at
 from .motion_quantities import (
     DERIVATIVE_ORDERS,
@@ -8,8 +7,9 @@ from .motion_quantities import (
     kinematic_factor,
 )
 from .reading import band_of_channels, read_band_recording
+from .reduced_recording import BandRecording, band_recording, before_force_high_pass
 from .resampling import Resampler, needed_ratio, resampled, whole_ratio, widest_band
-from .windowed_spectrum import WindowedSpectrum, padded_force, windowed_spectrum
+from .spectrum_lines import WindowedSpectrum, padded_force, windowed_spectrum
 
 __all__ = [
     "DERIVATIVE_ORDERS",

@@ -1,4 +1,4 @@
-"""Which channel measures at a degree of freedom, and with which sign."""
+"""Matching of channels to degrees of freedom, with their signs."""
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace

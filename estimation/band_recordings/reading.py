@@ -5,9 +5,9 @@ from collections.abc import Callable, Sequence
 
 from acquisition import Channel, Recording, Stream
 
-from .band_recording import BandRecording, band_recording, before_force_high_pass
 from .channel_matching import MatchedChannel, matched_channels
 from .motion_quantities import DERIVATIVE_ORDERS
+from .reduced_recording import BandRecording, band_recording, before_force_high_pass
 from .resampling import needed_ratio, whole_ratio
 
 EXCITING = ("force", "voltage")

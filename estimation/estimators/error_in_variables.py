@@ -166,7 +166,7 @@ def _relative(matrix: Complex, to: Complex) -> Complex:
 
 
 def _frf(spectra: CrossSpectra, values: Complex, valid: NDArray[np.bool_], driving: Complex) -> Frf:
-    """With the covariance that the equation error ``X - H F`` gives, over ``driving`` (what excites independently)."""
+    """Give the FRF with the covariance of the equation error ``X - H F``, over the inputs ``driving``."""
     quantity, unit = frf_quantity(spectra.responses, spectra.excitations)
     averages, n = spectra.effective_averages, len(spectra.excitations)
     covariance = None

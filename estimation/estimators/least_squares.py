@@ -71,7 +71,7 @@ def h1_side_by_side(tests: Sequence[CrossSpectra]) -> Frf:
 def _frf(
     spectra: CrossSpectra, values: NDArray[np.complex128], valid: NDArray[np.bool_], covariance: FrfCovariance | None
 ) -> Frf:
-    """With the multiple coherence: from H itself where there is one, else by pseudo-inverse."""
+    """Give the FRF with its multiple coherence: from H itself where there is one, else by pseudo-inverse."""
     total = np.real(np.einsum("kpp->kp", spectra.output_spectra))
     explained = np.real(np.einsum("kpq,kpq->kp", values, spectra.cross_spectra.conj()))
     coherence = np.clip(np.divide(explained, total, out=np.zeros(total.shape), where=total > 0), 0.0, 1.0)
@@ -96,7 +96,7 @@ def _covariance(
     inverse: NDArray[np.complex128],
     valid: NDArray[np.bool_],
 ) -> FrfCovariance | None:
-    """From the response power that H leaves; None where too few averages leave nothing to judge by."""
+    """Estimate the covariance from the residual response power; None where there are too few averages."""
     averages, n_inputs = spectra.effective_averages, len(spectra.excitations)
     if averages <= n_inputs + 0.5:
         return None

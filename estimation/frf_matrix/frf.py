@@ -117,7 +117,7 @@ class Frf(Result):
 
     @property
     def laplace(self) -> NDArray[np.complex128]:
-        """Where in the Laplace plane the values stand: ``i w``, with an exponential window ``i w + 1/tau``, rad/s.
+        """Laplace variable of each line, rad/s: ``i w``, or ``i w + 1/tau`` with an exponential window.
 
         Returns
         -------

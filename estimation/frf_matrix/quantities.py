@@ -1,4 +1,4 @@
-"""What an FRF is called and measured in, and its conversion to receptance."""
+"""Name and unit of an FRF's quantity, and its conversion to receptance."""
 
 from collections.abc import Sequence
 from dataclasses import replace

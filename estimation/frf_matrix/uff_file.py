@@ -124,7 +124,7 @@ def _data_set(f: NDArray[np.float64], function: _Function, nodes: Mapping[str, i
 
 
 def _number(value: float, is_frequency: bool) -> str:
-    """In the fields of the format: 13 characters for a frequency beside values, 20 for a value."""
+    """Write a number in the fields of the format: 13 characters for a frequency beside values, 20 for a value."""
     return f"{value:13.7e}" if is_frequency else f"{value:20.11e}"
 
 

@@ -1,4 +1,4 @@
-"""Where the points of a measurement lie and along which directions they are measured: what mode shapes are drawn on."""
+"""Positions and directions of the measured points, on which mode shapes are drawn."""
 
 import lazy_loader
 

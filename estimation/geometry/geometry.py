@@ -69,7 +69,7 @@ class Geometry:
             raise InputError(f"a line goes to node {_some(missing)}, which is not there; add it or take it out")
 
     def position(self, node: str) -> NDArray[np.float64]:
-        """Where a node lies, m, shape (3,).
+        """Give the position of a node, m, shape (3,).
 
         Raises
         ------
@@ -81,7 +81,7 @@ class Geometry:
     def direction(self, degree_of_freedom: str) -> NDArray[np.float64]:
         """Unit vector of a degree of freedom such as ``12:-X`` in the structure's own axes, shape (3,).
 
-        Of a rotation it is the axis, right-handed.
+        For a rotation it gives the axis, right-handed.
 
         Raises
         ------

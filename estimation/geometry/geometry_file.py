@@ -47,7 +47,7 @@ def read_geometry(path: str | os.PathLike[str]) -> Geometry:
 
 
 def import_geometry(path: str | os.PathLike[str]) -> tuple[Geometry, tuple[str, ...]]:
-    """As :func:`read_geometry`, and one sentence for each thing that the file leaves open.
+    """Read a geometry as :func:`read_geometry` does, and state each thing that the file leaves open.
 
     Raises
     ------

@@ -125,7 +125,7 @@ def _rings(answers: LateAnswers) -> NDArray[np.bool_]:
 
 
 def _answers(answers: LateAnswers) -> NDArray[np.bool_]:
-    """Where what is late answers the taps and is no hum.
+    """Say on which lines the late signal is a response to the taps and no hum.
 
     It follows the force from tap to tap, or it falls, or it was not there before the first tap. Of a single tap in a
     recording without a quiet time before it, nothing can be told.
@@ -137,7 +137,7 @@ def _answers(answers: LateAnswers) -> NDArray[np.bool_]:
 
 
 def _stands_out(power: Real, n_taps: int) -> NDArray[np.bool_]:
-    """Where a power exceeds that of the lines around, as noise does by chance on one line of a million only."""
+    """Say where a power exceeds that of the lines around by more than noise does on one line of a million."""
     if not n_taps:
         return np.zeros(power.shape, dtype=bool)
     around = median_filter(power, size=(min(_AROUND, len(power)), 1), mode="nearest")

@@ -55,7 +55,7 @@ class LateAnswers:
 
 
 def late_answers(found: Sequence[FoundTaps], settings: TapSettings) -> list[LateAnswers]:
-    """Of each point hit and set of responses.
+    """Average the late responses for each point that was hit and each set of responses.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ class _Sums:
             self._n_rest += 1
 
     def average(self, places: tuple[str, ...]) -> LateAnswers:
-        """For one tap."""
+        """Give the powers for one tap."""
         both = self._last * self._force[:, None]
         coherence = np.abs(self._cross) ** 2 / np.where(both > 0, both, 1.0)
         return LateAnswers(

@@ -1,4 +1,4 @@
-"""Which points were hit and measured in which test: labels of the matrix, signs, and what belongs together."""
+"""Points that were hit and measured in each test: labels of the matrix, signs, and which tests belong together."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -102,11 +102,11 @@ class FoundTaps:
 
     @property
     def used(self) -> tuple[JudgedTap, ...]:
-        """Those that no reason speaks against."""
+        """The taps against which there is no reason."""
         return tuple(tap for tap in self.taps if not tap.reason)
 
     def time(self, tap: JudgedTap) -> float:
-        """Of a tap, s, on the recording's axis."""
+        """Give the time of a tap on the recording's axis, s."""
         return self.start_time + tap.tap.time
 
 

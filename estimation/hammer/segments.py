@@ -1,4 +1,4 @@
-"""Where a tap's segment begins and ends, and which taps have room for one."""
+"""Begin and end of a tap's segment, and which taps have room for one."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -52,7 +52,7 @@ class TapSettings:
 
     @property
     def duration(self) -> float:
-        """Of a segment, s."""
+        """Duration of a segment, s."""
         return self.length / self.sample_rate
 
 

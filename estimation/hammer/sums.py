@@ -146,7 +146,7 @@ def _windows(settings: TapSettings, n_forces: int, n_responses: int) -> Real:
 
 
 def _correction(channel: Channel, s: Complex) -> Complex:
-    """What a channel's lines are multiplied by: its delay undone, and a response's first-order high-pass."""
+    """Give the factor for a channel's lines: it undoes the delay, and a response's first-order high-pass."""
     factor = np.exp(s * (channel.input_delay_s or 0.0))
     if channel.high_pass_hz and channel.quantity != "force":
         factor = factor * before_high_pass(s, [channel.high_pass_hz])[:, 0]

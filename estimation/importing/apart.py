@@ -24,7 +24,7 @@ _ASKED = 'write unit = "m/s^2/N" (or m/N, m/s/N, g/N ...) under [frf]'
 
 @dataclass(frozen=True)
 class Parts:
-    """Where the parts of one FRF lie, and how its numbers are to be read."""
+    """Places of the parts of one FRF, and how its numbers are read."""
 
     source: FrfSource
     places: Mapping[str, int | str]

@@ -1,4 +1,4 @@
-"""Which column of a table is which part of an FRF, where its headings leave no doubt."""
+"""Roles of the columns of a table, where its headings leave no doubt."""
 
 import re
 from collections.abc import Mapping

@@ -149,7 +149,7 @@ def _require_all(
 
 
 def _without_line_at_zero(f: Real, values: Complex) -> NDArray[np.bool_]:
-    """At 0 Hz analysers divide 0 by 0; a value that is not finite there is no damage."""
+    """Drop a value at 0 Hz that is not finite: analysers divide 0 by 0 there, so it is no damage."""
     return np.asarray((f == 0) & ~np.isfinite(values).all(axis=(1, 2)))
 
 

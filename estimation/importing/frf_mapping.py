@@ -61,7 +61,7 @@ Label = Annotated[str, AfterValidator(lambda label: expanded((label,))[0])]
 
 
 class FrfParts(BaseModel):
-    """Where the numbers lie: complex ``values``, or ``real`` and ``imaginary``, or ``magnitude`` and ``phase``."""
+    """Places of the numbers: complex ``values``, or ``real`` and ``imaginary``, or ``magnitude`` and ``phase``."""
 
     model_config = _STRICT
     values: Place | PlaceList | None = None

@@ -48,7 +48,7 @@ def single_frfs(mapping: FrfMapping) -> tuple[OneFrf, ...]:
 
 
 def _implied(mapping: FrfMapping) -> EntryMapping:
-    """Without entries one of the two ends is the same for all FRFs of a list."""
+    """Give the end that is the same for all FRFs of a list, where the mapping has no entries."""
     table = mapping.frf
     if len(table.excitations) == 1:
         return EntryMapping(excitation=table.excitations[0])

@@ -23,7 +23,7 @@ _COLUMN = re.compile(r"(?P<name>.+)\[(?P<column>\d+)\]")
 
 
 class FrfSource(Protocol):
-    """What entries and matrices are taken from."""
+    """A file from which entries and matrices are read."""
 
     @property
     def path(self) -> Path:

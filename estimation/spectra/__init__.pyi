@@ -1,5 +1,6 @@
 from .coherence import input_coherence, multiple_coherence, partial_coherence, principal_inputs, virtual_coherence
 from .independence import RANK_TOLERANCE, InputIndependence, bands_text, independent_lines, input_independence
+from .judging_spectra import spectra_for_judging
 from .order_tracking import excitation_map, spectrogram, track_order
 from .recording_spectra import EXCITING, RESPONDING, choose_channels, cross_spectra
 from .spectral_accumulator import SpectralAccumulator
@@ -31,6 +32,7 @@ __all__ = [
     "partial_coherence",
     "principal_inputs",
     "settings_for",
+    "spectra_for_judging",
     "spectrogram",
     "sum_tests",
     "track_order",

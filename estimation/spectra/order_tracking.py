@@ -94,7 +94,7 @@ def track_order(samples: Real, angle: Real, order: float, periods: float = 20.0)
 
 
 def excitation_map(tests: Sequence[CrossSpectra], share: float = 1e-3) -> NDArray[np.bool_]:
-    """Which test drove which line: total input power above ``share`` of the largest over all tests and lines.
+    """Show which test drove which line: total input power above ``share`` of the largest over all tests and lines.
 
     Each input counts by its share of its own largest power, so that units do not matter.
 

@@ -1,4 +1,4 @@
-"""Which samples can be trusted: overload, clipping and dropped buffers, found before spectra are averaged."""
+"""Samples that can be trusted: overload, clipping and dropped buffers are found before spectra are averaged."""
 
 from collections.abc import Sequence
 

@@ -1,14 +1,5 @@
 """Figures of cuts: stability lobes, and spectra of cuts that were judged."""
 
-from .chatter import ShownCut, chatter_figure
-from .lobes import LobesBand, TriedCut, lobes_figure
-from .lobes_axes import draw_lobes
+import lazy_loader
 
-__all__ = [
-    "LobesBand",
-    "ShownCut",
-    "TriedCut",
-    "chatter_figure",
-    "draw_lobes",
-    "lobes_figure",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -14,7 +14,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 BINS = 180
-"""Of a turn of the spindle."""
+"""Number of parts of a turn of the spindle over which forces are averaged."""
 
 
 def cut_turn_figure(found: CutDiagnosis) -> Figure:
@@ -69,7 +69,7 @@ def cut_orders_figure(found: CutDiagnosis) -> Figure:
 
 
 def shown_fit(found: CutDiagnosis) -> CutFit:
-    """What the improved cutting file stands for."""
+    """Give the fit that the improved cutting file stands for."""
     return found.details.final
 
 

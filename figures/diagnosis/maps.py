@@ -1,4 +1,4 @@
-"""Where the residual sits: frequency x channel of each recording, and time x frequency, before and after."""
+"""Maps of the residual: frequency x channel of each recording, and time x frequency, before and after."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ Real = NDArray[np.float64]
 SHADES = "Greys"
 STAGES = ("Nominal model, refitted", "Final model")
 LEAST_TOP = 10.0
-"""Of the scale: less than ten times the noise is no black."""
+"""Least upper end of the scale: less than ten times the noise is not drawn black."""
 
 
 def channel_map_figure(view: ResidualView, significant: NDArray[np.bool_]) -> Figure:

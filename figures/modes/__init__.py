@@ -1,18 +1,5 @@
 """Figures of modal models: vectors, shapes, stabilisation charts, indicators and synthesis."""
 
-from .indicators import indicator_figure
-from .mode import mode_figure
-from .model_axes import draw_model
-from .shapes import assurance_figure, compass_figure
-from .stabilisation import stabilisation_figure
-from .synthesis import synthesis_figure
+import lazy_loader
 
-__all__ = [
-    "assurance_figure",
-    "compass_figure",
-    "draw_model",
-    "indicator_figure",
-    "mode_figure",
-    "stabilisation_figure",
-    "synthesis_figure",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

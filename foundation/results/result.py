@@ -25,7 +25,7 @@ class Result:
         return self._summary().html()
 
     def _summary(self) -> Summary:
-        """What matters of this result.
+        """Give the few facts that matter of this result.
 
         Raises
         ------

@@ -15,7 +15,7 @@ _CELL = "text-align:left;padding:1px 10px 1px 0"
 
 @dataclass(frozen=True)
 class Summary:
-    """What matters of a result.
+    """The few facts that matter of a result.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Summary:
     rows: tuple[tuple[str, ...], ...] = ()
 
     def text(self) -> str:
-        """At most four lines of text."""
+        """Write at most four lines of text."""
         return "\n  ".join((self.headline, *self.lines)[:MOST_LINES])
 
     def html(self) -> str:
@@ -74,3 +74,17 @@ def counted(number: int, thing: str) -> str:
     ('1 mode', '3 modes')
     """
     return f"{number} {thing}" + ("" if number == 1 else "s")
+
+
+def doubts_line(warnings: Sequence[str]) -> tuple[str, ...]:
+    """A line with the number of warnings and the first one, cut at 100 characters; empty where there is none.
+
+    Examples
+    --------
+    >>> doubts_line(["the force is small"])
+    ('1 warning: the force is small',)
+    """
+    if not warnings:
+        return ()
+    first = warnings[0] if len(warnings[0]) <= 100 else f"{warnings[0][:97]}..."
+    return (f"{counted(len(warnings), 'warning')}: {first}",)

@@ -1,5 +1,6 @@
 from .converting import FRF_SUFFIXES, convert_files, is_frf_conversion, is_uff_conversion
 from .cuts import (
+    CERTIFIED,
     LOBE_METHODS,
     CutOptions,
     KeptCut,
@@ -18,12 +19,13 @@ from .cuts import (
 )
 from .estimating import LOCAL, Estimate, EstimateOptions, estimate_recordings, spectra_of_tests, write_estimate
 from .fitting import (
+    METHODS,
+    POLYREFERENCE,
     SUBSPACE,
     FitOptions,
     calibrate_model,
     chart_from_json,
     check_candidates,
-    fit_files,
     fit_model,
     fit_recordings,
     picked_in_words,
@@ -42,12 +44,15 @@ from .measuring import (
     plan_tables,
     preflight,
 )
-from .predict import predict_file
+from .predict import Predicted, predict_recording, prediction_lines, write_prediction
 
 __all__ = [
+    "CERTIFIED",
     "FRF_SUFFIXES",
     "LOBE_METHODS",
     "LOCAL",
+    "METHODS",
+    "POLYREFERENCE",
     "SUBSPACE",
     "CutOptions",
     "Estimate",
@@ -55,6 +60,7 @@ __all__ = [
     "FitOptions",
     "KeptCut",
     "OpenedSession",
+    "Predicted",
     "Tally",
     "acquire",
     "acquire_live",
@@ -65,7 +71,6 @@ __all__ = [
     "convert_files",
     "doubts_of_cuts",
     "estimate_recordings",
-    "fit_files",
     "fit_model",
     "fit_recordings",
     "is_frf_conversion",
@@ -79,7 +84,8 @@ __all__ = [
     "picked_in_words",
     "plan_from_file",
     "plan_tables",
-    "predict_file",
+    "predict_recording",
+    "prediction_lines",
     "preflight",
     "read_cuts",
     "spectra_of_tests",
@@ -92,4 +98,5 @@ __all__ = [
     "write_cuts",
     "write_estimate",
     "write_fit",
+    "write_prediction",
 ]

@@ -79,7 +79,7 @@ def _record(opened: object, out: Path) -> None:
 
 
 def _say(line: str) -> None:
-    """At once, also into a pipe: somebody waits for the address."""
+    """Print at once, also into a pipe: somebody waits for the address."""
     print(line, flush=True)
 
 

@@ -15,15 +15,13 @@ def calibrate(
     out: Output,
 ) -> None:
     """Carry an in-process model from the sensor to the tool tip by two hammer FRFs."""
-    from estimation import read_frf
-    from modal_fit import read_modal_model
-
-    from ..chain import calibrate_model, write_calibration
+    from ..chain import write_calibration
+    from ..face import calibrate as calibrate_to_tip
     from ..progress import bar
     from ..tables import mode_table, show
 
     check_output(out, (".json",), [model, tip, sensor])
-    result = calibrate_model(read_modal_model(model), read_frf(tip), read_frf(sensor), bar, (tip.name, sensor.name))
+    result = calibrate_to_tip(model, tip, sensor, progress=bar)
     write_calibration(out, result, [model, tip, sensor])
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)

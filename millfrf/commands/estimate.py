@@ -43,17 +43,27 @@ def estimate(
     and, by feedback, the force; --instrument names what it does not reach. local-polynomial: whole records instead of
     segments, without leakage, for short records and forces that are rough in frequency.
     """
-    from ..chain import EstimateOptions, estimate_recordings, write_estimate
+    from ..chain import write_estimate
+    from ..face import estimate as estimate_frf
     from ..progress import bar
 
     check_output(out, (".h5", ".hdf5"), recordings)
-    channels = (names(excitation), names(response))
-    kept = check_band(band)
-    estimator = estimator.replace("_", "-")
-    given = (segment, overlap, window, stack, *channels, kept, stream, estimator, exclude, names(instrument))
-    options = EstimateOptions(*given)
-    result = estimate_recordings(recordings, options, bar)
-    write_estimate(out, result, recordings, options)
+    result = estimate_frf(
+        *recordings,
+        segment=segment,
+        overlap=overlap,
+        window=window,
+        stack=stack,
+        excitations=names(excitation),
+        responses=names(response),
+        band=check_band(band),
+        stream=stream,
+        estimator=estimator.replace("_", "-"),
+        exclude=exclude,
+        instruments=names(instrument),
+        progress=bar,
+    )
+    write_estimate(out, result, recordings)
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)
     frf = result.frf

@@ -41,7 +41,16 @@ def fit(
     """
     from modal_fit import ModalFit
 
-    from ..chain import FitOptions, check_candidates, fit_files, picked_in_words, write_candidates, write_fit
+    from ..chain import (
+        POLYREFERENCE,
+        SUBSPACE,
+        FitOptions,
+        check_candidates,
+        picked_in_words,
+        write_candidates,
+        write_fit,
+    )
+    from ..face import fit as fit_model
     from ..progress import bar
     from ..tables import error_table, mode_table, show
 
@@ -51,8 +60,22 @@ def fit(
     check_band(band)
     if modes is not None and modes < 1:
         raise InputError(f"--modes {modes}: give 1 or more, or leave it out to keep all that are found")
-    given = (max_order, modes, names(excitation), names(response), stream, poles, refine)
-    result, used = fit_files(files, method, lambda chosen: FitOptions(band, chosen, *given), bar)
+    channels = (names(excitation), names(response))
+    result = fit_model(
+        *files,
+        band=band,
+        method=method,
+        max_order=max_order,
+        modes=modes,
+        excitations=channels[0],
+        responses=channels[1],
+        stream=stream,
+        poles=poles,
+        refine=refine,
+        progress=bar,
+    )
+    used_method = POLYREFERENCE if isinstance(result, ModalFit) else SUBSPACE
+    used = FitOptions(band, used_method, max_order, modes, *channels, stream, poles, refine)
     write_fit(out, result, files, used)
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)

@@ -1,12 +1,9 @@
 """`millfrf lobes`: depth limit over spindle speed."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
-
-from foundation import InputError
 
 from ..options import Output, check_output
 
@@ -29,38 +26,22 @@ def lobes(
     ] = "certified",
 ) -> None:
     """Stability lobes from a modal model or straight from a measured FRF."""
-    from estimation import read_frf
-    from modal_fit import ModalModel, read_modal_model
+    from cutting import read_cutting_process
+    from modal_fit import read_modal_model
     from stability import write_lobes
 
-    from ..chain import compute_lobes, lobes_summary, mode_coupling_line, speed_axis
-    from ..file_kinds import FRF, MODEL, kind_of
-    from ..gate import (
-        check_depth,
-        check_speeds,
-        lowest_frequency,
-        read_checked_cutting,
-        rigid_directions,
-        stored_doubts,
-    )
+    from ..chain import lobes_summary, mode_coupling_line
+    from ..face import lobes as lobes_of
+    from ..file_kinds import MODEL, kind_of
     from ..progress import bar
     from ..provenance import of_lobes
 
     check_output(out, (".csv",))
-    kind = kind_of(dynamics)
-    if kind not in (FRF, MODEL):
-        raise InputError(f"{dynamics} is a file of {kind}; lobes need a modal model or an FRF at the tool tip")
-    process, doubts = read_checked_cutting(cutting)
-    known = read_frf(dynamics) if kind == FRF else read_modal_model(dynamics)
-    doubts += [*check_depth(max_depth, process), *rigid_directions(known)]
-    mode = lowest_frequency(known.natural_frequencies) if isinstance(known, ModalModel) else None
-    doubts += check_speeds(speeds, process, mode)
-    result = compute_lobes(known, process, speed_axis(*speeds), max_depth, method, bar, dynamics.name)
-    result = replace(result, warnings=(*stored_doubts(dynamics), *doubts, *result.warnings))
+    result = lobes_of(dynamics, cutting, speeds=speeds, max_depth=max_depth, method=method, progress=bar)
     asked = {"speeds_rpm": speeds, "max_depth_m": max_depth, "method": method}
     write_lobes(out, result, provenance=of_lobes([dynamics, cutting], asked))
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)
     typer.echo(f"wrote {out}: {lobes_summary(result, max_depth)}")
-    if kind == MODEL:
-        typer.echo(mode_coupling_line(read_modal_model(dynamics), process, max_depth))
+    if kind_of(dynamics) == MODEL:
+        typer.echo(mode_coupling_line(read_modal_model(dynamics), read_cutting_process(cutting), max_depth))

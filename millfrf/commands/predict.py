@@ -15,8 +15,14 @@ def predict(
     stream: Annotated[str | None, typer.Option("--stream", help="Sample clock.")] = None,
 ) -> None:
     """Simulate a recording's forces through a model; print how far measured responses are off."""
-    from ..chain import predict_file
+    from ..chain import prediction_lines, write_prediction
+    from ..face import predict as predict_responses
 
     check_output(out, (".h5",), [recording])
-    for line in predict_file(model, recording, out, stream=stream):
-        typer.echo(line, err=line.startswith("warning: "))
+    found = predict_responses(model, recording, stream=stream)
+    write_prediction(out, found, model, recording)
+    for warning in found.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    for line in prediction_lines(found):
+        typer.echo(line)
+    typer.echo(f"wrote {out}")

@@ -50,30 +50,32 @@ def tap(
     one point are averaged; files that hit or measure different points become columns and rows of one matrix. Which
     point was hit is taken from --points, --point, the recording's set-up, or the force channel.
     """
+    from ..face import tap as frf_of_taps
     from ..progress import bar
     from ..tables import show
-    from ..taps import TapOptions, tap_recordings, tap_tables, write_taps
+    from ..taps import tap_tables, write_taps
 
     check_output(out, (".h5", ".hdf5"), [*recordings, *([points] if points else [])])
-    options = TapOptions(
-        segment,
-        pre_trigger,
-        force_window,
-        exponential,
-        point,
-        points,
-        names(excitation),
-        names(response),
-        check_band(band),
-        stream,
+    result = frf_of_taps(
+        *recordings,
+        point=point,
+        points=points,
+        segment=segment,
+        pre_trigger=pre_trigger,
+        force_window=force_window,
+        exponential=exponential,
+        excitations=names(excitation),
+        responses=names(response),
+        band=check_band(band),
+        stream=stream,
+        progress=bar,
     )
-    result = tap_recordings(recordings, options, bar)
-    write_taps(out, result, recordings, options)
+    write_taps(out, result, recordings)
     for table in tap_tables(result):
         show(table)
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)
-    frf, tau = result.merged.frf, result.settings.time_constant
+    frf, tau = result.frf, result.settings.time_constant
     window = "" if tau is None else f"; exponential window of {tau:.4g} s, whose damping the fit takes off"
     known = "no common band" if frf.band is None else f"band {frf.band[0]:.4g} to {frf.band[1]:.4g} Hz"
     typer.echo(

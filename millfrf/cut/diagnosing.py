@@ -1,4 +1,4 @@
-"""From a cutting file and recordings of the cut to a folder with the diagnosis, the improved file and a report."""
+"""The step from a cutting file and recordings of the cut to a diagnosis, the improved file and a report."""
 
 import math
 from collections.abc import Sequence

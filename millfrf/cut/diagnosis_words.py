@@ -33,7 +33,7 @@ def summary(found: CutDiagnosis) -> list[str]:
 
 
 def what_is_left(found: CutDiagnosis) -> str:
-    """What stands out of noise in the force that is shown, beside what may stand out."""
+    """State the part of the force that stands out of noise, beside the part that may stand out."""
     return (
         f"left: {100 * found.leftover:.2g} % of the residual's power stands out of noise and usual error; "
         f"none and explained: at most {100 * found.details.settings.verdict.noise_like:g} %"

@@ -147,7 +147,7 @@ def _tap(robot: ModalModel, path: Path, options: ConcealOptions, seed: int, prog
     sensors = dynamometer(options.noise, 2000.0) + tip_accelerometers(options.noise, high_pass_hz=None)
     taps = _record(HammerCell(robot, sample_rate=TAP_RATE, sensors=sensors, seed=seed), path, progress)
     estimate = estimate_recordings([taps], TAPS, progress)
-    write_estimate(options.out / "frf_taps.h5", estimate, [taps], TAPS)
+    write_estimate(options.out / "frf_taps.h5", estimate, [taps])
     nominal = options.out / "nominal.json"
     fit = fit_model(estimate.frf, TAP_FIT, progress)
     fit = replace(fit, model=replace(fit.model, residuals=None))

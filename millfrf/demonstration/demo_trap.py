@@ -28,7 +28,7 @@ BELOW = 0.9
 
 @dataclass(frozen=True)
 class Trap:
-    """What was said of the cut, and what became of it in time on the true robot.
+    """A cut that zero-order calls stable, and its course in time on the true robot.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ PADDED = 4096
 
 @dataclass(frozen=True)
 class Seal:
-    """What closes and opens a sealed file: a one-time pad and the fingerprint of what lies under it.
+    """Key and fingerprint that close and open a sealed file: a one-time pad, and a hash of the content.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Seal:
     fingerprint: str
 
     def __repr__(self) -> str:
-        """Without the key."""
+        """Show the seal without its key."""
         return f"Seal({self.path}, {self.fingerprint})"
 
 

@@ -102,7 +102,7 @@ class DemoOptions:
 
 @dataclass(frozen=True)
 class DemoResult:
-    """What the chain found, beside the truth.
+    """Results of the chain, beside the truth.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def _error(found: float, true: float) -> str:
 
 
 def nearest_modes(result: DemoResult) -> tuple[tuple[int, int], ...]:
-    """For each true mode inside the fitted band, the identified mode nearest to it in the complex plane."""
+    """Give, for each true mode inside the fitted band, the identified mode nearest to it in the complex plane."""
     inside = [r for r, f in enumerate(result.true.natural_frequencies) if FIT_BAND[0] < f < FIT_BAND[1]]
     return tuple((r, int(np.argmin(np.abs(result.identified.poles - result.true.poles[r])))) for r in inside)
 
@@ -257,7 +257,7 @@ def _record(source: Source, path: Path, progress: Progress) -> Path:
 
 def _estimate(path: Path, recordings: list[Path], options: EstimateOptions, progress: Progress) -> Frf:
     estimate = estimate_recordings(recordings, options, progress)
-    write_estimate(path, estimate, recordings, options)
+    write_estimate(path, estimate, recordings)
     return estimate.frf
 
 

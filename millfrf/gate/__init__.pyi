@@ -4,7 +4,7 @@ from .cut_statements import check_one_speed, stated_cut
 from .cutting_data import check_cutting, read_checked_cutting
 from .frfs import check_frf, check_frf_for_fit
 from .hammer import check_tap_recordings, check_taps_found, check_taps_used, check_window_damping, doubts_of_taps
-from .inputs import check_inputs, check_records, driven_lines
+from .inputs import check_band_recordings, check_inputs, driven_lines
 from .lobes_band import check_band_of_lobes
 from .local_lines import check_local_frf
 from .looking import doubts_of
@@ -27,6 +27,7 @@ __all__ = [
     "Given",
     "Segmentation",
     "check_band_of_lobes",
+    "check_band_recordings",
     "check_belonging",
     "check_channels",
     "check_cutting",
@@ -43,7 +44,6 @@ __all__ = [
     "check_one_speed",
     "check_reciprocity",
     "check_recordings",
-    "check_records",
     "check_sample_rates",
     "check_scales",
     "check_speed",

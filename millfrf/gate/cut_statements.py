@@ -1,4 +1,4 @@
-"""What a recording states of its cut, held against what was typed: speed, teeth, a sweep where one speed is due."""
+"""Statements of a recording about its cut, compared with what was typed: speed, teeth, a sweep."""
 
 import math
 import tomllib

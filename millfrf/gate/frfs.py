@@ -58,7 +58,7 @@ def check_frf(frf: Frf, name: str = "the FRF") -> list[str]:
 
 
 def check_frf_for_fit(frf: Frf, band: Band, name: str = "the FRF") -> list[str]:
-    """As :func:`check_frf`, and whether the fit's band (Hz) lies in that of the FRF.
+    """Judge an FRF as :func:`check_frf` does, and whether the fit's band (Hz) lies in that of the FRF.
 
     Returns
     -------

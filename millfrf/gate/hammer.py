@@ -112,7 +112,7 @@ def _remedy(reason: str) -> str:
 
 
 def doubts_of_taps(merged: MergedTaps, found: Sequence[FoundTaps], settings: TapSettings, decay: Decay) -> list[str]:
-    """What lets one doubt an FRF of hammer tests, one sentence each."""
+    """Give the doubts about an FRF of hammer tests, one sentence each."""
     return [
         *_of_averages(merged.frf),
         *_of_ringing(settings, decay),

@@ -59,7 +59,7 @@ def incoherence_doubts(frf: Frf) -> list[str]:
 
 
 def _coherence(frf: Frf) -> Real | None:
-    """Of each entry, (n_frequencies, n_responses, n_excitations): multiple coherence, else that of the entries."""
+    """Give the coherence of each entry, (n_frequencies, n_responses, n_excitations): multiple, else ordinary."""
     if frf.multiple_coherence is not None:
         return np.broadcast_to(frf.multiple_coherence[:, :, None], frf.values.shape)
     return frf.coherence

@@ -9,10 +9,9 @@ from estimation import (
     RANK_TOLERANCE,
     BandRecording,
     CrossSpectra,
-    SpectralAccumulator,
     bands_text,
     input_independence,
-    settings_for,
+    spectra_for_judging,
     sum_tests,
 )
 from foundation import Band, InputError
@@ -24,9 +23,6 @@ DRIVEN = 1e-4
 
 LEAST_SHARE = 0.5
 """Share of the driven lines on which a fit needs independent inputs; below it the model guesses most of the band."""
-
-LONGEST_SEGMENT = 8.0
-"""Segments of records whose inputs are judged before a fit, s."""
 
 
 def driven_lines(spectra: CrossSpectra) -> NDArray[np.bool_]:
@@ -81,16 +77,16 @@ def check_inputs(total: CrossSpectra, band: Band | None = None, least_share: flo
     return list(judged.warnings)
 
 
-def check_records(
-    records: Sequence[BandRecording], band: Band, names: Sequence[str], rates: Sequence[float]
+def check_band_recordings(
+    recordings: Sequence[BandRecording], band: Band, names: Sequence[str], rates: Sequence[float]
 ) -> list[str]:
-    """Judge the inputs and the sample rates of records that are fitted together.
+    """Judge the inputs and the sample rates of recordings that are fitted together.
 
-    Segments last 8 s, or less where the records are short: so long that each input can have its own segment.
+    Their spectra are those of :func:`estimation.spectra_for_judging`.
 
     Parameters
     ----------
-    records
+    recordings
         Records of one set-up.
     band : Hz
         Lowest and highest frequency of the fit.
@@ -102,19 +98,9 @@ def check_records(
     InputError
         As :func:`check_inputs` and :func:`millfrf.gate.sample_rates.check_sample_rates`.
     """
-    n_inputs = len(records[0].excitations)
-    shortest = min(len(record.force) / record.rate for record in records)
-    seconds = min(LONGEST_SEGMENT, shortest, shortest * len(records) / (2 * n_inputs))
-    tests = [_spectra(record, seconds) for record in records]
+    tests = spectra_for_judging(recordings)
     doubts = check_sample_rates([gain_of(*each) for each in zip(tests, names, rates, strict=True)])
     return doubts + check_inputs(sum_tests(tests), band, LEAST_SHARE)
-
-
-def _spectra(record: BandRecording, seconds: float) -> CrossSpectra:
-    settings = settings_for(record.rate, max(seconds, 8 / record.rate), window="hann")
-    accumulator = SpectralAccumulator(record.excitations, record.responses, record.rate, settings)
-    accumulator.add(record.force, record.response)
-    return accumulator.finish()
 
 
 def _refuse_silent(total: CrossSpectra, inside: NDArray[np.bool_]) -> None:

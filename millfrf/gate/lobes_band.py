@@ -120,7 +120,7 @@ def _moved_from_outside(
 def _sensitivities(
     structure: Frf | ModalModel, process: MillingProcess, lobes: StabilityLobes, chosen: NDArray[np.int64]
 ) -> list[LimitSensitivity | None]:
-    """Of some of the limits; None where a limit has no first order (helix, unequal pitch, another solver's limit)."""
+    """Give sensitivities of some limits; None without a first order (helix, unequal pitch, another solver's limit)."""
     some = replace(
         lobes,
         spindle_speeds=lobes.spindle_speeds[chosen],

@@ -1,4 +1,4 @@
-"""What local polynomials leave to doubt: errors shared by neighbouring lines, and lines with large ones."""
+"""Doubts about local polynomials: errors shared by neighbouring lines, and lines with large ones."""
 
 import numpy as np
 

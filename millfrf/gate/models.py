@@ -70,7 +70,7 @@ def _check_band(model: ModalModel, name: str) -> None:
 
 
 def stored_doubts(path: str | os.PathLike[str]) -> list[str]:
-    """What an FRF's or a model's file says of its making that lets one doubt it, each with the file's name.
+    """Give the doubts stored in an FRF's or a model's file, each with the file's name.
 
     The warnings in its provenance, and a fit that was poor: they go wherever the result goes.
     """
@@ -84,7 +84,7 @@ def stored_doubts(path: str | os.PathLike[str]) -> list[str]:
 
 
 def fit_doubts(chi_square: float | None, error: NDArray[np.float64] | None, said: Sequence[str] = ()) -> list[str]:
-    """What the quality of a fit lets one doubt, one sentence each.
+    """Give the doubts that the quality of a fit raises, one sentence each.
 
     Parameters
     ----------

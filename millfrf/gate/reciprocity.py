@@ -71,7 +71,7 @@ def check_model_reciprocity(model: ModalModel, name: str = "the model") -> list[
 
 
 def plainly_different(pair: ReciprocityPair) -> bool:
-    """Whether a pair differs by more than robots do, and by more than its noise."""
+    """Say whether a pair differs by more than robots do, and by more than its noise."""
     beyond = not pair.difference < BEYOND_NOISE * pair.noise
     opposite = pair.difference > OPPOSITE and pair.correlation > ALIKE
     return beyond and (_over_drive_points(pair) > PLAIN or opposite)

@@ -92,7 +92,7 @@ def check_channels(
     segments: Segmentation | None = None,
     remedy: str = NAME_OTHERS,
 ) -> list[str]:
-    """As :func:`check_recordings`, with the names of exciting and responding channels told by ``chosen``.
+    """Judge recordings as :func:`check_recordings` does; ``chosen`` names exciting and responding channels.
 
     Raises
     ------

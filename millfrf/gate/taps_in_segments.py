@@ -89,7 +89,7 @@ def _harm(cut: Segmentation) -> str:
 
 
 def _tapped(force: NDArray[np.float64], sample_rate: float, seconds: float) -> bool:
-    """Whether a force is a few pulses in quiet."""
+    """Say whether a force is a few pulses in quiet."""
     size = np.abs(force - np.median(force))
     if size.max() <= STANDS_OUT * 1.4826 * np.median(size):
         return False
@@ -100,6 +100,6 @@ def _tapped(force: NDArray[np.float64], sample_rate: float, seconds: float) -> b
 
 
 def _early(times: NDArray[np.float64], duration: float, seconds: float) -> bool:
-    """Whether each tap that lies in a whole segment lies at its beginning."""
+    """Say whether each tap that lies in a whole segment lies at its beginning."""
     whole = times[times < np.floor(duration / seconds) * seconds]
     return bool(((whole % seconds) < EARLY * seconds).all())

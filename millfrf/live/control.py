@@ -1,4 +1,4 @@
-"""What the page's buttons say to the recording: start, stop, mark."""
+"""Commands of the page's buttons to the recording: start, stop, mark."""
 
 import threading
 import time
@@ -67,7 +67,7 @@ class LiveControl:
 
     @property
     def marks(self) -> tuple[Mark, ...]:
-        """Those set so far."""
+        """Marks that were set so far."""
         return tuple(self._marks)
 
     def start(self) -> None:

@@ -1,4 +1,4 @@
-"""Is there enough data? Per frequency band, the share of lines whose FRF is as sure as was planned."""
+"""Amount of data: for each band of frequencies, the share of lines whose FRF is as sure as was planned."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -34,7 +34,7 @@ class BandProgress:
 
     @property
     def enough(self) -> bool:
-        """At least nine tenths of the lines are there."""
+        """Whether at least nine tenths of the lines reach the wanted error."""
         return self.share >= 0.9
 
 

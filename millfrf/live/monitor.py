@@ -117,12 +117,12 @@ class LiveMonitor:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Those shown."""
+        """Channels that are shown."""
         return self.stream.channels
 
     @property
     def seconds(self) -> float:
-        """Of the stream since the start, as far as drawn."""
+        """Time of the stream since the start, as far as it is drawn, s."""
         return self._n_samples / self.stream.sample_rate
 
     def _begin(self) -> None:
@@ -198,7 +198,7 @@ class LiveMonitor:
         return band_progress(frf, self.band, s.n_bands, relative=s.relative_error, absolute=s.absolute_error)
 
     def snapshot(self) -> Snapshot:
-        """What a page shall draw now."""
+        """Give the state that a page draws now."""
         with self._lock:
             times, traces = self._traces.drawn()
             peaks = np.max([size for _, size in self._recent], axis=0) if self._recent else 0 * self._overloads

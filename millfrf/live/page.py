@@ -74,7 +74,7 @@ def _choices(monitor: LiveMonitor) -> tuple[list[str], list[str], list[str]]:
 def _feeder(
     drawings: list[Drawing], status: Any, buttons: tuple[Any, Any, Any], monitor: LiveMonitor, control: LiveControl
 ) -> Any:
-    """What feeds one page; it leaves a beat out where drawing takes longer than half a period."""
+    """Make the function that feeds one page; it leaves a beat out where drawing takes over half a period."""
     rest_until = 0.0
 
     def feed() -> None:

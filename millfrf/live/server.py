@@ -66,7 +66,7 @@ class LiveServer:
 
     @property
     def url(self) -> str:
-        """Where to point a browser."""
+        """Address for a browser."""
         host = f"[{self._address}]" if ":" in self._address else self._address
         return f"http://{host}:{self._server.port}{self._path}"
 

@@ -81,7 +81,7 @@ class LiveSpectra:
             self._accumulator.add(low[:, :n], low[:, n:])
 
     def grown(self) -> GrownSpectra | None:
-        """What came out so far; None before the first segment is full."""
+        """Give the spectra so far; None before the first segment is full."""
         try:
             spectra = self._accumulator.result()
         except InputError:

@@ -44,7 +44,7 @@ class SourceFile:
         return self.path.stem.replace("_", " ").removeprefix("lobes ")
 
     def made_from(self, other: "SourceFile") -> bool:
-        """Whether ``other`` is among the files this one was made from, by its bytes."""
+        """Say whether ``other`` is among the files this one was made from, by its bytes."""
         return any(source.get("sha256") == other.sha256 for source in self.provenance.get("sources", []))
 
 

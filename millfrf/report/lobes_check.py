@@ -67,7 +67,7 @@ class CheckedLobes:
 
     @property
     def wrong(self) -> bool:
-        """Whether any limit of the file differs from the certified one by more than three hundredths."""
+        """Say whether any limit of the file differs from the certified one by more than three hundredths."""
         return bool((np.abs(self.differences) > DIFFERS).any())
 
     @property
@@ -91,7 +91,7 @@ def checked_lobes(collected: Collected) -> tuple[CheckedLobes, ...]:
 
 
 def lobes_warnings(checked: tuple[CheckedLobes, ...], collected: Collected) -> list[str]:
-    """What must be said aloud: limits that are not those of the cut, and files that nothing beside them confirms."""
+    """Warn of limits that are not those of the cut, and of files that nothing beside them confirms."""
     warnings = []
     for one in checked:
         if one.certified is None:

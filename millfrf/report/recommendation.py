@@ -25,7 +25,7 @@ from ..gate import check_band_of_lobes
 from .lobes_check import CheckedLobes
 
 CONFIDENCE, DRIFT = 0.95, 0.02
-"""Of the recommended cut: probability of stability, and relative drift of the spindle's speed."""
+"""Probability of stability, and relative drift of the spindle's speed, of the recommended cut."""
 
 LESS, TIMES = 0.9, 4
 """Share to which a cut that does not settle is lowered, and how often."""
@@ -33,7 +33,7 @@ LESS, TIMES = 0.9, 4
 
 @dataclass(frozen=True)
 class Recommendation:
-    """What a report recommends and why.
+    """The cut that a report recommends, and the reasons.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a report is made of: sections with sentences, tables, figures and parts that fold."""
+"""Parts of a report: sections with sentences, tables, figures and parts that fold."""
 
 from dataclasses import dataclass, replace
 

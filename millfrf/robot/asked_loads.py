@@ -1,4 +1,4 @@
-"""What a user says about loads and errors of a robot's statics, as checked numbers."""
+"""Loads and errors of a robot's statics as a user types them, as checked numbers."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ FURTHEST = 20.0
 
 @dataclass(frozen=True)
 class Loads:
-    """What is carried, and which part of the weight's deflection counts: ``all``, ``change`` or ``none``."""
+    """Payload, and the part of the weight's deflection that counts: ``all``, ``change`` or ``none``."""
 
     payload: Payload
     weight: str = "all"

@@ -1,4 +1,4 @@
-"""What a user says about a posture, as joint values and cutting axes."""
+"""Postures as a user types them, as joint values and cutting axes."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""What the robot commands do: read, compute, print a table, write a file."""
+"""Common steps of the robot commands: read, compute, print a table, write a file."""
 
 import json
 from collections.abc import Sequence

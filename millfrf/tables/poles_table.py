@@ -1,4 +1,4 @@
-"""What a file of picked poles or of candidates holds."""
+"""Tables of a file of picked poles or of candidates."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""From recordings of hammer tests to one FRF file: which point was hit where, taps judged, windows, averages."""
+"""The step from recordings of hammer tests to one FRF file: points, judged taps, windows, averages."""
 
 import lazy_loader
 

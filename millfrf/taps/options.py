@@ -65,7 +65,7 @@ class TapOptions:
 
     @property
     def time_constant(self) -> float | None:
-        """Of the exponential window, s; 0: no such window; None: chosen."""
+        """Time constant of the exponential window, s; 0: no such window; None: it is chosen."""
         return _seconds("--exponential", self.exponential)
 
 

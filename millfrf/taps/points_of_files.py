@@ -1,4 +1,4 @@
-"""Which channels of which recording stand for which points: from a table, an option, or the files themselves."""
+"""Points that the channels of each recording stand for: from a table, an option, or the files themselves."""
 
 import os
 import tomllib

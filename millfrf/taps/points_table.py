@@ -17,7 +17,7 @@ OWN_COLUMNS = ("file", "hit", "from_s", "to_s")
 
 
 class PointRow(BaseModel):
-    """What was hit and measured in one file, or in a part of it.
+    """Points that were hit and measured in one file, or in a part of it.
 
     Parameters
     ----------

@@ -1,12 +1,14 @@
-"""From recordings of hammer tests to an FRF: one step after the other."""
+"""The step from recordings of hammer tests to an FRF: one part after the other."""
 
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from estimation import (
     Decay,
     FoundTaps,
+    Frf,
     MergedTaps,
     TapSettings,
     TapSums,
@@ -20,16 +22,19 @@ from estimation import (
     tap_sums,
     window_for,
 )
-from foundation import Band, InputError
+from foundation import Band, InputError, Result, Summary, counted, doubts_line
 
 from ..gate import check_tap_recordings, check_taps_found, check_taps_used, doubts_of_taps
 from ..progress import Progress, silent
 from .options import TapOptions
 from .points_of_files import tests_of
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
-@dataclass(frozen=True)
-class TapResult:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TapResult(Result):
     """An FRF of hammer tests with what it was made from.
 
     Parameters
@@ -44,6 +49,8 @@ class TapResult:
         What was left of the answers at the segments' ends, before the exponential window.
     warnings
         One sentence each.
+    options
+        How the recordings were turned into the FRF.
     """
 
     merged: MergedTaps
@@ -51,6 +58,30 @@ class TapResult:
     settings: TapSettings
     decay: Decay
     warnings: tuple[str, ...]
+    options: TapOptions
+
+    @property
+    def frf(self) -> Frf:
+        """The FRF matrix, with coherence and averages of each entry."""
+        return self.merged.frf
+
+    def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
+        """Draw entries of the FRF and return the axes; see :func:`figures.draw_frf` for the choices."""
+        return self.frf.plot(axes, **choices)
+
+    def _summary(self) -> Summary:
+        frf, used = self.frf, sum(len(each.used) for each in self.found)
+        shape = f"{counted(len(frf.responses), 'response')} x {counted(len(frf.excitations), 'excitation')}"
+        rows = tuple((each.test.path.name, str(len(each.taps)), str(len(each.used))) for each in self.found)
+        return Summary(
+            f"TapResult: {used} of {counted(sum(len(each.taps) for each in self.found), 'tap')} used, {shape}",
+            (
+                f"frf: {frf.quantity} in {frf.unit}, {counted(len(frf.frequencies), 'line')}",
+                *doubts_line(self.warnings),
+            ),
+            ("recording", "taps", "used"),
+            rows,
+        )
 
 
 def tap_recordings(
@@ -82,7 +113,7 @@ def tap_recordings(
     settings = replace(settings, time_constant=window_for(decay.left, settings) if asked is None else asked or None)
     merged = merge_taps(_sums(found, settings, options.band, progress), settings.time_constant)
     doubts += doubts_of_taps(merged, found, settings, decay)
-    return TapResult(merged, tuple(found), settings, decay, tuple(dict.fromkeys(doubts)))
+    return TapResult(merged, tuple(found), settings, decay, tuple(dict.fromkeys(doubts)), options)
 
 
 def _found(tests: Sequence[TapTest], progress: Progress) -> list[FoundTaps]:

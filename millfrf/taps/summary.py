@@ -1,4 +1,4 @@
-"""What became of the taps, as tables: used and left out in each file, averages and band of each point hit."""
+"""Tables of the taps: used and left out in each file, averages and band of each point hit."""
 
 from collections.abc import Sequence
 

@@ -8,7 +8,6 @@ from dataclasses import asdict
 from estimation import FoundTaps, write_frf
 
 from ..provenance import sources, versions
-from .options import TapOptions
 from .run import TapResult
 
 
@@ -16,9 +15,9 @@ def write_taps(
     path: str | os.PathLike[str],
     result: TapResult,
     recordings: Sequence[str | os.PathLike[str]],
-    options: TapOptions,
 ) -> None:
     """Write the FRF whole, with each tap that was found and why it was left out."""
+    options = result.options
     used = sum(len(each.used) for each in result.found)
     tables = [] if options.points is None else [options.points]
     provenance = {

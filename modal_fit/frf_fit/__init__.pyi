@@ -1,4 +1,5 @@
-from .fit import NOT_REFINED, REFINED, MatrixFit, fit_matrix
+from .fit import fit_matrix
+from .matrix_fit import NOT_REFINED, REFINED, MatrixFit
 from .mode_selection import default_order
 from .picked import fit_picked
 

@@ -1,11 +1,11 @@
-"""From whitened modes back to a `ModalModel`, with the covariance of poles and vectors."""
+"""The step from whitened modes back to a `ModalModel`, with the covariance of poles and vectors."""
 
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import Frf
+from estimation import Frf, FrfCovariance
 
 from ..models import ModalModel, ModeErrors, residuals_with_poles
 from .variable_projection import Elimination, MeasuredLines, Modes, Real, derivatives
@@ -63,6 +63,27 @@ def modal_model(
     )
 
 
+def exchanged_axes(frf: Frf) -> Frf:
+    """The transposed FRF matrix: responses and excitations change places.
+
+    Parameters
+    ----------
+    frf
+        The measured FRF matrix.
+    """
+    covariance = frf.covariance
+    return replace(
+        frf,
+        values=frf.values.transpose(0, 2, 1),
+        responses=frf.excitations,
+        excitations=frf.responses,
+        multiple_coherence=None,
+        coherence=None if frf.coherence is None else frf.coherence.transpose(0, 2, 1),
+        averages=None if frf.averages is None else frf.averages.T,
+        covariance=None if covariance is None else FrfCovariance(covariance.excitation, covariance.response),
+    )
+
+
 def transposed(model: ModalModel) -> ModalModel:
     """The model with responses and excitations exchanged."""
     residuals = model.residuals
@@ -90,7 +111,7 @@ def transposed(model: ModalModel) -> ModalModel:
 def _covariance(
     modes: Modes, found: Elimination, lines: MeasuredLines, unknowns: Real, scale: float, back: Real
 ) -> Real:
-    """Of Re poles, Im poles, Re right, Im right, Re left, Im left, each mode by mode."""
+    """Give the covariance of Re poles, Im poles, Re right, Im right, Re left, Im left, each mode by mode."""
     n, n_responses = len(modes.poles), lines.values.shape[2]
     turned = _right_by_unknowns(modes, found, lines)  # (2n, n_responses, n_unknowns): real parts, then imaginary
     turned = np.einsum("up,apz->auz", back, turned)
@@ -142,7 +163,7 @@ def _widened(covariance: Real, modes: Modes, errors: ModeErrors) -> Real:
 
 
 def _sorting_index(modes: Modes, found: Elimination, order: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Where each parameter of the sorted model stands in the unsorted one."""
+    """Give the place in the unsorted model of each parameter of the sorted one."""
     n = len(order)
     pieces, first = [], 0
     for width in (1, found.error.shape[1], modes.left.shape[1]):

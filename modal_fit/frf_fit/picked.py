@@ -10,12 +10,13 @@ from estimation import Frf
 
 from ..models import ModeErrors
 from ..stabilisation import StabilisationChart
-from .assembly import modal_model, transposed
-from .fit import _STEPS, _TOLERANCE, REFINED, MatrixFit, _exchanged, _line_weights, _weighted
+from .assembly import exchanged_axes, modal_model, transposed
+from .matrix_fit import REFINED, STEPS, TOLERANCE, MatrixFit
 from .mode_selection import candidates
 from .spread import mode_errors, unknowns_covariance
 from .variable_projection import Complex, Elimination, MeasuredLines, Modes, Refined, eliminate, participations
 from .variable_projection import refine as refine_modes
+from .weighting import line_weights, weighted_lines
 
 KEPT = "picked poles"
 
@@ -46,18 +47,18 @@ def fit_picked(
 def _picked(
     frf: Frf, inside: NDArray[np.bool_], band: tuple[float, float], max_order: int, poles: Complex, *, refine: bool
 ) -> MatrixFit:
-    """On the side with more responses."""
+    """Fit picked poles on the side with more responses."""
     if len(frf.excitations) > len(frf.responses):
-        turned = _picked(_exchanged(frf), inside, band, max_order, poles, refine=refine)
+        turned = _picked(exchanged_axes(frf), inside, band, max_order, poles, refine=refine)
         return replace(turned, model=transposed(turned.model))
-    chart, _ = candidates(frf, band, max_order, _line_weights(frf, inside))
-    lines, reweigh = _weighted(frf, inside, band)
+    chart, _ = candidates(frf, band, max_order, line_weights(frf, inside))
+    lines, reweigh = weighted_lines(frf, inside, band)
     modes = Modes(poles, participations(poles, lines)).scaled()
     lines = reweigh(lines, eliminate(modes, lines))
     modes = Modes(poles, participations(poles, lines)).scaled()
     if not refine:
         return _kept(frf, chart, modes, eliminate(modes, lines), lines)
-    refined = refine_modes(modes, lines, steps=_STEPS, tolerance=_TOLERANCE)
+    refined = refine_modes(modes, lines, steps=STEPS, tolerance=TOLERANCE)
     return _refined(frf, chart, refined, lines)
 
 
@@ -71,7 +72,7 @@ def _kept(frf: Frf, chart: StabilisationChart, modes: Modes, found: Elimination,
 
 
 def _refined(frf: Frf, chart: StabilisationChart, refined: Refined, lines: MeasuredLines) -> MatrixFit:
-    """With error bars, as an automatic fit; whoever asks for the refinement gets it, without a test on other lines."""
+    """Refine picked poles and give them error bars; no test on other lines may undo it, as the user asked for it."""
     modes, found = refined.modes, refined.elimination
     n_left = 2 * found.n_modes * (1 + lines.drive.shape[2])
     chi_square = _chi_square(found, lines, n_left + found.solution.size)

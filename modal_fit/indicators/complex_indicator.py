@@ -86,7 +86,7 @@ class ComplexModeIndicator:
         return tuple(sorted(found, key=_frequency_and_curve))
 
     def _logarithm(self, curve: int) -> NDArray[np.float64]:
-        """Of a curve, with the rounding of the largest value as floor."""
+        """Give the logarithm of a curve, with the rounding of the largest value as floor."""
         floor = max(_ROUNDING * float(self.singular_values[:, 0].max()), 1e-300)
         return np.log(np.maximum(self.singular_values[:, curve], floor))
 

@@ -71,7 +71,7 @@ class LikelihoodModel:
 
 @dataclass(frozen=True)
 class Setting:
-    """What stays fixed during a fit: the lines, the out-of-band basis and the scaled polynomial.
+    """The quantities that stay fixed during a fit: lines, out-of-band basis and scaled polynomial.
 
     Parameters
     ----------

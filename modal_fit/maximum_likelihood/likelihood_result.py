@@ -1,4 +1,4 @@
-"""From fitted unknowns to a `ModalModel`, and the choice of out-of-band terms by information criterion."""
+"""The step from fitted unknowns to a `ModalModel`, and the choice of out-of-band terms by information criterion."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -83,7 +83,7 @@ def modal_model_from(
 
 
 def _sorting_index(model: LikelihoodModel, order: NDArray[np.int64], n_kept: int) -> NDArray[np.int64]:
-    """Where each packed unknown of the sorted model stands in the unsorted one."""
+    """Give the place in the unsorted model of each packed unknown of the sorted one."""
     numbered = model.unpack(np.arange(model.pack().size, dtype=float))
     moved = replace(numbered, poles=numbered.poles[order], right=numbered.right[order], left=numbered.left[order])
     return moved.pack()[:n_kept].astype(np.int64)

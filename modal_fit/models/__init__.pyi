@@ -12,6 +12,7 @@ from .out_of_band import (
     residuals_with_poles,
 )
 from .shape_measures import modal_assurance, phase_collinearity, phase_deviation, reciprocity_residual
+from .summary_of_fit import fit_summary
 from .synthesised import Synthesis, synthesis
 from .uncertainty import derived_covariance, frequency_and_damping_errors, pack_parameters, unpack_parameters
 
@@ -25,6 +26,7 @@ __all__ = [
     "basis_with_poles",
     "compare_modes",
     "derived_covariance",
+    "fit_summary",
     "fixed_pole",
     "fixed_poles",
     "frequency_and_damping_errors",

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Residuals(Result):
-    """What the modes outside the band leave inside it.
+    """Out-of-band terms: the part of the FRF in the band that modes outside it make.
 
     ``upper + lower / (i w)^2 + sum_k residues[k] / (i w - poles[k]) + conjugate``, on receptance. The two
     real matrices are the textbook's (Ewins, Modal Testing, 2nd ed., section 4.5); the optional terms at

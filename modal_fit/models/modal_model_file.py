@@ -137,7 +137,7 @@ def _errors_from_json(stored: dict[str, Any] | None) -> ModeErrors | None:
 
 
 def _wrong_field(content: dict[str, Any]) -> str:
-    """Which field holds no pairs of numbers in the shape that the others ask for."""
+    """Name the field that holds no pairs of numbers in the shape that the others ask for."""
     for name in ("poles_rad_per_s", "right", "left"):
         try:
             pairs = np.asarray(content.get(name), dtype=float)

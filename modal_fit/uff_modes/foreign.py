@@ -67,7 +67,7 @@ def foreign_model(path: Path, sets: Sequence[ModeSet]) -> tuple[ModalModel, tupl
 
 
 def _vibrating(path: Path, sets: Sequence[ModeSet], notes: Notes) -> list[ModeSet]:
-    """Those with a pole in the upper half plane: no rigid bodies, and one of each conjugate pair."""
+    """Keep modes with a pole in the upper half plane: no rigid bodies, and one of each conjugate pair."""
     poles = poles_of(sets)
     rigid, lower = int((np.abs(poles) == 0).sum()), int((poles.imag < 0).sum())
     still = int((poles.imag == 0).sum()) - rigid
@@ -105,7 +105,7 @@ def _require_shares(path: Path, modes: Sequence[ModeSet]) -> None:
 def _scales(
     path: Path, modes: Sequence[ModeSet], poles: NDArray[np.complex128], notes: Notes
 ) -> tuple[NDArray[np.complex128], bool]:
-    """What ``phi phi^T`` is divided by to give the residues of a receptance in m/N, and whether the file says it."""
+    """Give the divisor of ``phi phi^T`` for residues of a receptance in m/N, and whether the file states it."""
     normal = np.array([mode.analysis == NORMAL for mode in modes])
     masses = np.array([mode.parameters[1] if mode.analysis == NORMAL else 0.0 for mode in modes])
     modal_a = np.array([complex(*mode.parameters[2:4]) for mode in modes])

@@ -22,7 +22,7 @@ from .concealed_structure import concealed_law, concealed_structure, unmeasured_
 Real = NDArray[np.float64]
 
 FINE_RATE, RATE = 8192.0, 512.0
-"""Of the simulation and of the recordings, Hz."""
+"""Sample rates of the simulation and of the recordings, Hz."""
 
 RPM = math.pi / 30
 SWEEP_RPM = (240.0, 1080.0)

@@ -1,4 +1,4 @@
-"""What a concealed effect does to the measuring chain: before the converter, and in it."""
+"""Effects on the measuring chain: before the converter, and in it."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -18,7 +18,7 @@ FOREIGN = "stiffness_modulation"
 
 @dataclass(frozen=True)
 class ConcealedEffect:
-    """What is hidden.
+    """A hidden effect with its size and place.
 
     Parameters
     ----------

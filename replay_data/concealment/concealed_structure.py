@@ -1,4 +1,4 @@
-"""What a concealed effect does to the structure itself: other modes, a joint's law, a force that nobody measures."""
+"""Effects on the structure itself: other modes, a joint's law, a force that nobody measures."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""From the motion itself to what the converter writes down: anti-alias filter, high-pass, noise, range, steps."""
+"""The chain from the motion to the converter's numbers: anti-alias filter, high-pass, noise, range, steps."""
 
 from collections.abc import Sequence
 

@@ -28,7 +28,7 @@ LONGEST = (4000, 4_000_000)
 
 @dataclass(frozen=True)
 class Settling:
-    """What became of the deviation from a motion that repeats with every tooth.
+    """The course of a deviation from a motion that repeats with every tooth.
 
     Parameters
     ----------

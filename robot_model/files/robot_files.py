@@ -77,7 +77,7 @@ def read_as(schema: type[Schema], robot: str | os.PathLike[str], kind: str) -> S
 
 
 def assumptions(robot: str | os.PathLike[str]) -> tuple[str, ...]:
-    """Where a robot's file says `assumed`, with the reason: one line a table.
+    """List the places where a robot's file says `assumed`, with the reason: one line a table.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""From mass, damping and stiffness matrices to a `ModalModel` at the tool tip."""
+"""The step from mass, damping and stiffness matrices to a `ModalModel` at the tool tip."""
 
 from collections.abc import Sequence
 

@@ -48,7 +48,7 @@ class Identification:
 
     @property
     def standard_errors(self) -> Real:
-        """Of the values, in their units, shape (n_parameters,); infinite where unidentifiable."""
+        """Standard errors of the values, in their units, shape (n_parameters,); infinite where unidentifiable."""
         return np.where(self.identifiable, self.values * self.relative_errors, np.inf)
 
 

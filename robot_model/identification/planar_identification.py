@@ -96,7 +96,7 @@ def _first_frequency(robot: PlanarRobot, angles: Real) -> float:
 
 
 def _receptance(robot: PlanarRobot, angles: Real, frequencies: Real) -> NDArray[np.complex128]:
-    """What ``rigid_model(...).receptance(...)`` gives, without its checks: the search calls it often."""
+    """Compute ``rigid_model(...).receptance(...)`` without its checks: the search calls it often."""
     mass, stiffness = rigid_matrices(robot, angles)
     squares, shapes = eigh(stiffness, mass)
     tip = tip_jacobian(robot, angles) @ shapes

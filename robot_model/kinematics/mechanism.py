@@ -124,7 +124,7 @@ class Mechanism:
 
     @cached_property
     def active(self) -> NDArray[np.bool_]:
-        """Which entries of q are driven, shape (n_moving,)."""
+        """Whether each entry of q is driven, shape (n_moving,)."""
         return np.array([self.frames[index].active for index in self.moving])
 
     @cached_property

@@ -213,7 +213,7 @@ def monte_carlo_deformation(
 def tolerance_grade(width: float, diameter: float) -> int:
     """Finest IT grade, 6 to 16, whose tolerance of a diameter is at least ``width`` (m); 17 where none is.
 
-    Of a size alone: the position of a hole is graded by :func:`position_tolerance`.
+    It grades a size alone; :func:`position_tolerance` grades the position of a hole.
     ``i = 0.45 D^(1/3) + 0.001 D`` um with D in mm, the geometric mean of its step; IT6 = 10 i and so on (ISO 286-1).
 
     Raises

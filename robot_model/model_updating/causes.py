@@ -1,4 +1,4 @@
-"""Which single change of a robot's model explains the frequencies found at several postures?"""
+"""Single changes of a robot's model that explain frequencies found at several postures."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What may be wrong with a robot's model: every single change with one number that is weighed against data."""
+"""Changes of a robot's model, each with one number that is weighed against data."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -107,7 +107,7 @@ def _payload(robot: SpatialRobot, payload_at: Real | None) -> Change:
 
 
 def _places(robot: SpatialRobot) -> tuple[Companion, ...]:
-    """Where a mass may hang: somewhere between the last axis and the tip, beside the tool by a quarter of that."""
+    """Give the places where a mass may hang: between the last axis and the tip, a quarter of that beside the tool."""
     mechanism = robot.mechanism
     placed = mechanism.transforms(np.zeros(len(mechanism.moving)))
     tool, last = placed[mechanism.index(mechanism.tool)], placed[mechanism.moving[-1]]

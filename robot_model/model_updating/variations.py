@@ -1,4 +1,4 @@
-"""What may be wrong with a robot's model: the same robot with one thing changed."""
+"""Variations of a robot's model: the same robot with one thing changed."""
 
 from dataclasses import replace
 

@@ -125,7 +125,7 @@ def _element(section: Section, length: float) -> tuple[Real, Real]:
 
 
 def _turned(local: Real, direction: float) -> Real:
-    """From axial, transverse and rotation to reach, height and rotation."""
+    """Turn axial, transverse and rotation into reach, height and rotation."""
     cosine, sine = np.cos(direction), np.sin(direction)
     turn = np.kron(np.eye(2), np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]]))
     return np.asarray(turn @ local @ turn.T)

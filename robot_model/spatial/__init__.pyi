@@ -1,7 +1,6 @@
 from .cell_structure import cell_structure_at
 from .compliant_tool import housing_node, tool_spring, with_tool_spring
 from .natural_coordinates import NaturalRobot, natural_robot
-from .robot_check import check_tip
 from .spatial_modes import (
     TIP_ROTATIONS,
     StructureModes,
@@ -13,6 +12,7 @@ from .spatial_modes import (
     modes_at,
 )
 from .spatial_robot import ElasticJoint, Link, LumpedBody, SpatialRobot, drive_stiffness, rigid_arms, structure_at
+from .tip_check import check_tip
 from .weight import (
     NO_MASSES,
     Payload,

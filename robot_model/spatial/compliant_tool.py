@@ -12,7 +12,7 @@ from .spatial_robot import ElasticJoint, LumpedBody, SpatialRobot
 Real = NDArray[np.float64]
 
 TOOL_MASS = 0.2
-"""Of a small end mill with its collet, kg: with 0.1 um/N its own mode is at 1.1 kHz, above a robot's band."""
+"""Mass of a small end mill with its collet, kg: with 0.1 um/N its own mode is at 1.1 kHz, above a robot's band."""
 
 STIFFEST = 1e-12
 """Compliance below which the spring is rigid, m/N."""

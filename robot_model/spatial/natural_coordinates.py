@@ -160,7 +160,7 @@ class _Builder:
         self.values: list[float] = []
 
     def either(self, here: Real, there: Real, shared: "_Entry") -> "_Entry":
-        """What is shared where the two are the same in the reference (and so in every posture), else a new one."""
+        """Share a node where the two are the same in the reference (and so in every posture), else make a new one."""
         return shared if np.linalg.norm(there - here) < _SAME else self.new(there)
 
     def new(self, value: Real) -> "_Entry":

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from foundation import InputError
 
@@ -45,30 +42,6 @@ def check_robot(robot: SpatialRobot) -> None:
             )
     if robot.gravity and robot.mechanism.closures:
         raise InputError("gravity is given for open chains only; this robot has closed loops: leave it at 0")
-
-
-def check_tip(robot: SpatialRobot) -> None:
-    """Refuse a tip node that is not at the origin of the tool frame: postures aim the one, forces act on the other.
-
-    Raises
-    ------
-    InputError
-        The two stand apart, or on different bodies.
-    """
-    from .spatial_robot import structure_at
-
-    mechanism = robot.mechanism
-    q = np.zeros(len(mechanism.moving))
-    rigid = replace(robot, links=(), gravity=0.0)
-    apart = (
-        structure_at(rigid, q).positions[robot.tip] - mechanism.transforms(q)[mechanism.index(mechanism.tool), :3, 3]
-    )
-    distance = float(np.linalg.norm(apart))
-    if distance > 1e-6 or node_bodies(robot)[robot.tip] != mechanism.body_of[mechanism.tool]:
-        raise InputError(
-            f"tip_node {robot.tip} stands {distance:.3g} m from the origin of the tool frame {mechanism.tool!r}, or on "
-            "another body; place that node in the tool frame at [0, 0, 0]"
-        )
 
 
 def node_bodies(robot: SpatialRobot) -> dict[int, str]:

@@ -1,4 +1,4 @@
-"""From a posture to natural frequencies, mode shapes and the `ModalModel` at the tool tip."""
+"""The step from a posture to natural frequencies, mode shapes and the `ModalModel` at the tool tip."""
 
 from dataclasses import dataclass
 
@@ -118,7 +118,7 @@ def modal_damping(robot: SpatialRobot, squares: Real) -> Real:
 
 
 def damping_warnings(robot: SpatialRobot, modes: StructureModes) -> tuple[str, ...]:
-    """What Rayleigh damping does to high modes, in one sentence; empty where all stay below 20 %."""
+    """Warn in one sentence of large Rayleigh damping in high modes; empty where all stay below 20 %."""
     ratios = modal_damping(robot, modes.squares) / (2 * np.sqrt(modes.squares))
     high = modes.frequencies > 20.0
     if not np.any(ratios[high] > 0.2):

@@ -30,7 +30,7 @@ class ElasticJoint:
 
 @dataclass(frozen=True)
 class Link:
-    """From one node to another; a section makes it flexible, in ``elements`` beam elements.
+    """A link from one node to another; a section makes it flexible, in ``elements`` beam elements.
 
     ``frame`` and ``angles`` (delta, eta, kappa; rad) turn a frame into the link's, x along the neutral axis (Belchior
     et al. 2013, Eq. 2); without a frame, z is any normal (round sections).
@@ -163,7 +163,7 @@ def _node_places(robot: SpatialRobot, frames: dict[str, Real]) -> Real:
 
 
 def rigid_arms(robot: SpatialRobot, structure: Structure) -> tuple[str, ...]:
-    """Where joints that share a node stand apart: what lies between them is taken as rigid, one sentence a pair."""
+    """List joints that share a node but stand apart: the part between them is taken as rigid, one sentence a pair."""
     found = []
     for node in range(robot.n_nodes):
         here = [

@@ -95,7 +95,7 @@ def weight_loads(robot: SpatialRobot, structure: Structure) -> Real:
 
 
 def acceleration(robot: SpatialRobot) -> float:
-    """Of gravity, m/s^2: the robot's own figure where it has one, else 9.80665."""
+    """Acceleration of gravity, m/s^2: the robot's own figure where it has one, else 9.80665."""
     return robot.gravity if robot.gravity > 0 else STANDARD_GRAVITY
 
 

@@ -22,11 +22,11 @@ def certified_lobes(
 ) -> StabilityLobes:
     """Give the lowest limit at each speed with time-periodic coefficients, and a status that says how sure it is.
 
-    Of a modal model: collocation; each limit is then verified with Floquet multipliers just below it (0.05 %), just
-    above it, and on a ladder of depths beneath it, or up to ``max_depth`` where there is none. Where they disagree the
-    limit is looked for again (:func:`second_look`); what cannot be settled is a lower bound or unresolved, never
-    infinite. With a helix, unequal pitch or process damping the multipliers find the limit too, on a ladder in steps of
-    15 %. Of an FRF: the multi-frequency solution with its stated error, ``not-verified``.
+    For a modal model, collocation gives the limits. Floquet multipliers verify each limit just below it (0.05 %), just
+    above it, and on a ladder of depths beneath it; where there is no limit, up to ``max_depth``. Where they disagree
+    the limit is looked for again (:func:`second_look`). A limit that cannot be settled is a lower bound or unresolved,
+    never infinite. With a helix, unequal pitch or process damping the multipliers find the limit, on a ladder in steps
+    of 15 %. For an FRF, the multi-frequency solution gives limits with a stated error, ``not-verified``.
 
     Parameters
     ----------

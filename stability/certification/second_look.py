@@ -1,4 +1,4 @@
-"""Where a limit and the multipliers disagree: a denser ladder, halving on stability, a second discretisation."""
+"""A second search for a limit that the multipliers deny: a denser ladder, halving, a second discretisation."""
 
 from dataclasses import dataclass
 

@@ -19,7 +19,7 @@ RUNG = 1.3
 
 @dataclass(frozen=True)
 class Verification:
-    """What the multipliers say about limits.
+    """Result of checking limits with Floquet multipliers.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Which line of a chattering tool is the strongest: the Floquet mode's spectrum at a crossing."""
+"""The strongest line of a chattering tool: the Floquet mode's spectrum at a crossing."""
 
 import numpy as np
 from numpy.typing import NDArray

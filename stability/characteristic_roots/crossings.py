@@ -72,7 +72,7 @@ def find_crossings(spectrum: Spectrum, grid: Real, max_depth: float, *, folds: b
 
 
 def nearest(values: Complex, wanted: Complex) -> Complex:
-    """From each row the value nearest to what is wanted."""
+    """Give the value of each row that is nearest to the wanted one."""
     if not len(values):
         return np.zeros(0, dtype=complex)
     chosen = np.argmin(np.abs(values - wanted[:, None]), axis=1)
@@ -126,7 +126,7 @@ def _clear(one: Complex, other: Complex, smallest: float) -> NDArray[np.bool_]:
 
 
 def _each_close(distance: Real, scale: Real, matters: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """For each row: every eigenvalue that matters has moved little, and far less than to any other."""
+    """Say for each row whether every eigenvalue that matters moved little, and far less than to any other."""
     ordered = np.sort(distance, axis=2)
     closest = np.argmin(distance, axis=2)
     nearest_scale = np.take_along_axis(scale, closest[:, :, None], axis=2)[:, :, 0]
@@ -161,7 +161,7 @@ def _sign_changes(
 def _roots(
     spectrum: Spectrum, speed: Index, low: Real, high: Real, value_low: Complex, value_high: Complex
 ) -> tuple[Real, Complex, NDArray[np.bool_]]:
-    """Where the imaginary part vanishes, all brackets together by the Illinois rule."""
+    """Find where the imaginary part vanishes, for all brackets together by the Illinois rule."""
     low, high = low.copy(), high.copy()
     weight_low, weight_high = value_low.imag.copy(), value_high.imag.copy()
     first, width, rise = low.copy(), high - low, value_high - value_low

@@ -1,4 +1,4 @@
-"""Which depths need no search, and the stages in which the others are searched, whatever the largest depth is."""
+"""Depths that need no search, and the stages in which the others are searched, whatever the largest depth is."""
 
 import numpy as np
 from numpy.typing import NDArray

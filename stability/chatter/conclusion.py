@@ -1,4 +1,4 @@
-"""From what is found in a recording to a verdict: chatter first, then what only looks like it, then stability."""
+"""The step from the lines of a recording to a verdict: chatter first, then what looks like it, then stability."""
 
 import math
 from dataclasses import replace

@@ -69,14 +69,14 @@ def cut_spectrum(evidence: Evidence, highest: float) -> CutSpectrum:
 
 
 def _channel(evidence: Evidence) -> int:
-    """Where the strongest line has its largest share of the motion; without lines, where least repeats."""
+    """Choose the channel in which the strongest line has its largest share; without lines, where least repeats."""
     if evidence.families:
         return int(np.argmax(evidence.families[0].lines[0].amplitude / evidence.late.size))
     return int(np.argmax(evidence.late.residual.std(axis=0) / evidence.late.size))
 
 
 def _largest(values: Real) -> Real:
-    """At most `MOST_POINTS` points, each the largest of equally many neighbours; NaN where all are."""
+    """Give at most `MOST_POINTS` points, each the largest of equally many neighbours; NaN where all are."""
     each = -(-len(values) // MOST_POINTS)
     padded = np.concatenate([values, np.full(-len(values) % each, np.nan)]).reshape(-1, each)
     largest = np.where(np.isnan(padded), -np.inf, padded).max(axis=1)

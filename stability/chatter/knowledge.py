@@ -8,7 +8,7 @@ from .motion import ToolMotion
 
 @dataclass(frozen=True)
 class Knowledge:
-    """What is known of a cut beside its recording.
+    """Facts about a cut that are known beside its recording.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ _CHANCE = 0.15  # share of the motion below which one side line may be there by 
 
 @dataclass(frozen=True)
 class Sorted:
-    """What the lines are.
+    """The lines of a recording, sorted by their origin.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def _counted(family: Family, evidence: Evidence) -> Family:
 
 
 def mains_of(line: Line, evidence: Evidence) -> str:
-    """As :func:`mains_name`, to the accuracy with which a recording tells a line's frequency."""
+    """Name a line of the mains as :func:`mains_name` does, to the accuracy of a line's frequency in the recording."""
     track = evidence.track
     return mains_name(line.frequency, width_of(line, evidence.spectrum.resolution, track.mean_frequency, track.drift))
 

@@ -1,4 +1,4 @@
-"""Is an alternating motion forced by runout? What the model says of the cut that the recording shows."""
+"""Judgement of an alternating motion with the model: is it forced by runout, or is it period doubling?"""
 
 from dataclasses import replace
 

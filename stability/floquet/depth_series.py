@@ -322,7 +322,7 @@ def _free_motion(
 
 @compiled
 def _impulses(poles: Complex, after: Real, weights: Real, block: int, duration: float, impulse: Real) -> None:
-    """What the chip at each node leaves in the modal coordinates when the window is over."""
+    """Give the modal coordinates that the chip at each node leaves when the window is over."""
     modes = len(poles)
     for r in range(modes):
         rest = np.exp(poles[r] * duration)

@@ -1,4 +1,4 @@
-"""Which of many cuts are unstable: the powers of their monodromy matrices, eigenvalues only where these do not tell."""
+"""Unstable cuts among many: powers of their monodromy matrices, eigenvalues only where these do not tell."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,4 +1,4 @@
-"""From the errors of a measurement to a standard error of each stability limit, and to a probability."""
+"""The step from errors of a measurement to a standard error of each stability limit, and to a probability."""
 
 import math
 
@@ -110,7 +110,7 @@ def usable_limits(lobes: StabilityLobes, errors: Real, max_depth: float) -> tupl
 
 
 def speeds_within(speeds: Real, speed: float, drift: float) -> Real:
-    """Those of ``speeds`` within a relative ``drift`` of one, with the ends of that range.
+    """Give the ``speeds`` within a relative ``drift`` of one, with the ends of that range.
 
     Raises
     ------

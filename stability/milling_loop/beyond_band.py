@@ -1,4 +1,4 @@
-"""What a fitted model says beyond its band: terms at fixed poles hold inside the band only."""
+"""A fitted model beyond its band: terms at fixed poles hold inside the band only."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from modal_fit import ModalModel, Residuals
 
 N_LINES = 400
 AROUND = 0.2
-"""Of the lowest and highest natural frequency: how far a model without a stated band is taken to hold."""
+"""Distance to which a model without a stated band holds beyond its lowest and highest mode, as a share of them."""
 
 
 def with_residual_flexibility(model: ModalModel) -> ModalModel:

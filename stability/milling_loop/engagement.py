@@ -1,4 +1,4 @@
-"""Where in a tooth period which teeth cut: the pieces between entries and exits, on which everything is smooth."""
+"""Pieces of a tooth period in which the same teeth cut; everything is smooth on each of them."""
 
 from dataclasses import dataclass
 from itertools import pairwise

@@ -70,7 +70,7 @@ def tool_receptance(structure: Frf | ModalModel, *, node: str | None = None) -> 
 
 @dataclass(frozen=True)
 class ToolDirections:
-    """Which rows and columns of a receptance are X, Y, Z of the tool, and with which sign."""
+    """Rows and columns of a receptance that are X, Y, Z of the tool, with their signs."""
 
     rows: list[int]
     row_axes: list[int]

@@ -335,13 +335,13 @@ def _peaks(source: ToolReceptance) -> Real:
 
 
 def _highest_peak(source: ToolReceptance) -> float:
-    """Where an FRF is cut off first, Hz: above all lines that reach a thirtieth of its highest peak."""
+    """Give the first frequency (Hz) to cut off an FRF: above all lines that reach a thirtieth of its highest peak."""
     size = np.linalg.norm(source.evaluate(source.grid), axis=(1, 2))
     return 1.5 * float(source.grid[np.flatnonzero(size >= size.max() / 30)[-1]])
 
 
 def _every_second_line(frf: Frf) -> ToolReceptance | None:
-    """What limits are compared with to see what the distance of lines does; None where too few lines would be left."""
+    """Keep every second line, to see the effect of their distance; None where too few would be left."""
     half = replace(
         frf,
         frequencies=frf.frequencies[::2],

@@ -68,7 +68,7 @@ def semi_discretised_multipliers(
 
 
 def semi_discretised(system: DelaySystem, speed: float, depth: float, *, steps: int, order: int) -> Multipliers:
-    """As :func:`semi_discretised_multipliers`, for a system without residual flexibility and values that are good."""
+    """Compute multipliers as :func:`semi_discretised_multipliers` does, for arguments that were checked."""
     moving = np.flatnonzero(np.abs(system.right).any(axis=0))
     output = system.output_matrix[moving]
     pieces = engagement_pieces(system.process)
@@ -112,7 +112,7 @@ def _cutting_matrices(system: DelaySystem, piece: Piece, angles: Real) -> Real:
 def _steps(
     system: DelaySystem, piece: Piece, count: int, cut: tuple[float, float, int], moving: NDArray[np.int64]
 ) -> tuple[Real, Real]:
-    """For each step of a piece: what it does to the state, and to the delayed motions at its nodes."""
+    """Give the effect of each step of a piece on the state, and on the delayed motions at its nodes."""
     speed, depth, order = cut
     turn = (piece.end - piece.begin) / count
     h = turn / speed

@@ -125,7 +125,7 @@ def _nearest(cut: VariedCut, value: complex) -> complex:
 
 
 def _strongest_line(system: DelaySystem, cut: VariedCut, value: complex, vector: Complex) -> float:
-    """Of the lines of the critical motion the one at which the tool moves most, Hz."""
+    """Give the line of the critical motion at which the tool moves most, Hz."""
     force = (cut.force @ vector).reshape(len(cut.times), -1)
     top = int(np.ceil(1.5 * np.abs(system.poles).max() * cut.period / (2 * np.pi))) + 1
     lines = (np.angle(value) + 2 * np.pi * np.arange(-top, top + 1)) / cut.period

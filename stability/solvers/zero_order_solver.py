@@ -66,7 +66,7 @@ def zero_order(
 
 
 def averaged(process: MillingProcess) -> str:
-    """What a solution with averaged coefficients cannot see, as a sentence for its warnings."""
+    """Write the warning that averaged coefficients cannot show period doubling."""
     share = (process.exit_angle - process.start_angle) * process.teeth / (2 * np.pi)
     return (
         "cutting coefficients are averaged over the tooth period: period doubling is not seen, and where teeth cut for "

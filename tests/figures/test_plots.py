@@ -3,13 +3,14 @@
 import pickle
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 import pytest
 
-from acquisition import Channel
+from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from estimation import CrossSpectra, Frf, SpectralSettings
 from foundation import InputError, Result
 from modal_fit import ModalModel
@@ -158,3 +159,34 @@ def test_modes_and_lobes_become_tables() -> None:
     table = _lobes().to_frame()
     np.testing.assert_allclose(table["depth_limit_m"], _lobes().depth_limits)
     assert list(table["bifurcation"]) == list(_lobes().bifurcations)
+
+
+def _recording(folder: Path) -> Path:
+    channels = (Channel("fx", "force", "N", "TCP", "+X"), Channel("ax", "acceleration", "m/s^2", "TCP", "+X"))
+    path = folder / "cut.h5"
+    time = np.arange(2000) / 1000.0
+    samples = np.stack([5 + 2 * np.sin(60 * time), np.cos(60 * time)], axis=1)
+    with RecordingWriter(path, (StreamDescription("main", 1000.0, 0.0, channels),), title="a <b>cut</b>") as writer:
+        writer.append("main", samples)
+    return path
+
+
+def test_a_recording_tells_draws_and_tables_itself(tmp_path: Path) -> None:
+    path = _recording(tmp_path)
+    with Recording(path) as one, Recording(path) as other:
+        assert repr(one).splitlines()[0] == "Recording: cut.h5, 1 stream"
+        assert "Stream main: 2 channels, 2 s at 1000 Hz" in repr(one)
+        assert "channels fx, ax" in repr(one)
+        assert "a <b>cut" not in one._repr_html_()
+        assert one == other
+        assert hash(one) == hash(other)
+        with pickle.loads(pickle.dumps(one)) as again:
+            assert again == one
+            np.testing.assert_array_equal(again.stream().read(), one.stream().read())
+        table = one.to_frame()
+        np.testing.assert_array_equal(table["fx"], one.stream().read(channels=["fx"])[:, 0])
+        assert table.index[1] == 0.001
+        assert one.to_xarray().sel(channel="ax").shape == (2000,)
+        axes = one.plot(channels=["fx"])
+        assert [label.get_text() for label in axes.get_yticklabels()] == ["fx\n± 2 N"]
+    assert repr(one) == "Recording: cut.h5, closed"

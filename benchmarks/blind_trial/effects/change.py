@@ -34,10 +34,10 @@ class Scene:
         Static along ``direction``, N/m.
     force
         RMS of all three forces, N.
-    accelerations : (3,)
-        RMS, m/s^2.
+    accelerations : (3,), m/s^2
+        Root mean square of each acceleration.
     seed
-        Of whatever else the effect draws; the same at every strength.
+        Seed of everything else that the effect draws; the same at every strength.
     """
 
     structure: Structure
@@ -83,9 +83,9 @@ class Effect:
     Parameters
     ----------
     name
-        Of the answer.
+        Name of the right answer.
     families
-        Of its law; the first is the textbook's.
+        Families of its law; the first is the textbook's.
     build
         Change of a family at a ``dial``; the response changes with the dial monotonically for small dials.
     start, largest

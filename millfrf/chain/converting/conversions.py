@@ -1,4 +1,4 @@
-"""What a conversion is about, by its files and its mapping: recordings, FRFs, modal models, a geometry."""
+"""Kind of a conversion by its files and its mapping: recordings, FRFs, modal models, a geometry."""
 
 import tomllib
 from collections.abc import Callable, Sequence
@@ -56,7 +56,7 @@ def convert_files(
 
 
 def is_frf_conversion(sources: Sequence[Path], mapping: Path | None) -> bool:
-    """Whether FRFs of other programs are read: the mapping says so, or without one the files leave no doubt."""
+    """Say whether FRFs of other programs are read: the mapping says so, or without one the files leave no doubt."""
     if mapping is not None:
         return _is_about_frfs(mapping)
     if len(sources) > 1:

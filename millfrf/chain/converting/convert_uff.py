@@ -29,14 +29,14 @@ Files = Sequence[str | os.PathLike[str]]
 
 @dataclass(frozen=True)
 class Told:
-    """What a conversion has to say: what it inferred, and what one may doubt, which is stored with the result."""
+    """Remarks of a conversion: what it inferred, and doubts, which are stored with the result."""
 
     inferred: tuple[str, ...] = ()
     doubts: tuple[str, ...] = ()
 
 
 def is_uff_conversion(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> bool:
-    """Whether one side is a UFF file, or a geometry is to be written."""
+    """Say whether one side is a UFF file, or a geometry is to be written."""
     suffixes = [Path(path).suffix.lower() for path in (source, target)]
     return suffixes[1] == ".toml" or any(suffix in UFF_SUFFIXES for suffix in suffixes)
 
@@ -116,7 +116,7 @@ def made_of(files: Files, told: Told) -> dict[str, Any]:
 
 
 def _left_out(model: ModalModel, name: str) -> tuple[str, ...]:
-    """What a UFF file of modes has no place for."""
+    """List the parts of a model for which a UFF file of modes has no place."""
     lost = [
         what
         for what, there in (

@@ -1,9 +1,10 @@
 from .chatter import CutOptions, doubts_of_cuts, judge_recordings, stated_runout, tone_table, verdict_table
 from .chatter_file import KeptCut, read_cuts, write_cuts
 from .chatter_spectra import keep_spectra
-from .lobes import LOBE_METHODS, compute_lobes, lobes_summary, mode_coupling_line, speed_axis
+from .lobes import CERTIFIED, LOBE_METHODS, compute_lobes, lobes_summary, mode_coupling_line, speed_axis
 
 __all__ = [
+    "CERTIFIED",
     "LOBE_METHODS",
     "CutOptions",
     "KeptCut",

@@ -1,4 +1,4 @@
-"""From recordings of cuts to verdicts, and tables of them."""
+"""The step from recordings of cuts to verdicts, and tables of them."""
 
 import math
 import os
@@ -169,7 +169,7 @@ def modelled_cut(options: CutOptions, channels: Sequence[Channel]) -> ModelledCu
 
 
 def stated_runout(cutting: str | os.PathLike[str], process: MillingProcess) -> float:
-    """Of a cutting file that was read into ``process``, m; NaN where the file does not state any."""
+    """Give the runout of a cutting file that was read into ``process``, m; NaN where the file states none."""
     table = tomllib.loads(Path(cutting).read_text(encoding="utf-8"))["cutting"]
     return process.runout if "runout_m" in table else math.nan
 
@@ -226,7 +226,7 @@ def doubts_of_cuts(
 
 
 def _speed(recording: Recording, options: CutOptions) -> float:
-    """In rpm: as asked for, or as the recording's events or set-up say."""
+    """Give the spindle speed in rpm: as asked for, or as the recording's events or set-up say."""
     rpm = options.speed_rpm
     if rpm is None and SPEED_EVENTS in recording.events:
         rpm = float(np.median(recording.events[SPEED_EVENTS].read()[1]))

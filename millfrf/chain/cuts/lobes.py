@@ -1,4 +1,4 @@
-"""From a model or an FRF at the tool tip to stability lobes."""
+"""The step from a model or an FRF at the tool tip to stability lobes."""
 
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""From recordings to an FRF file: spectra test by test, stacked, with the sensors' high-pass taken out."""
+"""The step from recordings to an FRF file: spectra of each test, stacked, without the sensors' high-pass."""
 
 import json
 import os
@@ -22,6 +22,7 @@ from estimation import (
     instrumental_variable,
     known_band,
     settings_for,
+    spectra_for_judging,
     sum_tests,
     write_frf,
 )
@@ -40,7 +41,7 @@ from ...progress import Progress, silent
 from ...provenance import sources, versions
 from .estimate_options import INSTRUMENTAL, LOCAL, TITLES, Estimate, EstimateOptions, check_options
 from .instruments import channels_with_instruments, only_inputs
-from .local_estimate import band_records, judging_spectra, local_frf
+from .local_estimate import band_recordings, local_frf
 
 SPECTRAL: dict[str, Callable[[CrossSpectra], Frf]] = {"h1": h1, "h2": h2, "hv": hv}
 
@@ -109,21 +110,21 @@ def estimate_recordings(
             f"{total.n_excluded} of {total.n_excluded + total.n_segments} segments hold overload, clipping or dropped "
             "samples and were left out"
         )
-    return _finished(frf, tests, doubts)
+    return _finished(frf, tests, doubts, options)
 
 
 def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, progress: Progress) -> Estimate:
-    """By local polynomials over whole records; the inputs are judged by spectra as everywhere."""
+    """Estimate by local polynomials over whole recordings; the inputs are judged by spectra as everywhere."""
     assert options.band is not None
     names = (options.excitations, options.responses)
     doubts = check_recordings(
         paths, stream=options.stream, excitations=names[0], responses=names[1], segments=None, progress=progress
     )
-    records = band_records(paths, names, options.stream, options.band[1], progress)
-    tests = tuple(lines_of(test, options.band) for test in judging_spectra(records, options.band))
+    found = band_recordings(paths, names, options.stream, options.band[1], progress)
+    tests = tuple(lines_of(test, options.band) for test in spectra_for_judging(found))
     doubts += [*_rate_doubts(paths, tests), *check_inputs(sum_tests(tests))]
-    frf = local_frf(records, options.band, progress)
-    return _finished(frf, tests, [*doubts, *check_local_frf(frf, len(records))])
+    frf = local_frf(found, options.band, progress)
+    return _finished(frf, tests, [*doubts, *check_local_frf(frf, len(found))], options)
 
 
 def _rate_doubts(paths: Sequence[str | os.PathLike[str]], tests: Sequence[CrossSpectra]) -> list[str]:
@@ -131,23 +132,22 @@ def _rate_doubts(paths: Sequence[str | os.PathLike[str]], tests: Sequence[CrossS
     return check_sample_rates(gains)
 
 
-def _finished(frf: Frf, tests: tuple[CrossSpectra, ...], doubts: Sequence[str]) -> Estimate:
-    """Without the sensors' high-pass, and with the band in which it is known."""
+def _finished(frf: Frf, tests: tuple[CrossSpectra, ...], doubts: Sequence[str], options: EstimateOptions) -> Estimate:
+    """Take out the sensors' high-pass, and state the band in which the FRF is known."""
     total = sum_tests(tests)
     frf = correct_high_pass(frf, [channel.high_pass_hz for channel in total.responses])
     driven = np.interp(frf.frequencies, total.frequencies, driven_lines(total).astype(float)) >= 0.5
     frf = replace(frf, band=known_band(frf, driven))
-    return Estimate(frf, tests, input_independence(total), tuple(doubts))
+    return Estimate(frf, tests, input_independence(total), tuple(doubts), options)
 
 
 def write_estimate(
     path: str | os.PathLike[str],
     estimate: Estimate,
     recordings: Sequence[str | os.PathLike[str]],
-    options: EstimateOptions,
 ) -> None:
     """Write the FRF with its provenance: recordings, settings, averages, warnings, versions."""
-    first = estimate.tests[0]
+    first, options = estimate.tests[0], estimate.options
     length = first.settings.segment_length / first.sample_rate
     judged_by = {"segment": length} if options.estimator == LOCAL else {}  # it has no segments of its own
     provenance = {

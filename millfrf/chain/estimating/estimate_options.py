@@ -1,9 +1,13 @@
 """`EstimateOptions`: how recordings become an FRF; and `Estimate`, the FRF with what it was made from."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from estimation import CrossSpectra, Frf, InputIndependence
-from foundation import InputError
+from foundation import InputError, Result, Summary, counted, doubts_line
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 STACKS = ("sum", "side-by-side")
 INSTRUMENTAL, LOCAL = "instrumental-variable", "local-polynomial"
@@ -50,8 +54,8 @@ class EstimateOptions:
     instruments: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Estimate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Estimate(Result):
     """An estimated FRF, with the spectra it was made from.
 
     Parameters
@@ -64,12 +68,37 @@ class Estimate:
         Independence of the stacked inputs, line by line.
     warnings
         Doubts about the FRF, one sentence each.
+    options
+        How the recordings were turned into the FRF.
     """
 
     frf: Frf
     tests: tuple[CrossSpectra, ...]
     independence: InputIndependence
     warnings: tuple[str, ...]
+    options: EstimateOptions
+
+    def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
+        """Draw entries of the FRF and return the axes; see :func:`figures.draw_frf` for the choices."""
+        return self.frf.plot(axes, **choices)
+
+    def _summary(self) -> Summary:
+        frf, averages = self.frf, sum(test.effective_averages for test in self.tests)
+        shape = f"{counted(len(frf.responses), 'response')} x {counted(len(frf.excitations), 'excitation')}"
+        holds = "" if frf.band is None else f"; holds in {frf.band[0]:.4g} to {frf.band[1]:.4g} Hz"
+        rows = tuple(
+            (str(number + 1), str(test.n_segments), f"{test.effective_averages:.3g}", str(test.n_excluded))
+            for number, test in enumerate(self.tests)
+        )
+        return Summary(
+            f"Estimate by {self.options.estimator}: {counted(len(self.tests), 'test')} worth {averages:.3g} averages",
+            (
+                f"frf: {frf.quantity} in {frf.unit}, {shape}, {counted(len(frf.frequencies), 'line')}{holds}",
+                *doubts_line(self.warnings),
+            ),
+            ("test", "segments", "effective averages", "left out"),
+            rows,
+        )
 
 
 def check_options(options: EstimateOptions) -> None:

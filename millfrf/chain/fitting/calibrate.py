@@ -1,4 +1,4 @@
-"""From a model at the sensor to a model at the tool tip."""
+"""The step from a model at the sensor to a model at the tool tip."""
 
 import os
 from collections.abc import Sequence

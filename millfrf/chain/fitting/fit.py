@@ -1,4 +1,4 @@
-"""From an FRF file, or straight from recordings, to a modal model file."""
+"""The step from an FRF file, or straight from recordings, to a modal model file."""
 
 import os
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ from modal_fit import (
     write_modal_model,
 )
 
-from ...gate import check_frf_for_fit, check_recordings, check_records, fit_doubts
+from ...gate import check_band_recordings, check_frf_for_fit, check_recordings, fit_doubts
 from ...progress import Progress, silent
 from ...provenance import add_to_json, sources, versions
 from .fit_options import (
@@ -76,7 +76,7 @@ def fit_recordings(
         paths, stream=options.stream, excitations=options.excitations, responses=options.responses, progress=progress
     )
     records = [_band_recording(path, options, progress) for path in paths]
-    doubts += check_records(
+    doubts += check_band_recordings(
         [record for record, _ in records],
         options.band,
         [Path(path).name for path in paths],

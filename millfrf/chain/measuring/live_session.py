@@ -17,7 +17,7 @@ _LINGER = 3.0  # s in which open pages learn how it ended
 
 
 def live_settings(session: Session) -> LiveSettings:
-    """What the page estimates, from the session's tables ``live``, ``plan``, ``cutting``, ``tool`` and ``cut``."""
+    """Give the settings of the page from the session's tables ``live``, ``plan``, ``cutting``, ``tool`` and ``cut``."""
     teeth = _number(session.cutting, "teeth") or _number(session.tool, "teeth")
     return LiveSettings(
         session.band_hz,

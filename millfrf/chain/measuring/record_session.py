@@ -1,4 +1,4 @@
-"""From a session file to a recording: the source it describes, recorded until it ends or is stopped."""
+"""The step from a session file to a recording: the source it describes, recorded until it ends or is stopped."""
 
 import math
 import os
@@ -44,7 +44,7 @@ class OpenedSession:
 
 @dataclass
 class Tally:
-    """What was recorded, counted as it comes.
+    """Count of the recorded samples and events, kept while they come.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ class Tally:
         self.samples[taken.stream] = self.samples.get(taken.stream, 0) + len(taken.samples)
 
     def seconds(self) -> float:
-        """Of the longest stream."""
+        """Duration of the longest stream, s."""
         return max((n / self.rates[name] for name, n in self.samples.items()), default=0.0)
 
     def summary(self) -> str:
@@ -180,7 +180,7 @@ def acquire(
 
 
 def _kept(tally: Tally, out: str | os.PathLike[str]) -> str:
-    """What a recording that ended too early holds."""
+    """Say what a recording holds that ended too early."""
     return f"{os.fspath(out)} holds the {tally.seconds():.2f} s before"
 
 

@@ -1,4 +1,4 @@
-"""What the samples of a recording show by themselves, in one pass over the file."""
+"""Judgement of a recording's samples by themselves, in one pass over the file."""
 
 import lazy_loader
 

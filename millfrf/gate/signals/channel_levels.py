@@ -75,7 +75,7 @@ class ChannelLevel:
 
     @property
     def mean(self) -> float:
-        """Of all finite samples."""
+        """Mean of all finite samples."""
         return (self._origin or 0.0) + self.total / max(self.n_samples, 1)
 
     @property
@@ -102,7 +102,7 @@ class ChannelLevel:
         return count, self._top.value if piled[0] is self._top else -self._bottom.value
 
     def concerns(self) -> list[str]:
-        """What looks wrong with this channel."""
+        """List the faults of this channel."""
         name, found = self.channel.name, []
         if self.n_missing:
             found.append(f"{name}: {self.n_missing} samples are NaN or infinite; record anew or cut them out")

@@ -67,7 +67,7 @@ class Extreme:
         self.value, self.count, self.visits, self.longest = value, 0, 0, 0
 
     def piled(self, peak: float) -> bool:
-        """Whether samples pile up here as only a limit makes them; ``peak`` is the channel's largest magnitude."""
+        """Say whether samples pile up here as only a limit makes them; ``peak`` is the channel's largest magnitude."""
         if self.visits < LEAST_VISITS or self.count < LEAST_PILED or self.longest < 2:
             return False
         return self.count > PILED * max(self.n_following, 1) and abs(self.value) > NEAR_ZERO * peak

@@ -19,7 +19,7 @@ SLOWEST_RATE = 20.0
 
 @dataclass(frozen=True)
 class Look:
-    """What one pass over a stream found.
+    """Findings of one pass over a stream.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Look:
     copies: Copies
 
     def concerns(self, sample_rate: float) -> list[str]:
-        """What looks wrong, one sentence each with its remedy."""
+        """List the faults, one sentence each with its remedy."""
         found = [concern for level in self.levels for concern in level.concerns()]
         if not any(level.n_missing for level in self.levels):
             found += self.repeats.concerns(sample_rate)
@@ -52,7 +52,7 @@ class Look:
 
 
 def rate_concerns(sample_rate: float) -> list[str]:
-    """What looks wrong with a sample rate (Hz)."""
+    """List the faults of a sample rate (Hz)."""
     if sample_rate >= SLOWEST_RATE:
         return []
     return [

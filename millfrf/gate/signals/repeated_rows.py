@@ -57,7 +57,7 @@ class RepeatedRows:
         self._before = marks[fresh:]
 
     def concerns(self, sample_rate: float) -> list[str]:
-        """What looks wrong, one sentence each."""
+        """List the faults, one sentence each."""
         found = []
         if 0 < self.n_held < self.n_rows:
             found.append(

@@ -258,7 +258,7 @@ def which_test(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
 
 
 def warnings(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
-    """What should make a reader careful."""
+    """List the warnings of a diagnosis."""
     gain, said = diagnosis.improvement, [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in diagnosis.doubts]
     if len(diagnosis.details.recordings) < 2:
         said.append("There is a single recording: nothing could be held out, and errors are those of the fit.")

@@ -1,4 +1,4 @@
-"""What a diagnosis does to the stability lobes."""
+"""Effect of a diagnosis on the stability lobes."""
 
 import numpy as np
 

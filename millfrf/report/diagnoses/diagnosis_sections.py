@@ -118,7 +118,7 @@ def number_section(diagnosis: StructureDiagnosis) -> Section:
 
 
 def candidate_section(diagnosis: StructureDiagnosis) -> Section:
-    """What was weighed."""
+    """Make the section on all causes that were weighed."""
     accepted = {cause.name: cause.evidence for cause in diagnosis.physics}
     rows, seen = [], set()
     for one in sorted(diagnosis.candidates, key=lambda one: (one.stage != "fitted", -one.evidence)):

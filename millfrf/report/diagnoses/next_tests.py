@@ -1,4 +1,4 @@
-"""What an answer of a diagnosis means in a workshop, and which test would tell it from its rivals."""
+"""Meaning of a diagnosis in a workshop, and the test that would tell a cause from its rivals."""
 
 import tomllib
 from dataclasses import dataclass

@@ -102,7 +102,7 @@ def _candidates(found: RobotDiagnosis) -> Section:
 
 
 def _errors(found: RobotDiagnosis) -> Table:
-    """Where the errors of the numbers told come from."""
+    """Explain the sources of the errors of the numbers told."""
     rows = []
     for one in found.physics:
         number, unit = told_number(one)

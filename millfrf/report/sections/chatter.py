@@ -1,4 +1,4 @@
-"""What recorded cuts said about their stability: verdicts, foreign tones, spectra."""
+"""Stability of recorded cuts: verdicts, foreign tones, spectra."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What became of the taps behind an FRF of hammer tests."""
+"""The taps behind an FRF of hammer tests: how many were used, and why the others were not."""
 
 from typing import Any
 

@@ -15,7 +15,7 @@ PROMINENT = 2.0
 
 
 def has_lines(frf: Frf, band: Band) -> bool:
-    """Whether enough lines lie in the band for a curve."""
+    """Say whether enough lines lie in the band for a curve."""
     inside = frf.valid & (frf.frequencies > 0) & (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
     return int(inside.sum()) > 2
 

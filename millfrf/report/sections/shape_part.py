@@ -1,4 +1,4 @@
-"""What a report shows of mode shapes: table, auto-MAC with MPC and MPD, and every vector in the complex plane."""
+"""Mode shapes in a report: table, auto-MAC with MPC and MPD, and every vector in the complex plane."""
 
 from figures import as_data_uri, assurance_figure, compass_figure, mode_figure
 from modal_fit import ModalModel, ModeShapes

@@ -87,7 +87,7 @@ def _brief(name: str, lobes: StabilityLobes) -> tuple[str, ...]:
 
 
 def _method(one: CheckedLobes) -> str:
-    """Which method a file's limits are of, and what they are worth."""
+    """Name the method of a file's limits, and what they are worth."""
     status = {name: one.given.status.count(name) for name in dict.fromkeys(one.given.status)}
     counted = ", ".join(f"{count} {name}" for name, count in status.items())
     if one.structure is None:

@@ -1,4 +1,4 @@
-"""From a robot's file and recordings in several postures to a folder with the diagnosis, models and a report."""
+"""The step from a robot's file and recordings in several postures to a diagnosis, models and a report."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

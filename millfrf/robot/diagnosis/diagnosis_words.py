@@ -53,7 +53,7 @@ def summary(found: RobotDiagnosis) -> list[str]:
 
 
 def what_is_left(found: RobotDiagnosis) -> str:
-    """What is left beside what may be left for `explained`."""
+    """State what is left, beside what may be left for `explained`."""
     limits, share = ROBOT.verdict, found.after.size / max(found.before.size, 1e-300)
     return (
         f"left: {100 * share:.2g} % of what the model leaves beyond noise, {found.after.share:.2g} times what a right "
@@ -62,7 +62,7 @@ def what_is_left(found: RobotDiagnosis) -> str:
 
 
 def what_is_asked() -> str:
-    """What a change must do to be told."""
+    """State the conditions under which a change is told."""
     return (
         "A change is told if it lowers the error on recordings left out of the fit with "
         f"p < {ROBOT.proof.significance:g}. Its ± is one standard error: root of the sum of squares of the fit's own, "

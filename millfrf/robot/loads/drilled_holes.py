@@ -59,7 +59,7 @@ class DrillingArea:
 
 @dataclass(frozen=True)
 class Accuracy:
-    """What is known of the robot's accuracy, and what the drawing allows.
+    """Accuracy of the robot as far as it is known, and the tolerance of the drawing.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class _Holes:
         return counted_weight(sags, self.loads.weight)[:, :3]
 
     def budget(self, hole: int) -> UncertaintyBudget:
-        """Of the position of one hole across the drill."""
+        """Give the budget of the position of one hole across the drill."""
         repeatability = self.accuracy.repeatability or self.case.repeatability
         known = self.accuracy.known
         across = lateral_uncertainty(self.case.robot, self.found.q[hole], self.wrench, known, DOWN, self._resting(hole))
@@ -110,7 +110,7 @@ class _Holes:
         return UncertaintyBudget(repeatability, across, machining)
 
     def warnings(self, worst: int) -> list[str]:
-        """What is not known; one sentence each. ``worst``: the hole that needs the largest tolerance."""
+        """List what is not known; one sentence each. ``worst``: the hole that needs the largest tolerance."""
         found, unknown = [], self.budget(worst).unknown
         if not self.case.robot.bodies and self.loads.weight != "none":
             found.append(NO_MASSES)

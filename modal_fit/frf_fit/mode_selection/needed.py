@@ -96,7 +96,7 @@ def _variance_at_mode(trial: Trial) -> float:
 
 
 def most_missed(trial: Trial) -> tuple[float, float, bool]:
-    """Of the near modes' half-power bands the one that misses the candidate most.
+    """Give the near mode whose half-power band misses the candidate most.
 
     When two modes stand close, the fit without the candidate may sit on either.
 
@@ -124,7 +124,7 @@ def most_missed(trial: Trial) -> tuple[float, float, bool]:
 
 
 def _within_reach(modes: Modes, least: float = 0.0) -> NDArray[np.bool_]:
-    """Which modes, the last one among them, stand so near to it that their errors touch it."""
+    """Say which modes stand so near to the last one that their errors touch it; it counts too."""
     width = modes.frequencies * modes.damping_ratios
     distance = np.abs(modes.frequencies - modes.frequencies[-1])
     return np.asarray(distance <= np.maximum(_REACH * (width + width[-1]), least))

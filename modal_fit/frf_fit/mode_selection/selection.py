@@ -117,7 +117,7 @@ def _refined(state: Selection, reweigh: Reweigh) -> Selection:
 
 
 def _apart(steady: Sequence[Candidate]) -> list[Candidate]:
-    """Without those that stand within a steadier one's half-power band with a like participation."""
+    """Drop candidates within the half-power band of a steadier one with a like participation."""
     apart: list[Candidate] = []
     for one in steady:
         near = [

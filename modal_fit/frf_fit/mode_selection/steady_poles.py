@@ -128,7 +128,7 @@ def _minus_share(candidate: Candidate) -> float:
 
 
 def _distinct(found: Sequence[Candidate]) -> list[Candidate]:
-    """Without those that a steadier candidate stands for."""
+    """Drop candidates that a steadier candidate stands for."""
     distinct: list[Candidate] = []
     for one in found:
         reach = [_SAME * max(one.damping_ratio, other.damping_ratio) for other in distinct]

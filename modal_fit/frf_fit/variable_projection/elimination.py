@@ -28,7 +28,7 @@ class Modes:
 
     @staticmethod
     def none(n_excitations: int) -> "Modes":
-        """No mode yet."""
+        """Give an empty set of modes."""
         return Modes(np.zeros(0, dtype=complex), np.zeros((0, n_excitations), dtype=complex))
 
     @property

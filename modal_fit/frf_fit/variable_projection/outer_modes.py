@@ -15,7 +15,7 @@ _NO_VIBRATION = 0.5  # damping ratio
 
 
 def inside(modes: Modes, band: tuple[float, float]) -> NDArray[np.bool_]:
-    """Which modes stand in the band."""
+    """Say which modes stand in the band."""
     return np.asarray((modes.frequencies > band[0]) & (modes.frequencies < band[1]))
 
 

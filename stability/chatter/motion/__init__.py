@@ -1,4 +1,4 @@
-"""What the recording of a cut holds: the spindle's angle, orders, lines, how they vary, what they do to the chip."""
+"""Evidence in the recording of a cut: the spindle's angle, orders, lines, how they vary, and the chip."""
 
 import lazy_loader
 

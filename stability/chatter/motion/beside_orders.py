@@ -12,7 +12,7 @@ OF_THE_ORDER = 0.1
 
 
 def stand_aside(power: Real, count: int, order_power: Real) -> NDArray[np.bool_]:
-    """Which lines of a spectrum stand beside an order and are none of its own.
+    """Say which lines of a spectrum stand beside an order and are none of its own.
 
     An order whose size or angle varies slowly has two lines of equal size beside it. Chatter whose frequency comes
     close to an order has one.

@@ -1,4 +1,4 @@
-"""What is found in the recording of a cut, before anything is concluded from it."""
+"""Evidence that is found in the recording of a cut, before anything is concluded from it."""
 
 import math
 from dataclasses import dataclass

@@ -43,7 +43,7 @@ class Family:
 
     @property
     def p_value(self) -> float:
-        """Of its most significant line."""
+        """Probability that noise alone has a line as strong as the most significant one."""
         return min(line.p_value for line in self.lines)
 
 

@@ -54,7 +54,7 @@ class Revolutions:
 
     @property
     def residual(self) -> Real:
-        """What is left when all orders are taken away, (n_revolutions * n_places, n_channels).
+        """Samples without the orders of the spindle, (n_revolutions * n_places, n_channels).
 
         At each angle a straight line over the revolutions is taken away, so that orders may grow or fall slowly.
         """

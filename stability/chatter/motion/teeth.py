@@ -47,7 +47,7 @@ def alternating_change(late: Revolutions, spectrum: Spectrum, motion: ToolMotion
 
 
 def _alternating(revolutions: Revolutions) -> Real:
-    """What changes its sign from tooth to tooth, (n_places / teeth, n_channels)."""
+    """Give the part that changes its sign from tooth to tooth, (n_places / teeth, n_channels)."""
     turn = revolutions.mean_turn
     by_tooth = turn.reshape(revolutions.teeth, -1, turn.shape[1])
     signs = np.where(np.arange(revolutions.teeth) % 2, -1.0, 1.0)[:, None, None]

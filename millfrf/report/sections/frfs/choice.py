@@ -1,4 +1,4 @@
-"""What is drawn of an FRF: its quantity, its frequency axis, the band of its model."""
+"""Choice of what is drawn of an FRF: its quantity, its frequency axis, the band of its model."""
 
 from estimation import Frf, to_receptance
 from figures import coherent_lines
@@ -15,7 +15,7 @@ def shown_frf(frf: Frf, model: ModalModel | None) -> Frf:
 
 
 def knows(model: ModalModel, frf: Frf) -> bool:
-    """Whether a model has the unit and some responses of an FRF."""
+    """Say whether a model has the unit and some responses of an FRF."""
     return model.unit == frf.unit and bool(set(model.responses) & set(frf.responses))
 
 

@@ -46,7 +46,7 @@ def misfit_table(title: str, frf: Frf, compared: Synthesis, most: int | None = S
 
 
 def _median_coherence(frf: Frf, compared: Synthesis) -> NDArray[np.float64] | None:
-    """In the band of the comparison, (n_responses, n_excitations); None where it is not known."""
+    """Give the median coherence in the compared band, (n_responses, n_excitations); None where it is not known."""
     if frf.coherence is None:
         return None
     inside = np.isin(frf.frequencies, compared.frequencies)

@@ -13,7 +13,7 @@ from scipy.io import savemat
 from acquisition import Channel, EventAxis, Events, Recording, RecordingWriter, StreamDescription, convert
 from foundation import FileFormatError, InputError
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 FORCE = Channel("fx", "force", "N", "TCP", "+X", full_scale=500.0, sensor="9255B, s/n 12", extra={"gain": 2})
 SPEED = Channel("spindle, measured", "angular_velocity", "rad/s")
 ACCELERATION = Channel("ax", "acceleration", "m/s^2", "HOUSING", "-X", high_pass_hz=0.5)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, prev_fast_len, rfft
 
-from .band_recording import BandRecording
+from .reduced_recording import BandRecording
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -140,7 +140,7 @@ def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay
 
 
 def _full_trust(recording: BandRecording, count: int) -> Complex:
-    """That of forces as measured."""
+    """Give full weight to every line: the forces are taken as measured."""
     return np.tile(np.eye(recording.force.shape[1], dtype=complex), (count, 1, 1))
 
 

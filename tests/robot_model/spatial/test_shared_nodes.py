@@ -103,7 +103,7 @@ def test_shared_nodes_are_a_rigid_link_between_separate_ones() -> None:
 
 
 def test_what_is_taken_as_rigid_is_said(tmp_path: Path) -> None:
-    source = Path(__file__).parents[2] / "robot_model" / "robots" / "kuka_kr90_r3100.toml"
+    source = Path(__file__).parents[3] / "robot_model" / "robots" / "kuka_kr90_r3100.toml"
     text = source.read_text(encoding="utf-8")
     own = tmp_path / "shared.toml"
     elbow = "\n[[points]]\nnode = 3\nframe = '1'\nat_m = [0.35, 0.0, 0.0]\nsource = 'test'\n"

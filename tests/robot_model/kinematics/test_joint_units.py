@@ -20,7 +20,7 @@ from robot_model import (
     with_gravity,
 )
 
-KUKA = Path(__file__).parents[2] / "robot_model" / "robots" / "kuka_kr90_r3100.toml"
+KUKA = Path(__file__).parents[3] / "robot_model" / "robots" / "kuka_kr90_r3100.toml"
 RAIL = """
 [[frames]]
 name = "rail"

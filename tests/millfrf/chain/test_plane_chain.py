@@ -12,7 +12,7 @@ import pytest
 from millfrf.__main__ import run
 from modal_fit import read_modal_model
 
-PAGE = (Path(__file__).parents[2] / "docs" / "importing.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "importing.md").read_text(encoding="utf-8")
 PLANE = np.array(
     [18.837, 40.133, 87.737, 89.673, 97.533, 105.185, 117.880, 125.186, 125.659, 130.032, 135.100, 143.173, 166.223]
 )

@@ -12,7 +12,7 @@ import pytest
 from estimation import write_frf
 from millfrf.__main__ import run
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "modal_report.py"
+EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "modal_report.py"
 
 
 @pytest.fixture(scope="module")
