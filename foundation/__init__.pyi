@@ -1,4 +1,5 @@
 from .atomic_files import writing_whole_file
+from .checked_toml import checked_toml
 from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom
 from .errors import FileFormatError, InputError, MillfrfError, MillfrfWarning
 from .noted_table import WARNING, apart, warning_lines
@@ -22,6 +23,7 @@ __all__ = [
     "Summary",
     "apart",
     "checked_band",
+    "checked_toml",
     "counted",
     "doubts_line",
     "drawing",
