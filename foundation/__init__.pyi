@@ -4,6 +4,7 @@ from .errors import FileFormatError, InputError, MillfrfError, MillfrfWarning
 from .noted_table import WARNING, apart, warning_lines
 from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library, same_values
 from .table_mistakes import mistake_in_words, shown
+from .toml_tables import checked_toml
 from .units import SI_UNITS, si_factor, unit_factor
 from .valid_band import Band, checked_band, shared_band
 
@@ -22,6 +23,7 @@ __all__ = [
     "Summary",
     "apart",
     "checked_band",
+    "checked_toml",
     "counted",
     "doubts_line",
     "drawing",

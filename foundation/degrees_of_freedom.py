@@ -50,13 +50,13 @@ class DegreeOfFreedom:
 
     @classmethod
     def parse(cls, text: str) -> "DegreeOfFreedom":
-        """Read ``node:direction``."""
+        """Read a degree of freedom from ``node:direction``."""
         node, _, direction = text.partition(":")
         return cls(node, direction)
 
     @property
     def sign(self) -> float:
-        """+1 or -1."""
+        """Sign of the direction, +1 or -1."""
         return -1.0 if self.direction.startswith("-") else 1.0
 
     @property

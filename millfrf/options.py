@@ -1,15 +1,21 @@
 """Options that several commands share, and small readers of what a user typed."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from foundation import InputError
 
+if TYPE_CHECKING:  # the commands start without loading the room of FRFs
+    from estimation import Frf
+
 Band = Annotated[tuple[float, float] | None, typer.Option("--band", metavar="LO HI", help="Frequency band, Hz.")]
 Output = Annotated[Path, typer.Option("--out", metavar="FILE", help="File to write.")]
+Responding = Annotated[
+    list[str] | None, typer.Option("--response", help="Channel that responds; repeat, or separate by commas.")
+]
 Stream = Annotated[str | None, typer.Option("--stream", help="Sample clock; needed where a recording has several.")]
 
 
@@ -79,3 +85,17 @@ def check_output(path: Path, suffixes: Sequence[str], inputs: Sequence[Path] = (
         raise InputError(f"cannot write {path}: it is a folder; give a file name")
     if any(one.exists() and path.exists() and path.samefile(one) for one in inputs):
         raise InputError(f"{path} is the input itself; choose another --out")
+
+
+def echo_warnings(warnings: Iterable[str]) -> None:
+    """Print each warning as one line on standard error."""
+    for warning in warnings:
+        typer.echo(f"warning: {warning}", err=True)
+
+
+def size_of(frf: "Frf") -> str:
+    """Say in words what an FRF matrix holds: quantity, responses, excitations, valid lines."""
+    return (
+        f"{frf.quantity}, {len(frf.responses)} responses x {len(frf.excitations)} excitations, "
+        f"{int(frf.valid.sum())} of {len(frf.frequencies)} lines valid"
+    )

@@ -63,12 +63,12 @@ class ConstantSpeed:
 
     @property
     def slowest(self) -> float:
-        """rad/s."""
+        """Lowest speed of the course, rad/s."""
         return self.speed
 
     @property
     def fastest(self) -> float:
-        """rad/s."""
+        """Highest speed of the course, rad/s."""
         return self.speed
 
     def angle(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -117,12 +117,12 @@ class LinearSweep:
 
     @property
     def slowest(self) -> float:
-        """rad/s."""
+        """Lowest speed of the course, rad/s."""
         return min(self.first, self.last)
 
     @property
     def fastest(self) -> float:
-        """rad/s."""
+        """Highest speed of the course, rad/s."""
         return max(self.first, self.last)
 
     def angle(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -181,12 +181,12 @@ class DriftingSpeed:
 
     @property
     def slowest(self) -> float:
-        """rad/s."""
+        """Lowest speed of the course, rad/s."""
         return self.mean * (1 - self.share)
 
     @property
     def fastest(self) -> float:
-        """rad/s."""
+        """Highest speed of the course, rad/s."""
         return self.mean * (1 + self.share)
 
     def angle(self, time: NDArray[np.float64]) -> NDArray[np.float64]:

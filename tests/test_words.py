@@ -14,7 +14,7 @@ WAITING = {"mismatch"}
 """Packages that are not clean yet. A package leaves this list when it is; none is added."""
 
 LEAST_WORDS = 3
-"""Words that the description of a parameter has at least."""
+"""Words that a docstring's summary and the description of a parameter have at least."""
 
 NO_SUBJECT = re.compile(r"(Of|Whose|Told)\b|As :")
 """A description that begins like this has no subject: "Of the cutter." does not say what of the cutter it is."""
@@ -90,20 +90,28 @@ def _mistakes(path: Path) -> Iterator[str]:
     if path.name.startswith("_") and path.name != "__init__.py":
         return
     for node, name in _public_things(tree):
-        docstring = ast.get_docstring(node)  # type: ignore[arg-type]
         place = f"{where}:{node.lineno} {name}"  # type: ignore[attr-defined]
+        docstring = ast.get_docstring(node)  # type: ignore[arg-type]
         if not docstring:
             yield f"{place} has no docstring"
             continue
-        for parameter, (shape, description) in _parameters_section(docstring).items():
-            if words(description) < LEAST_WORDS:
-                yield f"{place}: {parameter} is described as {description!r}; say what it is, its shape and its unit"
-            if NO_SUBJECT.match(description):
-                yield f"{place}: {parameter} is described as {description!r}; begin with the thing itself"
-            if " : " in shape:
-                yield f"{place}: {parameter} shares its line with another name; give each name its own line"
-            if not _inherits(node) and parameter not in _arguments(node):
-                yield f"{place}: {parameter} is described but not there"
+        summary = docstring.split("\n\n")[0]
+        if words(summary) < LEAST_WORDS:
+            yield f"{place} says only {summary!r}; name the thing, with its unit"
+        yield from (f"{place}: {mistake}" for mistake in _mistakes_of_parameters(node, docstring))
+
+
+def _mistakes_of_parameters(node: ast.AST, docstring: str) -> Iterator[str]:
+    there = _arguments(node)
+    for parameter, (shape, description) in _parameters_section(docstring).items():
+        if words(description) < LEAST_WORDS:
+            yield f"{parameter} is described as {description!r}; say what it is, its shape and its unit"
+        if NO_SUBJECT.match(description):
+            yield f"{parameter} is described as {description!r}; begin with the thing itself"
+        if " : " in shape:
+            yield f"{parameter} shares its line with another name; give each name its own line"
+        if not _inherits(node) and parameter not in there:
+            yield f"{parameter} is described but not there"
 
 
 @pytest.mark.parametrize("package", [name for name in _packages() if name not in WAITING])
@@ -115,7 +123,7 @@ def test_everything_public_says_what_it_is(package: str) -> None:
 LONGEST = 119
 """Characters of a line in the docs at most; rows of tables cannot be broken and are excepted."""
 
-UNWRAPPED = {"CHANGELOG.md", "docs/diagnosis.md"}
+UNWRAPPED: set[str] = set()
 """Pages that are not wrapped yet. A page leaves this list when it is; none is added."""
 
 

@@ -2,7 +2,6 @@
 
 import logging
 import os
-import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,9 +9,9 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
-from foundation import FileFormatError, InputError, mistake_in_words, writing_whole_file
+from foundation import FileFormatError, InputError, checked_toml, writing_whole_file
 
 from ..drivers import CanSignal, DbcDecoder
 from ..errors import DriverMissing
@@ -81,7 +80,7 @@ def add_can_log(
     """
     source, out = Path(log), Path(target)
     require_writable(out)
-    wanted = _read_mapping(Path(mapping))
+    wanted = checked_toml(Path(mapping), LogMapping, "mapping")
     signals = [CanSignal(each.signal, each.series, each.factor) for each in wanted.signals]
     events = read_can_log(source, DbcDecoder(source.parent / wanted.dbc, signals))
     shifted = {name: (times + wanted.offset_s, values) for name, (times, values) in events.items()}
@@ -135,14 +134,3 @@ def _take(message: Any, first: float, decoder: DbcDecoder, found: dict[str, tupl
         times, values = found.setdefault(name, ([], []))
         times.append(message.timestamp - first)
         values.append(value)
-
-
-def _read_mapping(path: Path) -> LogMapping:
-    try:
-        return LogMapping.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise InputError(f"cannot read mapping {path}: {error.strerror}; check the name") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"mapping {path} is not TOML: {error}") from error
-    except ValidationError as error:
-        raise InputError(f"mapping {path}: {mistake_in_words(error, LogMapping)}") from error

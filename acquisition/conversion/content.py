@@ -24,7 +24,7 @@ class Samples(Protocol):
 
     @property
     def n_samples(self) -> int:
-        """Rows."""
+        """Number of samples of each channel."""
 
     @property
     def dtype(self) -> "np.dtype[np.floating]":
@@ -64,7 +64,7 @@ class ArraySamples:
 
     @property
     def n_samples(self) -> int:
-        """Rows."""
+        """Number of samples of each channel."""
         return len(self.array)
 
     @property

@@ -1,15 +1,14 @@
 """`Mapping`: which array or column of a file is which channel; a TOML file checked where it enters."""
 
 import os
-import tomllib
 from collections import Counter
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from foundation import SI_UNITS, InputError, mistake_in_words, si_factor
+from foundation import SI_UNITS, InputError, checked_toml, si_factor
 
 from ..channel import Channel
 
@@ -189,12 +188,4 @@ def load_mapping(path: str | os.PathLike[str]) -> Mapping:
     InputError
         No such file, no TOML, or a key that is unknown, missing or out of range; one line with file, key and value.
     """
-    file = Path(path)
-    try:
-        return Mapping.model_validate(tomllib.loads(file.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise InputError(f"cannot read mapping {file}: {error.strerror}; check the name") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"mapping {file} is not TOML: {error}") from error
-    except ValidationError as error:
-        raise InputError(f"mapping {file}: {mistake_in_words(error, Mapping)}") from error
+    return checked_toml(Path(path), Mapping, "mapping")

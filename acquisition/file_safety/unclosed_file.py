@@ -57,11 +57,11 @@ class UnclosedFile(io.RawIOBase):
         self._file = path.open("rb", buffering=0)
 
     def readable(self) -> bool:
-        """True."""
+        """Say that the file can be read."""
         return True
 
     def seekable(self) -> bool:
-        """True."""
+        """Say that the file can be positioned."""
         return True
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:

@@ -78,7 +78,7 @@ class Recording:
 
     @property
     def recorded_at(self) -> str:
-        """ISO 8601 UTC."""
+        """Date and time of the recording, ISO 8601 in UTC."""
         return self._text("recorded_at")
 
     @property

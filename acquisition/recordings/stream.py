@@ -45,7 +45,7 @@ class Stream:
 
     @property
     def sample_rate(self) -> float:
-        """Hz."""
+        """Samples a second, Hz."""
         return self.description.sample_rate
 
     @property
@@ -60,7 +60,7 @@ class Stream:
 
     @property
     def n_samples(self) -> int:
-        """Rows stored."""
+        """Number of samples that are stored."""
         return int(self._samples.shape[0])
 
     @property

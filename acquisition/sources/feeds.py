@@ -21,7 +21,7 @@ class EventFeed(Protocol):
         """The series it gives and the clock of each."""
 
     def open(self) -> None:
-        """Start."""
+        """Start to receive events."""
 
     def poll(self) -> list[Events]:
         """Give the events since the last call, without waiting; raise an error of the receiver."""
@@ -102,5 +102,5 @@ class WithFeeds(AroundSource):
                 self._error = self._error or error
 
     def close(self) -> None:
-        """Close everything."""
+        """Close the feeds and the source."""
         self._opened.close()

@@ -51,7 +51,7 @@ class FrfEntry:
 
     @property
     def name(self) -> str:
-        """``response / excitation``."""
+        """Name of the entry, ``response / excitation``."""
         return f"{self.response} / {self.excitation}"
 
 

@@ -2,15 +2,14 @@
 
 import os
 import re
-import tomllib
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from foundation import DegreeOfFreedom, InputError, mistake_in_words
+from foundation import DegreeOfFreedom, InputError, checked_toml
 
 _STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 _RANGE = re.compile(r"(?P<prefix>.*?)(?P<first>\d+)\.\.(?P<last>\d+)(?P<rest>:.+)")
@@ -222,12 +221,4 @@ def load_frf_mapping(path: str | os.PathLike[str]) -> FrfMapping:
     InputError
         No such file, no TOML, or a key that is unknown, missing or out of range; one line with file, key and value.
     """
-    file = Path(path)
-    try:
-        return FrfMapping.model_validate(tomllib.loads(file.read_text(encoding="utf-8")))
-    except OSError as error:
-        raise InputError(f"cannot read mapping {file}: {error.strerror}; check the name") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"mapping {file} is not TOML: {error}") from error
-    except ValidationError as error:
-        raise InputError(f"mapping {file}: {mistake_in_words(error, FrfMapping)}") from error
+    return checked_toml(Path(path), FrfMapping, "mapping")

@@ -27,7 +27,7 @@ class FrfSource(Protocol):
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """Path of the file."""
 
     def array(self, place: int | str, part: str) -> NDArray[Any]:
         """The numbers at a place that is named for a part; real or complex."""
@@ -54,7 +54,7 @@ class TextSource:
         return np.asarray(self.table.values[:, column(self.table, place, part)])
 
     def roles(self) -> dict[str, int | str]:
-        """By headings."""
+        """Roles of the columns, by their headings."""
         return dict(column_roles(self.table))
 
     def unit(self, place: int | str) -> str:
@@ -62,7 +62,7 @@ class TextSource:
         return self.table.units[column(self.table, place, "unit")]
 
     def contents(self) -> str:
-        """Columns."""
+        """Names of the columns, for messages."""
         return f"columns {described(self.table)}"
 
 

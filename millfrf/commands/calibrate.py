@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..options import Output, check_output
+from ..options import Output, check_output, echo_warnings
 
 
 def calibrate(
@@ -23,7 +23,6 @@ def calibrate(
     check_output(out, (".json",), [model, tip, sensor])
     result = calibrate_to_tip(model, tip, sensor, progress=bar)
     write_calibration(out, result, [model, tip, sensor])
-    for warning in result.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+    echo_warnings(result.warnings)
     show(mode_table(result.model))
     typer.echo(f"wrote {out}")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..options import Band, Output, Stream, check_band, check_output, names
+from ..options import Band, Output, Responding, Stream, check_band, check_output, echo_warnings, names, size_of
 
 
 def estimate(
@@ -18,9 +18,7 @@ def estimate(
     excitation: Annotated[
         list[str] | None, typer.Option("--excitation", help="Channel that excites; repeat, or separate by commas.")
     ] = None,
-    response: Annotated[
-        list[str] | None, typer.Option("--response", help="Channel that responds; repeat, or separate by commas.")
-    ] = None,
+    response: Responding = None,
     band: Band = None,
     stream: Stream = None,
     estimator: Annotated[
@@ -64,11 +62,6 @@ def estimate(
         progress=bar,
     )
     write_estimate(out, result, recordings)
-    for warning in result.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+    echo_warnings(result.warnings)
     frf = result.frf
-    typer.echo(
-        f"wrote {out}: {frf.quantity}, {len(frf.responses)} responses x {len(frf.excitations)} excitations, "
-        f"{int(frf.valid.sum())} of {len(frf.frequencies)} lines valid, "
-        f"{frf.frequencies[0]:g} to {frf.frequencies[-1]:g} Hz"
-    )
+    typer.echo(f"wrote {out}: {size_of(frf)}, {frf.frequencies[0]:g} to {frf.frequencies[-1]:g} Hz")

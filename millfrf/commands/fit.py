@@ -7,7 +7,7 @@ import typer
 
 from foundation import InputError
 
-from ..options import Output, Stream, check_band, check_output, names
+from ..options import Output, Stream, check_band, check_output, echo_warnings, names
 
 
 def fit(
@@ -77,8 +77,7 @@ def fit(
     used_method = POLYREFERENCE if isinstance(result, ModalFit) else SUBSPACE
     used = FitOptions(band, used_method, max_order, modes, *channels, stream, poles, refine)
     write_fit(out, result, files, used)
-    for warning in result.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+    echo_warnings(result.warnings)
     show(mode_table(result.model))
     by_source = error_table(result.model)
     if by_source is not None:

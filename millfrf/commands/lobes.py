@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..options import Output, check_output
+from ..options import Output, check_output, echo_warnings
 
 
 def lobes(
@@ -40,8 +40,7 @@ def lobes(
     result = lobes_of(dynamics, cutting, speeds=speeds, max_depth=max_depth, method=method, progress=bar)
     asked = {"speeds_rpm": speeds, "max_depth_m": max_depth, "method": method}
     write_lobes(out, result, provenance=of_lobes([dynamics, cutting], asked))
-    for warning in result.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+    echo_warnings(result.warnings)
     typer.echo(f"wrote {out}: {lobes_summary(result, max_depth)}")
     if kind_of(dynamics) == MODEL:
         typer.echo(mode_coupling_line(read_modal_model(dynamics), read_cutting_process(cutting), max_depth))

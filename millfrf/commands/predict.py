@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..options import Output, check_output
+from ..options import Output, check_output, echo_warnings
 
 
 def predict(
@@ -21,8 +21,7 @@ def predict(
     check_output(out, (".h5",), [recording])
     found = predict_responses(model, recording, stream=stream)
     write_prediction(out, found, model, recording)
-    for warning in found.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+    echo_warnings(found.warnings)
     for line in prediction_lines(found):
         typer.echo(line)
     typer.echo(f"wrote {out}")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..options import Band, Output, Stream, check_band, check_output, names
+from ..options import Band, Output, Responding, Stream, check_band, check_output, echo_warnings, names, size_of
 
 
 def tap(
@@ -38,9 +38,7 @@ def tap(
     excitation: Annotated[
         list[str] | None, typer.Option("--excitation", help="Channel of the hammer; repeat, or separate by commas.")
     ] = None,
-    response: Annotated[
-        list[str] | None, typer.Option("--response", help="Channel that responds; repeat, or separate by commas.")
-    ] = None,
+    response: Responding = None,
     band: Band = None,
     stream: Stream = None,
 ) -> None:
@@ -73,13 +71,8 @@ def tap(
     write_taps(out, result, recordings)
     for table in tap_tables(result):
         show(table)
-    for warning in result.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+    echo_warnings(result.warnings)
     frf, tau = result.frf, result.settings.time_constant
     window = "" if tau is None else f"; exponential window of {tau:.4g} s, whose damping the fit takes off"
     known = "no common band" if frf.band is None else f"band {frf.band[0]:.4g} to {frf.band[1]:.4g} Hz"
-    typer.echo(
-        f"wrote {out}: {frf.quantity}, {len(frf.responses)} responses x {len(frf.excitations)} excitations, "
-        f"{int(frf.valid.sum())} of {len(frf.frequencies)} lines valid, {known}, segments of "
-        f"{result.settings.duration:.4g} s{window}"
-    )
+    typer.echo(f"wrote {out}: {size_of(frf)}, {known}, segments of {result.settings.duration:.4g} s{window}")

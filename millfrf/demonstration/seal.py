@@ -55,7 +55,7 @@ def seal(path: Path, content: dict[str, Any]) -> Seal:
 
 
 def open_seal(sealed: Seal) -> dict[str, Any]:
-    """The content.
+    """Give the content under the seal.
 
     Raises
     ------

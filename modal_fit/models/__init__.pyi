@@ -1,5 +1,5 @@
 from .comparison import ModePair, compare_modes
-from .modal_model import ModalModel, Residuals
+from .modal_model import ModalModel
 from .modal_model_file import read_modal_model, write_modal_model
 from .mode_errors import ModeErrors
 from .out_of_band import (
@@ -11,6 +11,7 @@ from .out_of_band import (
     residuals_from,
     residuals_with_poles,
 )
+from .residuals import Residuals
 from .shape_measures import modal_assurance, phase_collinearity, phase_deviation, reciprocity_residual
 from .summary_of_fit import fit_summary
 from .synthesised import Synthesis, synthesis

@@ -10,70 +10,11 @@ from estimation import Frf
 from foundation import Band, InputError, Result, Summary, checked_band, counted, drawing, listed, optional_library
 
 from .mode_errors import ModeErrors
+from .residuals import Residuals
 
 if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Residuals(Result):
-    """Out-of-band terms: the part of the FRF in the band that modes outside it make.
-
-    ``upper + lower / (i w)^2 + sum_k residues[k] / (i w - poles[k]) + conjugate``, on receptance. The two
-    real matrices are the textbook's (Ewins, Modal Testing, 2nd ed., section 4.5); the optional terms at
-    fixed poles outside the band carry the curvature that a near out-of-band mode leaves, which else
-    goes into the damping of the modes inside. They stay bounded outside the band, as powers of w do not.
-
-    Parameters
-    ----------
-    upper : (n_responses, n_excitations)
-        Residual flexibility of the modes above the band, m/N.
-    lower : (n_responses, n_excitations)
-        Residual inertia of those below, m/N (rad/s)^2 (1/kg).
-    poles : (n_terms,), rad/s, or None
-        Fixed poles outside the band; they are no modes of the structure.
-    residues : (n_terms, n_responses, n_excitations), or None
-        Full-rank residue matrices at ``poles``.
-
-    Raises
-    ------
-    InputError
-        Only one of ``poles`` and ``residues`` is given, or their lengths differ.
-    """
-
-    upper: NDArray[np.float64]
-    lower: NDArray[np.float64]
-    poles: NDArray[np.complex128] | None = None
-    residues: NDArray[np.complex128] | None = None
-
-    def __post_init__(self) -> None:
-        n_poles = None if self.poles is None else len(self.poles)
-        n_residues = None if self.residues is None else len(self.residues)
-        if n_poles != n_residues:
-            raise InputError(f"residuals: {n_poles} poles but {n_residues} residue matrices; give one for each")
-
-    def receptance(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Evaluate on the imaginary axis ``s = 2 pi i f``, shape (n_frequencies, n_responses, n_excitations).
-
-        Raises
-        ------
-        InputError
-            ``s`` holds 0 and there is a lower residual: it is infinite there.
-        """
-        if self.lower.any() and (s == 0).any():
-            raise InputError("the model has a lower residual, infinite at 0 Hz; ask for frequencies above 0")
-        inverse_square = np.divide(1.0, s**2, out=np.zeros_like(s), where=s != 0)
-        values = self.upper + inverse_square[:, None, None] * self.lower
-        if self.poles is not None and self.residues is not None:
-            values = values + np.einsum("kn,npq->kpq", 1 / (s[:, None] - self.poles), self.residues)
-            values = values + np.einsum("kn,npq->kpq", 1 / (s[:, None] - self.poles.conj()), self.residues.conj())
-        return np.asarray(values)
-
-    def _summary(self) -> Summary:
-        terms = 0 if self.poles is None else len(self.poles)
-        parts = [name for name in ("upper", "lower") if getattr(self, name).any()]
-        return Summary(f"Residuals: {' and '.join(parts) or 'no'} residual, {terms} terms at poles outside the band")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -242,7 +183,7 @@ class ModalModel(Result):
     def _summary(self) -> Summary:
         frequencies, damping = self.natural_frequencies, 100 * self.damping_ratios
         band = "" if self.band is None else f", holds in {self.band[0]:.4g} to {self.band[1]:.4g} Hz"
-        modes = [f"{f:.4g} Hz {zeta:.3g} %" for f, zeta in zip(frequencies, damping, strict=True)]
+        modes = modes_in_short(frequencies, damping)
         terms = "" if self.residuals is None else "; with out-of-band terms"
         terms += f"; physics {listed([str(term.get('name')) for term in self.physics])}" if self.physics else ""
         columns: tuple[str, ...] = ("mode", "frequency (Hz)", "damping ratio (%)")
@@ -262,3 +203,22 @@ class ModalModel(Result):
             columns,
             tuple((str(r + 1), *row) for r, row in enumerate(zip(*cells, strict=True))),
         )
+
+
+def modes_in_short(frequencies: NDArray[np.float64], damping: NDArray[np.float64]) -> list[str]:
+    """Name each mode by its frequency in four digits and its damping ratio in three.
+
+    Parameters
+    ----------
+    frequencies : (n_modes,), Hz
+        Natural frequencies of the modes.
+    damping : (n_modes,), %
+        Damping ratios of the modes.
+
+    Examples
+    --------
+    >>> modes_in_short(np.array([52.0]), np.array([4.0]))
+    ['52.00 Hz 4.00 %']
+    """
+    pairs = zip(frequencies, damping, strict=True)
+    return [f"{f'{f:#.4g}'.rstrip('.')} Hz {f'{zeta:#.3g}'.rstrip('.')} %" for f, zeta in pairs]

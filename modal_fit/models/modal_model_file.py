@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError, InputError, writing_whole_file
 
-from .modal_model import ModalModel, Residuals
+from .modal_model import ModalModel
 from .mode_errors import ModeErrors
+from .residuals import Residuals
 
 FORMAT = "millfrf.modal_model"
 FORMAT_VERSION = 1

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .modal_model import Residuals
+from .residuals import Residuals
 
 Complex = NDArray[np.complex128]
 ABOVE: tuple[tuple[float, ...], ...] = ((), (2.0,), (1.3, 3.0))

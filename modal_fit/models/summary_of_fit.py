@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from foundation import Summary, counted, doubts_line, listed
 
-from .modal_model import ModalModel
+from .modal_model import ModalModel, modes_in_short
 
 
 def fit_summary(name: str, model: ModalModel, notes: Sequence[str], warnings: Sequence[str]) -> Summary:
@@ -21,8 +21,7 @@ def fit_summary(name: str, model: ModalModel, notes: Sequence[str], warnings: Se
     warnings
         Doubts about the model, one sentence each.
     """
-    pairs = zip(model.natural_frequencies, 100 * model.damping_ratios, strict=True)
-    modes = [f"{frequency:.4g} Hz {zeta:.3g} %" for frequency, zeta in pairs]
+    modes = modes_in_short(model.natural_frequencies, 100 * model.damping_ratios)
     table = model._summary()
     headline = f"{name}: {counted(len(modes), 'mode')}, {model.quantity} in {model.unit}"
     lines = (f"modes {listed(modes) or 'none'}", *notes, *doubts_line(warnings))

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..polyreference import ModalFit
-from ..stabilisation import StabilisationChart
+from ..stabilisation import OnePole, StabilisationChart
 
 _SAME = 0.003  # relative distance in the complex plane within which a pole of an order belongs to a group
 
 
 @dataclass(frozen=True)
-class CandidateGroup:
+class CandidateGroup(OnePole):
     """A group of poles of the stabilisation chart, from which a user may pick.
 
     Parameters
@@ -33,16 +33,6 @@ class CandidateGroup:
     n_orders: int
     taken: bool
     reason: str = ""
-
-    @property
-    def frequency(self) -> float:
-        """Hz."""
-        return abs(self.pole) / (2 * np.pi)
-
-    @property
-    def damping_ratio(self) -> float:
-        """Damping ratio."""
-        return -self.pole.real / abs(self.pole)
 
 
 def candidate_groups(fit: ModalFit) -> tuple[CandidateGroup, ...]:

@@ -50,7 +50,7 @@ class OfferedGroup(BaseModel):
 
     @property
     def pole(self) -> complex:
-        """rad/s."""
+        """Pole of the group, rad/s."""
         return _pole(self.frequency_hz, self.damping_ratio)
 
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from .matrix_fraction import OrderPoles
+from .one_pole import OnePole
 
 Complex = NDArray[np.complex128]
 _FREQUENCY, _DAMPING, _VECTOR = 0.01, 0.10, 0.95  # changes from order to order that count as stable
@@ -38,17 +39,17 @@ class StabilisationChart:
 
     @property
     def frequencies(self) -> NDArray[np.float64]:
-        """Hz."""
+        """Natural frequency of each pole, Hz."""
         return np.abs(self.poles) / (2 * np.pi)
 
     @property
     def damping_ratios(self) -> NDArray[np.float64]:
-        """zeta."""
+        """Damping ratio of each pole, zeta."""
         return -self.poles.real / np.abs(self.poles)
 
 
 @dataclass(frozen=True)
-class PoleGroup:
+class PoleGroup(OnePole):
     """Poles of several orders taken for one mode.
 
     Parameters
@@ -64,16 +65,6 @@ class PoleGroup:
     pole: complex
     n_orders: int
     reason: str = ""
-
-    @property
-    def frequency(self) -> float:
-        """Hz."""
-        return abs(self.pole) / (2 * np.pi)
-
-    @property
-    def damping_ratio(self) -> float:
-        """zeta."""
-        return -self.pole.real / abs(self.pole)
 
 
 def stabilisation_chart(by_order: Sequence[OrderPoles], band: tuple[float, float]) -> StabilisationChart:

@@ -84,7 +84,7 @@ class ConcealedCell:
         self._samples: Real | None = None
 
     def open(self) -> None:
-        """Simulate."""
+        """Simulate the whole recording."""
         self._samples = self.samples()
 
     def read(self) -> Block | None:

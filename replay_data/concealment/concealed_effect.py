@@ -35,7 +35,7 @@ class ConcealedEffect:
     parameters: dict[str, Any]
 
     def to_json(self) -> dict[str, Any]:
-        """Plain values."""
+        """Give plain values that a JSON file can hold."""
         return asdict(self)
 
 

@@ -18,8 +18,11 @@ NOT_YET = {"mismatch"}
 FACES = {"millfrf"}
 """Rooms whose front is the face for notebooks; examples and benchmarks may ask one of their shelves."""
 
-EAGER = {"foundation.results", "millfrf.commands"}
-"""Fronts that load at once: the base class of results, and commands, whose modules import nothing heavy."""
+EAGER = {"foundation.results", "millfrf.commands", "mismatch.physics", "mismatch.adapters.cut.physics"}
+"""Fronts that load at once: the base of results, commands (nothing heavy), and libraries that find their own files."""
+
+FOUND_BY_ITSELF = "PHYSICS"
+"""The name in a file of a library of causes; who needs one certain cause asks its file."""
 
 
 def _waits(*modules: str) -> bool:

@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import millfrf as mf
 from estimation import read_frf
 from millfrf.demonstration.whole_chain import (
     FIT_BAND,
@@ -122,3 +124,23 @@ def test_the_example_finds_the_modes_of_table_1(tmp_path: Path) -> None:
     np.testing.assert_allclose(model.damping_ratios, truth.damping_ratios, rtol=0.05)
     exact = example.certified_lobes(truth, replace(example.CUTTER), lobes.spindle_speeds, 10e-3)
     np.testing.assert_allclose(lobes.depth_limits, exact.depth_limits, rtol=0.03)
+
+
+def test_the_notebook_of_the_readme_runs_and_prints_what_it_says(
+    demo: DemoResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    [code] = re.findall(r"```python\n(import millfrf as mf\n.*?)```", text, flags=re.DOTALL)
+    assert len([line for line in code.splitlines() if line]) <= 10
+    [printed] = re.findall(r"```text\n(Estimate by .*?)```", text, flags=re.DOTALL)
+    (tmp_path / "millfrf-demo").symlink_to(demo.report.parent)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", mf.MillfrfWarning)
+        names: dict[str, Any] = {}
+        exec(compile(code, "README.md", "exec"), names)
+    assert capsys.readouterr().out == printed
+    assert (tmp_path / "lobes.png").stat().st_size > 10_000
+    found, true = names["fitted"].model.natural_frequencies, demo.true.natural_frequencies
+    np.testing.assert_allclose(found, sorted(true)[: len(found)], rtol=2e-3)

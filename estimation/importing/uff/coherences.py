@@ -44,7 +44,7 @@ class Coherence:
 
     @property
     def name(self) -> str:
-        """``response / excitation``."""
+        """Name of the entry, ``response / excitation``."""
         return f"{self.response} / {self.excitation}"
 
 

@@ -80,7 +80,7 @@ class Tally:
         return max((n / self.rates[name] for name, n in self.samples.items()), default=0.0)
 
     def summary(self) -> str:
-        """One line."""
+        """Sum the recording up in one line."""
         streams = ", ".join(f"{name}: {n} samples" for name, n in self.samples.items()) or "no samples"
         events = ", ".join(f"{name}: {n} events" for name, n in self.events.items())
         said = f"{streams}{'; ' if events else ''}{events}; {self.seconds():.2f} s"

@@ -86,7 +86,7 @@ class ChannelLevel:
 
     @property
     def peak(self) -> float:
-        """Largest magnitude."""
+        """Largest magnitude so far."""
         return max(abs(self.lowest), abs(self.highest)) if self.n_samples else 0.0
 
     @property

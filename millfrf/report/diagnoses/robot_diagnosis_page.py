@@ -14,8 +14,8 @@ from mismatch.adapters.robot import ROBOT, RobotDiagnosis, number_of, standard_e
 from mismatch.inference import Candidate
 
 from ...provenance import versions
-from ...robot.diagnosis.diagnosis_words import UNITS, refusal, told_number, what_is_asked
-from ...tables.result_tables import Table
+from ...robot import UNITS, refusal, told_number, what_is_asked
+from ...tables import Table
 from ..section import Picture, Section
 
 

@@ -8,7 +8,14 @@ from numpy.typing import NDArray
 
 from estimation import Frf
 
-from ...stabilisation import PoleGroup, StabilisationChart, choose_poles, matrix_fraction_poles, stabilisation_chart
+from ...stabilisation import (
+    OnePole,
+    PoleGroup,
+    StabilisationChart,
+    choose_poles,
+    matrix_fraction_poles,
+    stabilisation_chart,
+)
 
 _RANGES = (0.4, 0.6, 0.8, 1.0)  # of the highest order: low orders show strong modes, high orders weak and close ones
 Complex = NDArray[np.complex128]
@@ -19,7 +26,7 @@ _NO_VIBRATION = 0.5  # damping ratio
 
 
 @dataclass(frozen=True)
-class Candidate:
+class Candidate(OnePole):
     """A pole that may be a mode.
 
     Parameters
@@ -38,16 +45,6 @@ class Candidate:
     share: float
     n_orders: int
     participation: Complex
-
-    @property
-    def frequency(self) -> float:
-        """Hz."""
-        return abs(self.pole) / (2 * np.pi)
-
-    @property
-    def damping_ratio(self) -> float:
-        """Damping ratio."""
-        return -self.pole.real / abs(self.pole)
 
     def dropped(self, reason: str) -> PoleGroup:
         """The group of poles as a dropped one."""
