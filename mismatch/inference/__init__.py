@@ -12,10 +12,10 @@ from .diagnosis import (
 )
 from .diagnosis_file import diagnosis_content, read_diagnosis, write_diagnosis
 from .form_errors import jackknife_variance, shift_weight
+from .forward_search import Progress, pruned, released, search
 from .paired_tests import ratio_interval, signed_ranks, students_test
 from .process_pool import in_processes
 from .remainder import Remainder
-from .search import Progress, pruned, released, search
 from .settings import (
     FAULTS,
     EvidenceSettings,

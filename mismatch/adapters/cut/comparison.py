@@ -19,7 +19,7 @@ UNCONFIRMED = "fitted, but not confirmed: within its own error, or no gain on bl
 
 @dataclass(frozen=True)
 class CutComparison:
-    """A cut as :func:`mismatch.inference.search` wants it.
+    """A cut as :func:`mismatch.inference.forward_search` wants it.
 
     Parameters
     ----------

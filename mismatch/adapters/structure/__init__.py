@@ -1,6 +1,6 @@
 """The comparison of a modal model with recordings of forces and responses."""
 
-from .diagnose import diagnose
+from .diagnosing import diagnose
 from .improved_model import improved_model_of
 from .prediction import Prediction, predict
 

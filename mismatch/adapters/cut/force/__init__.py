@@ -1,7 +1,7 @@
 """The cutting force that a process gives along a recording, its spectra and their noise."""
 
 from .coefficients import COEFFICIENT_NAMES, Belief
-from .computed_force import Acting, chip_thickness, computed_force
+from .force_computation import Acting, chip_thickness, computed_force
 from .noise import ForceNoise, noise_of, whitened
 from .spectra import ForceSpectra, force_spectra
 from .tooth_views import CutView, fineness, view_of
