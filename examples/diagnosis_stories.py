@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 from figures import law_figure, spectra_figure
-from millfrf.demonstration.concealment import ConcealOptions, run_concealed
+from millfrf.demonstration import ConcealOptions, run_concealed
 from mismatch import diagnose, read_recordings
 from mismatch.location.free_form_law import free_form_laws
 from mismatch.location.held_out_spectra import held_out_spectra

@@ -95,7 +95,7 @@ def compare() -> Compared:
 
 
 def accelerance(s: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """Of the simulated tool tip along X, at points of the Laplace plane."""
+    """Give the FRF of the simulated tool tip along X, at points of the Laplace plane."""
     tip = select(default_structure(), TIP[:1], TIP[:1])
     residues = tip.right[:, 0] * tip.left[:, 0]
     terms = residues / (s[:, None] - tip.poles) + residues.conj() / (s[:, None] - tip.poles.conj())

@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from cutting import MillingProcess
-from millfrf.robot.depth_maps.posture_maps import depth_over_places, depth_over_redundancy
-from millfrf.robot.posture_figure import draw_posture_map
+from millfrf.robot import depth_over_places, depth_over_redundancy, draw_posture_map
 from robot_model import (
     CutPlace,
     PostureMap,

@@ -146,7 +146,8 @@ def _clock(input_path: Path, mapping: Mapping, files: dict[Path, ArrayFile]) -> 
         stated = {file.sample_rate for file in files.values()} - {None}
         if len(stated) != 1:
             raise InputError(
-                "the mapping must give either sample_rate (Hz) or time (name of the array or column of times)"
+                "the mapping must give either sample_rate (Hz) or time (name of the array or column of times); "
+                "add one of them"
             )
         return float(next(iter(stated)) or 0.0), mapping.start_time
     asked = mapping.time or ""

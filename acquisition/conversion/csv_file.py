@@ -123,7 +123,7 @@ def _parse(rows: list[tuple[int, str]], delimiter: str, decimal: str, path: Path
             yield line if decimal == "." else line.replace(decimal, ".")
 
     if not rows:
-        raise FileFormatError(f"{path} holds headings but no rows of numbers")
+        raise FileFormatError(f"{path} holds headings but no rows of numbers; export the samples too")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")

@@ -74,7 +74,7 @@ class NiSource:
         setup: str = "",
     ) -> None:
         if not inputs:
-            raise InputError("an NI source needs at least one input")
+            raise InputError("an NI source needs at least one input; add a table [[channels]] to the session")
         self.title, self.setup = title, setup
         self._inputs = tuple(inputs)
         self._wished_rate = sample_rate

@@ -77,7 +77,9 @@ class RecordingWriter:
         self.path = Path(path)
         self.streams = {stream.name: stream for stream in streams}
         if not streams or len(self.streams) != len(streams):
-            raise InputError(f"a recording needs streams of different names, got {[s.name for s in streams]}")
+            raise InputError(
+                f"a recording needs streams of different names, got {[s.name for s in streams]}; name each once"
+            )
         self._file = self._create(overwrite)
         self._spare: SpareSpace | None = None
         try:
@@ -145,7 +147,8 @@ class RecordingWriter:
         described = self._described(stream)
         if samples.ndim != 2 or samples.shape[1] != len(described.channels):
             raise InputError(
-                f"block of shape {samples.shape} for stream {stream}, expected {len(described.channels)} columns"
+                f"block of shape {samples.shape} for stream {stream}, expected {len(described.channels)} columns; "
+                "give one a channel"
             )
         if not np.isfinite(samples).all():
             column = int(np.argmax(~np.isfinite(samples).all(axis=0)))

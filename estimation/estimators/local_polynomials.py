@@ -119,7 +119,9 @@ def _check(recordings: Sequence[BandRecording], band: tuple[float, float], degre
         ):
             raise InputError("recordings of different channels or sample rates cannot be stacked; prepare them alike")
     if not 0 <= band[0] < band[1] <= first.usable_band:
-        raise InputError(f"band {band[0]:g} to {band[1]:g} Hz is not within 0 to {first.usable_band:g} Hz")
+        raise InputError(
+            f"band {band[0]:g} to {band[1]:g} Hz is not within 0 to {first.usable_band:g} Hz; choose a band inside"
+        )
     if degree < 0:
         raise InputError(f"degree {degree} is negative; give 0 or more")
 

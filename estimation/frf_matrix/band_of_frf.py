@@ -18,8 +18,9 @@ BRIDGED = 8
 def known_band(frf: Frf, driven: NDArray[np.bool_]) -> Band | None:
     """Find the stretch of known lines that holds most of the structure's motion.
 
-    A line is known where it is valid, driven, above 0 Hz and coherent in one response at least. Of several stretches (a
-    sweep of a cutter drives one for each harmonic of its teeth) the one with the most energy of the mobility counts.
+    A line is known where it is valid, driven, above 0 Hz and coherent in one response at least. If there
+    are several stretches (a sweep of a cutter drives one for each harmonic of its teeth), the one with the most energy
+    of the mobility counts.
 
     Parameters
     ----------

@@ -127,8 +127,8 @@ def _rings(answers: LateAnswers) -> NDArray[np.bool_]:
 def _answers(answers: LateAnswers) -> NDArray[np.bool_]:
     """Say on which lines the late signal is a response to the taps and no hum.
 
-    It follows the force from tap to tap, or it falls, or it was not there before the first tap. Of a single tap in a
-    recording without a quiet time before it, nothing can be told.
+    It follows the force from tap to tap, or it falls, or it was not there before the first tap. A single tap in a
+    recording without a quiet time before it does not tell the two apart.
     """
     if answers.quiet_known or answers.n_taps == 1:
         return np.ones(answers.last.shape, dtype=bool)

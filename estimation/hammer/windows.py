@@ -31,7 +31,7 @@ def exponential_window(n_samples: int, sample_rate: float, time_constant: float)
         A time constant that is not positive.
     """
     if not time_constant > 0:
-        raise InputError(f"time constant {time_constant:g} s must be positive")
+        raise InputError(f"time constant {time_constant:g} s must be positive; leave it out for no window")
     return np.asarray(np.exp(-np.arange(n_samples) / (sample_rate * time_constant)))
 
 

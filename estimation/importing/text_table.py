@@ -53,7 +53,7 @@ def read_text_table(path: Path, options: TextOptions | None = None) -> TextTable
     path
         Text, or text packed with gzip (``.gz``).
     options
-        What cannot be found, or is found wrong.
+        Options of the text that cannot be found in it, or are found wrongly: delimiter, decimal sign, header.
 
     Raises
     ------

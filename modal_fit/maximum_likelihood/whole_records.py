@@ -66,7 +66,8 @@ def record_spectra(recordings: Sequence[BandRecording], band: tuple[float, float
             raise InputError(f"test {number + 1} has other channels than test 1; stack tests of one set-up only")
         if high > recording.usable_band * (1 + 1e-9):
             raise InputError(
-                f"band up to {high:g} Hz, but test {number + 1} is flat only to {recording.usable_band:g} Hz"
+                f"band up to {high:g} Hz, but test {number + 1} is flat only to {recording.usable_band:g} Hz; "
+                "lower the band's end"
             )
         parts.append(_lines(recording, band, number))
     responses = layout[1]

@@ -66,11 +66,14 @@ def synthesis(frf: Frf, model: ModalModel, band: Band | None = None) -> Synthesi
     if (model.quantity == "transfer") != (frf.quantity == "transfer") or (
         model.quantity == "transfer" and model.unit != frf.unit
     ):
-        raise InputError(f"a model of {model.quantity} in {model.unit} cannot stand for a {frf.quantity} in {frf.unit}")
+        raise InputError(
+            f"a model of {model.quantity} in {model.unit} cannot stand for a {frf.quantity} in {frf.unit}; compare it "
+            "with the FRF it was fitted to"
+        )
     low, high = band or model.band or (0.0, np.inf)
     inside = frf.valid & (frf.frequencies > 0) & (frf.frequencies >= low) & (frf.frequencies <= high)
     if not inside.any():
-        raise InputError(f"no valid line of the FRF lies between {low:g} and {high:g} Hz")
+        raise InputError(f"no valid line of the FRF lies between {low:g} and {high:g} Hz; choose another band")
     s, measured = frf.laplace[inside], frf.values[inside]
     synthesised = _placed(s[:, None, None] ** power * model.at(s), model, frf)
     size = np.sum(np.abs(measured) ** 2, axis=0)

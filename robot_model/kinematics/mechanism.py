@@ -106,7 +106,10 @@ class Mechanism:
         seen = {"0"}
         for frame in self.frames:
             if frame.antecedent not in seen:
-                raise InputError(f"frame {frame.name} stands on {frame.antecedent!r}, which is not before it")
+                raise InputError(
+                    f"frame {frame.name} stands on {frame.antecedent!r}, which is not before it; list frames from the "
+                    "base on"
+                )
             if frame.name in seen:
                 raise InputError(f"two frames are named {frame.name!r}; name each once")
             seen.add(frame.name)

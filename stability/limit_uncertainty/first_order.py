@@ -121,7 +121,7 @@ def speeds_within(speeds: Real, speed: float, drift: float) -> Real:
     if not speeds.min() <= speed <= speeds.max():
         raise InputError(
             f"{speed * 30 / math.pi:.0f} rpm is outside the lobes, {speeds.min() * 30 / math.pi:.0f} to "
-            f"{speeds.max() * 30 / math.pi:.0f} rpm"
+            f"{speeds.max() * 30 / math.pi:.0f} rpm; choose a speed inside"
         )
     inside = speeds[(speeds >= low) & (speeds <= high)]
     return np.unique(np.concatenate([inside, np.clip([low, speed, high], speeds.min(), speeds.max())]))

@@ -18,7 +18,7 @@ Real = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 MOST_LINES = 161
-"""Of one limit's motion."""
+"""Lines of the motion at one limit that are taken at most."""
 
 CLOSED = 0.03
 """How far the loop gain at a limit may be from 1: beyond it the limit is not one of this structure and cut."""

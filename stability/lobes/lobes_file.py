@@ -73,7 +73,9 @@ def read_lobes(path: str | os.PathLike[str]) -> StabilityLobes:
             warnings, lines = apart(file)
         rows = list(csv.reader(lines))
         if not rows or tuple(rows[0]) not in (COLUMNS, OLDER_COLUMNS):
-            raise FileFormatError(f"{path} has columns {rows[:1]}, lobes have {', '.join(COLUMNS)}")
+            raise FileFormatError(
+                f"{path} has columns {rows[:1]}, lobes have {', '.join(COLUMNS)}; give a file that lobes wrote"
+            )
     except (UnicodeDecodeError, csv.Error) as error:
         raise FileFormatError(f"{path} is not a table of lobes: it is no text; give a file that lobes wrote") from error
     try:

@@ -108,7 +108,10 @@ def tool_directions(structure: Frf | ModalModel, node: str | None = None) -> Too
         No receptance, excitations at several nodes, or no response or excitation at the tool.
     """
     if structure.quantity != "receptance" or structure.unit != "m/N":
-        raise InputError(f"stability needs a receptance in m/N, this is {structure.quantity} in {structure.unit}")
+        raise InputError(
+            f"stability needs a receptance in m/N, this is {structure.quantity} in {structure.unit}; give a model or "
+            "an FRF of receptance"
+        )
     node = node or _only_node(structure.excitations)
     rows, row_axes, row_signs = _directions(structure.responses, node)
     columns, column_axes, column_signs = _directions(structure.excitations, node)

@@ -90,7 +90,10 @@ def trace_boundary(
         Speeds not positive and increasing, a tolerance that is not between 0 and 1, or what the solver refuses.
     """
     if not (0 < lowest_speed < highest_speed and np.isfinite(highest_speed)):
-        raise InputError(f"speeds {lowest_speed:g} to {highest_speed:g} rad/s are not positive and increasing")
+        raise InputError(
+            f"speeds {lowest_speed:g} to {highest_speed:g} rad/s are not positive and increasing; "
+            "give the lower one first"
+        )
     if not 0 < tolerance < 1:
         raise InputError(f"tolerance {tolerance!r} of depth is not between 0 and 1; 1e-3 is a good one")
     first = np.geomspace(lowest_speed, highest_speed, _first_count(structure, process, lowest_speed, highest_speed))

@@ -16,8 +16,9 @@ _STANDS_OUT = 20.0  # power of an order over the noise from which it counts
 def alternation(revolutions: Revolutions) -> float:
     """Size of the orders at odd multiples of half the tooth passing over that of all other orders.
 
-    Of the mean revolution; NaN with an odd number of teeth, where half the tooth passing is no order of the spindle. An
-    eccentric cutter with four teeth or more has orders one above and one below the tooth passing instead.
+    They are those of the mean revolution. With an odd number of teeth the result is NaN, because half the tooth passing
+    is no order of the spindle then. An eccentric cutter with four teeth or more has orders one above and
+    one below the tooth passing instead.
     """
     if revolutions.teeth % 2:
         return float("nan")
