@@ -11,9 +11,7 @@ from pathlib import Path
 
 from figures import law_figure, spectra_figure
 from millfrf.demonstration import ConcealOptions, run_concealed
-from mismatch import diagnose, read_recordings
-from mismatch.location.free_form_law import free_form_laws
-from mismatch.location.held_out_spectra import held_out_spectra
+from mismatch import diagnose, free_form_laws, held_out_spectra, read_recordings
 from modal_fit import read_modal_model
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"

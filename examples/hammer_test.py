@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from acquisition import Recording, record
 from estimation import exponential_window, force_window
 from foundation import TIP
-from millfrf.taps import TapOptions, TapResult, tap_recordings
+from millfrf import TapResult
+from millfrf.taps import TapOptions, tap_recordings
 from replay_data import HammerCell, default_structure, dynamometer, select, tip_accelerometers
 
 RATE, SECONDS = 2048.0, 1.0

@@ -16,9 +16,18 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, find_direction, fit, linear_floor, predict_lines
-from mismatch.physics import JointPhysics, library
-from mismatch.screening.joint_screening import screen_joints
+from mismatch import (
+    Hypothesis,
+    JointPhysics,
+    LabError,
+    ModelShape,
+    find_direction,
+    fit,
+    library,
+    linear_floor,
+    predict_lines,
+    screen_joints,
+)
 from modal_fit import ModalModel, read_modal_model
 
 Real = NDArray[np.float64]

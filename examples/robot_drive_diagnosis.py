@@ -28,8 +28,7 @@ from scipy.signal import butter, filtfilt, resample_poly
 from cutting import compiled
 from estimation import BandRecording, channels_of
 from figures import COLOURS, house_style, new_figure
-from mismatch import StructureDiagnosis, diagnose, predict
-from mismatch.models.model_terms import improved_model
+from mismatch import StructureDiagnosis, diagnose, improved_model, predict
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]

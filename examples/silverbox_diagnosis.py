@@ -21,8 +21,7 @@ from scipy.signal import csd, welch
 
 from estimation import BandRecording, channels_of
 from figures import COLOURS, house_style, new_figure
-from mismatch import StructureDiagnosis, diagnose, linear_floor, predict, seen_motion
-from mismatch.models.model_terms import improved_model
+from mismatch import StructureDiagnosis, diagnose, improved_model, linear_floor, predict, seen_motion
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]

@@ -6,9 +6,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cutting import MillingProcess
-from mismatch import Settings, StructureDiagnosis, diagnose, improved_model_of, read_recordings, write_diagnosis
-from mismatch.location.spindle_orders import SpindleSpeed, spindle_speed
-from mismatch.records.reading import measured_part
+from mismatch import (
+    Settings,
+    SpindleSpeed,
+    StructureDiagnosis,
+    diagnose,
+    improved_model_of,
+    measured_part,
+    read_recordings,
+    spindle_speed,
+    write_diagnosis,
+)
 from modal_fit import read_modal_model, write_modal_model
 
 from .chain import SUBSPACE, FitOptions, fit_recordings

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.fft import irfft
 
-from mismatch.adapters.cut import CutDiagnosis, CutFit
+from mismatch import CutDiagnosis, CutFit
 
 from ..style import COLOURS, legend_above, new_figure
 

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mismatch.location.free_form_law import BinnedForce, FreeFormLaw
+from mismatch import BinnedForce, FreeFormLaw
 
 from ..style import COLOURS, SHADE, house_style, legend_above, new_figure, panel_letter
 

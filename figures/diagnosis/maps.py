@@ -10,9 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter, ScalarFormatter
 from numpy.typing import NDArray
 
-from mismatch.location.residual_maps import ResidualMap, band_edges
-from mismatch.location.residual_view import ResidualView
-from mismatch.location.time_maps import BlockResidual
+from mismatch import BlockResidual, ResidualMap, ResidualView, band_edges
 
 from ..style import WIDTH_MM, house_style, new_figure
 

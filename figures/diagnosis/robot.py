@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from mismatch.adapters.robot import RobotDiagnosis, predicted_spectrum
+from mismatch import RobotDiagnosis, predicted_spectrum
 
 from ..style import COLOURS, legend_above, new_figure
 

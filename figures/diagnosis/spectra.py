@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from mismatch.location.held_out_spectra import HeldOutSpectra
+from mismatch import HeldOutSpectra
 
 from ..style import COLOURS, WIDTH_MM, house_style, new_figure
 

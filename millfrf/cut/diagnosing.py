@@ -8,12 +8,7 @@ from pathlib import Path
 from acquisition import Recording
 from cutting import MillingProcess
 from foundation import InputError
-from mismatch.adapters.cut import (
-    diagnose_cut,
-    read_cut_recording,
-    write_improved_cut,
-)
-from mismatch.inference import write_diagnosis
+from mismatch import diagnose_cut, read_cut_recording, write_diagnosis, write_improved_cut
 from modal_fit import read_modal_model
 
 from ..gate import RECORD_AGAIN, check_depth, check_one_speed, check_recordings, read_checked_cutting

@@ -2,8 +2,7 @@
 
 import math
 
-from mismatch import AcceptedCause
-from mismatch.adapters.cut import COEFFICIENTS, CutDiagnosis
+from mismatch import COEFFICIENTS, AcceptedCause, CutDiagnosis
 
 from ..tables import with_error
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from estimation import WindowedSpectrum
 
 from ..inference import FAULTS, FaultSettings
-from ..joints.saturation import Saturation, rounded, saturated
-from ..models.fitting import Fit, fit
+from ..joints import Saturation, rounded, saturated
+from ..models import Fit, fit
 from .tones import shown_signal
 
 Real = NDArray[np.float64]

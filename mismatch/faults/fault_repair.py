@@ -5,9 +5,8 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..inference import AcceptedCause, FaultSettings, Settings
-from ..models.fitting import Fit, fit
-from ..physics.clipping import PHYSICS as CLIPPING
-from ..physics.unmeasured_excitation import PHYSICS as TONE
+from ..models import Fit, fit
+from ..physics import CLIPPING, UNMEASURED_EXCITATION
 from .clipping import Clipping, find_clipping, mended
 from .tones import Tone, find_tone, stands_out, without_tone
 from .tones_beyond import tones_beyond
@@ -65,7 +64,7 @@ def with_tones_settled(
     settings
         Thresholds.
     """
-    tones = [cause for cause in accepted if cause.name == TONE.name]
+    tones = [cause for cause in accepted if cause.name == UNMEASURED_EXCITATION.name]
     gone = [one for one in tones if not stands_out(fitted, lines, one.parameters["frequency_hz"], settings)]
     most = settings.most_tones - len(tones) + len(gone)
     beyond = tones_beyond(fitted.hypothesis, lines, decay, most, settings)
@@ -80,7 +79,7 @@ def _tone_cause(tone: Tone, lines: WindowedSpectrum) -> AcceptedCause:
     errors = {"frequency_hz": width * float(np.sqrt(6 / tone.gain)) / np.pi}
     known = [(name, float(one)) for name, one in zip(names, tone.spread, strict=True) if np.isfinite(one)]
     errors |= {f"amplitude_{name}": one for name, one in known}
-    return AcceptedCause(TONE.name, {"channels": list(names)}, parameters, errors, tone.gain)
+    return AcceptedCause(UNMEASURED_EXCITATION.name, {"channels": list(names)}, parameters, errors, tone.gain)
 
 
 def _clipping_cause(clipping: Clipping, lines: WindowedSpectrum) -> AcceptedCause:

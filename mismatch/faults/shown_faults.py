@@ -11,7 +11,7 @@ from scipy.fft import irfft
 from estimation import BandRecording, WindowedSpectrum
 
 from ..inference import AcceptedCause
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models import Hypothesis, predict_lines
 from ..physics import FaultPhysics, library
 
 Complex = NDArray[np.complex128]

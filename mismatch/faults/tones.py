@@ -11,10 +11,8 @@ from scipy.stats import t as student
 from estimation import WindowedSpectrum
 
 from ..inference import FAULTS, FaultSettings
-from ..models.fitting import Fit
-from ..models.hypothesis import predict_lines
-from ..models.misfit import levels, through_structure
-from ..noise.noise_model import NoiseModel, whitening
+from ..models import Fit, levels, predict_lines, through_structure
+from ..noise import NoiseModel, whitening
 
 Real = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from estimation import WindowedSpectrum, windowed_spectrum
 
 from ..inference import FAULTS, FaultSettings
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models import Hypothesis, predict_lines
 from .tones import (
     NEAR,
     REACH,

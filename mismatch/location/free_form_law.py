@@ -8,14 +8,11 @@ from scipy.fft import irfft, rfft
 
 from estimation import WindowedSpectrum
 
-from ..joints.joint_simulation import driven_force
-from ..models.fitting import Fit
-from ..models.hypothesis import Cause, Hypothesis, predict_lines
-from ..models.misfit import through_structure
-from ..noise.noise_model import whitening
+from ..joints import driven_force
+from ..models import Cause, Fit, Hypothesis, predict_lines, through_structure
+from ..noise import whitening
 from ..physics import answer_name
-from ..screening.joint_direction import SeenMotion, seen_motion
-from ..screening.linear_floor import FloorRecord
+from ..screening import FloorRecord, SeenMotion, seen_motion
 from .structure_details import StructureDiagnosis
 
 Real = NDArray[np.float64]

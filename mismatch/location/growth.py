@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
 
-from ..models.fitting import Fit
-from ..models.hypothesis import Hypothesis
+from ..models import Fit, Hypothesis
 from .residual_maps import normalised, overlap
 
 Real = NDArray[np.float64]

@@ -9,9 +9,9 @@ from scipy.stats import f as fisher
 
 from .family_wise import FAMILY_WISE, holm
 from .growth import Growth, growth
-from .residual_view import ResidualView, linear_part
 from .spindle_orders import SpindleSpeed, order_powers
 from .time_maps import BlockResidual
+from .view_of_residual import ResidualView, linear_part
 
 Real = NDArray[np.float64]
 Tables = tuple[tuple[Real, Real], tuple[Real, Real]]

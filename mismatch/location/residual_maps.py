@@ -8,10 +8,8 @@ from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
 
-from ..models.fitting import Fit
-from ..models.hypothesis import Hypothesis, predict_lines
-from ..models.misfit import through_structure
-from ..noise.noise_model import whitening
+from ..models import Fit, Hypothesis, predict_lines, through_structure
+from ..noise import whitening
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -6,12 +6,11 @@ from typing import TYPE_CHECKING, TypeAlias
 from estimation import WindowedSpectrum
 
 from ..inference import Diagnosis
-from ..models.fitting import Fit
-from ..models.hypothesis import Hypothesis
-from ..records.compared_band import ComparedBand
+from ..models import Fit, Hypothesis
+from ..records import ComparedBand
 
 if TYPE_CHECKING:
-    from .residual_view import ResidualView
+    from .view_of_residual import ResidualView
 
 
 @dataclass(frozen=True)

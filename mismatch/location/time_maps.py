@@ -9,10 +9,8 @@ from scipy.signal.windows import hann
 
 from estimation import WindowedSpectrum
 
-from ..models.fitting import Fit
-from ..models.hypothesis import Hypothesis, predict_lines
-from ..models.misfit import through_structure
-from ..noise.noise_model import whitening
+from ..models import Fit, Hypothesis, predict_lines, through_structure
+from ..noise import whitening
 from .residual_maps import overlap
 
 Complex = NDArray[np.complex128]

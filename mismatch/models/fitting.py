@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from estimation import WindowedSpectrum
 
 from ..inference import Descended, Limits, descend, plain_step
-from ..noise.noise_model import NoiseModel
-from ..physics.modal_parameters import PHYSICS as BELIEF
+from ..noise import NoiseModel
+from ..physics import MODAL_PARAMETERS
+from .derivatives import jacobian
 from .hypothesis import Hypothesis, predict_lines
-from .jacobian import jacobian
 from .misfit import Misfit, misfit_under, whitened, with_noise
 
 Complex = NDArray[np.complex128]
@@ -202,4 +202,4 @@ def modes_are_odd(fitted: Fit) -> bool:
     shape = fitted.hypothesis.shape
     rows = shape.modal_rows(fitted.hypothesis.u)[: shape.believed]
     # the two numbers of each mode's scale are free
-    return BELIEF.odd(float(np.sum(rows**2)), shape.believed * (shape.per_mode - 2))
+    return MODAL_PARAMETERS.odd(float(np.sum(rows**2)), shape.believed * (shape.per_mode - 2))

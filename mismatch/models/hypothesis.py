@@ -11,8 +11,7 @@ from scipy.fft import rfft
 from estimation import WindowedSpectrum
 from modal_fit import ModalModel
 
-from ..joints.joint_law import JointLaw, JointMotion
-from ..joints.joint_simulation import JointResponse, common_axes, driven_force, joint_response
+from ..joints import JointLaw, JointMotion, JointResponse, common_axes, driven_force, joint_response
 from ..physics import Chain, ChainPhysics, JointPhysics, LimitedPhysics, ModePhysics, Physics
 from .modal_lines import displacement_at, receptance_at
 from .model_shape import ModelShape

@@ -6,8 +6,7 @@ from scipy.fft import irfft, rfft
 
 from estimation import WindowedSpectrum
 
-from ..joints.joint_simulation import JointResponse, common_axes, driven_force, joint_dynamics, stiffness_ramp
-from ..joints.tangent_loop import tangent_run
+from ..joints import JointResponse, common_axes, driven_force, joint_dynamics, stiffness_ramp, tangent_run
 from .hypothesis import TURN_STEP, Cause, Hypothesis, Predicted, across, surround
 from .modal_lines import displacement_at, receptance_at
 

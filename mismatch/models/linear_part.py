@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joints.joint_law import JointLaw, JointMotion
+from ..joints import JointLaw, JointMotion
 from ..physics import JointPhysics, Parameter
 from .hypothesis import Cause
 

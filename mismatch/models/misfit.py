@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
 
-from ..noise.line_loops import whitened_columns
-from ..noise.noise_model import NoiseModel, fit_noise, whitening_and_determinant
+from ..noise import NoiseModel, fit_noise, whitened_columns, whitening_and_determinant
 from .hypothesis import Hypothesis, Predicted, predict_lines, surround
 
 Complex = NDArray[np.complex128]

@@ -9,7 +9,7 @@ from foundation import FileFormatError
 from modal_fit import ModalModel
 
 from ..inference import LabError
-from ..joints.joint_law import JointMotion
+from ..joints import JointMotion
 from ..physics import ChainPhysics, JointPhysics, ModePhysics, Physics, library
 from .hypothesis import Cause, Hypothesis
 from .model_shape import ModelShape

@@ -4,6 +4,8 @@ import importlib
 import pkgutil
 from collections.abc import Collection
 
+from .clipping import PHYSICS as CLIPPING
+from .modal_parameters import PHYSICS as MODAL_PARAMETERS
 from .protocol import (
     BeliefPhysics,
     Chain,
@@ -17,8 +19,12 @@ from .protocol import (
     Physics,
     answer_name,
 )
+from .unmeasured_excitation import PHYSICS as UNMEASURED_EXCITATION
 
 __all__ = [
+    "CLIPPING",
+    "MODAL_PARAMETERS",
+    "UNMEASURED_EXCITATION",
     "BeliefPhysics",
     "Chain",
     "ChainPhysics",

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from estimation import BandRecording
 
-from ..joints.saturation import saturated
+from ..joints import saturated
 from .protocol import Parameter
 
 Real = NDArray[np.float64]

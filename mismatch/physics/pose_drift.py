@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joints.joint_law import JointLaw, JointMotion
+from ..joints import JointLaw, JointMotion
 from .protocol import Parameter
 
 Real = NDArray[np.float64]

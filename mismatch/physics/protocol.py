@@ -11,7 +11,7 @@ from estimation import BandRecording
 from foundation import DegreeOfFreedom
 from modal_fit import ModalModel
 
-from ..joints.joint_law import JointLaw, JointMotion
+from ..joints import JointLaw, JointMotion
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

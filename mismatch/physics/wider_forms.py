@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..joints.joint_law import JointLaw, JointMotion
-from ..joints.saturation import saturated
+from ..joints import JointLaw, JointMotion, saturated
 from .protocol import Parameter
 
 Real = NDArray[np.float64]

@@ -10,7 +10,7 @@ from estimation import DERIVATIVE_ORDERS, BandRecording, channel_at, read_band_r
 from foundation import InputError
 from modal_fit import ModalModel
 
-from .compared_band import ABOVE, compared_band, reach_of
+from .common_band import ABOVE, compared_band, reach_of
 
 SHORTEST = 20.0
 """Least length of a recording, in periods of the lowest mode."""

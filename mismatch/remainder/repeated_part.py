@@ -6,7 +6,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 from estimation import WindowedSpectrum
 
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models import Hypothesis, predict_lines
 
 Real = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.hypothesis import Cause, Hypothesis, line_response
+from ..models import Cause, Hypothesis, line_response
 from ..physics import ChainPhysics
-from .linear_floor import Floor
+from .whitened_residual import Floor
 
 Real = NDArray[np.float64]
 

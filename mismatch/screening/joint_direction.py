@@ -7,11 +7,9 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 from scipy.optimize import minimize
 
-from ..joints.joint_law import JointMotion
-from ..joints.joint_simulation import common_axes
-from ..models.hypothesis import Hypothesis, columns_of, predict_lines
-from ..models.modal_lines import receptance_at
-from .linear_floor import Floor, FloorRecord
+from ..joints import JointMotion, common_axes
+from ..models import Hypothesis, columns_of, predict_lines, receptance_at
+from .whitened_residual import Floor, FloorRecord
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft
 
-from ..joints.joint_simulation import driven_force
-from ..models.hypothesis import Cause, Hypothesis, columns_of
-from ..models.modal_lines import receptance_at
+from ..joints import driven_force
+from ..models import Cause, Hypothesis, columns_of, receptance_at
 from ..physics import JointPhysics
 from .joint_direction import SeenMotion, motion_of, seen_motion
-from .linear_floor import Floor, FloorRecord
+from .whitened_residual import Floor, FloorRecord
 
 Real = NDArray[np.float64]
 

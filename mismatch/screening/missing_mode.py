@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..models.hypothesis import Hypothesis
+from ..models import Hypothesis
 from ..physics import ModePhysics
-from .linear_floor import Floor, FloorRecord
+from .whitened_residual import Floor, FloorRecord
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -12,7 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 
-NOT_YET = {"mismatch"}
+NOT_YET: set[str] = set()
 """Rooms that wait for their fronts: their own shelves import each other's modules, others reach their insides."""
 
 FACE = "millfrf"

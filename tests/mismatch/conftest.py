@@ -9,21 +9,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from estimation import BandRecording, channels_of
-from mismatch import (
-    Hypothesis,
-    LabError,
-    ModelShape,
-    StructureDetails,
-    StructureDiagnosis,
-    band_of,
-    predict_lines,
-    windowed_spectrum,
-)
+from estimation import BandRecording, channels_of, windowed_spectrum
+from mismatch import Hypothesis, LabError, ModelShape, StructureDetails, StructureDiagnosis, band_of, predict_lines
 from mismatch.inference import Diagnosis, Improvement, Remainder
 from mismatch.models.fitting import Fit
 from mismatch.noise.noise_model import KNOTS, NoiseModel
-from mismatch.records.compared_band import compared_band
+from mismatch.records.common_band import compared_band
 from modal_fit import ModalModel
 
 

@@ -11,8 +11,8 @@ from acquisition import Channel, RecordingWriter, StreamDescription
 from estimation import BandRecording, windowed_spectrum
 from foundation import InputError
 from mismatch import Hypothesis, LabError, ModelShape, band_of
+from mismatch.adapters.structure.receptance_at_level import equivalent_receptance
 from mismatch.joints.joint_law import JointLaw, JointMotion
-from mismatch.models.equivalent_receptance import equivalent_receptance
 from mismatch.models.hypothesis import Cause
 from mismatch.models.linear_part import with_linear_part
 from mismatch.physics import JointPhysics, Parameter, library

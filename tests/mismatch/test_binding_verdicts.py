@@ -21,10 +21,10 @@ from mismatch.adapters.structure.confirmation import helps
 from mismatch.adapters.structure.held_out import block_powers
 from mismatch.adapters.structure.structure_verdict import verdict_of_structure
 from mismatch.inference import AcceptedCause, Improvement, Settings, VerdictSettings, leaves_too_much, share_left
-from mismatch.location.recording_errors import recording_errors
+from mismatch.location.errors_by_recording import recording_errors
 from mismatch.models.fitting import Fit, fit
 from mismatch.physics import library
-from mismatch.remainder.leftover import leftover
+from mismatch.remainder.leftover_test import leftover
 from modal_fit import ModalModel
 
 TONE = 11.37

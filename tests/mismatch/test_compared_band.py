@@ -14,7 +14,7 @@ from estimation import BandRecording
 from foundation import InputError
 from mismatch import LabError, ModelShape, diagnose, read_recording
 from mismatch.inference.diagnosis_file import write_diagnosis
-from mismatch.records.compared_band import compared_band
+from mismatch.records.common_band import compared_band
 from modal_fit import ModalModel, Residuals
 
 BAND = (5.0, 24.0)

@@ -7,11 +7,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import firwin, lfilter
 
-from estimation import BandRecording, WindowedSpectrum, channels_of
-from mismatch import Hypothesis, LabError, ModelShape, band_of, diagnose, predict_lines, windowed_spectrum
+from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_spectrum
+from mismatch import Hypothesis, LabError, ModelShape, band_of, diagnose, predict_lines
 from mismatch.inference import VerdictSettings
 from mismatch.records.true_forces import without_force_noise
-from mismatch.remainder.leftover import leftover
+from mismatch.remainder.leftover_test import leftover
 from modal_fit import ModalModel
 
 RATE, SILENT = 128.0, 26.0

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 
-from estimation import BandRecording
-from mismatch import Hypothesis, JointMotion, LabError, ModelShape, WindowedSpectrum, band_of, windowed_spectrum
+from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
+from mismatch import Hypothesis, JointMotion, LabError, ModelShape, band_of
 from mismatch.adapters.structure.form_errors import with_form_spread
 from mismatch.models.fitting import Fit, fit
 from mismatch.models.hypothesis import Cause

@@ -13,8 +13,8 @@ from estimation import BandRecording
 from mismatch import StructureDiagnosis
 from mismatch.location.family_wise import holm
 from mismatch.location.locate import located
-from mismatch.location.residual_view import residual_view
 from mismatch.location.spindle_orders import SpindleSpeed
+from mismatch.location.view_of_residual import residual_view
 from modal_fit import ModalModel
 
 RATE, NOISE = 128.0, 0.02

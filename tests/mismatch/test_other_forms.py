@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 
-from mismatch import Hypothesis, LabError, ModelShape, WindowedSpectrum, band_of, windowed_spectrum
+from estimation import WindowedSpectrum, windowed_spectrum
+from mismatch import Hypothesis, LabError, ModelShape, band_of
 from mismatch.adapters.structure.form_errors import with_form_spread
 from mismatch.models.fitting import Fit, fit
 from mismatch.models.hypothesis import Cause

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation import BandRecording, WindowedSpectrum
-from mismatch import Hypothesis, JointLaw, LabError, ModelShape, band_of, windowed_spectrum
+from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
+from mismatch import Hypothesis, JointLaw, LabError, ModelShape, band_of
 from mismatch import physics as physics_folder
 from mismatch.adapters.structure.told_causes import accepted_cause
 from mismatch.joints.joint_law import POINTS

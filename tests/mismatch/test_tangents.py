@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimation import BandRecording, WindowedSpectrum
-from mismatch import Hypothesis, LabError, ModelShape, band_of, predict_lines, windowed_spectrum
+from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
+from mismatch import Hypothesis, LabError, ModelShape, band_of, predict_lines
 from mismatch.joints.joint_law import JointMotion
 from mismatch.joints.joint_simulation import driven_force
+from mismatch.models.derivatives import jacobian
 from mismatch.models.hypothesis import Cause
-from mismatch.models.jacobian import jacobian
 from mismatch.models.modal_lines import displacement_at
 from mismatch.noise.line_loops import whiten_lines
 from mismatch.physics import JointPhysics, library

@@ -10,7 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from figures import as_data_uri, cut_orders_figure, cut_turn_figure, house_style
 from foundation import writing_whole_file
-from mismatch.adapters.cut import COEFFICIENT_NAMES, CutDiagnosis
+from mismatch import COEFFICIENT_NAMES, CutDiagnosis
 
 from ...provenance import versions
 from ...tables import Table

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from foundation import DegreeOfFreedom
-from mismatch import AcceptedCause, StructureDiagnosis
-from mismatch.physics import form_of
+from mismatch import AcceptedCause, StructureDiagnosis, form_of
 
 from .next_tests import next_test
 

@@ -5,8 +5,7 @@ import numpy as np
 from cutting import MillingProcess
 from figures import as_data_uri, lobes_figure
 from foundation import InputError
-from mismatch import Hypothesis, StructureDiagnosis
-from mismatch.models.equivalent_receptance import equivalent_receptance
+from mismatch import Hypothesis, StructureDiagnosis, equivalent_receptance
 from stability import StabilityLobes, zero_order
 
 from ...tables import Table

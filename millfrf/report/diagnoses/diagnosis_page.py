@@ -11,8 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from cutting import MillingProcess
 from foundation import writing_whole_file
-from mismatch import StructureDiagnosis
-from mismatch.inference.process_pool import in_processes
+from mismatch import StructureDiagnosis, in_processes
 
 from ...provenance import versions
 from ..section import Section

@@ -7,11 +7,14 @@ from matplotlib.figure import Figure
 
 from figures import as_data_uri, channel_map_figure, growth_figure, law_figure, spectra_figure, time_map_figure
 from foundation import InputError
-from mismatch import Candidate, StructureDiagnosis
-from mismatch.location.free_form_law import free_form_laws
-from mismatch.location.held_out_spectra import held_out_spectra
-from mismatch.location.locate import significant_cells
-from mismatch.location.recording_errors import recording_errors
+from mismatch import (
+    Candidate,
+    StructureDiagnosis,
+    free_form_laws,
+    held_out_spectra,
+    recording_errors,
+    significant_cells,
+)
 
 from ...tables import Table
 from ..section import Picture, Section

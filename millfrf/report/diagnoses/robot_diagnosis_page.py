@@ -10,8 +10,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from figures import as_data_uri, house_style, robot_evidence_figure, robot_spectra_figure
 from foundation import writing_whole_file
-from mismatch.adapters.robot import ROBOT, RobotDiagnosis, number_of, standard_error_of
-from mismatch.inference import Candidate
+from mismatch import ROBOT, Candidate, RobotDiagnosis, number_of, standard_error_of
 
 from ...provenance import versions
 from ...robot import UNITS, refusal, told_number, what_is_asked

@@ -8,14 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foundation import InputError
-from mismatch import LabError
-from mismatch.adapters.robot import (
-    PosedRecording,
-    diagnose_robot,
-    posed_channels,
-    read_posed,
-)
-from mismatch.inference import write_diagnosis
+from mismatch import LabError, PosedRecording, diagnose_robot, posed_channels, read_posed, write_diagnosis
 from modal_fit import write_modal_model
 from robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot, tool_down
 

@@ -2,15 +2,16 @@
 
 import numpy as np
 
-from mismatch.adapters.robot import (
+from mismatch import (
     ROBOT,
+    AcceptedCause,
+    Candidate,
     CompanionNumber,
     RobotDiagnosis,
     companions_of,
     number_of,
     standard_error_of,
 )
-from mismatch.inference import AcceptedCause, Candidate
 
 from ...tables import with_error
 

@@ -1,28 +1,5 @@
 """What is wrong with a robot's model: recordings in several postures against a few numbers of the robot."""
 
-from .diagnosis import diagnose_robot
-from .fit import RobotFit, fit_robot
-from .posed_recording import PosedRecording, posed, posed_channels, read_posed
-from .posed_robot import PosedRobot
-from .receptance import predicted_spectrum
-from .results import CompanionNumber, RobotDetails, RobotDiagnosis, companions_of, number_of, standard_error_of
-from .settings import ROBOT
+import lazy_loader
 
-__all__ = [
-    "ROBOT",
-    "CompanionNumber",
-    "PosedRecording",
-    "PosedRobot",
-    "RobotDetails",
-    "RobotDiagnosis",
-    "RobotFit",
-    "companions_of",
-    "diagnose_robot",
-    "fit_robot",
-    "number_of",
-    "posed",
-    "posed_channels",
-    "predicted_spectrum",
-    "read_posed",
-    "standard_error_of",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -21,7 +21,7 @@ from estimation import (
 from foundation import HOUSING, TIP, InputError
 from modal_fit import ModalModel
 
-from ...records.reading import read_at
+from ...records import read_at
 
 Real = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from foundation import InputError
 from robot_model import Change
 
-from ...models.misfit import levels
-from ...noise.noise_model import fit_noise, whitening
+from ...models import levels
+from ...noise import fit_noise, whitening
 from .fit import RobotFit, fit_robot
 from .fit_state import FitProblem
 from .posed_robot import Changes, PosedRobot

@@ -1,7 +1,5 @@
 """The comparison of a modal model with recordings of forces and responses."""
 
-from .diagnosing import diagnose
-from .improved_model import improved_model_of
-from .prediction import Prediction, predict
+import lazy_loader
 
-__all__ = ["Prediction", "diagnose", "improved_model_of", "predict"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from estimation import WindowedSpectrum
 
 from ...inference import EvidenceSettings, Proposal
-from ...models.fitting import Fit, fit
-from ...models.hypothesis import Cause, Hypothesis
+from ...models import Cause, Fit, Hypothesis, fit
 from ...physics import ChainPhysics, LimitedPhysics, ModePhysics
 
 Real = NDArray[np.float64]

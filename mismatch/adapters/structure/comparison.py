@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from estimation import WindowedSpectrum
 
 from ...inference import Proposal, Remainder, Round, Search, Settings, equivalents_of
-from ...models.fitting import Fit, fit
-from ...models.refinement import settled
+from ...models import Fit, fit, settled
 from ...physics import JointPhysics, Physics
-from ...remainder.leftover import leftover
+from ...remainder import leftover
 from .acceptance import evidence_needed, impossible, plainest, possible_gains, worth_it
 from .rounds import Standing, StructureRound, Weighed, weigh
 

@@ -2,10 +2,9 @@
 
 from functools import partial
 
-from ...faults.shown_faults import residual_lines
+from ...faults import residual_lines
 from ...inference import AcceptedCause, Improvement, Search, Settings, in_processes, released
-from ...models.fitting import Fit, fit
-from ...models.misfit import least_misfit, through_structure
+from ...models import Fit, fit, least_misfit, through_structure
 from .comparison import StructureComparison
 from .held_out import ITERATIONS, HeldOut, Recordings, chance_of_no_gain, held_out_improvement
 

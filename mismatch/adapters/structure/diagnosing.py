@@ -9,7 +9,7 @@ from threadpoolctl import threadpool_limits
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from modal_fit import ModalModel
 
-from ...faults.fault_repair import repair_faults, with_tones_settled
+from ...faults import repair_faults, with_tones_settled
 from ...inference import (
     AcceptedCause,
     Candidate,
@@ -21,19 +21,11 @@ from ...inference import (
     Settings,
     search,
 )
-from ...location.locate import located
-from ...location.residual_view import residual_view
-from ...location.spindle_orders import SpindleSpeed
-from ...location.structure_details import StructureDetails, StructureDiagnosis
-from ...models.fitting import Fit, fit
-from ...models.hypothesis import Hypothesis
-from ...models.linear_part import with_linear_part
-from ...models.model_shape import ModelShape
+from ...location import SpindleSpeed, StructureDetails, StructureDiagnosis, located, residual_view
+from ...models import Fit, Hypothesis, ModelShape, fit, with_linear_part
 from ...physics import is_fault, library
-from ...records.compared_band import compared_band
-from ...records.true_forces import without_force_noise
-from ...remainder.beyond_model import beyond_model
-from ...remainder.leftover import leftover
+from ...records import compared_band, without_force_noise
+from ...remainder import beyond_model, leftover
 from .comparison import StructureComparison
 from .confirmation import confirmed
 from .form_errors import with_form_spread

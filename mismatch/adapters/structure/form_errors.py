@@ -11,11 +11,8 @@ from scipy.stats import t as student
 
 from estimation import WindowedSpectrum
 
-from ...models.fitting import Fit, fit
-from ...models.hypothesis import held_values, predict_lines
-from ...models.jacobian import jacobian
-from ...models.misfit import through_structure
-from ...noise.noise_model import NoiseModel, whitening
+from ...models import Fit, fit, held_values, jacobian, predict_lines, through_structure
+from ...noise import NoiseModel, whitening
 from ...physics import FormedPhysics, JointPhysics
 from .held_out import block_slices
 

@@ -11,12 +11,10 @@ from scipy.fft import irfft
 
 from estimation import WindowedSpectrum
 
-from ...faults.shown_faults import residual_lines
+from ...faults import residual_lines
 from ...inference import AcceptedCause, Improvement, ProofSettings, in_processes, ratio_interval
-from ...models.fitting import Fit, fit
-from ...models.hypothesis import Hypothesis
-from ...models.misfit import least_misfit, through_structure
-from ...noise.noise_model import NoiseModel, whitening
+from ...models import Fit, Hypothesis, fit, least_misfit, through_structure
+from ...noise import NoiseModel, whitening
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

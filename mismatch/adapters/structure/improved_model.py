@@ -2,8 +2,8 @@
 
 from modal_fit import ModalModel
 
-from ...location.structure_details import StructureDiagnosis
-from ...models.model_terms import improved_model
+from ...location import StructureDiagnosis
+from ...models import improved_model
 from ...physics import is_fault
 
 

@@ -9,10 +9,9 @@ from scipy.fft import irfft
 from estimation import BandRecording, windowed_spectrum
 from modal_fit import ModalModel
 
-from ...faults.shown_faults import with_faults
-from ...models.hypothesis import predict_lines
-from ...models.model_terms import hypothesis_of
-from ...records.reading import band_of
+from ...faults import with_faults
+from ...models import hypothesis_of, predict_lines
+from ...records import band_of
 
 Real = NDArray[np.float64]
 

@@ -7,14 +7,21 @@ from typing import Any
 from estimation import WindowedSpectrum
 
 from ...inference import Candidate, Proposal, Remainder, Round, Settings, in_processes
-from ...models.fitting import Fit
+from ...models import Fit
 from ...physics import ChainPhysics, JointPhysics, ModePhysics, Physics, answer_name
-from ...remainder.leftover import leftover
-from ...screening.chain_screening import ScreenedChain, screen_chains
-from ...screening.joint_candidates import SightedLaws, joint_candidates, sighted_laws
-from ...screening.linear_candidates import channel_of, linear_candidates
-from ...screening.linear_floor import noise_floor
-from ...screening.missing_mode import SightedMode, find_mode
+from ...remainder import leftover
+from ...screening import (
+    ScreenedChain,
+    SightedLaws,
+    SightedMode,
+    channel_of,
+    find_mode,
+    joint_candidates,
+    linear_candidates,
+    noise_floor,
+    screen_chains,
+    sighted_laws,
+)
 from .acceptance import evidence_needed, impossible, possible_gains, strained
 
 

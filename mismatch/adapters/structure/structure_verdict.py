@@ -11,7 +11,7 @@ from ...inference import (
     leaves_too_much,
     verdict_of,
 )
-from ...models.hypothesis import Hypothesis
+from ...models import Hypothesis
 from .acceptance import strained
 
 

@@ -7,10 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...inference import AcceptedCause, Proposal
-from ...models.fitting import Fit, modes_are_odd
-from ...models.hypothesis import Cause, direction_of, held_values
-from ...physics import ModePhysics, answer_name
-from ...physics.modal_parameters import PHYSICS as BELIEF
+from ...models import Cause, Fit, direction_of, held_values, modes_are_odd
+from ...physics import MODAL_PARAMETERS, ModePhysics, answer_name
 
 Real = NDArray[np.float64]
 
@@ -122,4 +120,4 @@ def modal_deviation(fitted: Fit) -> AcceptedCause | None:
         parameters[f"damping_ratio_{k + 1}"] = float(model.damping_ratios[k])
         errors[f"damping_ratio_{k + 1}"] = float(spread[k, 1] * shape.lab.damping * nominal.damping_ratios[k])
     beyond = float(np.sum(rows**2)) - count * (shape.per_mode - 2)
-    return AcceptedCause(BELIEF.name, {"modes": [k + 1 for k in modes]}, parameters, errors, beyond)
+    return AcceptedCause(MODAL_PARAMETERS.name, {"modes": [k + 1 for k in modes]}, parameters, errors, beyond)

@@ -1,9 +1,5 @@
 """A set of numbers for measured cuts, and its fit."""
 
-from .fitting import CutFit, fit_cut
-from .free_numbers import FreeNumbers
-from .hypothesis import CutHypothesis
-from .measured_cut import MeasuredCut
-from .start import fit_turned, started
+import lazy_loader
 
-__all__ = ["CutFit", "CutHypothesis", "FreeNumbers", "MeasuredCut", "fit_cut", "fit_turned", "started"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,23 +1,5 @@
 """The cutting force that a process gives along a recording, its spectra and their noise."""
 
-from .coefficients import COEFFICIENT_NAMES, Belief
-from .force_computation import Acting, chip_thickness, computed_force
-from .noise import ForceNoise, noise_of, whitened
-from .spectra import ForceSpectra, force_spectra
-from .tooth_views import CutView, fineness, view_of
+import lazy_loader
 
-__all__ = [
-    "COEFFICIENT_NAMES",
-    "Acting",
-    "Belief",
-    "CutView",
-    "ForceNoise",
-    "ForceSpectra",
-    "chip_thickness",
-    "computed_force",
-    "fineness",
-    "force_spectra",
-    "noise_of",
-    "view_of",
-    "whitened",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,21 +1,5 @@
 """Recordings of cuts: forces, the tip's motion, the spindle's angle, and whether the cut chatters."""
 
-from .chatter import CutChatter, chatter_of
-from .reading import read_cut_recording
-from .recording import FINE, MOST_ORDERS, CutRecording, cut_recording
-from .spindle_law import SpindleLaw, found_law, stated_law
-from .tip_motion import TipMotion
+import lazy_loader
 
-__all__ = [
-    "FINE",
-    "MOST_ORDERS",
-    "CutChatter",
-    "CutRecording",
-    "SpindleLaw",
-    "TipMotion",
-    "chatter_of",
-    "cut_recording",
-    "found_law",
-    "read_cut_recording",
-    "stated_law",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

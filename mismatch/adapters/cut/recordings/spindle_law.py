@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from acquisition import Recording
 from foundation import InputError
 
-from ....location.spindle_orders import SPEED, spindle_speed
+from ....location import SPEED, spindle_speed
 
 Real = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from scipy.ndimage import median_filter, uniform_filter1d
 from estimation import kinematic_factor
 from modal_fit import ModalModel
 
-from ....models.modal_lines import receptance_at
+from ....models import receptance_at
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

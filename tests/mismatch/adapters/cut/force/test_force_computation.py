@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from cutting import MillingProcess, damping_matrices, edge_matrices
-from cutting.tooth_force import rigid_force
+from cutting.one_tooth import rigid_force
 from mismatch.adapters.cut import CutRecording, SpindleLaw
 from mismatch.adapters.cut.force import computed_force, view_of
 from mismatch.adapters.cut.physics import CutPhysics, library

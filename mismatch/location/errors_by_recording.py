@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..faults.shown_faults import residual_lines
-from ..models.misfit import through_structure
+from ..faults import residual_lines
+from ..models import through_structure
 from ..physics import is_fault
 from .structure_details import StructureDiagnosis
 

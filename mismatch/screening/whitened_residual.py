@@ -9,11 +9,8 @@ from scipy.stats import gamma
 
 from estimation import WindowedSpectrum
 
-from ..models.fitting import ENOUGH, Fit
-from ..models.hypothesis import predict_lines
-from ..models.jacobian import jacobian
-from ..models.misfit import levels, through_structure, whitened
-from ..noise.noise_model import whitening
+from ..models import ENOUGH, Fit, jacobian, levels, predict_lines, through_structure, whitened
+from ..noise import whitening
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

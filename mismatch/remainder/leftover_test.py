@@ -9,7 +9,7 @@ from scipy.signal.windows import hann
 from estimation import WindowedSpectrum
 
 from ..inference import Remainder
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models import Hypothesis, predict_lines
 from .cell_regression import moving_power
 from .repeated_part import repeated_share
 

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
 
-from ..faults.shown_faults import residual_lines
-from ..models.misfit import through_structure
+from ..faults import residual_lines
+from ..models import through_structure
 from ..physics import is_fault
 from .residual_maps import band_edges
 from .structure_details import StructureDiagnosis

@@ -9,9 +9,7 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..inference import Proposal, ScreeningSettings, in_processes
-from ..models.fitting import Fit, fit
-from ..models.hypothesis import Cause
-from ..models.refinement import with_chain
+from ..models import Cause, Fit, fit, with_chain
 from ..physics import FormedPhysics, answer_name
 from .chain_screening import ScreenedChain
 from .missing_mode import SightedMode

@@ -7,9 +7,8 @@ import numpy as np
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 
-from ..models.fitting import Fit
-from ..models.hypothesis import Hypothesis, predict_lines
-from ..noise.noise_model import NoiseModel
+from ..models import Fit, Hypothesis, predict_lines
+from ..noise import NoiseModel
 from .family_wise import NoiseSpread, noise_spread
 from .residual_maps import ResidualMap, band_edges, residual_map
 from .structure_details import StructureDetails

@@ -8,12 +8,11 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..inference import Candidate, Proposal, Settings, in_processes
-from ..models.fitting import Fit, fit
-from ..models.hypothesis import direction_of
+from ..models import Fit, direction_of, fit
 from ..physics import JointPhysics, answer_name
 from .joint_direction import find_direction
 from .joint_screening import Screened, screen_joints
-from .linear_floor import linear_floor
+from .whitened_residual import linear_floor
 
 FEW = 1000
 """Lines of a recording on which shapes of a law are compared."""

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
 
-from ..models.hypothesis import Hypothesis, predict_lines
+from ..models import Hypothesis, predict_lines
 
 Complex = NDArray[np.complex128]
 

@@ -1,0 +1,70 @@
+from .comparison import Comparison, Fitted, Proposal, Round, Search, best_first, equivalents_of
+from .descent import Descended, Limits, Problem, bounded_step, descend, plain_step
+from .diagnosis import VERDICTS, AcceptedCause, Candidate, Diagnosis, HeldOutError, Improvement
+from .diagnosis_file import diagnosis_content, read_diagnosis, write_diagnosis
+from .form_errors import jackknife_variance, shift_weight
+from .forward_search import Progress, pruned, released, search
+from .paired_tests import ratio_interval, signed_ranks, students_test
+from .process_pool import in_processes
+from .remainder import Remainder
+from .settings import (
+    FAULTS,
+    EvidenceSettings,
+    FaultSettings,
+    LabError,
+    ProofSettings,
+    ScreeningSettings,
+    SearchSettings,
+    Settings,
+    VerdictSettings,
+)
+from .verdict import Findings, leaves_too_much, share_left, verdict_of
+
+__all__ = [
+    "FAULTS",
+    "VERDICTS",
+    "AcceptedCause",
+    "Candidate",
+    "Comparison",
+    "Descended",
+    "Diagnosis",
+    "EvidenceSettings",
+    "FaultSettings",
+    "Findings",
+    "Fitted",
+    "HeldOutError",
+    "Improvement",
+    "LabError",
+    "Limits",
+    "Problem",
+    "Progress",
+    "ProofSettings",
+    "Proposal",
+    "Remainder",
+    "Round",
+    "ScreeningSettings",
+    "Search",
+    "SearchSettings",
+    "Settings",
+    "VerdictSettings",
+    "best_first",
+    "bounded_step",
+    "descend",
+    "diagnosis_content",
+    "equivalents_of",
+    "in_processes",
+    "jackknife_variance",
+    "leaves_too_much",
+    "plain_step",
+    "pruned",
+    "ratio_interval",
+    "read_diagnosis",
+    "released",
+    "search",
+    "share_left",
+    "shift_weight",
+    "signed_ranks",
+    "students_test",
+    "verdict_of",
+    "write_diagnosis",
+]

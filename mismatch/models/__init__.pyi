@@ -1,0 +1,36 @@
+from .derivatives import jacobian
+from .fitting import ENOUGH, Fit, fit, modes_are_odd, residual
+from .hypothesis import Cause, Hypothesis, columns_of, direction_of, held_values, line_response, predict_lines
+from .linear_part import with_linear_part
+from .misfit import least_misfit, levels, through_structure, whitened
+from .modal_lines import receptance_at
+from .model_shape import ModelShape
+from .model_terms import hypothesis_of, improved_model
+from .refinement import settled, with_chain
+
+__all__ = [
+    "ENOUGH",
+    "Cause",
+    "Fit",
+    "Hypothesis",
+    "ModelShape",
+    "columns_of",
+    "direction_of",
+    "fit",
+    "held_values",
+    "hypothesis_of",
+    "improved_model",
+    "jacobian",
+    "least_misfit",
+    "levels",
+    "line_response",
+    "modes_are_odd",
+    "predict_lines",
+    "receptance_at",
+    "residual",
+    "settled",
+    "through_structure",
+    "whitened",
+    "with_chain",
+    "with_linear_part",
+]

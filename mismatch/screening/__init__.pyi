@@ -1,0 +1,28 @@
+from .chain_screening import ScreenedChain, screen_chains
+from .joint_direction import JointSighting, SeenMotion, find_direction, seen_motion
+from .joint_laws_fitted import SightedLaws, joint_candidates, sighted_laws
+from .joint_screening import screen_joints
+from .linear_causes_fitted import channel_of, linear_candidates
+from .missing_mode import SightedMode, find_mode
+from .whitened_residual import Floor, FloorRecord, linear_floor, noise_floor
+
+__all__ = [
+    "Floor",
+    "FloorRecord",
+    "JointSighting",
+    "ScreenedChain",
+    "SeenMotion",
+    "SightedLaws",
+    "SightedMode",
+    "channel_of",
+    "find_direction",
+    "find_mode",
+    "joint_candidates",
+    "linear_candidates",
+    "linear_floor",
+    "noise_floor",
+    "screen_chains",
+    "screen_joints",
+    "seen_motion",
+    "sighted_laws",
+]
