@@ -17,7 +17,7 @@ from mismatch import (
     spindle_speed,
     write_diagnosis,
 )
-from modal_fit import read_modal_model, write_modal_model
+from modal_fit import ModalModel, read_modal_model, write_modal_model
 
 from .chain import SUBSPACE, FitOptions, fit_recordings
 from .gate import check_model_and_recordings
@@ -55,21 +55,58 @@ def diagnose_files(
     folder = Path(out)
     refuse_file(folder)
     whole = read_modal_model(model_path)
-    model = measured_part(whole, recordings, stream=stream)
-    doubts = check_model_and_recordings(model_path, model, recordings, stream, progress)
-    trials = read_recordings(recordings, model, stream=stream)
-    with progress("diagnosing"):
-        diagnosis = diagnose(model, trials, settings, speeds=_speeds(recordings))
-    diagnosis = replace(diagnosis, doubts=(*doubts, *diagnosis.doubts))
+    diagnosis = diagnose_recordings(
+        whole, recordings, settings, model_file=model_path, stream=stream, progress=progress
+    )
     folder.mkdir(parents=True, exist_ok=True)
     paths = (folder / "diagnosis.json", folder / "improved_model.json", folder / "report.html")
     write_diagnosis(paths[0], diagnosis)
     write_modal_model(paths[1], improved_model_of(diagnosis))
     with progress("writing the report"):
         write_diagnosis_report(paths[2], diagnosis, Path(model_path).name, process)
-    missing = [label for label in whole.responses if label not in model.responses]
+    measured = measured_part(whole, recordings, stream=stream).responses
+    missing = [label for label in whole.responses if label not in measured]
     note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []
     return DiagnosisFiles(diagnosis, paths, (*note, *summary(diagnosis)))
+
+
+def diagnose_recordings(
+    model: ModalModel,
+    recordings: Sequence[str | os.PathLike[str]],
+    settings: Settings | None = None,
+    *,
+    model_file: str | os.PathLike[str] = "the model",
+    stream: str | None = None,
+    progress: Progress = silent,
+) -> StructureDiagnosis:
+    """Judge a nominal model beside recordings, with the doubts of the gate; nothing is written.
+
+    Parameters
+    ----------
+    model
+        Nominal modal model; responses that no recording measures are left out.
+    recordings
+        Recordings to compare it with, best at several levels.
+    settings
+        Thresholds of the decisions; None: the defaults.
+    model_file
+        File of the model, whose stored doubts count, and its name in messages.
+    stream
+        Name of the sample clock; None: the only one.
+    progress
+        Shows progress while recordings are read and causes are tried.
+
+    Raises
+    ------
+    InputError
+        A model and recordings that cannot be compared.
+    """
+    compared = measured_part(model, recordings, stream=stream)
+    doubts = check_model_and_recordings(model_file, compared, recordings, stream, progress)
+    trials = read_recordings(recordings, compared, stream=stream)
+    with progress("diagnosing"):
+        found = diagnose(compared, trials, settings, speeds=_speeds(recordings))
+    return replace(found, doubts=(*doubts, *found.doubts))
 
 
 def nominal_from_simulation(

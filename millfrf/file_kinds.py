@@ -12,20 +12,22 @@ from estimation import is_geometry_table
 from foundation import FileFormatError, InputError
 
 RECORDING, FRF, MODEL, LOBES, CUTTING = "recording", "frf", "modal model", "lobes", "cutting data"
-GEOMETRY, CHATTER, POLES = "geometry", "chatter verdicts", "picked poles"
+GEOMETRY, CHATTER, POLES, DIAGNOSIS = "geometry", "chatter verdicts", "picked poles", "diagnosis"
 _FORMATS = {
     "millfrf.recording": RECORDING,
     "millfrf.frf": FRF,
     "millfrf.modal_model": MODEL,
     "millfrf.chatter": CHATTER,
     "millfrf.poles": POLES,
+    "millfrf.diagnosis": DIAGNOSIS,
+    "millfrf.robot_diagnosis": DIAGNOSIS,
 }
 _LOBES_COLUMNS = ["spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation"]
 
 
 def kind_of(path: str | os.PathLike[str]) -> str:
     """``recording``, ``frf``, ``modal model``, ``lobes``, ``cutting data``, ``geometry``, ``chatter
-    verdicts`` or ``picked poles``.
+    verdicts``, ``picked poles`` or ``diagnosis``.
 
     Raises
     ------

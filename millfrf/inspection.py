@@ -14,7 +14,7 @@ from modal_fit import read_modal_model
 from stability import STATUSES, read_lobes
 
 from .chain import read_cuts, tone_table, verdict_table
-from .file_kinds import CHATTER, CUTTING, FRF, GEOMETRY, LOBES, MODEL, POLES, RECORDING, kind_of
+from .file_kinds import CHATTER, CUTTING, DIAGNOSIS, FRF, GEOMETRY, LOBES, MODEL, POLES, RECORDING, kind_of
 from .gate import (
     check_frf,
     check_model,
@@ -75,6 +75,7 @@ def inspect_file(path: str | os.PathLike[str], progress: Progress = silent) -> F
         GEOMETRY: _geometry,
         CHATTER: _chatter,
         POLES: _poles,
+        DIAGNOSIS: _diagnosis,
     }
     return readers[kind](path)
 
@@ -234,3 +235,13 @@ def _geometry_concerns(geometry: Geometry) -> list[str]:
     if len(geometry.nodes) > 1 and size == 0:
         concerns.append("all nodes lie at one place; no shape can be drawn on them")
     return concerns
+
+
+def _diagnosis(path: str | os.PathLike[str]) -> Findings:
+    from mismatch import read_diagnosis  # not above: other files are looked at without loading the diagnosis
+
+    found = read_diagnosis(path)
+    causes = ", ".join(cause.name for cause in found.physics) or "no cause"
+    gain = found.improvement
+    error = f"error on {gain.held_out} {100 * gain.before:.3g} % nominal, {100 * gain.after:.3g} % improved"
+    return Findings(DIAGNOSIS, f"diagnosis of a {found.compared}: {found.verdict}, {causes}; {error}", (), found.doubts)

@@ -1,4 +1,5 @@
 from .cut import cut_orders_figure, cut_turn_figure
+from .errors import draw_diagnosis
 from .growth import growth_figure
 from .law import law_figure
 from .maps import channel_map_figure, time_map_figure
@@ -9,6 +10,7 @@ __all__ = [
     "channel_map_figure",
     "cut_orders_figure",
     "cut_turn_figure",
+    "draw_diagnosis",
     "growth_figure",
     "law_figure",
     "robot_evidence_figure",

@@ -1,3 +1,4 @@
+from .comparing import Diagnosis, Settings, diagnose
 from .estimating import (
     Channel,
     CrossSpectra,
@@ -17,6 +18,7 @@ __all__ = [
     "Channel",
     "CrossSpectra",
     "DegreeOfFreedom",
+    "Diagnosis",
     "Estimate",
     "FileFormatError",
     "Frf",
@@ -28,12 +30,14 @@ __all__ = [
     "ModalModel",
     "Predicted",
     "Recording",
+    "Settings",
     "StabilityLobes",
     "Stream",
     "SubspaceFit",
     "TapResult",
     "TipCalibration",
     "calibrate",
+    "diagnose",
     "estimate",
     "fit",
     "lobes",

@@ -7,11 +7,12 @@ from acquisition import Recording, Stream
 from cutting import read_cutting_process
 from estimation import read_frf, read_geometry
 from foundation import FileFormatError, InputError, MillfrfError, MillfrfWarning
+from mismatch import read_diagnosis
 from modal_fit import read_modal_model, read_picked_poles
 from stability import read_lobes
 
 from ..chain import read_cuts
-from ..file_kinds import CHATTER, CUTTING, FRF, GEOMETRY, LOBES, MODEL, POLES, RECORDING, kind_of
+from ..file_kinds import CHATTER, CUTTING, DIAGNOSIS, FRF, GEOMETRY, LOBES, MODEL, POLES, RECORDING, kind_of
 from ..gate import stored_doubts
 from .given import File, warn_of
 
@@ -26,6 +27,7 @@ READERS: Mapping[str, Callable[[File], Any]] = {
     GEOMETRY: read_geometry,
     CHATTER: read_cuts,
     POLES: read_picked_poles,
+    DIAGNOSIS: read_diagnosis,
 }
 """What reads each kind of file."""
 

@@ -2,9 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from foundation import Result, Summary, doubts_line, drawing
 
 from .remainder import Remainder
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Details = TypeVar("Details", covariant=True)
 
@@ -119,8 +124,8 @@ class Improvement:
     against: str = "refitted"
 
 
-@dataclass(frozen=True)
-class Diagnosis(Generic[Details]):
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Result, Generic[Details]):
     """Everything that a diagnosis says, whatever was compared.
 
     Parameters
@@ -170,3 +175,32 @@ class Diagnosis(Generic[Details]):
     def leftover(self) -> float:
         """Share of the final residual that is no noise: :attr:`Remainder.share` of ``after``."""
         return self.after.share
+
+    def plot(self, axes: "Axes | None" = None) -> "Axes":
+        """Draw the errors on held-out data and return the axes; see :func:`figures.draw_diagnosis`."""
+        return drawing("draw_diagnosis")(self, axes)
+
+    def _summary(self) -> Summary:
+        causes = [_cause_in_short(cause) for cause in self.physics]
+        gain = self.improvement
+        error = f"error on {gain.held_out}: {100 * gain.before:.3g} % nominal, {100 * gain.after:.3g} % improved"
+        told = "; ".join(causes) or "no cause"
+        if self.equivalents:
+            told += f" (cannot be told from {', '.join(self.equivalents)})"
+        rows = tuple(
+            (cause.name, name, f"{value:.4g}", f"{cause.standard_errors.get(name, float('nan')):.2g}")
+            for cause in self.physics
+            for name, value in cause.parameters.items()
+        )
+        return Summary(
+            f"Diagnosis of a {self.compared}: {self.verdict}",
+            (told, f"{error}, {100 * gain.noise_floor:.3g} % noise", *doubts_line(self.doubts)),
+            ("cause", "parameter", "value", "standard error"),
+            rows,
+        )
+
+
+def _cause_in_short(cause: AcceptedCause) -> str:
+    """Name of a cause with its place, where it has one."""
+    place = ", ".join(f"{key} {value}" for key, value in cause.location.items())
+    return f"{cause.name} ({place})" if place else cause.name

@@ -1,6 +1,6 @@
 from .derivatives import jacobian
 from .fitting import ENOUGH, Fit, fit, modes_are_odd, residual
-from .hypothesis import Cause, Hypothesis, columns_of, direction_of, held_values, line_response, predict_lines
+from .hypothesis import Cause, Hypothesis, columns_of, direction_of, held_values, line_response, predict_lines, surround
 from .linear_part import with_linear_part
 from .misfit import least_misfit, levels, through_structure, whitened
 from .modal_lines import receptance_at
@@ -29,6 +29,7 @@ __all__ = [
     "receptance_at",
     "residual",
     "settled",
+    "surround",
     "through_structure",
     "whitened",
     "with_chain",

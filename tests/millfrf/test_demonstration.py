@@ -83,8 +83,7 @@ def test_its_own_model_explains_its_own_recordings(demo: DemoResult, tmp_path: P
     found = diagnose_files(folder / "model_housing.json", sweeps, tmp_path / "out")
     assert found.diagnosis.verdict == "none"
     assert found.diagnosis.physics == ()
-    assert found.diagnosis.band is not None
-    assert found.diagnosis.band.edges == SUBSPACE_BAND
+    assert found.diagnosis.details.band.edges == SUBSPACE_BAND
     assert found.diagnosis.improvement.before < 1.1 * found.diagnosis.improvement.noise_floor
     assert any("13 to 60 Hz" in line for line in found.summary)
     assert "13 to 60 Hz" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

@@ -55,7 +55,9 @@ def test_the_import_loads_none_of_the_libraries_that_compute() -> None:
 
 
 def test_every_name_is_there_and_says_what_it_is() -> None:
-    assert {"open", "estimate", "fit", "calibrate", "lobes", "predict", "tap", "__version__"} <= set(dir(mf))
+    assert {"open", "estimate", "fit", "calibrate", "lobes", "diagnose", "predict", "tap", "__version__"} <= set(
+        dir(mf)
+    )
     for name in dir(mf):
         assert getattr(mf, name).__doc__ or name == "__version__", name
     assert mf.__version__.count(".") >= 2

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import BandRecording
+from estimation import BandRecording, channels_of
 from mismatch.adapters.robot import ROBOT as ROBOT_SETTINGS
 from mismatch.adapters.robot import PosedRecording, PosedRobot, posed
 from mismatch.adapters.robot.fit_state import FitProblem, FitState
@@ -45,8 +45,11 @@ def milled(
     force = np.fft.irfft(pushed, n=n, axis=0)[:, columns]
     response = np.fft.irfft(moved * (2j * np.pi * lines[:, None]) ** 2, n=n, axis=0)[:, columns]
     noisy = [part + noise * part.std(axis=0) * rng.normal(size=part.shape) for part in (force, response)]
-    names = tuple(kind + label[-1].lower() for kind in "fa" for label in labels)
-    return BandRecording(f"posture {seed + 1}", RATE, *noisy, np.full(len(columns), 2), names)
+    channels = [
+        channels_of(quantity, labels, [quantity[0] + label[-1].lower() for label in labels])
+        for quantity in ("force", "acceleration")
+    ]
+    return BandRecording(f"posture {seed + 1}", RATE, noisy[0], noisy[1], *channels)
 
 
 def in_postures(
