@@ -19,11 +19,11 @@ class CutSettings(Settings):
     Parameters
     ----------
     coefficient_error
-        One standard deviation of what a laboratory's force coefficients are off, a share: coefficients of one material
-        scatter so between tools, batches and speeds (Altintas, Manufacturing Automation, 2nd ed., section 2.8).
+        One standard deviation of what a laboratory's force coefficients are off, a share. It is a choice of this
+        project, no published figure.
     force_error
-        Share by which each spectral line of a right computed force is still off: a dynamometer's linearity and cross
-        talk are of this size. What is smaller is not named.
+        Share by which each spectral line of a right computed force is still off; what is smaller is not named. It is
+        a choice of this project, no published figure.
     odd
         Laboratory's errors by which a coefficient must be off to be named: 1 in 370 by chance.
     chance
