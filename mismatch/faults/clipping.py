@@ -18,7 +18,7 @@ LIMITS = np.linspace(0.25, 1.0, 76)
 """Limits that are tried, as shares of the largest value measured."""
 
 ROUNDS = 12
-"""Of mending and refitting."""
+"""Rounds of mending and refitting at most."""
 
 SETTLED = 1e-3
 """Relative change of the error beside the limit at which mending stops."""
@@ -34,11 +34,11 @@ class Clipping:
     Parameters
     ----------
     response
-        Its number.
+        Number of the clipped response among the responses, from 0.
     saturation
-        Its characteristic.
+        Limit and sharpness of the channel, the limit in the unit of the response.
     gain
-        Twice the log likelihood gained.
+        Twice the logarithm of the likelihood that the limit gains.
     """
 
     response: int
@@ -56,11 +56,11 @@ def find_clipping(fitted: Fit, lines: list[WindowedSpectrum], settings: FaultSet
     Parameters
     ----------
     fitted
-        What predicts.
+        Fit whose prediction is compared with the responses.
     lines
-        Recordings, responses as measured.
+        Recordings with their responses as measured.
     settings
-        Thresholds.
+        Thresholds of the tests for tones and clipping.
     """
     return _found([shown_signal(fitted, one) for one in lines], lines, settings)
 
@@ -83,7 +83,7 @@ def _found(predicted: list[Real], lines: list[WindowedSpectrum], settings: Fault
 
 
 def _held(measured: Real, shown: Real, limit: float, settings: FaultSettings) -> tuple[float, float] | None:
-    """Place and standard error of a limit: what was due beyond shows it, however much was due, and nothing passes."""
+    """Place and standard error of a limit; None where samples pass it, or those due beyond it do not stop there."""
     beyond = np.abs(shown) > settings.beyond * limit
     if beyond.sum() < settings.least_beyond or np.quantile(np.abs(measured), 0.9995) > 1.2 * limit:
         return None
@@ -102,25 +102,25 @@ def mended(
 ) -> tuple[Fit, list[WindowedSpectrum], Clipping]:
     """Put back what the limit cut off, and refit, until both agree.
 
-    Each round takes the cut part from the prediction of the last; as that was fitted to too little, rounds approach
-    their end slowly, the slower the more was cut, and the next start is extrapolated from the last few (Anderson,
-    J. ACM 12, 1965).
+    Each round takes the cut part from the prediction of the round before. That prediction was fitted to a response
+    that is too small, so the rounds converge slowly, and more slowly where more was cut. The next start is therefore
+    extrapolated from the last few rounds (Anderson, J. ACM 12, 1965).
 
     Parameters
     ----------
     fitted
-        Without knowledge of the limit.
+        Fit that was made without knowledge of the limit.
     lines
-        Recordings as measured.
+        Recordings as they were measured.
     clipping
-        What was found.
+        Limit that :func:`find_clipping` found.
     settings
-        Thresholds.
+        Thresholds of the tests for tones and clipping.
 
     Returns
     -------
     fitted, lines, clipping
-        Settled.
+        The fit, the mended recordings and the limit of the last round.
     """
     start, shown = fitted, [shown_signal(fitted, one) for one in lines]
     tried, reached, error = list[Real](), list[Real](), np.inf
@@ -142,7 +142,7 @@ def mended(
 
 
 def _extrapolated(tried: list[Real], reached: list[Real]) -> Real:
-    """Where rounds that led from ``tried`` to ``reached`` lead to, by the combination that changes least."""
+    """The numbers at which the rounds from ``tried`` to ``reached`` would end: their combination that changes least."""
     starts, ends = np.array(tried[-MEMORY:]), np.array(reached[-MEMORY:])
     if len(ends) < 2:
         return np.asarray(ends[-1])
@@ -171,7 +171,7 @@ def _repaired(predicted: list[Real], lines: list[WindowedSpectrum], clipping: Cl
 def _again(
     predicted: list[Real], lines: list[WindowedSpectrum], clipping: Clipping, settings: FaultSettings
 ) -> Clipping:
-    """The same channel's limit as the better prediction shows it."""
+    """The limit of the same channel as the better prediction shows it."""
     again = _found(predicted, lines, settings)
     found = again if again is not None and again.response == clipping.response else clipping
     sharp = replace(found.saturation, sharpness=np.inf)

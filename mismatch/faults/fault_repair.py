@@ -1,4 +1,4 @@
-"""Tones taken out and clipping mended before causes are looked for."""
+"""Repair of recordings before causes are looked for: tones are taken out, clipping is mended."""
 
 import numpy as np
 
@@ -24,7 +24,7 @@ def repair_faults(
     base
         The fit without any cause.
     settings
-        Thresholds.
+        Thresholds of the diagnosis, those for faults among them.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def with_tones_settled(
     Parameters
     ----------
     fitted
-        With all causes.
+        The fit with all causes.
     lines
         Recordings before tones were taken out.
     accepted
@@ -62,7 +62,7 @@ def with_tones_settled(
     decay
         Decay rate of the slowest mode, 1/s.
     settings
-        Thresholds.
+        Thresholds of the tests for tones and clipping.
     """
     tones = [cause for cause in accepted if cause.name == UNMEASURED_EXCITATION.name]
     gone = [one for one in tones if not stands_out(fitted, lines, one.parameters["frequency_hz"], settings)]

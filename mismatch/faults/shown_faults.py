@@ -45,11 +45,11 @@ def residual_lines(hypothesis: Hypothesis, lines: WindowedSpectrum, faults: Sequ
     Parameters
     ----------
     hypothesis
-        What predicts.
+        Hypothesis that predicts the response.
     lines
-        The recording.
+        Windowed lines of the recording.
     faults
-        Its tones and limits.
+        Tones and limits of the recording, which are put into the prediction.
     """
     predicted = predict_lines(hypothesis, lines)
     if not faults:

@@ -1,4 +1,4 @@
-"""Tones from elsewhere: seen in the residual itself, they go before any cause is looked for."""
+"""Tones from elsewhere: they are seen in the residual itself and taken out before any cause is looked for."""
 
 from dataclasses import dataclass, replace
 
@@ -33,13 +33,13 @@ class Tone:
     Parameters
     ----------
     frequency
-        Hz.
+        Frequency of the tone, Hz.
     amplitudes : (n_responses,)
-        Of each response, mean over recordings.
+        Amplitude in each response, in the response's unit, mean over recordings.
     gain
-        Twice the log likelihood gained.
+        Twice the logarithm of the likelihood that the tone gains.
     spread : (n_responses,)
-        Standard error of the amplitudes: how far recordings differ, for a mean over few of them.
+        Standard error of the amplitudes, in their units: how far recordings differ, widened where they are few.
     """
 
     frequency: float
@@ -69,8 +69,8 @@ def mean_and_error(sizes: list[Real]) -> tuple[Real, Real]:
 def find_tone(fitted: Fit, lines: list[WindowedSpectrum], settings: FaultSettings = FAULTS) -> Tone | None:
     """The strongest residual line that stands out of the recordings at one frequency, and of no force.
 
-    A tone from elsewhere is the weaker beside the noise the harder is cut, as noise grows with the signal: it must be
-    seen in two recordings (in the only one, where there is one).
+    Noise grows with the signal, so a tone from elsewhere is weaker beside the noise where the forces are larger. It
+    must be seen in two recordings (in the only one, where there is one).
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def find_tone(fitted: Fit, lines: list[WindowedSpectrum], settings: FaultSetting
     lines
         Recordings to which it was fitted.
     settings
-        Thresholds.
+        Thresholds of the tests for tones and clipping.
     """
     if len(lines) == 0:
         return None
@@ -105,7 +105,7 @@ def find_tone(fitted: Fit, lines: list[WindowedSpectrum], settings: FaultSetting
 def seen_together(
     contrasts: list[Real], lines: list[WindowedSpectrum], forced: float, settings: FaultSettings = FAULTS
 ) -> Real:
-    """Contrast of each line of the first recording (n_lines,), summed over recordings; 0 where it is no tone's.
+    """Contrast of each line of the first recording (n_lines,), summed over recordings; 0 where the line is no tone.
 
     A line of another recording counts with those beside it. Two recordings must show it (the only one, where there is
     one), and no force with a contrast above ``forced``.
@@ -113,13 +113,13 @@ def seen_together(
     Parameters
     ----------
     contrasts : each (n_lines,)
-        Of the recordings.
+        Contrast of each line of each recording.
     lines
-        They themselves.
+        The recordings, in the same order.
     forced
-        Contrast of a force from which a line is the cut's own.
+        Contrast of a force at a line from which the line counts as caused by the forces.
     settings
-        Thresholds.
+        Thresholds of the tests for tones and clipping.
     """
     axis = lines[0].frequencies
     each = [
@@ -134,14 +134,14 @@ def seen_together(
 def is_comb(contrast: Real, settings: FaultSettings = FAULTS) -> bool:
     """Whether more lines stand out than a machine nearby makes.
 
-    Forces that repeat within the record put all that they cause, errors of the model included, on a comb of lines.
+    Forces that repeat within the record cause a comb of lines, and errors of the model appear on the same lines.
 
     Parameters
     ----------
     contrast : (n_lines,)
         Contrast of each line, summed over recordings.
     settings
-        Thresholds.
+        Thresholds of the tests for tones and clipping.
     """
     lines = np.flatnonzero(contrast > settings.contrast / 3)
     return int(np.sum(np.diff(lines, prepend=-REACH) > 2)) > settings.most_lines
@@ -157,9 +157,9 @@ def stands_out(fitted: Fit, lines: list[WindowedSpectrum], frequency: float, set
     lines
         Recordings from which no tone was taken out.
     frequency
-        The line, Hz.
+        Frequency of the line, Hz.
     settings
-        Thresholds.
+        Thresholds of the tests for tones and clipping.
     """
     total = 0.0
     for one, noise in zip(lines, fitted.noises, strict=True):
@@ -188,10 +188,11 @@ def sharp_frequency(windowed: list[Real], rates: list[float], near: float) -> fl
     Parameters
     ----------
     windowed : each (n_kept, n_channels)
+        Signals in time, multiplied by their windows.
     rates
-        Of each, Hz.
+        Sample rates of the signals, Hz.
     near
-        The line, Hz.
+        Frequency of the line, Hz.
     """
     step = max(rate / len(kept) for kept, rate in zip(windowed, rates, strict=True))
     tries = near + step * np.linspace(-2, 2, 161)
@@ -205,8 +206,8 @@ def sharp_frequency(windowed: list[Real], rates: list[float], near: float) -> fl
 def without_tone(fitted: Fit, lines: WindowedSpectrum, tone: Tone) -> WindowedSpectrum:
     """The same recording without the tone, and without the lines about it.
 
-    The sinusoid that fits the residual best is subtracted, or a strong tone's leakage through the window would stand
-    out far from it; what is left of one that wavers is left out.
+    The sinusoid that fits the residual best is subtracted: otherwise a strong tone's leakage through the window would
+    stand out far from it. The lines near the tone are dropped, as a tone that wavers is not subtracted wholly.
     """
     rest = lines.recording.response - shown_signal(fitted, lines)
     turn = 2 * np.pi * tone.frequency * np.arange(len(rest)) / lines.recording.rate

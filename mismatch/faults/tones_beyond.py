@@ -31,26 +31,26 @@ def tones_beyond(
     """Lines above the compared band that stand out of the residual in two recordings, and in no force.
 
     No noise was fitted there, so each response is its own measure: a line's power against the median of its neighbours.
-    The hypothesis is the final one: a hardening joint answers periodic forces with lines that they do not have.
+    The hypothesis is the final one: a hardening joint answers periodic forces at frequencies that the forces lack.
 
     Parameters
     ----------
     hypothesis
-        With all causes.
+        The hypothesis with all causes.
     lines
-        Recordings.
+        Windowed lines of the recordings.
     decay
-        Of the slowest mode, 1/s.
+        Decay rate of the slowest mode, 1/s.
     most
-        How many tones are looked for.
+        Number of tones that are looked for at most.
     settings
-        Thresholds. No force may show more contrast there than ``quiet_force``: above the modes a force's line needs
-        no resonance to be seen in a response.
+        Thresholds of the tests for tones. No force may show more contrast there than ``quiet_force``: above the modes
+        a force's line needs no resonance to be seen in a response.
 
     Returns
     -------
     list of Tone
-        Strongest first.
+        Tones that were found, strongest first.
     """
     above = [_above(one, decay) for one in lines]
     if not above or min(len(one.frequencies) for one in above) < 4 * len(NEAR):

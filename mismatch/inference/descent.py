@@ -102,7 +102,7 @@ def descend(problem: Problem[State], start: State, limits: Limits) -> Descended[
     for _ in range(limits.most):
         step = problem.step(state, matrix + damping * np.diag(np.diag(matrix)), gradient)
         expected = float(step @ gradient)
-        # where a law is stiffer than its derivatives can follow there is no step either
+        # no step is taken either where a law is stiffer than its derivatives can follow
         if not expected >= 0.1 * limits.tolerance or not np.isfinite(step).all():
             break
         before = problem.cost(state)
@@ -148,7 +148,7 @@ def plain_step(matrix: Real, gradient: Real) -> Real:
     matrix : (n, n)
         Damped normal matrix.
     gradient : (n,)
-        Right-hand side.
+        Right-hand side of the normal equations.
     """
     try:
         return np.asarray(np.linalg.solve(matrix, gradient), dtype=float)

@@ -24,7 +24,7 @@ def diagnosis_content(diagnosis: Diagnosis[object]) -> dict[str, Any]:
     Parameters
     ----------
     diagnosis
-        Of any kind of comparison.
+        The diagnosis, from any kind of comparison.
     """
     content = {
         "format": FORMAT,
@@ -53,7 +53,7 @@ def write_diagnosis(path: str | os.PathLike[str], diagnosis: Diagnosis[object]) 
     path
         The file; an older one is replaced.
     diagnosis
-        Of any kind of comparison.
+        The diagnosis, from any kind of comparison.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def read_diagnosis(path: str | os.PathLike[str]) -> Diagnosis[None]:
 
 
 def _diagnosis(content: Mapping[str, Any]) -> Diagnosis[None]:
-    """From the content of version 1 or 2."""
+    """The diagnosis that a file's content of version 1 or 2 states."""
     share = _number(content["leftover_share"])
     unknown = {"before": {"share": math.nan, "size": math.nan}, "after": {"share": share, "size": math.nan}}
     left = content.get("remainder", unknown)

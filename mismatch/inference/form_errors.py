@@ -14,7 +14,7 @@ def jackknife_variance(numbers: Real) -> Real:
     Parameters
     ----------
     numbers : (n_parts, n_numbers)
-        Fitted without the first part, without the second, and so on.
+        Numbers fitted without the first part, without the second, and so on.
 
     Examples
     --------

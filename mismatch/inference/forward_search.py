@@ -44,7 +44,7 @@ def pruned(comparison: Comparison[Fit], found: Search[Fit]) -> Search[Fit]:
     comparison
         How the fit without a cause is made.
     found
-        Where the search ended.
+        The search where it ended.
     """
     for place in range(len(found.accepted) - 2, -1, -1):
         if len(found.accepted) < 2:
@@ -62,7 +62,7 @@ def released(found: Search[Fit], place: int, less: Fit, stage: str, evidence: fl
     Parameters
     ----------
     found
-        With the cause.
+        The search with the cause.
     place
         Which of the accepted causes goes.
     less

@@ -30,7 +30,7 @@ def signed_ranks(before: Real, after: Real) -> float:
 
 
 def students_test(before: Real, after: Real) -> float:
-    """The same p-value by Student's test of the mean fall: for so few blocks that ranks cannot be significant.
+    """p-value by Student's test of the mean fall, for so few blocks that ranks cannot be significant.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Independent work in copies of this process, one a core: threads would wait for the interpreter's lock."""
+"""Independent work in copies of this process, one for each core: threads would wait for the interpreter's lock."""
 
 import multiprocessing
 import os
@@ -20,7 +20,7 @@ def in_processes(tasks: Sequence[Callable[[], Result]]) -> list[Result]:
     Parameters
     ----------
     tasks
-        Without side effects; what they return can be pickled.
+        Functions without side effects; what they return can be pickled.
 
     Raises
     ------

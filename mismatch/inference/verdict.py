@@ -34,14 +34,14 @@ class Findings:
 
 
 def verdict_of(found: Findings, settings: VerdictSettings) -> str:
-    """``none``, ``explained``, ``partly explained`` or ``unexplained``.
+    """The verdict: ``none``, ``explained``, ``partly explained`` or ``unexplained``.
 
     Parameters
     ----------
     found
         What is left, and what the held-out data say.
     settings
-        Thresholds.
+        Thresholds of what an answer may leave.
 
     Examples
     --------
@@ -72,7 +72,7 @@ def leaves_too_much(gain: Improvement, settings: VerdictSettings) -> bool:
     gain
         Errors on the recording held out.
     settings
-        Thresholds.
+        Thresholds of what an answer may leave.
     """
     if gain.after > settings.most_of_response:
         return True
@@ -80,7 +80,9 @@ def leaves_too_much(gain: Improvement, settings: VerdictSettings) -> bool:
 
 
 def share_left(gain: Improvement) -> float:
-    """Of the nominal model's power above the noise on the held-out recording, what the answer leaves; 0 to 1 or more.
+    """Share of the nominal model's power above the noise, on the held-out recording, that the answer leaves.
+
+    The share is 0 where nothing is left, and more than 1 where the answer is worse than the nominal model.
 
     Parameters
     ----------

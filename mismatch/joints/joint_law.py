@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 
 POINTS = 8193
-"""Of a table over deflection or velocity."""
+"""Number of points of a table over deflection or velocity."""
 
 
 def _none() -> Real:
@@ -28,19 +28,19 @@ class JointLaw:
     reach
         Deflection x at the ends of its table, m; beyond, the table goes on straight.
     stiffness : (POINTS,), N
-        S at evenly spaced x from -reach to reach; empty: none.
+        Force S at evenly spaced x from -reach to reach; empty: none.
     speed
         Velocity at the ends of its table, m/s.
     damping : (POINTS,), N
-        D at evenly spaced v; empty: none.
+        Force D at evenly spaced v from -speed to speed; empty: none.
     ramp
-        r, N/m: change of stiffness from the beginning to the end of a recording, tau runs from -1/2 to 1/2.
+        Change r of the stiffness from the beginning to the end of a recording, N/m; tau runs from -1/2 to 1/2.
     bend
-        b, N/m: how far the middle lies below the straight change, ``r tau + b (4 tau^2 - 1)``.
+        Stiffness b by which the middle lies below the straight change, N/m: ``r tau + b (4 tau^2 - 1)``.
     springs : (n,), N/m
-        k of the elastic-plastic elements.
+        Stiffness k of each elastic-plastic element.
     yields : (n,), m
-        y.
+        Deflection y at which each elastic-plastic element yields.
     """
 
     reach: float = 1.0
@@ -65,13 +65,13 @@ class JointMotion:
     Parameters
     ----------
     deflection
-        Root mean square, m, of the strongest trial.
+        Standard deviation of the deflection in the strongest trial, m.
     velocity
-        Root mean square, m/s.
+        Standard deviation of the velocity in the same trial, m/s.
     reach, speed
-        Twice the largest deflection (m) and velocity (m/s).
+        Ends of the law's tables: two and a half times the largest deflection (m) and velocity (m/s) of all trials.
     stiffness
-        Of the structure along the joint's direction, N/m.
+        Static stiffness of the structure along the joint's direction, N/m.
     """
 
     deflection: float

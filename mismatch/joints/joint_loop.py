@@ -57,12 +57,14 @@ def free_run(
     dynamics
         For each mode: ``exp(p h)``, weights of the force at a step's beginning and end, factor from mode to deflection
         and to velocity, each (n_modes,).
-    tables, spans
-        Of the law, and the ends of their axes.
+    tables
+        Force of the law over deflection and over velocity, N, each at evenly spaced points.
+    spans
+        Ends of the tables' axes: deflection (m) and velocity (m/s).
     ramp : (n,), N/m
         Stiffness that changes with time.
     elements
-        Springs (N/m) and yields (m) of the elastic-plastic elements.
+        Springs (N/m) and yields (m) of the elastic-plastic elements, each (n_elements,).
     written
         Receives g (N), deflection (m) and velocity (m/s), each (n,).
     """

@@ -17,7 +17,7 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 INSTANTS_PER_PERIOD = 20.0
-"""Of the highest mode."""
+"""Instants of the simulation in one period of the highest mode."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ class JointResponse:
     Parameters
     ----------
     force : (n_padded_lines,), N
-        Padded spectrum.
+        Spectrum of the joint's force at the lines of the padded record.
     deflection, velocity : (k n_padded,), m and m/s
-        At the recording's samples, or k times as often (:func:`substeps`).
+        Motion of the joint at the recording's samples, or k times as often (:func:`substeps`).
     """
 
     force: Complex
@@ -57,12 +57,12 @@ def common_axes(model: ModalModel) -> tuple[list[int], list[int]]:
 
 
 def fineness(model: ModalModel, rate: float) -> int:
-    """Instants of the simulation a sample."""
+    """Instants of the simulation for each sample of the recording."""
     return max(4, int(np.ceil(INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate)))
 
 
 def substeps(model: ModalModel, rate: float, fine: int) -> int:
-    """Instants a sample at which a motion is kept: a divisor of ``fine`` that follows the highest mode."""
+    """Instants for each sample at which a motion is kept: a divisor of ``fine`` that follows the highest mode."""
     wanted = INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate
     return next((k for k in range(1, fine) if fine % k == 0 and k >= wanted), fine)
 
@@ -75,15 +75,15 @@ def joint_response(
     Parameters
     ----------
     model
-        Linear structure.
+        Modal model of the linear structure.
     lines
-        Of the recording.
+        Windowed spectrum of the recording.
     free : (n_padded_lines,), m
         Spectrum of the joint's deflection under the outer force alone.
     direction : (n_axes,)
-        Of the joint over the common axes, of unit length.
+        Unit vector of the joint over the common axes.
     law
-        Of the joint.
+        Force law of the joint.
     """
     frequencies = lines.padded_frequencies
     fine = fineness(model, lines.recording.rate)

@@ -15,7 +15,7 @@ SHARPEST = 60.0
 """Sharpness above which rounding cannot be seen."""
 
 LEAST_GAIN = 20.0
-"""Of twice the log likelihood, for a rounded limit over a sharp one."""
+"""Gain in twice the log likelihood from which a rounded limit is preferred to a sharp one."""
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,9 @@ class Saturation:
     Parameters
     ----------
     limit, error
-        l in the channel's unit, and its standard error.
+        Limit l in the channel's unit, and its standard error.
     sharpness, sharpness_error
-        n, and its standard error.
+        Sharpness n of the corner, and its standard error.
     """
 
     limit: float
@@ -42,8 +42,9 @@ def saturated(signal: Real, limit: float, sharpness: float = np.inf) -> Real:
     Parameters
     ----------
     signal : (n,)
+        Signal before the channel, in the channel's unit.
     limit, sharpness
-        As of :class:`Saturation`.
+        Numbers l and n of the characteristic, as in :class:`Saturation`.
 
     Examples
     --------
@@ -55,7 +56,7 @@ def saturated(signal: Real, limit: float, sharpness: float = np.inf) -> Real:
     if np.isinf(sharpness):
         return np.asarray(np.clip(signal, -limit, limit))
     share = np.abs(signal) / limit
-    # of what is far beyond the limit the power of the reciprocal stays finite
+    # far beyond the limit the power of the share may overflow; that of its reciprocal stays finite
     large = np.maximum(share, 1.0)
     within = np.minimum(share, 1.0) ** sharpness
     return np.asarray(signal / large * (large**-sharpness + within) ** (-1 / sharpness))
@@ -67,7 +68,7 @@ def rounded(measured: Real, shown: Real, sharp: Saturation) -> Saturation:
     Parameters
     ----------
     measured, shown : (n,)
-        As recorded, and as predicted without a limit.
+        Samples of the channel as recorded, and as predicted without a limit.
     sharp
         The sharp limit that was found.
     """

@@ -34,9 +34,9 @@ def tangent_run(
     motion
         Deflection (m) and velocity (m/s) of the free run, each (n,).
     dynamics, tables, spans, ramp, elements
-        As for the free run, at this run's step.
+        Arguments of the free run, at this run's step.
     change
-        Of driven deflection and velocity, each (n, n_columns).
+        Changes of the driven deflection (m) and velocity (m/s), each (n, n_columns).
     force : (n, n_columns)
         Holds e, the law's own change at this motion; receives dg.
     """

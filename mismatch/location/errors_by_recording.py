@@ -1,4 +1,4 @@
-"""Errors of each recording as it was measured, by the models fitted without the one held out."""
+"""Errors of each recording as it was measured, for the models that are fitted without the recording held out."""
 
 from dataclasses import dataclass
 
@@ -12,20 +12,21 @@ from .structure_details import StructureDiagnosis
 
 @dataclass(frozen=True)
 class RecordingError:
-    """Errors as shares of one recording's response.
+    """Errors of the models as shares of one recording's root mean square response.
 
     Parameters
     ----------
     recording
-        Its name.
+        Name of the recording.
     held_out
-        Whether the models were fitted without it.
+        Whether the models were fitted without the recording.
     force
-        Root mean square, N.
+        Root mean square of the recording's force, N.
     nominal, refitted, final
-        Of the nominal model, of modal parameters alone, of the final model.
+        Root mean square residual of the nominal model, of the model with refitted modal parameters alone, and of the
+        final model, each as a share of the response.
     noise
-        Root mean square noise.
+        Root mean square noise as a share of the response.
     """
 
     recording: str
@@ -38,7 +39,7 @@ class RecordingError:
 
 
 def recording_errors(diagnosis: StructureDiagnosis) -> tuple[RecordingError, ...]:
-    """Of all recordings; of the one held out they are those of the diagnosis' :class:`Improvement`."""
+    """Return the errors of all recordings; those of the one held out are in the diagnosis' :class:`Improvement` too."""
     details = diagnosis.details
     linear, improved = details.elsewhere
     faults = [cause for cause in diagnosis.physics if is_fault(cause.name)]

@@ -1,4 +1,4 @@
-"""Significance of many residual cells at once, the noise level itself being known only so well."""
+"""Significance of many residual cells at once, where the noise level itself is uncertain."""
 
 from dataclasses import dataclass
 
@@ -13,12 +13,12 @@ FAMILY_WISE = 0.01
 """Probability that any cell of a diagnosis is called significant where only noise is left."""
 
 LEAST_SPREAD = 0.02
-"""Of the noise level: nobody knows it better than to two per cent."""
+"""Least relative uncertainty of the noise level, which is never known better than to two per cent."""
 
 
 @dataclass(frozen=True)
 class NoiseSpread:
-    """How well the noise model hits the level of single cells.
+    """How well the noise model meets the noise level of single cells.
 
     Parameters
     ----------
@@ -32,18 +32,20 @@ class NoiseSpread:
     spread: float
 
     def chance(self, ratio: ArrayLike, count: ArrayLike) -> Real:
-        """Probability of a larger ratio in a cell of ``count`` independent complex lines of noise (F test)."""
+        """Return the probability of a larger ratio in a cell of ``count`` independent lines of noise (F test)."""
         numerator = np.maximum(2 * np.asarray(count, dtype=float), 1e-9)
         return np.asarray(fisher.sf(np.asarray(ratio) / self.level, numerator, 2 / self.spread**2))
 
 
 def noise_spread(ratio: Real, count: Real) -> NoiseSpread:
-    """Level and spread of the cells that the final model leaves, by median and median deviation.
+    """Return level and spread of the cells that the final model leaves, by median and median deviation.
 
     Parameters
     ----------
-    ratio, count
-        Of the cells, same shape: residual power over noise power, independent complex lines.
+    ratio
+        Residual power over noise power of each cell, any shape.
+    count
+        Independent complex lines of each cell, in the shape of ``ratio``.
     """
     logs = np.log(np.maximum(ratio, 1e-12)).ravel()
     middle = float(np.median(logs))
@@ -53,7 +55,7 @@ def noise_spread(ratio: Real, count: Real) -> NoiseSpread:
 
 
 def holm(chances: Real) -> Real:
-    """Adjusted p-values that control the family-wise error (Holm 1979, Scand. J. Statistics 6).
+    """Return adjusted p-values that control the family-wise error (Holm 1979, Scand. J. Statistics 6).
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The restoring force of a joint as it was measured, no law assumed: means in bins of deflection and of velocity."""
+"""The measured restoring force of a joint without an assumed law: means in bins of deflection and of velocity."""
 
 from dataclasses import dataclass, replace
 
@@ -25,16 +25,16 @@ BLOCK = 1.0
 
 @dataclass(frozen=True)
 class BinnedForce:
-    """Mean force in bins.
+    """Mean force of a joint in bins of its deflection or velocity.
 
     Parameters
     ----------
     at : (n,)
-        Mean of each bin: m, or m/s.
+        Mean deflection (m) or velocity (m/s) of each bin.
     force, error : (n,), N
-        Mean and its standard error from the scatter between pieces of the records.
+        Mean measured force and its standard error, from the scatter between pieces of the records.
     law : (n,), N
-        The accepted law's force, driven by the same motion, filtered and averaged alike.
+        Force of the accepted law under the same motion, filtered and averaged alike.
     """
 
     at: Real
@@ -50,13 +50,14 @@ class FreeFormLaw:
     Parameters
     ----------
     name
-        Of the accepted cause.
+        Name under which the accepted cause is reported.
     direction : (n_axes,)
-        Along which it acts.
+        Direction along which the joint acts.
     forward, backward
-        Against deflection, moving up and moving down: apart where the joint rubs or remembers.
+        Force against deflection while it rises and while it falls; the two differ where the joint has friction or
+        memory.
     damping
-        Against velocity, what depends on deflection taken off.
+        Force against velocity, without the part that depends on deflection.
     explained
         Share of the measured force's power that the law gives.
     """
@@ -71,7 +72,7 @@ class FreeFormLaw:
 
 @dataclass(frozen=True)
 class _Sample:
-    """Samples of all recordings, band-limited alike: deflection, velocity, force, the law's force, number of piece."""
+    """Samples of all recordings in one band: deflection, velocity, force, the law's force and number of the piece."""
 
     x: Real
     v: Real
@@ -81,7 +82,7 @@ class _Sample:
 
 
 def free_form_laws(diagnosis: StructureDiagnosis) -> tuple[FreeFormLaw, ...]:
-    """Measured force of each accepted joint cause, all other causes in place."""
+    """Return the measured force of each accepted joint cause, with all other causes in the model."""
     return tuple(
         _measured(diagnosis, cause)
         for cause in diagnosis.details.final.hypothesis.causes
@@ -111,7 +112,7 @@ def _measured(diagnosis: StructureDiagnosis, cause: Cause) -> FreeFormLaw:
 
 
 def _seen(final: Fit, bare: Hypothesis, cause: Cause, number: int, lines: WindowedSpectrum) -> _Sample:
-    """Motion and force along the joint in one recording, and the law's force for that motion."""
+    """Return motion and force along the joint in one recording, and the law's force for that motion."""
     assert cause.direction is not None
     through = through_structure(bare, lines)
     covariance = final.noises[number].covariance(lines.frequencies, through)
@@ -141,14 +142,14 @@ def _joined(parts: list[_Sample]) -> _Sample:
 
 
 def _edges(values: Real) -> Real:
-    """Edges of the bins where all but one in 500 samples lie: halfway between evenly wide and evenly filled."""
+    """Return edges of bins that hold all but one in 500 samples, halfway between evenly wide and evenly filled."""
     shares = np.linspace(0.001, 0.999, BINS + 1)
     filled = np.quantile(values, shares)
     return np.asarray(0.5 * (filled + np.linspace(filled[0], filled[-1], BINS + 1)))
 
 
 def _mean_at(values: Real, force: Real, edges: Real) -> Real:
-    """Mean force of a sample's bin, straight between the middles."""
+    """Return the mean force at each sample, interpolated linearly between the middles of the bins."""
     place = np.digitize(values, edges[1:-1])
     held = np.maximum(np.bincount(place, minlength=BINS), 1)
     means = np.bincount(place, force, BINS) / held
@@ -156,7 +157,7 @@ def _mean_at(values: Real, force: Real, edges: Real) -> Real:
 
 
 def _binned(samples: _Sample, values: Real, edges: Real, chosen: NDArray[np.bool_]) -> BinnedForce:
-    """Means, and their errors by leaving out one piece of the records at a time (jackknife)."""
+    """Return means in bins, and their errors by leaving out one piece of the records at a time (jackknife)."""
     inside = chosen & (values >= edges[0]) & (values <= edges[-1])
     place = np.digitize(values[inside], edges[1:-1])
     piece = samples.piece[inside]

@@ -1,4 +1,4 @@
-"""How a residual grows with the level of excitation: what kind of omission it is."""
+"""Growth of a residual with the level of excitation, which shows the kind of omission."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,14 +24,14 @@ class Growth:
     Parameters
     ----------
     force : (n_recordings,), N
-        Root mean square, all directions together.
+        Root mean square force, all directions together.
     amplitude, error : (n_recordings,)
-        Root mean square residual with the noise's power taken off, every channel in units of its own response averaged
-        over the recordings; its standard error. Zero where nothing stands above the noise.
+        Root mean square residual without the noise's power, and its standard error. Every channel counts in units of
+        its own response averaged over the recordings. The amplitude is zero where nothing stands above the noise.
     noise : (n_recordings,)
-        Of the noise, in the same unit.
+        Root mean square noise, in the unit of ``amplitude``.
     exponent, exponent_error
-        Of ``amplitude ~ force^exponent``; nan where fewer than two levels show it.
+        Exponent of ``amplitude ~ force^exponent`` and its standard error; nan where fewer than two levels show it.
     """
 
     force: Real
@@ -49,20 +49,21 @@ def growth(
     bands: Sequence[tuple[float, float]],
     spread: float,
 ) -> Growth:
-    """Growth of a hypothesis's residual inside bands (Hz; none: everywhere).
+    """Return how a hypothesis's residual grows with the force inside bands.
 
-    A linear omission grows as the force, a cubic as its third power, dry friction not at all.
+    The residual of a linear omission grows as the force and that of a cubic one as its third power; that of dry
+    friction does not grow.
 
     Parameters
     ----------
     hypothesis
-        Whose residual.
+        Hypothesis about the structure whose residual is measured.
     reference
-        Fit whose noise is taken off.
+        Fit whose noise is taken off the residual.
     lines
-        Recordings.
+        Windowed spectra of the recordings, in the order of that fit.
     bands
-        Where the residual was found.
+        Bands in which the residual was found, as low and high edge, Hz; empty for all frequencies.
     spread
         Relative standard deviation of the noise's variance, beyond chance.
     """
@@ -93,7 +94,7 @@ def _inside(frequencies: Real, bands: Sequence[tuple[float, float]]) -> NDArray[
 
 
 def _slope(force: Real, amplitude: Real, relative: Real) -> tuple[float, float]:
-    """Weighted slope of the logarithms and its standard error, enlarged where the points do not lie on a line."""
+    """Return the weighted slope of the logarithms and its standard error, enlarged by the misfit of the line."""
     if len(force) < 2 or np.ptp(np.log(force)) < 0.1:
         return float("nan"), float("nan")
     weight = 1 / np.maximum(relative, 1e-3) ** 2

@@ -15,24 +15,24 @@ from .view_of_residual import ResidualView, linear_part
 
 Real = NDArray[np.float64]
 Tables = tuple[tuple[Real, Real], tuple[Real, Real]]
-"""Ratio of residual to noise power and independent lines, before and after."""
+"""Ratio of residual to noise power, and number of independent lines, before and after."""
 
 NO_SPEED = "no recording states the spindle's speed in events or set-up"
 NO_ORDER = "no order of the spindle stands out of the residual beside it"
 
 
 def located(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> dict[str, Any]:
-    """Places of the mismatch, from the maps of what is left; plain content for a file.
+    """Return the places of the mismatch, from the maps of the residual, as plain content for a file.
 
-    Every cell of every map is tested for more residual power than noise has; p-values are adjusted together (Holm), so
-    that in a diagnosis of noise alone any place at all is named with probability ``family_wise_level``.
+    Every cell of every map is tested for more residual power than noise has; p-values are adjusted together (Holm):
+    a diagnosis of noise alone names any place at all with the probability ``family_wise_level``.
 
     Parameters
     ----------
     view
-        Maps of what is left before and after.
+        Maps of the residual before and after the causes are added.
     speeds
-        Spindle speed by the recording's name, where it is known.
+        Spindle speed by the recording's name, for the recordings that state one.
     """
     before, after = view.before, view.after
     tables = {
@@ -67,7 +67,7 @@ def located(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> dict[str,
 
 
 def significant_cells(content: Mapping[str, Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Mask (n_recordings, n_bands, n_responses) of the cells that :func:`located` named."""
+    """Return a mask (n_recordings, n_bands, n_responses) of the cells that :func:`located` named."""
     mask = np.zeros(shape, dtype=bool)
     for cell in content["cells"]:
         mask[tuple(cell)] = True
@@ -85,18 +85,18 @@ def _block_table(blocks: BlockResidual) -> tuple[Real, Real]:
 
 
 def _plain(value: float) -> float | None:
-    """Rounded to four digits; None for what is no number."""
+    """Return a value rounded to four digits; None where it is not finite."""
     return float(f"{value:.4g}") if np.isfinite(value) else None
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Beginning and end of each unbroken stretch."""
+    """Return beginning and end of each unbroken stretch of a mask."""
     steps = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
     return [(int(a), int(b)) for a, b in zip(steps[::2], steps[1::2], strict=True)]
 
 
 def _bands(edges: Real, tables: Tables, p_value: Real) -> list[dict[str, Any]]:
-    """Neighbouring significant bands together, most excess first."""
+    """Return significant bands with their neighbours joined, most excess first."""
     before, after = tables
     excess = np.maximum(before[0] - 1, 0) * before[1]
     found = []
@@ -140,12 +140,12 @@ def _levels(view: ResidualView, tables: Tables, p_value: Real) -> list[dict[str,
 
 
 def _cells(view: ResidualView, p_value: Real) -> list[list[int]]:
-    """Significant cells as indices [recording, band, channel]; bands are about sixth octaves."""
+    """Return the significant cells as indices [recording, band, channel]; bands are about sixth octaves."""
     return [[int(k) for k in cell] for cell in np.argwhere(p_value < FAMILY_WISE)]
 
 
 def _times(view: ResidualView, tables: Sequence[tuple[Real, Real]], p_values: Sequence[Real]) -> list[dict[str, Any]]:
-    """Stretches of time whose blocks are significant."""
+    """Return the stretches of time whose blocks are significant."""
     found = []
     for blocks, (ratio, _), p_value in zip(view.blocks_before, tables, p_values, strict=True):
         for start, stop in _runs(p_value < FAMILY_WISE):
@@ -162,7 +162,7 @@ def _times(view: ResidualView, tables: Sequence[tuple[Real, Real]], p_values: Se
 
 
 def _growth(view: ResidualView, bands: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Of the residual after the refit, and of what the final model leaves without its joints' laws."""
+    """Return the growth of the residual after the refit, and of that of the final model without its joints' laws."""
     ranges = [(band["low_hz"], band["high_hz"]) for band in bands]
     if not ranges:
         return {"note": "nothing stands above the noise, so nothing grows"}
@@ -187,7 +187,7 @@ def _growth_content(found: Growth) -> dict[str, Any]:
 
 
 def _orders(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> list[dict[str, Any]]:
-    """All orders of all recordings that state a speed, with the chance that an order stands out as it does."""
+    """Return all orders of all recordings that state a speed, with the chance that an order stands out as it does."""
     rows = []
     for blocks in view.blocks_before:
         if blocks.recording not in speeds:

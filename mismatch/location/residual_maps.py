@@ -16,7 +16,7 @@ Real = NDArray[np.float64]
 
 BANDS_PER_OCTAVE = 6
 LEAST_LINES = 12
-"""Of a band, in every recording."""
+"""Least number of lines of a band in every recording."""
 
 
 @dataclass(frozen=True)
@@ -26,14 +26,15 @@ class ResidualMap:
     Parameters
     ----------
     edges : (n_bands + 1,), Hz
+        Edges of the frequency bands.
     channels
         Names of the responses.
     recordings
-        Names, weakest force first.
+        Names of the recordings, weakest force first.
     ratio : (n_recordings, n_bands, n_responses)
-        Each channel against its own noise.
+        Residual power of each channel over the variance of its own noise.
     joint : (n_recordings, n_bands)
-        All channels together, whitened.
+        Mean residual power of all channels together, whitened.
     count : (n_recordings, n_bands)
         Independent complex lines of a cell of one channel.
     """
@@ -46,25 +47,25 @@ class ResidualMap:
     count: Real
 
     def pooled(self, axis: tuple[int, ...]) -> tuple[Real, Real]:
-        """Ratio and count over ``axis`` of ``ratio``, cells weighted by their lines."""
+        """Return the means of ``ratio`` over ``axis``, weighted by the lines of the cells, and the number of lines."""
         weight = np.broadcast_to(self.count[:, :, None], self.ratio.shape)
         total = weight.sum(axis=axis)
         return np.asarray((self.ratio * weight).sum(axis=axis) / np.maximum(total, 1e-9)), np.asarray(total)
 
     def pooled_joint(self, axis: int) -> tuple[Real, Real]:
-        """The same of ``joint``; every channel brings its lines."""
+        """Return the weighted means of ``joint`` over ``axis``, and the number of lines of all channels."""
         total = self.count.sum(axis=axis)
         ratio = (self.joint * self.count).sum(axis=axis) / np.maximum(total, 1e-9)
         return np.asarray(ratio), np.asarray(total * len(self.channels))
 
 
 def overlap(window: Real) -> float:
-    """How many neighbouring lines of a windowed spectrum count as one, ``N sum w^4 / (sum w^2)^2``."""
+    """Return how many neighbouring lines of a windowed spectrum count as one, ``N sum w^4 / (sum w^2)^2``."""
     return float(len(window) * np.sum(window**4) / np.sum(window**2) ** 2)
 
 
 def band_edges(lines: Sequence[WindowedSpectrum], per_octave: int = BANDS_PER_OCTAVE, least: int = LEAST_LINES) -> Real:
-    """Edges (Hz) of bands evenly wide on a logarithmic axis, each with ``least`` lines in every recording."""
+    """Return edges (Hz) of bands evenly wide on a logarithmic axis, each with ``least`` lines in every recording."""
     low = max(float(one.frequencies[0]) for one in lines)
     high = min(float(one.frequencies[-1]) for one in lines)
     fine = np.geomspace(low, high, max(2, round(per_octave * np.log2(high / low)) + 1))
@@ -82,25 +83,25 @@ def band_edges(lines: Sequence[WindowedSpectrum], per_octave: int = BANDS_PER_OC
 def normalised(
     hypothesis: Hypothesis, reference: Fit, number: int, lines: WindowedSpectrum
 ) -> tuple[Complex, Complex, Real]:
-    """Residual lines in units of the noise.
+    """Return the residual lines of one recording in units of the noise.
 
     Parameters
     ----------
     hypothesis
-        Whose residual.
+        Hypothesis about the structure whose residual is taken.
     reference
         Fit whose noise is the unit.
     number
-        Of the recording in that fit.
+        Place of the recording in that fit, from 0.
     lines
-        The recording.
+        Windowed spectrum of the recording.
 
     Returns
     -------
     single, white : (n_lines, n_responses)
-        Each channel by its own noise; all channels whitened together.
+        Residual with each channel divided by its own noise, and with all channels whitened together.
     variance : (n_lines, n_responses)
-        Of the noise.
+        Variance of the noise of each line and channel.
     """
     rest = lines.measured - predict_lines(hypothesis, lines).response
     through = through_structure(reference.hypothesis, lines)
@@ -110,7 +111,7 @@ def normalised(
 
 
 def residual_map(hypothesis: Hypothesis, reference: Fit, lines: Sequence[WindowedSpectrum], edges: Real) -> ResidualMap:
-    """Map of one hypothesis's residual over all recordings, noise from ``reference``."""
+    """Return the map of one hypothesis's residual over all recordings, with the noise of ``reference``."""
     ratio, joint, count = [], [], []
     for number, one in enumerate(lines):
         single, white, _ = normalised(hypothesis, reference, number, one)
@@ -127,6 +128,6 @@ def residual_map(hypothesis: Hypothesis, reference: Fit, lines: Sequence[Windowe
 
 
 def _means(power: Real, place: NDArray[np.int64], held: Real) -> Real:
-    """Mean of power (n_lines, n) in each band, (n_bands, n); 1 where a band holds no line."""
+    """Return the mean of power (n_lines, n) in each band, (n_bands, n); 1 where a band holds no line."""
     sums = np.array([np.bincount(place, power[:, p], len(held)) for p in range(power.shape[1])]).T
     return np.asarray(np.where(held[:, None] > 0, sums / np.maximum(held, 1)[:, None], 1.0))

@@ -1,4 +1,4 @@
-"""Spectra of the recording that was held out: measured, what each model leaves of it, noise."""
+"""Spectra of the recording held out: the response, the residual of each model, and the noise."""
 
 from dataclasses import dataclass
 
@@ -25,15 +25,16 @@ class HeldOutSpectra:
     Parameters
     ----------
     recording
-        Its name.
+        Name of the recording that is held out.
     frequencies : (n_bands,), Hz
+        Geometric means of the bands' edges.
     channels
         Names of the responses.
     powers : (n_responses,)
-        0 displacement, 1 velocity, 2 acceleration.
+        Quantity of each response: 0 displacement, 1 velocity, 2 acceleration.
     measured, predicted, before, after, noise : (n_bands, n_responses)
-        The response, the improved model's prediction, residuals of the refitted nominal and of the improved model,
-        both fitted to the other recordings, and the noise.
+        Spectra of the measured response, of the improved model's prediction, of the residuals of the refitted nominal
+        and of the improved model, both fitted to the other recordings, and of the noise.
     """
 
     recording: str
@@ -48,7 +49,7 @@ class HeldOutSpectra:
 
 
 def held_out_spectra(diagnosis: StructureDiagnosis) -> HeldOutSpectra:
-    """Spectra of the recording named by the diagnosis' improvement, both models fitted to the others only."""
+    """Return spectra of the recording named by the diagnosis' improvement, both models fitted to the others only."""
     details = diagnosis.details
     lines = list(details.measured)
     names = [one.recording.name for one in lines]
@@ -73,7 +74,7 @@ def held_out_spectra(diagnosis: StructureDiagnosis) -> HeldOutSpectra:
 
 
 def _density(power: Real, lines: WindowedSpectrum, edges: Real) -> Real:
-    """Root of the mean one-sided density in bands; nan where a band holds no line."""
+    """Return the root of the mean one-sided density in bands; nan where a band holds no line."""
     place = np.digitize(lines.frequencies, edges[1:-1])
     held = np.bincount(place, minlength=len(edges) - 1)
     sums = np.array([np.bincount(place, power[:, p], len(held)) for p in range(power.shape[1])]).T

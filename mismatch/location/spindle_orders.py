@@ -1,4 +1,4 @@
-"""Does the residual sit at multiples of the spindle's speed?"""
+"""Residual power at multiples of the spindle's speed."""
 
 import os
 import tomllib
@@ -17,30 +17,32 @@ Real = NDArray[np.float64]
 SPEED = "spindle_speed_rpm"
 MOST_ORDERS = 24
 NEAR = 1.5
-"""Lines of a block on either side of an order that belong to it."""
+"""Distance from an order within which lines belong to it, in spacings of a block's lines."""
 
 
 @dataclass(frozen=True)
 class SpindleSpeed:
-    """Speed over time as a recording states it.
+    """Speed of the spindle over time as a recording states it.
 
     Parameters
     ----------
     time : (n,), s
+        Times at which the speed is stated, from the beginning of the recording.
     rpm : (n,)
+        Speed at these times, revolutions a minute.
     """
 
     time: Real
     rpm: Real
 
     def hertz(self, start: float, stop: float) -> tuple[float, float]:
-        """Mean rotations a second between two times, and their change there."""
+        """Return the mean speed between two times, and its range there, revolutions a second."""
         at = np.interp(np.linspace(start, stop, 9), self.time, self.rpm) / 60
         return float(at.mean()), float(np.ptp(at))
 
 
 def spindle_speed(path: str | os.PathLike[str]) -> SpindleSpeed | None:
-    """Speed from a recording's events, or a constant one from its set-up; None where it states none."""
+    """Return the speed from a recording's events, or a constant one from its set-up; None where neither states one."""
     with Recording(Path(path)) as recording:
         if SPEED in recording.events:
             time, rpm = recording.events[SPEED].read()
@@ -60,10 +62,10 @@ def spindle_speed(path: str | os.PathLike[str]) -> SpindleSpeed | None:
 
 
 def order_powers(blocks: BlockResidual, speed: SpindleSpeed) -> tuple[Real, Real, Real]:
-    """Residual power at each order and beside it, and the independent lines that carry it, each (MOST_ORDERS,).
+    """Return the residual power at each order, that beside it, and the independent lines, each (MOST_ORDERS,).
 
-    Blocks in which the speed changes by more than the resolution at an order are left out there; "beside" are the
-    lines midway between neighbouring orders.
+    An order leaves out the blocks in which the speed moves it by more than the resolution. The lines midway between
+    neighbouring orders lie "beside" them.
     """
     step = float(blocks.frequencies[1] - blocks.frequencies[0])
     sums = np.zeros((3, MOST_ORDERS))

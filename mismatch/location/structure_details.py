@@ -1,4 +1,4 @@
-"""`StructureDetails`: what the diagnosis of a structure leaves for its maps, figures and reports."""
+"""`StructureDetails`: the fits and recordings of a diagnosis, from which its maps, figures and reports are made."""
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
@@ -15,22 +15,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StructureDetails:
-    """What the diagnosis of a structure was made with.
+    """Fits and recordings with which the diagnosis of a structure was made.
 
     Parameters
     ----------
     base, final
-        Fits without any cause, and with those that are told.
+        Fit without any cause, and fit with the causes that are reported.
     recordings
         Recordings with tones taken out and clipping mended, weakest first.
     measured
         The same recordings as they were measured.
     elsewhere
-        Modal parameters alone, and the final hypothesis, fitted without the recording held out.
+        Hypothesis with modal parameters alone, and final hypothesis, both fitted without the recording held out.
     band
         Band in which model and recordings are compared, and why.
     view
-        Maps of what is left before and after; None before they are made.
+        Maps of the residual before and after the causes are added; None until they are made.
     """
 
     base: Fit

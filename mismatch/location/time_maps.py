@@ -1,4 +1,4 @@
-"""Maps of residual power over noise power in blocks of time, and along the spindle's orders."""
+"""Maps of residual power over noise power in blocks of time."""
 
 from dataclasses import dataclass
 
@@ -17,10 +17,10 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 BLOCKS = 24
-"""Of a recording."""
+"""Most blocks of a recording."""
 
 LEAST_PERIODS = 6.0
-"""Of the lowest frequency in a block."""
+"""Least length of a block, in periods of the lowest frequency."""
 
 
 @dataclass(frozen=True)
@@ -30,16 +30,17 @@ class BlockResidual:
     Parameters
     ----------
     recording
-        Name.
+        Name of the recording.
     times : (n_blocks + 1,), s
         Edges of the blocks, from the beginning of the recording.
     frequencies : (n_lines,), Hz
+        Frequencies of the lines of a block.
     power : (n_blocks, n_lines)
-        Mean over the responses, 1 where only noise is left.
+        Mean residual power over the responses, 1 where only noise is left.
     channels
         Number of responses.
     overlap
-        Neighbouring lines that count as one.
+        Number of neighbouring lines that count as one.
     """
 
     recording: str
@@ -50,7 +51,7 @@ class BlockResidual:
     overlap: float
 
     def banded(self, edges: Real) -> tuple[Real, Real]:
-        """Mean power (n_blocks, n_bands) and independent lines (n_bands,) in bands; nan where a band holds none."""
+        """Return mean power (n_blocks, n_bands) and independent lines (n_bands,) in bands; nan in empty bands."""
         place = np.digitize(self.frequencies, edges[1:-1])
         held = np.bincount(place, minlength=len(edges) - 1).astype(float)
         sums = np.array([np.bincount(place, row, len(held)) for row in self.power])
@@ -59,18 +60,18 @@ class BlockResidual:
 
 
 def block_residual(hypothesis: Hypothesis, reference: Fit, number: int, lines: WindowedSpectrum) -> BlockResidual:
-    """Residual of a hypothesis block by block; lines that a mended tone took out are left out here too.
+    """Return the residual of a hypothesis block by block, without the lines that a mended tone has removed.
 
     Parameters
     ----------
     hypothesis
-        Whose residual.
+        Hypothesis about the structure whose residual is taken.
     reference
         Fit whose noise is the unit.
     number
-        Of the recording in that fit.
+        Place of the recording in that fit, from 0.
     lines
-        The recording.
+        Windowed spectrum of the recording.
     """
     rate, n = lines.recording.rate, len(lines.recording.force)
     rest = _kept(lines, lines.recording.response - lines.signal(predict_lines(hypothesis, lines).spectrum))
@@ -92,7 +93,7 @@ def block_residual(hypothesis: Hypothesis, reference: Fit, number: int, lines: W
 
 
 def _kept(lines: WindowedSpectrum, rest: Real) -> Real:
-    """Residual without the frequencies between the lines that are compared."""
+    """Return the residual without the frequencies in the gaps between the lines that are compared."""
     step = lines.recording.rate / len(lines.window)
     if not (np.diff(lines.frequencies) > 1.5 * step).any():
         return rest
@@ -104,7 +105,7 @@ def _kept(lines: WindowedSpectrum, rest: Real) -> Real:
 
 
 def _whitening_at(reference: Fit, number: int, lines: WindowedSpectrum, axis: Real) -> Complex:
-    """Whitening at other frequencies: the structure's part interpolated as a mean over the coarser lines."""
+    """Return the whitening at other frequencies, from the mean of the noise's covariance over the nearest lines."""
     through = through_structure(reference.hypothesis, lines)
     covariance = reference.noises[number].covariance(lines.frequencies, through)
     nearest = np.clip(np.searchsorted(0.5 * (axis[1:] + axis[:-1]), lines.frequencies), 0, len(axis) - 1)

@@ -15,28 +15,28 @@ from .structure_details import StructureDetails
 from .time_maps import BlockResidual, block_residual
 
 QUIET = NoiseSpread(1.25, 0.5)
-"""Of a noise level read from the quietest bands: they lie below the mean by chance, and its colour is not known."""
+"""Level and spread of a noise read from the quietest bands, which lie below the mean by chance and hide its colour."""
 
 
 @dataclass(frozen=True)
 class ResidualView:
-    """Maps of what the refitted nominal model leaves (before) and what the final one leaves (after).
+    """Maps of the residual of the refitted nominal model (before) and of the final model (after).
 
     Parameters
     ----------
     details
-        Fits and recordings.
+        Fits and recordings of the diagnosis.
     measured
-        Recordings as they were measured: tones and clipping not mended.
+        Recordings as they were measured, with tones and clipping.
     before, after
-        Frequency band x channel x recording.
+        Maps over frequency band, channel and recording.
     blocks_before, blocks_after
-        Blocks of time of each recording.
+        Residuals in blocks of time, one for each recording.
     reference
-        The final fit with the noise that is the unit of the maps: as fitted, or, where something stayed unexplained and
-        may have been taken for noise, the level of the quietest fifth of narrow bands.
+        Final fit, whose noise is the unit of the maps. Where something stayed unexplained and may have been taken for
+        noise, that noise has the level of the quietest fifth of narrow bands instead of the fitted one.
     noise
-        How well that noise is known.
+        Level and spread of that noise: how well it is known.
     """
 
     details: StructureDetails
@@ -52,7 +52,7 @@ class ResidualView:
 def residual_view(
     details: StructureDetails, unexplained: bool, trials: Sequence[BandRecording] | None = None
 ) -> ResidualView:
-    """Maps of a diagnosis.
+    """Return the maps of the residual of a diagnosis.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def residual_view(
     unexplained
         Whether something stayed unexplained and may have been taken for noise.
     trials
-        The recordings as read, so that mended tones and clipping are located too; None: what the diagnosis holds.
+        Recordings as read, so that mended tones and clipping are located too; None for those the diagnosis holds.
     """
     mended = details.recordings
     measured = tuple(_as_measured(one, trials or ()) for one in mended)
@@ -85,7 +85,7 @@ def residual_view(
 
 
 def _quiet(final: Fit, number: int, lines: WindowedSpectrum) -> NoiseModel:
-    """Noise at the level that a fifth of all narrow bands stays below, no part of it from forces."""
+    """Return noise at the level below which a fifth of all narrow bands stays, with no part of it from forces."""
     rest = lines.measured - predict_lines(final.hypothesis, lines).response
     bands = np.array_split(np.abs(rest) ** 2, min(150, max(4, len(rest) // 12)))
     level = np.log(np.quantile([band.mean(axis=0) for band in bands], 0.2, axis=0))
@@ -94,14 +94,14 @@ def _quiet(final: Fit, number: int, lines: WindowedSpectrum) -> NoiseModel:
 
 
 def linear_part(details: StructureDetails) -> Hypothesis | None:
-    """The final model with the causes of its joints taken away; None where it has none."""
+    """Return the final model without the causes of its joints; None where it has none."""
     final = details.final.hypothesis
     kept = tuple(cause for cause in final.causes if cause.direction is None)
     return replace(final, causes=kept) if len(kept) < len(final.causes) else None
 
 
 def _as_measured(lines: WindowedSpectrum, trials: Sequence[BandRecording]) -> WindowedSpectrum:
-    """The recording before anything was mended; the run-in is that of the diagnosis."""
+    """Return the recording before anything was mended, with the run-in of the diagnosis."""
     for trial in trials:
         if trial.name == lines.recording.name and trial.response.shape == lines.recording.response.shape:
             decay = 7.0 * trial.rate / max(lines.start, 1)

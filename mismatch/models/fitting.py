@@ -31,17 +31,17 @@ class Fit:
     Parameters
     ----------
     hypothesis
-        At its best.
+        The hypothesis with the numbers that fit best.
     noises
-        One a recording.
+        Noise of each recording, in the order of the recordings.
     misfit
-        ``2 sum ln det V + r^H V^-1 r`` over lines and recordings.
+        Misfit ``2 sum ln det V + r^H V^-1 r``, summed over lines and recordings.
     deviation
-        |u|^2, in lab errors.
+        Square |u|^2 of the deviation from the nominal model in lab errors, as far as it is believed.
     score
         ``misfit + deviation + n_cause_numbers ln N``: Bayes' information criterion with the lab's belief as prior.
     covariance : (size, size)
-        Of u and the causes' coordinates.
+        Covariance of u and the causes' coordinates.
     """
 
     hypothesis: Hypothesis
@@ -63,21 +63,21 @@ def fit(
     """Fit a hypothesis to recordings.
 
     Minimises ``misfit + |u|^2`` by Gauss-Newton with step halving (Levenberg's damping where halving fails); noise is
-    estimated anew at each step, so causes compete on what they leave, not on a noise that one of them assumed. Of long
-    recordings every few lines come first.
+    estimated anew at each step, so causes compete on what they leave, not on a noise that one of them assumed. A long
+    recording is fitted on every few of its lines first.
 
     Parameters
     ----------
     lines
-        Recordings.
+        Windowed spectra of the recordings that are compared.
     start
-        To begin with.
+        Hypothesis that the fit begins with.
     noises
-        To begin with; None: from the residual of ``start``.
+        Noise of each recording that the fit begins with; None: estimated from the residual of ``start``.
     iterations
-        At most.
+        Number of steps at most.
     tolerance
-        Of the misfit: two gains below it end the fit, or a tenth of it expected.
+        Gain in misfit that counts: the fit ends after two smaller gains, or where less than a tenth of it is expected.
     """
     hypothesis, known = start, noises
     with ThreadPoolExecutor(THREADS) as pool:
@@ -89,7 +89,7 @@ def fit(
         end = _descended(pool, lines, hypothesis, known, Limits(iterations, tolerance))
         hypothesis, seen = end.state.hypothesis, end.state.seen
         cold = list(pool.map(with_noise, lines, [hypothesis] * len(lines), [None] * len(lines), seen))
-    # a noise that crept along from a bad beginning may have stopped short: of two searches the better counts
+    # a noise that crept along from a bad beginning may have stopped short: the better of two searches counts
     seen = [min(pair, key=lambda one: one.misfit) for pair in zip(seen, cold, strict=True)]
     misfit, deviation = sum(one.misfit for one in seen), _deviation(hypothesis)
     count = 2 * sum(one.measured.size for one in lines)
@@ -122,11 +122,11 @@ class _Problem:
     lines: list[WindowedSpectrum]
 
     def cost(self, state: _State) -> float:
-        """``misfit + |u|^2``."""
+        """The cost ``misfit + |u|^2``."""
         return sum(one.misfit for one in state.seen) + _deviation(state.hypothesis)
 
     def normal_equations(self, state: _State) -> tuple[Real, Real]:
-        """With the lab's belief about u, and a belief so weak about causes that it only keeps them solvable."""
+        """Normal equations with the lab's belief about u; a very weak one about causes only keeps them solvable."""
         hypothesis = state.hypothesis
         size, count = hypothesis.shape.size, hypothesis.size
         parts = list(self.pool.map(_normal_of, self.lines, [hypothesis] * len(self.lines), state.seen))
@@ -138,7 +138,7 @@ class _Problem:
         return matrix, gradient
 
     def step(self, state: _State, matrix: Real, gradient: Real) -> Real:
-        """The plain solution."""
+        """The plain solution of the normal equations."""
         return plain_step(matrix, gradient)
 
     def moved(self, state: _State, step: Real) -> _State:
@@ -148,7 +148,7 @@ class _Problem:
         return _State(there, list(self.pool.map(misfit_under, self.lines, [there] * len(self.lines), noises)))
 
     def settled(self, state: _State) -> _State:
-        """The same under the noise that fits its residual best."""
+        """The hypothesis under the noise that fits its residual best."""
         there = [state.hypothesis] * len(self.lines)
         noises = [one.noise for one in state.seen]
         return replace(state, seen=list(self.pool.map(with_noise, self.lines, there, noises, state.seen)))

@@ -20,10 +20,10 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 TURN_STEP = 0.02
-"""Of a direction in a fit, rad."""
+"""Angle that one unit of a direction's coordinate stands for in a fit, rad."""
 
 LONGEST_STEP = 15.0
-"""Of a cause's coordinate in one step of a fit; a number on a linear scale may also change by half of itself."""
+"""Largest change of a cause's coordinate in one step of a fit; one on a linear scale may also change by its half."""
 
 
 @dataclass(frozen=True)
@@ -33,15 +33,15 @@ class Cause:
     Parameters
     ----------
     physics
-        From the library.
+        The kind of cause, from the library.
     values : (n_parameters,)
-        In SI units, in the order of ``physics.parameters``.
+        Numbers of the cause in SI units, in the order of ``physics.parameters``.
     place
-        Of a linear cause; empty for a joint.
+        Place at which a linear cause sits; empty for a joint.
     direction : (n_axes,)
-        Of a joint over the axes that forces and responses share, unit length; empty for a linear cause.
+        Unit vector of a joint over the axes that forces and responses share; None for a linear cause.
     motion
-        Of that joint.
+        Sizes of the joint's motion in the trials; None for a linear cause.
     seen
         Deflection and velocity at each sample by recording's name: the law is then driven by them instead of being
         simulated freely. For approaching a solution only; what was measured leaks into the prediction.
@@ -60,7 +60,7 @@ class Cause:
         return len(self.values) + (len(self.direction) - 1 if self.direction is not None else 0)
 
     def coordinates(self) -> Real:
-        """What the fit starts from, (size,); angles are zero."""
+        """Coordinates that the fit starts from, (size,); angles are zero."""
         values = [p.to_fit(float(v)) for p, v in zip(self.physics.parameters, self.values, strict=True)]
         return np.array(values + [0.0] * (self.size - len(values)))
 
@@ -114,11 +114,11 @@ class Hypothesis:
     Parameters
     ----------
     shape
-        Nominal model and lab error.
+        Nominal model and the lab error that its numbers are counted in.
     u : (shape.size,)
-        Deviation from it in lab errors.
+        Deviation from the nominal model in lab errors.
     causes
-        Added, in the order found.
+        Causes that were added to the model, in the order found.
     """
 
     shape: ModelShape
@@ -127,7 +127,7 @@ class Hypothesis:
 
     @property
     def model(self) -> ModalModel:
-        """The linear part."""
+        """The modal model at ``u``, without causes."""
         return self.shape.model(self.u)
 
     @property
@@ -230,13 +230,13 @@ class Predicted:
     Parameters
     ----------
     response : (n_lines, n_responses)
-        Windowed lines.
+        Windowed lines of the predicted responses, in the responses' units.
     spectrum : (n_padded_lines, n_responses)
-        Of the whole record, ramped and padded.
-    joint : (n_padded_lines, n_excitations)
-        Forces of the joints on the structure, without sign change.
+        Spectrum of the predicted responses over the whole record, ramped and padded.
+    joint : (n_padded_lines, n_excitations), N
+        Spectrum of all joints' forces as their laws give them; the structure feels them with a minus sign.
     joints
-        Each of them, in the order of the causes.
+        Force and motion of each joint, in the order of the causes.
     """
 
     response: Complex
@@ -278,9 +278,9 @@ def line_response(hypothesis: Hypothesis, lines: WindowedSpectrum, joint: Comple
     Parameters
     ----------
     hypothesis
-        Its joints are not simulated.
+        Hypothesis whose linear part answers; its joints are not simulated.
     lines
-        Recording.
+        Windowed spectrum of the recording.
     joint : (n_lines, n_excitations)
         Windowed lines of the joints' forces, or None.
     """

@@ -24,16 +24,16 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
     """Derivative of the windowed lines of the joints' force on the structure, (n_lines, n_excitations, size).
 
     A change of the modal parameters, of the outer force or of an earlier joint changes a joint's driven motion; its
-    tangent run says how its force answers. Sign as the structure feels it: minus g along the direction.
+    tangent run says how its force answers. The sign is the one that the structure feels: minus g along the direction.
 
     Parameters
     ----------
     hypothesis
-        With at least one joint.
+        Hypothesis with at least one joint.
     lines
-        Recording.
+        Windowed spectrum of the recording.
     predicted
-        Of that hypothesis for it.
+        What the hypothesis predicts for the recording.
     """
     frequencies = lines.padded_frequencies
     frequencies = frequencies[frequencies <= BEYOND * lines.frequencies[-1]]

@@ -15,15 +15,16 @@ Real = NDArray[np.float64]
 class WithLinearPart:
     """A joint's law ``g + k x + c v``.
 
-    The linear part of a law cannot be told from modal parameters that are off; with it the lab's belief decides
-    whether anything else is.
+    The linear part of a law cannot be told from modal parameters that are off. Where it is fitted beside the law, the
+    lab's belief decides whether the modal parameters are off.
 
     Parameters
     ----------
     inner
         The law itself.
     motion
-        Of the joint: k is fitted in tenths of its stiffness, c in tenths of that over its typical frequency.
+        Sizes of the joint's motion: k is fitted in tenths of the stiffness that the structure has there, c in tenths
+        of that stiffness over the motion's typical frequency.
     """
 
     def __init__(self, inner: JointPhysics, motion: JointMotion) -> None:
@@ -40,7 +41,7 @@ class WithLinearPart:
         )
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Those of the law, without linear part."""
+        """Starting values of the law itself, with zeros for the linear part."""
         return tuple(np.append(start, [0.0, 0.0]) for start in self.inner.starts(motion))
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
@@ -58,7 +59,7 @@ class WithLinearPart:
 
 
 def with_linear_part(cause: Cause) -> Cause:
-    """A joint's cause with spring and damper of nothing beside its law."""
+    """A joint's cause with a spring and a damper of zero strength beside its law."""
     assert cause.motion is not None
     assert isinstance(cause.physics, JointPhysics)
     physics = WithLinearPart(cause.physics, cause.motion)

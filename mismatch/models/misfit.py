@@ -21,15 +21,15 @@ class Misfit:
     Parameters
     ----------
     predicted
-        Of the recording.
+        What the hypothesis predicts for the recording.
     white : (n_lines, n_responses, n_responses)
-        Whitening of its residual.
+        Whitening W of the residual at each line, lower triangular, with ``W^H W = V^-1``.
     rest : (n_lines, n_responses)
-        Residual.
+        Residual lines, measured minus predicted, in the responses' units.
     misfit
-        ``2 sum ln det V + r^H V^-1 r``.
+        Misfit ``2 sum ln det V + r^H V^-1 r`` over the lines.
     noise
-        V.
+        Noise whose covariance at the lines is V.
     """
 
     predicted: Predicted
@@ -78,7 +78,7 @@ def least_misfit(hypothesis: Hypothesis, lines: WindowedSpectrum) -> float:
 
 
 def through_structure(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Complex:
-    """From forces to measured responses at the lines, (n_lines, n_responses, n_excitations)."""
+    """Matrix from measured forces to measured responses at the lines, (n_lines, n_responses, n_excitations)."""
     around = surround(hypothesis, lines.frequencies)
     closed = around.closed(hypothesis.model.receptance(lines.frequencies))
     if around.force is not None:
@@ -87,7 +87,7 @@ def through_structure(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Comple
 
 
 def levels(lines: WindowedSpectrum) -> tuple[Real, Real]:
-    """Root mean square a line of responses and of forces."""
+    """Root mean square over the lines of each response and of each force."""
     return (
         np.sqrt(np.mean(np.abs(lines.measured) ** 2, axis=0)),
         np.sqrt(np.mean(np.abs(lines.force_here) ** 2, axis=0)),

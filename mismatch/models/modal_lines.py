@@ -34,7 +34,9 @@ def displacement_at(model: ModalModel, frequencies: Real, force: Complex) -> Com
     Parameters
     ----------
     frequencies : (n,), Hz
+        Frequencies of the lines, from 0 Hz on.
     force : (n, n_excitations), N
+        Force spectrum at the lines.
     """
     s = np.asarray(2j * np.pi * frequencies, dtype=complex)
     out = np.empty((len(s), model.right.shape[1]), dtype=complex)

@@ -15,12 +15,18 @@ def modal_displacement(s: Complex, poles: Complex, right: Complex, left: Complex
 
     Parameters
     ----------
-    s : (n,), 1/s
-    poles : (n_modes,), 1/s
+    s : (n,), rad/s
+        Laplace variable ``i omega`` of the lines.
+    poles : (n_modes,), rad/s
+        Poles of the modes, one of each conjugate pair.
     right : (n_modes, n_responses)
+        Right vectors of the modes; ``right left^T`` is the residue, m/(N s).
     left : (n_modes, n_excitations)
-    force : (n, n_excitations)
-    out : (n, n_responses)
+        Left vectors of the modes.
+    force : (n, n_excitations), N
+        Force spectrum at the lines.
+    out : (n, n_responses), m
+        Receives the displacement at the lines.
     """
     for k in range(len(s)):
         out[k] = 0.0
@@ -48,15 +54,18 @@ def modal_slopes(
 
     Parameters
     ----------
-    s : (n,), 1/s
-    force : (n, n_excitations)
+    s : (n,), rad/s
+        Laplace variable ``i omega`` of the lines.
+    force : (n, n_excitations), N
+        Force spectrum at the lines.
     modes
         Poles (n_modes,), right (n_modes, n_responses) and left vectors (n_modes, n_excitations).
     units
         Change of each pole by a unit of frequency and of damping, units of right and of left entries, each (n_modes,).
     factor : (n, n_responses)
+        Factor that the displacement at each line is multiplied by.
     out : (n, n_responses, n_columns)
-        Columns after the modes' are left alone.
+        Receives the derivatives in the modes' columns; the columns behind them are left alone.
     """
     poles, right, left = modes
     by_frequency, by_damping, right_unit, left_unit = units

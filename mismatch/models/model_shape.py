@@ -26,11 +26,11 @@ class ModelShape:
     Parameters
     ----------
     nominal
-        The model that is believed.
+        The model that is believed, with added modes behind its own.
     lab
-        What one unit is.
+        Error of a lab's fit that one unit stands for.
     added
-        Number of modes at the end that the believed model did not have: nothing is believed of them.
+        Number of modes at the end that the believed model did not have: nothing is believed about them.
     """
 
     nominal: ModalModel
@@ -57,11 +57,11 @@ class ModelShape:
 
     @property
     def bare(self) -> "ModelShape":
-        """The same without added modes."""
+        """The parameters of the model without added modes."""
         return ModelShape(_modes_of(self.nominal, np.arange(self.believed)), self.lab)
 
     def without_mode(self, place: int, u: Real) -> tuple["ModelShape", Real]:
-        """The same without one of the added modes, and u (size,) without its numbers.
+        """The parameters without one of the added modes, and u (size,) without that mode's numbers.
 
         ``place`` counts added modes from 0, in the order in which they were added.
         """
@@ -73,15 +73,15 @@ class ModelShape:
 
     @property
     def modal_size(self) -> int:
-        """Parameters of the modes."""
+        """Number of parameters that belong to the modes."""
         return int(self.per_mode * len(self.nominal.poles))
 
     def modal_rows(self, values: Real) -> Real:
-        """Those of ``values`` (size,) that belong to the modes, (n_modes, per_mode)."""
+        """The entries of ``values`` (size,) that belong to the modes, (n_modes, per_mode)."""
         return values[: self.modal_size].reshape(-1, self.per_mode)
 
     def with_mode(self, pole: complex, right: Complex, left: Complex) -> "ModelShape":
-        """The same with one more mode at the end."""
+        """The parameters of the model with one more mode at the end."""
         model = replace(
             self.nominal,
             poles=np.append(self.nominal.poles, pole),
@@ -93,12 +93,12 @@ class ModelShape:
 
     @property
     def per_mode(self) -> int:
-        """Parameters a mode."""
+        """Number of parameters that each mode has."""
         return 2 + 2 * int(self.nominal.right.shape[1] + self.nominal.left.shape[1])
 
     @property
     def size(self) -> int:
-        """Parameters altogether."""
+        """Number of all parameters, those for modes outside the band included."""
         return self.modal_size + (self.outside.size if self.outside is not None else 0)
 
     def _scales(self) -> tuple[Real, Real]:
@@ -130,10 +130,13 @@ class ModelShape:
         Parameters
         ----------
         u : (size,)
+            Deviation at which the derivative is taken, in lab errors.
         frequencies : (n_lines,), Hz
-        force : (n_lines, n_excitations)
+            Frequencies of the lines.
+        force : (n_lines, n_excitations), N
+            Force spectrum at the lines.
         factor : (n_lines, n_responses)
-            The displacement is multiplied by it; None: one.
+            Factor that the displacement is multiplied by; None: one.
         """
         model = self.model(u)
         poles = model.poles

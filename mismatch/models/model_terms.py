@@ -21,9 +21,9 @@ def improved_model(hypothesis: Hypothesis, faults: tuple[dict[str, Any], ...] = 
     Parameters
     ----------
     hypothesis
-        Fitted.
+        The fitted hypothesis that is written as a model.
     faults
-        Terms of causes that are no part of it: a tone, a limit.
+        Terms of causes that are no part of the hypothesis: a tone, a limit.
     """
     terms = []
     for cause in hypothesis.causes:

@@ -14,10 +14,10 @@ TERMS = 3
 """Flexibility of the modes above, its curvature, inertia of the modes below."""
 
 FAR, DAMPING = 2.0, 0.05
-"""The curvature is that of a mode at so many times the band's upper end, so damped; where it lies matters little."""
+"""Frequency of the mode whose curvature is taken, over the band's upper end, and its damping; both matter little."""
 
 POINTS = 128
-"""Of the band, where the size of the terms is set."""
+"""Number of points in the band at which the size of the terms is set."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,9 @@ class OutsideBand:
     scale : (TERMS,)
         Root mean square of each basis over the band.
     pole
-        Of the curvature, rad/s.
+        Pole of the mode that gives the curvature, rad/s.
     lowest
-        Below it the inertia of lower modes says nothing and is left out, rad/s.
+        Angular frequency below which the inertia of lower modes says nothing and is left out, rad/s.
     """
 
     units: Real
@@ -43,7 +43,7 @@ class OutsideBand:
 
     @property
     def size(self) -> int:
-        """Numbers altogether."""
+        """Number of all coefficients of the terms."""
         return int(self.units.size)
 
     def basis(self, s: Complex) -> Complex:
@@ -67,8 +67,11 @@ class OutsideBand:
         Parameters
         ----------
         s : (n_lines,), rad/s
-        force : (n_lines, n_excitations)
+            Laplace variable ``i omega`` of the lines.
+        force : (n_lines, n_excitations), N
+            Force spectrum at the lines.
         factor : (n_lines, n_responses)
+            Factor that the displacement at each line is multiplied by.
         """
         n, m = self.units.shape[1:]
         result = np.zeros((len(s), n, TERMS, n, m), dtype=complex)
@@ -84,9 +87,9 @@ def outside_band(model: ModalModel, share: float) -> OutsideBand | None:
     Parameters
     ----------
     model
-        As the lab believes it.
+        The model as the lab believes it.
     share
-        Of the receptance's root mean square over the band that counts as one unit: the lab's error of shapes.
+        Share of the receptance's root mean square over the band that counts as one unit: the lab's error of shapes.
     """
     if model.band is None:
         return None
@@ -101,7 +104,7 @@ def outside_band(model: ModalModel, share: float) -> OutsideBand | None:
 
 
 def _residue(pole: complex) -> complex:
-    """Of the mode ``|pole|^2 / (s^2 + 2 zeta |pole| s + |pole|^2)``."""
+    """Residue of the mode ``|pole|^2 / (s^2 + 2 zeta |pole| s + |pole|^2)``."""
     return abs(pole) ** 2 / (2j * pole.imag)
 
 

@@ -12,7 +12,7 @@ ITERATIONS, FROM_BELIEF = 60, 20
 
 
 def settled(lines: list[WindowedSpectrum], fitted: Fit) -> Fit:
-    """Fit until it rests; if the lab's model then looks odd, once more from that model, and the better of both.
+    """Fit until it rests; if the modes then look odd, fit again from the lab's model and keep the better of both.
 
     A cause of changed stiffness and the modes it changes run along one long valley: a search that began beside it may
     stop where modes carry what the cause should. A next cause must not live on what this one left undone.
@@ -20,9 +20,9 @@ def settled(lines: list[WindowedSpectrum], fitted: Fit) -> Fit:
     Parameters
     ----------
     lines
-        Recordings.
+        Windowed spectra of the recordings that are compared.
     fitted
-        From a few steps.
+        A fit of a few steps, from which the search goes on.
     """
     rested = fit(lines, fitted.hypothesis, fitted.noises, iterations=ITERATIONS)
     if not modes_are_odd(rested) or not rested.hypothesis.has_added_physics:
@@ -39,11 +39,11 @@ def with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Fit
     Parameters
     ----------
     lines
-        Recordings.
+        Windowed spectra of the recordings that are compared.
     current
-        Without the cause.
+        The fit without the cause.
     cause
-        With numbers to begin with.
+        The linear cause, with numbers to begin with.
     """
     hypothesis = current.hypothesis
     fitted = fit(lines, hypothesis.with_cause(cause), current.noises)

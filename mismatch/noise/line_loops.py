@@ -23,7 +23,7 @@ def whiten_in_place(matrix: Complex) -> float:
 
 @compiled
 def _cholesky_in_place(matrix: Complex) -> float:
-    """Lower Cholesky factor over the lower triangle; ln of the determinant, or infinity."""
+    """Write the Cholesky factor over the lower triangle; return ln of the determinant, or infinity."""
     n = len(matrix)
     log_determinant = 0.0
     for j in range(n):
@@ -44,7 +44,7 @@ def _cholesky_in_place(matrix: Complex) -> float:
 
 @compiled
 def _invert_in_place(lower: Complex) -> None:
-    """Inverse of a lower triangle, zeros above it."""
+    """Overwrite a lower triangle by its inverse, and what is above it by zeros."""
     n = len(lower)
     for j in range(n):
         lower[j, j] = 1.0 / lower[j, j].real
@@ -59,7 +59,7 @@ def _invert_in_place(lower: Complex) -> None:
 
 @compiled
 def whiten_lines(covariance: Complex) -> float:
-    """Whitening of every V (n_lines, n, n), in place; return the sum of ln det V, infinity where one has none."""
+    """Whiten every V (n_lines, n, n) in place; return the sum of ln det V, infinity where one has none."""
     total = 0.0
     for k in range(len(covariance)):
         total += whiten_in_place(covariance[k])
@@ -73,9 +73,11 @@ def whitened_columns(white: Complex, lines: Complex, out: Real) -> None:
     Parameters
     ----------
     white : (n_lines, n, n)
-        Lower triangular.
+        Whitening W_k of each line, lower triangular.
     lines : (n_lines, n, n_columns)
+        Columns A_k of each line that are whitened.
     out : (2, n_lines, n, n_columns)
+        Receives the real parts, then the imaginary parts.
     """
     n = white.shape[1]
     for k in range(len(white)):

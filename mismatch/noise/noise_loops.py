@@ -20,11 +20,17 @@ def lump_lines(
     Parameters
     ----------
     edges : (n_bands + 1,)
+        Index of the first line of each band, and the number of lines.
     residual : (n_lines, n)
+        Residual lines of the responses.
     weights : (n_lines,)
+        Weight of each line, 1 or less.
     through : (n_lines, n, n_excitations)
+        Matrix G from forces to responses at each line.
     sample : (n_bands, n, n)
+        Receives the mean of ``r r^H`` over each band.
     passed : (n_bands, n_excitations, n, n)
+        Receives the covariance that unit noise of each force leaves in each band.
     """
     n, m = through.shape[1], through.shape[2]
     sample[:] = 0.0
@@ -46,9 +52,13 @@ def line_covariances(own: Real, through: Complex, pushed: Real, out: Complex) ->
     Parameters
     ----------
     own : (n_lines, n)
+        Noise variance of each response at each line.
     through : (n_lines, n, n_excitations)
-    pushed : (n_excitations,)
+        Matrix G from forces to responses at each line.
+    pushed : (n_excitations,), N^2
+        Noise variance of each force at a line.
     out : (n_lines, n, n)
+        Receives the covariance of each line.
     """
     n, m = through.shape[1], through.shape[2]
     for k in range(len(own)):
@@ -73,7 +83,9 @@ def noise_likelihood(
     slopes: tuple[Real, Real],
     curvature: tuple[Real, Real, Real],
 ) -> float:
-    """``sum_b n_b (ln det V_b + tr V_b^-1 S_b)``, ``V = diag(own) + sum_q pushed_q T_q``, slopes and curvature.
+    """Return ``sum_b n_b (ln det V_b + tr V_b^-1 S_b)``, and write its slopes and curvature.
+
+    The covariance of a band is ``V = diag(own) + sum_q pushed_q T_q``.
 
     Parameters
     ----------
@@ -81,12 +93,14 @@ def noise_likelihood(
         Lines in each band (n_bands,), covariance of the residual (n_bands, n, n), what unit noise of each force leaves
         in the responses (n_bands, n_excitations, n, n).
     own : (n_bands, n)
-    pushed : (n_excitations,)
+        Noise variance of each response in each band.
+    pushed : (n_excitations,), N^2
+        Noise variance of each force at a line.
     slopes
-        Receive those by ln own (n_bands, n) and by ln pushed (n_excitations,).
+        Receives the slopes by ln own (n_bands, n) and by ln pushed (n_excitations,).
     curvature
-        Receives second derivatives: of own with own (n_bands, n, n), of own with forces (n_bands, n, n_excitations), of
-        forces with forces (n_excitations, n_excitations).
+        Receives second derivatives: by ln own twice (n_bands, n, n), by ln own and ln pushed
+        (n_bands, n, n_excitations), and by ln pushed twice (n_excitations, n_excitations).
     """
     counts, sample, through = bands
     by_own, by_force = slopes
@@ -134,7 +148,7 @@ def _curvature(
     pushed: Real,
     out: tuple[Real, Real, Real],
 ) -> None:
-    """Of one band, from V^-1 and ``2 V^-1 S V^-1 - V^-1``; that of forces with forces is added up."""
+    """Write one band's curvature from V^-1 and ``2 V^-1 S V^-1 - V^-1``; that of forces with forces is added up."""
     inverse, bent = between
     by_own, mixed, by_force = out
     n, m = len(own), len(pushed)
@@ -168,7 +182,7 @@ def _product(one: Complex, other: Complex, out: Complex) -> None:
 
 @compiled
 def _covariance(through: Complex, own: Real, pushed: Real, out: Complex) -> None:
-    """``diag(own) + sum_q pushed_q T_q``, and a trace of itself that keeps it positive definite."""
+    """Write ``diag(own) + sum_q pushed_q T_q``, and a trace of itself that keeps it positive definite."""
     out[:] = 0.0
     for q in range(len(pushed)):
         out += pushed[q] * through[q]
@@ -208,7 +222,7 @@ def _trace_of_product(one: Complex, other: Complex) -> float:
 
 @compiled
 def _product_of_inverse(white: Complex, inverse: Complex) -> None:
-    """``V^-1 = W^H W``."""
+    """Write ``V^-1 = W^H W``."""
     n = len(white)
     for i in range(n):
         for j in range(n):

@@ -13,7 +13,7 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 KNOTS = 4
-"""Of each response's noise spectrum over log frequency."""
+"""Number of knots of each response's noise spectrum over log frequency."""
 
 STIFFNESS = 1.0
 """Standard deviation of ln variance between neighbouring knots: colour is smooth, resonances are not colour."""
@@ -22,7 +22,7 @@ FORCE_SHARE = (-0.7, 1.0)
 """Mean and standard deviation of ln(force noise share / response noise share): forces are measured no worse."""
 
 WARM, COLD = 12, 60
-"""Steps at most from a noise that was fitted before, and from none."""
+"""Steps at most if the search begins with a noise that was fitted before, and if it begins with none."""
 
 
 @dataclass(frozen=True)
@@ -34,10 +34,11 @@ class NoiseModel:
     Parameters
     ----------
     knots : (KNOTS,), ln Hz
+        Logarithms of the frequencies between which the noise spectrum is interpolated.
     responses : (n_responses, KNOTS)
-        ln of the responses' noise variance a line at the knots.
+        Logarithm of each response's noise variance at a line, at the knots.
     forces : (n_excitations,)
-        ln of the forces' noise variance a line.
+        Logarithm of each force's noise variance at a line.
     """
 
     knots: Real
@@ -57,7 +58,7 @@ class NoiseModel:
 
 
 def whitening(covariance: Complex) -> Complex:
-    """W with ``W^H W = V^-1``, so that W r is white, (n_lines, n, n), lower triangular.
+    """The W with ``W^H W = V^-1`` for which W r is white, (n_lines, n, n), lower triangular.
 
     Raises
     ------
@@ -86,12 +87,16 @@ def fit_noise(
     Parameters
     ----------
     frequencies : (n_lines,), Hz
+        Frequencies of the lines, rising.
     residual : (n_lines, n_responses)
+        Residual lines, measured minus predicted.
     through : (n_lines, n_responses, n_excitations)
+        Matrix G from forces to responses at the lines.
     levels
-        Root mean square a line of responses (n_responses,) and forces (n_excitations,): the scale of the weak prior.
+        Root mean square over the lines of responses (n_responses,) and forces (n_excitations,): the scale of the weak
+        prior.
     start
-        To begin with.
+        Noise that the search begins with; None: taken from the residual.
     """
     knots = np.linspace(np.log(frequencies[0]), np.log(frequencies[-1]), KNOTS)
     n, m = residual.shape[1], through.shape[2]

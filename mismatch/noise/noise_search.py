@@ -11,7 +11,7 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 MOST_BANDS, LEAST_LINES = 150, 12
-"""Narrow bands into which lines are lumped, and lines a band where there are few."""
+"""Number of narrow bands at most into which lines are lumped, and lines in a band where there are few lines."""
 
 SETTLED = 1e-4
 """Gain expected of a step, in ln likelihood, below which the search ends."""
@@ -30,13 +30,13 @@ class Lumps:
     Parameters
     ----------
     counts : (n_bands,)
-        Lines.
+        Number of lines in each band.
     sample : (n_bands, n, n)
-        Covariance of the residual.
+        Covariance of the residual in each band.
     through : (n_bands, n_excitations, n, n)
-        What unit noise of each force leaves in the responses.
+        Covariance that unit noise of each force leaves in the responses.
     hats : (n_bands, n_knots)
-        Interpolation between knots.
+        Weights that interpolate from the knots to each band.
     """
 
     counts: Real
@@ -63,11 +63,11 @@ def cost_of(x: Real, lumps: Lumps, belief: tuple[Real, Real]) -> tuple[float, Re
     Parameters
     ----------
     x : (n * n_knots + n_excitations,)
-        ln variances: of each response at the knots, of the forces.
+        Logarithms of the noise variances: those of each response at the knots, then those of the forces.
     lumps
-        Lines.
+        Residual lines lumped in narrow bands.
     belief
-        A and b of the prior ``0.5 |A x + b|^2``.
+        Matrix A and vector b of the prior ``0.5 |A x + b|^2``.
     """
     n, knots = lumps.sample.shape[1], lumps.hats.shape[1]
     m, bands = len(x) - n * knots, len(lumps.counts)

@@ -1,4 +1,4 @@
-"""The library of causes: one small file each; a file that defines ``PHYSICS`` is found by itself."""
+"""The library of causes: one small file each; :func:`library` finds every file that defines ``PHYSICS``."""
 
 import importlib
 import pkgutil
@@ -43,7 +43,7 @@ __all__ = [
 
 
 def library() -> dict[str, Physics]:
-    """All causes in this folder by name.
+    """Return all causes in this folder by name.
 
     Examples
     --------
@@ -59,12 +59,12 @@ def library() -> dict[str, Physics]:
 
 
 def is_fault(name: str) -> bool:
-    """Whether a cause of this name is a fault of the recording itself, no part of the structure.
+    """Tell whether a cause of this name is a fault of the recording itself and no part of the structure.
 
     Parameters
     ----------
     name
-        Name of a cause, as a diagnosis tells it.
+        Name of a cause, as a diagnosis reports it.
 
     Examples
     --------
@@ -75,7 +75,7 @@ def is_fault(name: str) -> bool:
 
 
 def form_of(answer: str, numbers: Collection[str]) -> Physics | None:
-    """The file that is reported under a name and has these numbers; None for what is no file of this folder.
+    """Return the cause that is reported under a name and has these numbers; None where the library has none.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Responses behind a high-pass of one stage, or of two alike."""
+"""Responses that pass a high-pass filter of one stage, or of two equal stages."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,20 +23,20 @@ class AcCoupling:
     confusable_with = ("channel_delay",)
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
-        """The whole measuring chain, with one stage (sensor or amplifier) or two (both)."""
+        """Return the whole measuring chain, with one stage (sensor or amplifier) or two (both)."""
         return ("", TWO_STAGES)
 
     def start(self, model: ModalModel) -> Real:
-        """A corner so low that it is all but absent, Hz."""
+        """Return a corner frequency so low that the high-pass is nearly absent, Hz."""
         return np.array([0.05])
 
     def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
-        """Matrices at ``s``, rad/s."""
+        """Return the matrices of the cause at ``s`` (n,), rad/s."""
         passed = (s / (s + 2 * np.pi * values[0])) ** (2 if place == TWO_STAGES else 1)
         return Chain(response=passed[:, None, None] * np.eye(len(model.responses)))
 
     def other_forms(self, values: Real, place: str) -> tuple[tuple[str, Real], ...]:
-        """The other number of stages with the same phase well above the corner, ``n f_c / f``."""
+        """Return the other number of stages, with the corner that gives the same phase ``n f_c / f`` well above it."""
         return (("", 2 * values),) if place == TWO_STAGES else ((TWO_STAGES, values / 2),)
 
 

@@ -30,15 +30,15 @@ class AxisMisalignment:
     )
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
-        """The three columns that are X, Y, Z of one node; none without such a triad."""
+        """Return the three columns that are X, Y, Z of one node; none without such a triad."""
         return _triad(model)
 
     def start(self, model: ModalModel) -> Real:
-        """Absent."""
+        """Return the numbers at which the cause is absent."""
         return np.array([0.0, 0.0, 0.0])
 
     def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
-        """Matrices at ``s``, rad/s."""
+        """Return the matrices of the cause at ``s`` (n,), rad/s."""
         columns = [int(place) for place in place.split()]
         rotation = np.eye(len(model.excitations))
         rotation[np.ix_(columns, columns)] = Rotation.from_rotvec(values).as_matrix()

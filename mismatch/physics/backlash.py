@@ -26,15 +26,15 @@ class Backlash:
     )
 
     def wider(self) -> tuple[SmoothBacklash, float]:
-        """The law with one shape number more, and the number at which it is as this one, or nearly."""
+        """Return the law with one more shape number, and the value of that number at which it is nearly this law."""
         return SmoothBacklash(), 8.0
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Shapes to try, amplitude 1."""
+        """Return the numbers from which fits start: one set a shape, each with the amplitude 1."""
         return tuple(np.array([1.0, k * motion.deflection]) for k in (0.15, 0.4, 0.8, 1.6))
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force."""
+        """Return the law of the joint's force at these numbers."""
         x = motion.deflections
         return JointLaw(reach=motion.reach, stiffness=-values[0] * np.clip(x, -values[1], values[1]))
 

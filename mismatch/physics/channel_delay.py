@@ -24,15 +24,15 @@ class ChannelDelay:
     )
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
-        """One place: the whole measuring chain."""
+        """Return one place: the whole measuring chain."""
         return ("",)
 
     def start(self, model: ModalModel) -> Real:
-        """Absent."""
+        """Return the numbers at which the cause is absent."""
         return np.array([0.0])
 
     def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
-        """Matrices at ``s``, rad/s."""
+        """Return the matrices of the cause at ``s`` (n,), rad/s."""
         late = np.exp(-s * values[0])
         return Chain(response=late[:, None, None] * np.eye(len(model.responses)))
 

@@ -25,7 +25,7 @@ class Clipping:
     confusable_with = ("stiffness_hardening",)
 
     def shown(self, response: Real, recording: BandRecording, start: int, term: Mapping[str, Any]) -> Real:
-        """A predicted response with its channel held below the limit."""
+        """Return a predicted response (n_samples, n_responses) whose clipped channel is held below the limit."""
         response = response.copy()
         column = recording.channels.index(term["location"]["channel"]) - recording.force.shape[1]
         limit, sharpness = (float(term["parameters"].get(name, np.inf)) for name in ("limit", "sharpness"))

@@ -26,24 +26,24 @@ class CoulombFriction:
     )
 
     def wider(self) -> tuple[WiderFriction, float]:
-        """The law with one shape number more, and the number at which it is as this one, or nearly."""
+        """Return the law with one more shape number, and the value of that number at which it is nearly this law."""
         return WiderFriction((*self.parameters, SHARPNESS)), 2.6
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Shapes to try, amplitude 1."""
+        """Return the numbers from which fits start: one set a shape, each with the amplitude 1."""
         return tuple(np.array([1.0, k * motion.velocity]) for k in (0.01, 0.03, 0.08))
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force."""
+        """Return the law of the joint's force at these numbers."""
         friction, smooth = self.held(values, motion)
         return JointLaw(speed=motion.speed, damping=friction * np.tanh(motion.velocities / smooth))
 
     def held(self, values: Real, motion: JointMotion) -> Real:
-        """The numbers that the law goes by: dry friction gives way within a small part of the motion."""
+        """Return the numbers that the law uses: dry friction gives way within a small part of the motion."""
         return np.array([values[0], np.clip(values[1], 4e-4 * motion.speed, DRY * motion.velocity)])
 
     def strained(self, values: Real, motion: JointMotion) -> bool:
-        """Whether a force was asked for that still rises with the speed: damping of another kind."""
+        """Tell whether the numbers ask for a force that still rises with speed, which is other damping."""
         return bool(values[1] > DRY * motion.velocity)
 
 

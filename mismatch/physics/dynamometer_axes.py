@@ -1,4 +1,4 @@
-"""Force channels that pass through resonances of the dynamometer that differ from axis to axis."""
+"""Force channels that pass through the dynamometer's resonances, one for each axis."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,26 +27,26 @@ class DynamometerAxes:
     confusable_with = ("channel_delay", "gain_error")
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
-        """One place, if forces along X, Y and Z are measured."""
+        """Return one place if forces along X, Y and Z are measured."""
         return ("",) if set(axes_of(model.excitations)) == set("XYZ") else ()
 
     def start(self, model: ModalModel) -> Real:
-        """Absent."""
+        """Return the numbers at which the cause is absent."""
         return np.zeros(4)
 
     def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
-        """Matrices at ``s``, rad/s."""
+        """Return the matrices of the cause at ``s`` (n,), rad/s."""
         squared = np.array([values["XYZ".index(axis)] for axis in axes_of(model.excitations)])
         own = 1 + values[3] * s[:, None] + squared * s[:, None] ** 2
         return Chain(force=own[:, :, None] * np.eye(len(squared)))
 
     def derived(self, values: Real) -> dict[str, float]:
-        """Resonance and damping ratio of each axis."""
+        """Return the resonance, Hz, and the damping ratio of each axis."""
         found = {axis: resonance_of(float(values[k]), float(values[3])) for k, axis in enumerate("xyz")}
         return {f"{axis}_{name}": value for axis, one in found.items() for name, value in one.items()}
 
     def impossible(self, values: Real, margin: Real) -> str:
-        """Why these numbers cannot be, beyond a margin for their errors; empty where they can."""
+        """Say why these numbers are impossible by more than their margins of error; empty where they are possible."""
         if values[3] >= -margin[3]:
             return ""
         return f"a dynamometer cannot have a negative damping, {values[3]:.3g} s"

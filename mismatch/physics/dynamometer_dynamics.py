@@ -24,24 +24,24 @@ class DynamometerDynamics:
     confusable_with = ("channel_delay",)
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
-        """One place: the whole measuring chain."""
+        """Return one place: the whole measuring chain."""
         return ("",)
 
     def start(self, model: ModalModel) -> Real:
-        """Absent."""
+        """Return the numbers at which the cause is absent."""
         return np.array([0.0, 0.0])
 
     def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
-        """Matrices at ``s``, rad/s."""
+        """Return the matrices of the cause at ``s`` (n,), rad/s."""
         whole = 1 + values[1] * s + values[0] * s**2
         return Chain(force=whole[:, None, None] * np.eye(len(model.excitations)))
 
     def derived(self, values: Real) -> dict[str, float]:
-        """Resonance and damping ratio."""
+        """Return the resonance, Hz, and the damping ratio."""
         return resonance_of(float(values[0]), float(values[1]))
 
     def impossible(self, values: Real, margin: Real) -> str:
-        """Why these numbers cannot be, beyond a margin for their errors; empty where they can."""
+        """Say why these numbers are impossible by more than their margins of error; empty where they are possible."""
         if values[0] <= 0 or values[1] >= -margin[1]:
             return ""
         return f"a dynamometer cannot have a damping ratio of {self.derived(values)['damping_ratio']:.3g}"

@@ -21,15 +21,15 @@ class DynamometerTableInertia:
     confusable_with = ("modal_parameters",)
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
-        """One place, if every force has a response along its axis."""
+        """Return one place if every force has a response along its axis."""
         return ("",) if set(axes_of(model.excitations)) <= set(axes_of(model.responses)) else ()
 
     def start(self, model: ModalModel) -> Real:
-        """Absent."""
+        """Return the numbers at which the cause is absent."""
         return np.array([0.0])
 
     def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
-        """Matrices at ``s``, rad/s."""
+        """Return the matrices of the cause at ``s`` (n,), rad/s."""
         rows = axes_of(model.responses)
         moved = np.zeros((len(model.excitations), len(model.responses)))
         for column, axis in enumerate(axes_of(model.excitations)):
@@ -37,7 +37,7 @@ class DynamometerTableInertia:
         return Chain(feedback=s[:, None, None] ** 2 * moved)
 
     def impossible(self, values: Real, margin: Real) -> str:
-        """Why these numbers cannot be, beyond a margin for their errors; empty where they can."""
+        """Say why these numbers are impossible by more than their margins of error; empty where they are possible."""
         if values[0] >= -margin[0]:
             return ""
         return f"a table cannot have a mass of {values[0]:.3g} kg; a tool lighter than the model's is other modes"

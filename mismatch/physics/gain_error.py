@@ -24,15 +24,15 @@ class GainError:
     )
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
-        """Each channel by its degree of freedom."""
+        """Return each channel by its degree of freedom."""
         return (*(f"response {name}" for name in model.responses), *(f"force {name}" for name in model.excitations))
 
     def start(self, model: ModalModel) -> Real:
-        """Absent."""
+        """Return the numbers at which the cause is absent."""
         return np.array([0.0])
 
     def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
-        """Matrices at ``s``, rad/s."""
+        """Return the matrices of the cause at ``s`` (n,), rad/s."""
         kind, label = place.split(" ", 1)
         if kind == "response":
             gains = np.where(np.array(model.responses) == label, 1 + values[0], 1.0)

@@ -25,15 +25,15 @@ class GyroscopicCoupling:
     confusable_with = ("modal_parameters",)
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
-        """Columns and rows that are X, Y, Z; none without both triads."""
+        """Return the columns and rows that are X, Y, Z; none without both triads."""
         return _triads(model)
 
     def start(self, model: ModalModel) -> Real:
-        """Absent."""
+        """Return the numbers at which the cause is absent."""
         return np.array([0.0, 0.0, 0.0])
 
     def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
-        """Matrices at ``s``, rad/s."""
+        """Return the matrices of the cause at ``s`` (n,), rad/s."""
         columns = [int(text) for text in place.split("|")[0].split()]
         rows = [int(text) for text in place.split("|")[1].split()]
         x, y, z = values

@@ -10,7 +10,7 @@ Real = NDArray[np.float64]
 
 
 ELEMENTS = 6
-"""In parallel, yields spread evenly in their logarithm."""
+"""Number of elements in parallel; their yields are spread evenly in the logarithm."""
 
 
 class Hysteresis:
@@ -30,22 +30,22 @@ class Hysteresis:
     )
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Shapes to try, amplitude 1."""
+        """Return the numbers from which fits start: one set a shape, each with the amplitude 1."""
         return tuple(np.array([1.0, k * motion.deflection, 0.8]) for k in (0.15, 0.3, 1.0, 2.5))
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force."""
+        """Return the law of the joint's force at these numbers."""
         steps = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
         stiffness, typical, spread = self.held(values, motion)
         yields = typical * np.exp(spread * 2 * (steps - 0.5))
         return JointLaw(springs=np.full(ELEMENTS, stiffness / ELEMENTS), yields=yields)
 
     def held(self, values: Real, motion: JointMotion) -> Real:
-        """The numbers that the law goes by: what yields in less of the motion is dry friction."""
+        """Return the numbers that the law uses: an element that yields within less of the motion is dry friction."""
         return np.array([values[0], max(values[1], DRY * motion.deflection), values[2]])
 
     def strained(self, values: Real, motion: JointMotion) -> bool:
-        """Whether elements were asked for that yield in no time: dry friction."""
+        """Tell whether the numbers ask for elements that yield almost at once, which is dry friction."""
         return bool(values[1] < DRY * motion.deflection)
 
 

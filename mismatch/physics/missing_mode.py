@@ -6,7 +6,7 @@ from .protocol import Parameter
 
 
 class MissingMode:
-    """A resonance that the modal test overlooked, or a part that was mounted since."""
+    """A resonance that the modal test overlooked, or that a part mounted since has added."""
 
     name = "missing_mode"
     equation = "H += r l^T / (s - p) + conjugate"
@@ -15,7 +15,7 @@ class MissingMode:
     confusable_with = ("unmeasured_excitation", "modal_parameters")
 
     def resolved(self, pole: complex, spacing: float, least: float) -> bool:
-        """Whether the half-power bandwidth of a mode is wider than ``least`` spacings of lines, Hz."""
+        """Tell whether a mode's half-power bandwidth is wider than ``least`` times the ``spacing`` of the lines, Hz."""
         return float(-pole.real / np.pi) > least * spacing
 
 

@@ -8,8 +8,8 @@ from .protocol import Parameter
 class ModalParameters:
     """The structure has changed since its modal test, or the test was wrong.
 
-    ``|u|^2`` of n believed numbers has the mean n and the variance 2 n for errors of the usual size; it is odd four
-    standard deviations above.
+    For errors of the usual size ``|u|^2`` of n believed numbers has the mean n and the variance 2 n; it counts as odd
+    from four standard deviations above the mean.
     """
 
     name = "modal_parameters"
@@ -19,7 +19,7 @@ class ModalParameters:
     confusable_with = ("gain_error", "axis_misalignment", "missing_mode")
 
     def odd(self, deviation: float, count: int) -> bool:
-        """Whether ``|u|^2`` of that many believed numbers is larger than errors of the usual size make it."""
+        """Tell whether ``|u|^2`` of ``count`` believed numbers is larger than errors of the usual size make it."""
         return bool(deviation >= count + 4 * np.sqrt(2 * count))
 
 

@@ -1,4 +1,4 @@
-"""A damper that acts on some of the structure: it couples the modes that proportional damping keeps apart."""
+"""A damper that acts on part of the structure: it couples the modes that proportional damping keeps apart."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,15 +23,15 @@ class NonProportionalDamping:
     confusable_with = ("modal_parameters",)
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
-        """One place, if forces and responses both have X, Y and Z once."""
+        """Return one place if forces and responses both have X, Y and Z once."""
         return ("",) if all(sorted(axes_of(labels)) == ["X", "Y", "Z"] for labels in _sides(model)) else ()
 
     def start(self, model: ModalModel) -> Real:
-        """Absent."""
+        """Return the numbers at which the cause is absent."""
         return np.zeros(len(PLACES))
 
     def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
-        """Matrices at ``s``, rad/s."""
+        """Return the matrices of the cause at ``s`` (n,), rad/s."""
         damping = np.zeros((3, 3))
         for value, (i, j) in zip(values, PLACES, strict=True):
             damping[i, j] = damping[j, i] = value

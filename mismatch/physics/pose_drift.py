@@ -1,4 +1,4 @@
-"""A joint whose stiffness changes steadily during the cut, evenly or sooner or later."""
+"""A joint whose stiffness changes steadily during the cut: evenly, or faster at its beginning or its end."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ Real = NDArray[np.float64]
 
 
 SCALE = 1e3
-"""A noticeable step, N/m."""
+"""Step of the stiffness that is noticeable in a fit, N/m."""
 
 
 class PoseDrift:
@@ -27,11 +27,11 @@ class PoseDrift:
     confusable_with = ("stiffness_softening",)
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Shapes to try, amplitude 1: the nominal model holds at the beginning of a recording, or at its end."""
+        """Return two starts with the amplitude 1: the nominal model holds at a recording's beginning, or at its end."""
         return (np.array([1.0, 0.0, 0.0]), np.array([1.0, 1.0, 0.0]))
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force."""
+        """Return the law of the joint's force at these numbers."""
         lasting = values[0] * (0.5 - values[1])
         return JointLaw(
             reach=motion.reach,

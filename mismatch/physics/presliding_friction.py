@@ -10,17 +10,18 @@ from .wider_forms import SPREAD, WiderPresliding
 Real = NDArray[np.float64]
 
 ELEMENTS = 6
-"""In parallel, yields spread evenly in their logarithm, the same force each."""
+"""Number of elements in parallel, of equal force; their yields are spread evenly in the logarithm."""
 
 LEAST_PRESLIDING = 2e-3
-"""Of the typical deflection: less is friction without presliding, and as stiff as no time step can follow."""
+"""Least presliding as a share of the typical deflection: less is friction without presliding, too stiff for any time
+step."""
 
 
 class PreslidingFriction:
     """Asperities act as springs until they break away: sliding begins after some micrometres, not at once.
 
-    In the limit of no presliding it is Coulomb's friction, and it is reported as that; where most of the motion is
-    presliding it is :mod:`hysteresis <mismatch.physics.hysteresis>`.
+    Without presliding it becomes Coulomb's friction, and it is reported under that name; where most of the motion is
+    presliding it becomes :mod:`hysteresis <mismatch.physics.hysteresis>`.
     """
 
     name = "presliding_friction"
@@ -37,27 +38,27 @@ class PreslidingFriction:
     )
 
     def wider(self) -> tuple[WiderPresliding, float]:
-        """The law with one shape number more, and the number at which it is as this one, or nearly."""
+        """Return the law with one more shape number, and the value of that number at which it is nearly this law."""
         return WiderPresliding((*self.parameters, SPREAD)), 0.8
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Shapes to try, amplitude 1."""
+        """Return the numbers from which fits start: one set a shape, each with the amplitude 1."""
         return tuple(np.array([1.0, k * motion.deflection]) for k in (0.01, 0.03, 0.08))
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force."""
+        """Return the law of the joint's force at these numbers."""
         steps = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
         friction, presliding = self.held(values, motion)
         yields = presliding * np.exp(1.6 * (steps - 0.5))
         return JointLaw(springs=friction / ELEMENTS / yields, yields=yields)
 
     def held(self, values: Real, motion: JointMotion) -> Real:
-        """The numbers that the law goes by: sliding begins within a small part of the motion."""
+        """Return the numbers that the law uses: sliding begins within a small part of the motion."""
         least, most = LEAST_PRESLIDING * motion.deflection, DRY * motion.deflection
         return np.array([values[0], np.clip(values[1], least, most)])
 
     def strained(self, values: Real, motion: JointMotion) -> bool:
-        """Whether much presliding was asked for: hysteresis."""
+        """Tell whether the numbers ask for so much presliding that the law is hysteresis."""
         return bool(values[1] > DRY * motion.deflection)
 
 

@@ -1,4 +1,4 @@
-"""What a hypothesis about left-out physics has to say: the protocols behind every file of this folder."""
+"""Protocols that every file of this folder follows: what a hypothesis about left-out physics states."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ Real = NDArray[np.float64]
 
 
 DRY = 0.1
-"""Of the typical deflection or velocity: what gives way within less is dry friction; an element that yields later is
+"""Share of the typical deflection or velocity within which dry friction gives way. An element that yields later is
 hysteresis, and a force that still rises with the speed beyond it is damping of another kind."""
 
 
@@ -29,15 +29,15 @@ class Parameter:
     Parameters
     ----------
     name
-        With its unit as a suffix, as it stands in files: ``delay_s``.
+        Name of the number as it stands in files, with its unit as a suffix: ``delay_s``.
     unit
-        SI.
+        SI unit of the number; empty for a number without a unit.
     unit_step
-        What counts as a step of this number in a fit: a plain difference, or a relative one if ``logarithmic``.
+        Noticeable step of this number in a fit: a difference in ``unit``, or a relative one if ``logarithmic``.
     low, high
-        Bounds.
+        Bounds of the number, in ``unit``.
     logarithmic
-        The number is positive and its logarithm is fitted.
+        Whether the number is positive and its logarithm is fitted.
     """
 
     name: str
@@ -48,11 +48,11 @@ class Parameter:
     logarithmic: bool = False
 
     def to_fit(self, value: float) -> float:
-        """The number as the fit sees it: differences of about one are noticeable steps."""
+        """Return the number as the fit sees it: differences of about one are noticeable steps."""
         return float(np.log(value) if self.logarithmic else value) / self.unit_step
 
     def from_fit(self, coordinate: float) -> float:
-        """Back from :meth:`to_fit`, brought within the bounds."""
+        """Return the number that :meth:`to_fit` takes to ``coordinate``, brought within the bounds."""
         scaled = coordinate * self.unit_step
         value = np.exp(np.clip(scaled, -300, 300)) if self.logarithmic else scaled
         return float(np.clip(value, self.low, self.high))
@@ -60,16 +60,16 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Chain:
-    """How a linear cause stands around the structure: ``X = H (B F - K X)``, measured ``C X``; None is the identity.
+    """Matrices of a linear cause around the structure H: ``X = H (B F - K X)``, of which ``C X`` is measured.
 
     Parameters
     ----------
     response : (n, n_responses, n_responses) or None
-        C.
+        Matrix C from the true to the measured responses; None is the identity.
     force : (n, n_excitations, n_excitations) or None
-        B.
+        Matrix B from the measured to the true forces; None is the identity.
     feedback : (n, n_excitations, n_responses) or None
-        K; None is zero.
+        Matrix K from the responses to the forces taken off, N/m; None is zero.
     """
 
     response: Complex | None = None
@@ -79,7 +79,7 @@ class Chain:
 
 @runtime_checkable
 class ChainPhysics(Protocol):
-    """A linear cause of few numbers: measuring chain, coupling, mass."""
+    """A linear cause with a few numbers: a measuring chain, a coupling or a mass."""
 
     name: str
     equation: str
@@ -88,15 +88,15 @@ class ChainPhysics(Protocol):
     confusable_with: tuple[str, ...]
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
-        """Where it may act: channel labels of the model, or one empty text."""
+        """Return the places where the cause may act: channel labels of the model, or one empty text."""
         ...
 
     def start(self, model: ModalModel) -> Real:
-        """The numbers at which the cause is absent, or all but."""
+        """Return the numbers at which the cause is absent, or nearly absent."""
         ...
 
     def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
-        """Its matrices at ``s`` (n,), rad/s."""
+        """Return the matrices of the cause at ``s`` (n,), rad/s."""
         ...
 
 
@@ -111,41 +111,41 @@ class JointPhysics(Protocol):
     confusable_with: tuple[str, ...]
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Shapes to try, the amplitude 1."""
+        """Return the numbers from which fits start: one set a shape, each with the amplitude 1."""
         ...
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force law."""
+        """Return the law of the joint's force at these numbers."""
         ...
 
 
 @runtime_checkable
 class LimitedPhysics(Protocol):
-    """A joint's law whose name holds only within limits that the motion sets; beyond them it is another law."""
+    """A joint's law that keeps its name only within limits set by the motion; beyond them it is another law."""
 
     def held(self, values: Real, motion: JointMotion) -> Real:
-        """The numbers that the law goes by: those given, brought within the limits."""
+        """Return the numbers that the law uses: the given ones, brought within the limits."""
         ...
 
     def strained(self, values: Real, motion: JointMotion) -> bool:
-        """Whether the numbers ask for what the name excludes."""
+        """Tell whether the numbers lie beyond the limits, where the law has another name."""
         ...
 
 
 @runtime_checkable
 class BoundedPhysics(Protocol):
-    """A cause whose numbers may have a sign that nothing real has: it is then said to be impossible, and not told."""
+    """A cause whose fitted numbers may have a sign that nothing real has: it is then impossible and not reported."""
 
     def impossible(self, values: Real, margin: Real) -> str:
-        """Why numbers cannot be, beyond a margin (n_parameters,) for their errors; empty where they can."""
+        """Say why numbers are impossible by more than their margins of error (n_parameters,); empty where possible."""
         ...
 
 
 @runtime_checkable
 class FaultPhysics(Protocol):
-    """A fault of a recording itself: it is mended there before causes are looked for, and shown in a prediction.
+    """A fault of a recording itself: it is mended before causes are sought, and a prediction shows it again.
 
-    Faults are shown in the order of their number ``order``: a limit holds for whatever a channel shows, tones too.
+    Predictions show faults in the order of ``order``: a channel's limit comes after tones, as it clips them too.
     """
 
     order: int
@@ -156,9 +156,9 @@ class FaultPhysics(Protocol):
     confusable_with: tuple[str, ...]
 
     def shown(self, response: Real, recording: BandRecording, start: int, term: Mapping[str, Any]) -> Real:
-        """A predicted response (n_samples, n_responses) with the fault of a term ``{name, location, parameters}``.
+        """Return a predicted response (n_samples, n_responses) with the fault of a term.
 
-        ``start`` is the first sample after the run-in.
+        The term is ``{name, location, parameters}``; ``start`` is the first sample after the run-in.
         """
         ...
 
@@ -174,7 +174,7 @@ class ModePhysics(Protocol):
     confusable_with: tuple[str, ...]
 
     def resolved(self, pole: complex, spacing: float, least: float) -> bool:
-        """Whether a mode is wider than ``least`` spacings of lines (Hz): else it is a tone, or an accident."""
+        """Tell whether a mode is wider than ``least`` spacings of lines, Hz; else it is a tone or chance."""
         ...
 
 
@@ -189,7 +189,7 @@ class BeliefPhysics(Protocol):
     confusable_with: tuple[str, ...]
 
     def odd(self, deviation: float, count: int) -> bool:
-        """Whether ``|u|^2`` of that many believed numbers is larger than errors of the usual size make it."""
+        """Tell whether ``|u|^2`` of ``count`` believed numbers is larger than errors of the usual size make it."""
         ...
 
 
@@ -197,12 +197,12 @@ Physics = ChainPhysics | JointPhysics | FaultPhysics | ModePhysics | BeliefPhysi
 
 
 def answer_name(physics: Physics) -> str:
-    """Name under which a cause is reported: its own, or that of the cause it is a form of (``answers_as``)."""
+    """Return the name under which a cause is reported: its own, or that of the cause of which it is a form."""
     return str(getattr(physics, "answers_as", physics.name))
 
 
 def resonance_of(squared_period: float, damping_time: float) -> dict[str, float]:
-    """Frequency and damping ratio of ``1 + c s + T2 s^2``, c in s and T2 in s^2; nothing where T2 is none."""
+    """Return frequency (Hz) and damping ratio of ``1 + c s + T2 s^2``, c in s and T2 in s^2; empty unless T2 > 0."""
     if squared_period <= 0:
         return {}
     root = float(np.sqrt(squared_period))
@@ -210,14 +210,14 @@ def resonance_of(squared_period: float, damping_time: float) -> dict[str, float]
 
 
 def axes_of(labels: tuple[str, ...]) -> list[str]:
-    """Axis (X, Y or Z) of each degree of freedom."""
+    """Return the axis (X, Y or Z) of each degree of freedom."""
     return [DegreeOfFreedom.parse(label).axis for label in labels]
 
 
 @runtime_checkable
 class FormedPhysics(Protocol):
-    """A linear cause whose places are forms of one law, so that its numbers mean another thing at each."""
+    """A linear cause whose places are forms of one law: its numbers have another meaning at each."""
 
     def other_forms(self, values: Real, place: str) -> tuple[tuple[str, Real], ...]:
-        """Other places, with the numbers there that come nearest to the given ones here."""
+        """Return the other places, with the numbers there that come nearest to the given ones at ``place``."""
         ...

@@ -11,7 +11,7 @@ Real = NDArray[np.float64]
 
 
 class QuadraticDamping:
-    """Lubricant and air, or hydraulic balancing: the force goes with v |v|."""
+    """Lubricant and air, or hydraulic balancing: the force is proportional to v |v|."""
 
     name = "quadratic_damping"
     equation = "g = c2 |v| v"
@@ -20,15 +20,15 @@ class QuadraticDamping:
     confusable_with = ("coulomb_friction",)
 
     def wider(self) -> tuple[WiderDamping, float]:
-        """The law with one shape number more, and the number at which it is as this one, or nearly."""
+        """Return the law with one more shape number, and the value of that number at which it is nearly this law."""
         return WiderDamping((*self.parameters, POWER)), 2.0
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Shapes to try, amplitude 1."""
+        """Return the numbers from which fits start: one set a shape, each with the amplitude 1."""
         return (np.array([1.0]),)
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force."""
+        """Return the law of the joint's force at these numbers."""
         v = motion.velocities
         return JointLaw(speed=motion.speed, damping=values[0] * np.abs(v) * v)
 

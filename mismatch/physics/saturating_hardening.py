@@ -1,4 +1,4 @@
-"""Stiffness that is gained beyond a knee, and no more: contacts that close, a preloaded gear on its second flank."""
+"""Stiffness that a joint gains beyond a knee, up to a limit: closing contacts, a preloaded gear on its second flank."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +10,11 @@ Real = NDArray[np.float64]
 
 
 class SaturatingHardening:
-    """Hardening that ends: from one stiffness at small deflections to another at large ones.
+    """Hardening that ends: one stiffness at small deflections turns into another at large ones.
 
-    It differs from :mod:`smooth backlash <mismatch.physics.smooth_backlash>` by a linear spring alone: here the model
-    that is believed holds at small deflections, there at large ones. How odd the modes would have to be decides.
+    It differs from :mod:`smooth backlash <mismatch.physics.smooth_backlash>` by a linear spring alone: here the
+    nominal model holds at small deflections, there it holds at large ones. The law that asks for the less odd modes
+    is taken.
     """
 
     name = "saturating_hardening"
@@ -31,11 +32,11 @@ class SaturatingHardening:
     )
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Shapes to try, amplitude 1."""
+        """Return the numbers from which fits start: one set a shape, each with the amplitude 1."""
         return tuple(np.array([1.0, k * motion.deflection, 2.0]) for k in (0.5, 1.0, 2.0))
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force."""
+        """Return the law of the joint's force at these numbers."""
         x = motion.deflections
         return JointLaw(reach=motion.reach, stiffness=values[0] * (x - saturated(x, values[1], values[2])))
 

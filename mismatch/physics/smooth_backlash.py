@@ -12,8 +12,8 @@ Real = NDArray[np.float64]
 class SmoothBacklash:
     """Backlash whose gap closes little by little; sharp corners are :mod:`backlash <mismatch.physics.backlash>`.
 
-    It differs from :mod:`saturating hardening <mismatch.physics.saturating_hardening>` by a linear spring alone: how
-    odd the modes would have to be decides between them, and where that says nothing both are told.
+    It differs from :mod:`saturating hardening <mismatch.physics.saturating_hardening>` by a linear spring alone:
+    the law that asks for the less odd modes is taken, and both are reported where the modes do not decide.
     """
 
     name = "smooth_backlash"
@@ -31,11 +31,11 @@ class SmoothBacklash:
     )
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Shapes to try, amplitude 1."""
+        """Return the numbers from which fits start: one set a shape, each with the amplitude 1."""
         return tuple(np.array([1.0, k * motion.deflection, 2.0]) for k in (0.3, 0.6, 1.2))
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force."""
+        """Return the law of the joint's force at these numbers."""
         kept = saturated(motion.deflections, values[1], values[2])
         return JointLaw(reach=motion.reach, stiffness=-values[0] * kept)
 

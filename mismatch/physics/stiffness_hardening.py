@@ -25,11 +25,11 @@ class StiffnessHardening:
     )
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Shapes to try, amplitude 1."""
+        """Return the numbers from which fits start: one set a shape, each with the amplitude 1."""
         return tuple(np.array([1.0, n]) for n in (2.0, 3.0, 4.5))
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force."""
+        """Return the law of the joint's force at these numbers."""
         x = motion.deflections
         return JointLaw(reach=motion.reach, stiffness=values[0] * np.sign(x) * (np.abs(x) / 1e-3) ** values[1])
 

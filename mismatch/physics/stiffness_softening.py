@@ -27,11 +27,11 @@ class StiffnessSoftening:
     )
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Shapes to try, amplitude 1."""
+        """Return the numbers from which fits start: one set a shape, each with the amplitude 1."""
         return tuple(np.array([1.0, k * motion.deflection, n]) for k in (0.5, 1.0, 2.0, 4.0) for n in (2.0,))
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force."""
+        """Return the law of the joint's force at these numbers."""
         x = motion.deflections
         return JointLaw(reach=motion.reach, stiffness=values[0] * (saturated(x, values[1], values[2]) - x))
 

@@ -25,7 +25,7 @@ class UnmeasuredExcitation:
     confusable_with = ("missing_mode",)
 
     def shown(self, response: Real, recording: BandRecording, start: int, term: Mapping[str, Any]) -> Real:
-        """A predicted response with the tone.
+        """Return a predicted response (n_samples, n_responses) with the tone.
 
         A steady tone has no known phase in another recording: amplitude and phase are read from the recording at that
         one frequency.
@@ -36,7 +36,7 @@ class UnmeasuredExcitation:
 
 
 def tone_of(rest: Real, time: Real, frequency: float, start: int) -> Real:
-    """Sinusoid of the frequency nearest to a given one that is in a residual, (n_samples, n_responses).
+    """Return the sinusoid in a residual whose frequency is near a given one, (n_samples, n_responses).
 
     Parameters
     ----------

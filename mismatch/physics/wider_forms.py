@@ -1,4 +1,4 @@
-"""Laws with one shape number more than the library's: they show what a number owes to the form of its law."""
+"""Laws with one more shape number than the library's: they show how far a number depends on the form of its law."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,14 @@ from .protocol import Parameter
 Real = NDArray[np.float64]
 
 ELEMENTS = 10
-"""Of a slider law with free spread."""
+"""Number of elements of a slider law with free spread."""
 
 
 @dataclass(frozen=True)
 class WiderFriction:
-    """Friction over velocity that saturates as slowly as a free sharpness says.
+    """Friction over velocity whose saturation has a free sharpness.
 
-    Sharpness 2 is the square root's, about 2.6 comes close to the hyperbolic tangent, 1 to the arctangent.
+    A sharpness of 2 gives ``s / sqrt(1 + s^2)``; about 2.6 comes close to the hyperbolic tangent, 1 to the arctangent.
     """
 
     parameters: tuple[Parameter, ...]
@@ -28,11 +28,11 @@ class WiderFriction:
     confusable_with: tuple[str, ...] = ()
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Beside the hyperbolic tangent."""
+        """Return one start near the hyperbolic tangent, with the amplitude 1."""
         return (np.array([1.0, 0.05 * motion.velocity, 2.0]),)
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force."""
+        """Return the law of the joint's force at these numbers."""
         smooth = max(values[1], 4e-4 * motion.speed)
         return JointLaw(
             speed=motion.speed, damping=values[0] / smooth * saturated(motion.velocities, smooth, values[2])
@@ -41,7 +41,7 @@ class WiderFriction:
 
 @dataclass(frozen=True)
 class WiderPresliding:
-    """Sliders in parallel whose yields spread as widely as a free number says; together they slide at F_c."""
+    """Sliders in parallel whose yields have a free spread; together they slide at the force F_c."""
 
     parameters: tuple[Parameter, ...]
     name: str = "wider_presliding"
@@ -50,11 +50,11 @@ class WiderPresliding:
     confusable_with: tuple[str, ...] = ()
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Beside the library's spread."""
+        """Return one start at the library's spread, with the amplitude 1."""
         return (np.array([1.0, 0.05 * motion.deflection, 0.8]),)
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force."""
+        """Return the law of the joint's force at these numbers."""
         steps = (np.arange(ELEMENTS) + 0.5) / ELEMENTS
         yields = max(values[1], 1e-3 * motion.deflection) * np.exp(2 * values[2] * (steps - 0.5))
         return JointLaw(springs=values[0] / ELEMENTS / yields, yields=yields)
@@ -62,7 +62,7 @@ class WiderPresliding:
 
 @dataclass(frozen=True)
 class WiderDamping:
-    """Damping that goes with any power of the velocity."""
+    """Damping that is proportional to any power of the velocity."""
 
     parameters: tuple[Parameter, ...]
     name: str = "wider_damping"
@@ -71,11 +71,11 @@ class WiderDamping:
     confusable_with: tuple[str, ...] = ()
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
-        """Beside the square."""
+        """Return one start at the square of the velocity, with the amplitude 1."""
         return (np.array([1.0, 2.0]),)
 
     def law(self, values: Real, motion: JointMotion) -> JointLaw:
-        """The joint's force; the power is taken about the typical velocity."""
+        """Return the law of the joint's force; the power is taken of the velocity over its typical value."""
         v, typical = motion.velocities, motion.velocity
         return JointLaw(
             speed=motion.speed,

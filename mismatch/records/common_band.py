@@ -6,25 +6,25 @@ from foundation import InputError
 from modal_fit import ModalModel
 
 BELOW, ABOVE = 3.0, 3.0
-"""Without a stated band: lowest mode over the lower edge, upper edge over the highest mode."""
+"""Lowest mode over the lower edge, and upper edge over the highest mode, where a model states no band."""
 
 SAMPLED = 0.42
 """Highest frequency that is compared, as a share of the sample rate."""
 
 ROOM = 1.1
-"""Upper edge over the highest mode that a sample rate must allow."""
+"""Least ratio of the upper edge, as far as the sample rate allows it, to the highest mode."""
 
 
 @dataclass(frozen=True)
 class ComparedBand:
-    """Between which frequencies a model and a recording are compared.
+    """Band of frequencies in which a model and a recording are compared.
 
     Parameters
     ----------
     low, high
-        Edges, Hz.
+        Lower and upper edge of the band, Hz.
     why
-        Where the edges come from, as the end of a sentence that begins with the band.
+        Origin of the edges, as the end of a sentence that begins with the band.
     """
 
     low: float
@@ -38,7 +38,7 @@ class ComparedBand:
 
     @property
     def sentence(self) -> str:
-        """Band and reason for people.
+        """Band and its reason in words.
 
         Examples
         --------
@@ -49,7 +49,7 @@ class ComparedBand:
 
 
 def compared_band(model: ModalModel, rate: float) -> ComparedBand:
-    """Band in which a model and a recording are compared.
+    """Return the band in which a model and a recording are compared.
 
     That is the band in which the model holds, where the model states one: outside, modes that the model does not have
     would look like left-out physics. A model that states none is compared from a third of its lowest mode to three
@@ -58,7 +58,7 @@ def compared_band(model: ModalModel, rate: float) -> ComparedBand:
     Parameters
     ----------
     model
-        With or without a band.
+        Model of the structure, with or without a band of its own.
     rate
         Sample rate of the recording, Hz.
 
@@ -93,7 +93,7 @@ def compared_band(model: ModalModel, rate: float) -> ComparedBand:
 
 
 def reach_of(model: ModalModel, rate: float) -> tuple[float, float]:
-    """A third of the lowest to three times the highest mode, Hz, as far as a sample rate (Hz) allows.
+    """Return the band from a third of the lowest to three times the highest mode, as far as ``rate`` allows, Hz.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Recordings at a model's degrees of freedom, brought down to what a comparison with the model needs."""
+"""Recordings at a model's degrees of freedom, reduced to the sample rate that a comparison with the model needs."""
 
 import os
 from collections.abc import Sequence
@@ -20,12 +20,12 @@ KEPT = 6.0
 
 
 def band_of(model: ModalModel, rate: float) -> tuple[float, float]:
-    """Band (Hz) in which a model and a recording are compared: both edges of :func:`compared_band`.
+    """Return the band (Hz) in which a model and a recording are compared: both edges of :func:`compared_band`.
 
     Parameters
     ----------
     model
-        With or without a band of its own.
+        Model of the structure, with or without a band of its own.
     rate
         Sample rate of the recording, Hz.
 
@@ -46,9 +46,9 @@ def read_recording(path: str | os.PathLike[str], model: ModalModel, *, stream: s
         Recording with a force channel at each of the model's excitations and a displacement, velocity or acceleration
         at each of its responses.
     model
-        What will be compared.
+        Model with which the recordings are compared.
     stream
-        Sample clock; None: the only one.
+        Name of the sample clock; None for the only one.
 
     Raises
     ------
@@ -71,18 +71,18 @@ def read_at(
     Parameters
     ----------
     path
-        Recording.
+        Recording file with the channels at these degrees of freedom.
     excitations, responses
         Degrees of freedom of the columns, ``node:direction``.
     model
-        Modes of the band.
+        Model whose modes and band set the least sample rate and length.
     stream
-        Sample clock; None: the only one.
+        Name of the sample clock; None for the only one.
 
     Raises
     ------
     InputError
-        As :func:`read_recording`.
+        The recording has a flaw that :func:`read_recording` refuses.
     """
     highest = ABOVE * float(model.natural_frequencies.max())
     if model.band is not None:
@@ -107,16 +107,16 @@ def read_recordings(
     Parameters
     ----------
     paths
-        Recordings.
+        Recordings that are compared, in any order.
     model
-        What will be compared.
+        Model with which the recordings are compared.
     stream
-        Sample clock; None: the only one of each recording.
+        Name of the sample clock; None for the only one of each recording.
 
     Raises
     ------
     InputError
-        No recording, or what :func:`read_recording` refuses.
+        No recording is given, the model is not one of receptances, or :func:`read_recording` refuses a recording.
     """
     if not paths:
         raise InputError("no recording given; name one or more")
@@ -131,16 +131,16 @@ def read_recordings(
 def measured_part(
     model: ModalModel, paths: Sequence[str | os.PathLike[str]], *, stream: str | None = None
 ) -> ModalModel:
-    """The model with the responses that every recording has; a sensor that was not mounted is no obstacle.
+    """Return the model reduced to the responses that every recording has, as not every sensor need be mounted.
 
     Parameters
     ----------
     model
-        What will be compared.
+        Model with which the recordings are compared.
     paths
-        Recordings.
+        Recordings that are compared, in any order.
     stream
-        Sample clock; None: the only one of each recording.
+        Name of the sample clock; None for the only one of each recording.
 
     Raises
     ------

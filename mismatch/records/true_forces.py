@@ -1,4 +1,4 @@
-"""Measured forces replaced by what they say of the true ones."""
+"""Measured forces replaced by the estimates of the true forces that they give."""
 
 from dataclasses import replace
 
@@ -17,27 +17,29 @@ SCALES = (301, 101, 31, 11)
 """Lines over which the spectral matrix of the forces is averaged, from wide to narrow."""
 
 CHANCE = 3.0
-"""Standard deviations by which the power over fewer lines must differ to be believed; wholly so at two more."""
+"""Standard deviations by which the power over fewer lines must differ to be believed; from two more on it is believed
+fully."""
 
 WIDELY, QUIETEST = 201, 0.05
-"""Lines so many that chance hardly counts, and the share of them whose power bounds the forces' noise."""
+"""Lines over which chance averages out, and the share of such means whose power bounds the forces' noise."""
 
 
 def without_force_noise(spectrum: WindowedSpectrum, variance: Real) -> WindowedSpectrum:
-    """Replace a recording's measured forces by what they say of the true ones, ``F_hat = W F``, ``W = (P - S) P^-1``.
+    """Replace a recording's measured forces F by estimates of the true ones, ``F_hat = W F``, ``W = (P - S) P^-1``.
 
     P is the measured forces' spectral matrix around a line and S the variance of their noise (Wiener, 1949). Where a
     spectrum holds little but noise, as between the harmonics of a steady cut or above the band of the cutting force,
-    the structure was not pushed by what was measured: predicted from it, a response would be missing and a mode would
-    seem to cancel it. The same holds across forces that rise and fall together. P is averaged as widely as the spectrum
-    is smooth: from few lines, those that noise makes strong by chance would be taken for force.
+    the measured force did not push the structure: a prediction from it would hold a response that was never there, and
+    a mode would seem to cancel it. The same holds across forces that rise and fall together. P is averaged as widely as
+    the spectrum is smooth: an average over few lines would take those for force that noise makes strong by chance.
 
     Parameters
     ----------
     spectrum
-        Its forces replaced already or not.
+        Windowed spectrum of the recording; its forces may have been replaced before.
     variance : (n_excitations,)
-        Of the forces' noise a line; no more of it is believed than what the quietest lines hold.
+        Variance of the forces' noise on each line, in the unit of the windowed spectrum's squared lines. The power of
+        the quietest lines is its upper bound.
     """
     n = spectrum.start + len(spectrum.window)
     forces = rfft(spectrum.recording.force[spectrum.start : n] * spectrum.window[:, None], axis=0)
@@ -48,9 +50,9 @@ def without_force_noise(spectrum: WindowedSpectrum, variance: Real) -> WindowedS
     deviation = np.sqrt(np.maximum(np.minimum(variance, quiet), 1e-12 * own.mean(axis=0)))
     power, chance = _smoothed(products / np.outer(deviation, deviation))
     values, vectors = np.linalg.eigh(power)
-    # less by what chance may have added, or noise that looks strong passes for force
+    # chance may have added to the power: without this reduction, strong noise would pass for force
     share = 1 - 1 / np.maximum(values / (1 + np.sqrt(chance))[:, None], 1.0)
-    # which directions these are is itself known from some lines only
+    # the directions themselves are known from a limited number of lines only
     unsure = np.maximum(1 - 1 / np.maximum(values, 1.0), chance[:, None])
     whole, root = (
         deviation[:, None] * (vectors * weight[:, None, :]) @ vectors.conj().swapaxes(1, 2) / deviation
@@ -69,7 +71,7 @@ def without_force_noise(spectrum: WindowedSpectrum, variance: Real) -> WindowedS
 
 
 def _smoothed(products: Complex) -> tuple[Complex, Real]:
-    """Mean of matrices over as many neighbours as differ by no more than chance does, and its relative variance."""
+    """Return means of matrices over as many neighbours as differ by chance alone, and their relative variances."""
     widest = min(SCALES[0], len(products) // 5)
     mean, chance = _around(products, widest), np.full(len(products), float(np.sum(_weights(widest) ** 2)))
     for count in SCALES[1:]:
@@ -85,12 +87,12 @@ def _smoothed(products: Complex) -> tuple[Complex, Real]:
 
 
 def _around(power: Complex, count: int) -> Complex:
-    """Mean over ``count`` neighbouring lines, tapered."""
+    """Return the tapered mean over ``count`` neighbouring lines."""
     flat = power.reshape(len(power), -1)
     return np.asarray(convolve(flat, _weights(count)[:, None], mode="same", method="fft").reshape(power.shape))
 
 
 def _weights(count: int) -> Real:
-    """Of neighbours in a mean."""
+    """Return the weights of ``count`` neighbours in a mean."""
     weights = hann(count + 2)[1:-1]
     return np.asarray(weights / weights.sum())

@@ -19,7 +19,7 @@ CLEAR = 0.25
 """Share of the response's power outside the modes that the model must lack for a doubt."""
 
 NOT_SMALL = 1e-3
-"""Least share of a channel's whole power that this must be."""
+"""Least share of a channel's whole power that the power moved by forces outside the modes must be."""
 
 
 def beyond_model(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> tuple[str, ...]:

@@ -18,8 +18,9 @@ def moving_power(rest: Real, shown: Real, bins: int) -> float:
     Parameters
     ----------
     rest, shown : (n_bins, n_segments)
+        Power of the residual and of the prediction in cells of time and frequency.
     bins
-        That share one noise level.
+        Number of neighbouring bins that share one noise level.
     """
     count = rest.shape[1]
     together = np.zeros(count)

@@ -16,7 +16,7 @@ from .repeated_part import repeated_share
 Real = NDArray[np.float64]
 
 SEGMENT = 2.0
-"""Length of a segment, s, at least twenty periods of nothing in particular: half a hertz apart."""
+"""Length of a segment, s: its bins lie half a hertz apart."""
 
 BINS = 12
 """Neighbouring bins that share one noise level."""
@@ -34,15 +34,15 @@ def leftover(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Remainder
     (what a nonlinearity spreads). The share is what the last two carry, less what they carry by chance, when the
     prediction is shifted in time against the residual. Where forces were replaced by what they say of the true ones,
     the forces as measured are tried too, and what moves with both counts: the replaced ones lack force where it swells
-    from little, the measured ones bring their noise. Of forces that repeat, what the residual repeats with them moves
-    with the signal too (:func:`repeated_share`): a steady test has no times of more and of less signal.
+    from little, the measured ones bring their noise. Where forces repeat, the part of the residual that repeats with
+    them counts too (:func:`repeated_share`): a steady test has no times of more and of less signal.
 
     Parameters
     ----------
     hypothesis
-        After all that was found.
+        The hypothesis with everything that was found.
     lines
-        Recordings.
+        Windowed lines of the recordings.
 
     Returns
     -------

@@ -29,9 +29,9 @@ def repeated_share(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Real:
     Parameters
     ----------
     hypothesis
-        What predicts.
+        Hypothesis that predicts the response.
     lines
-        One recording. Of forces that do not repeat all shares are 0.
+        Windowed lines of one recording. All shares are 0 where its forces do not repeat.
     """
     nothing = np.zeros(lines.measured.shape[1])
     decay = float((-hypothesis.model.poles.real).min())
@@ -48,7 +48,7 @@ def repeated_share(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Real:
 
 
 def repeat_of(force: Real, least: int, most: int) -> int | None:
-    """Lag (samples) from ``least`` to ``most`` after which forces (n_samples, n) are the same again; None: none is.
+    """Lag (samples) from ``least`` to ``most`` after which forces (n_samples, n) are the same again; None if none is.
 
     Examples
     --------

@@ -26,7 +26,7 @@ class JointSighting:
     gain
         Twice the log likelihood that one force along it explains, its spectrum free, beyond what noise gains.
     share
-        Of what a force in any direction would explain.
+        Gain as a share of what a force in any direction would explain.
     """
 
     direction: Real
@@ -66,7 +66,7 @@ def find_direction(floor: Floor, hypothesis: Hypothesis) -> JointSighting:
 
 @dataclass(frozen=True)
 class _Bands:
-    """Per line: G^H V^-1 r and G^H V^-1 G over the joint's axes, and the bands' edges."""
+    """Statistics G^H V^-1 r and G^H V^-1 G of each line over the joint's axes, and the bands' edges."""
 
     pull: Complex
     weight: Complex
@@ -92,7 +92,7 @@ def _gain(bands: _Bands, direction: Real) -> float:
 
 
 def _gain_of_all(bands: _Bands) -> float:
-    """The same for a force in all directions, counted as that many separate ones."""
+    """Gain of a force that is free in every direction, counted as that many separate forces."""
     inverse = np.linalg.pinv(bands.weight, hermitian=True)
     power = np.real(np.einsum("ki,kij,kj->k", bands.pull.conj(), inverse, bands.pull))
     n = bands.pull.shape[1]
@@ -115,6 +115,7 @@ class SeenMotion:
     Parameters
     ----------
     deflection, velocity : (n_samples,), m, m/s
+        Most likely motion along the joint's direction.
     force : (n_samples,), N
         Most likely force along the direction given its spectrum.
     """
@@ -172,7 +173,10 @@ def _wiener(record: FloorRecord, direction: Real, columns: list[int]) -> Complex
 
 
 def motion_of(seen: list[SeenMotion], stiffness: float) -> JointMotion:
-    """Sizes of a joint's motion over all recordings, the means left in: play and knees are where the joint stands."""
+    """Sizes of a joint's motion over all recordings.
+
+    The reach counts from zero and not from the mean, as play and knees lie where the joint stands.
+    """
     deflections = np.concatenate([one.deflection for one in seen])
     velocities = np.concatenate([one.velocity for one in seen])
     strongest = max(seen, key=lambda one: float(np.std(one.deflection)))

@@ -20,14 +20,14 @@ FEW = 1000
 
 @dataclass(frozen=True)
 class SightedLaws:
-    """Laws along the likeliest direction, best first, and what is told of them."""
+    """Laws along the likeliest direction, best first, and what a diagnosis tells about them."""
 
     screened: tuple[Screened, ...]
     weighed: tuple[Candidate, ...]
 
     @property
     def gain(self) -> float:
-        """Screened, of the best."""
+        """Screened gain of the best law, in misfit; zero where there is none."""
         return self.screened[0].gain if self.screened else 0.0
 
 
@@ -39,13 +39,13 @@ def sighted_laws(
     Parameters
     ----------
     lines
-        Recordings.
+        Windowed spectra of the recordings that are compared.
     current
         The fit with the causes found so far.
     laws
-        Laws to try.
+        Laws from the library that are screened.
     settings
-        Thresholds.
+        Thresholds of the diagnosis.
     """
     taken = {answer_name(cause.physics) for cause in current.hypothesis.causes}
     laws = [law for law in laws if answer_name(law) not in taken]
@@ -73,15 +73,15 @@ def joint_candidates(
     Parameters
     ----------
     lines
-        Recordings.
+        Windowed spectra of the recordings that are compared.
     current
-        Without a law.
+        The fit without a further law.
     sighted
-        Laws to try.
+        Laws to try, as they were screened, best first.
     settings
-        Thresholds.
+        Thresholds of the diagnosis.
     least
-        Screened gain from which one is fitted.
+        Screened gain from which a law is fitted.
     gained
         Score that the best linear cause gains.
     """

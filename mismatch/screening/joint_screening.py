@@ -22,9 +22,9 @@ class Screened:
     Parameters
     ----------
     causes
-        Each with the amplitude that fits best, driven by the motion that was seen.
+        The law in each shape, with the amplitude that fits best, driven by the motion that was seen.
     gain
-        Of the first, in misfit, linear in the amplitude and after the modal parameters have adapted.
+        Gain of the first shape in misfit, linear in the amplitude and after the modal parameters have adapted.
     """
 
     causes: tuple[Cause, ...]
@@ -39,11 +39,11 @@ def screen_joints(floor: Floor, hypothesis: Hypothesis, direction: Real, laws: l
     floor
         Residual of the fit so far.
     hypothesis
-        That fit.
+        Hypothesis of the fit so far.
     direction : (n_axes,)
-        Unit vector.
+        Unit vector over the axes that forces and responses share.
     laws
-        To try.
+        Laws that are tried.
     """
     seen = [seen_motion(record, hypothesis, direction) for record in floor.records]
     columns = columns_of(hypothesis.model)

@@ -28,7 +28,7 @@ def linear_candidates(
     Parameters
     ----------
     lines
-        Recordings.
+        Windowed spectra of the recordings that are compared.
     current
         The fit without them.
     chains
@@ -36,7 +36,7 @@ def linear_candidates(
     mode
         The further mode that would explain most; None: none is looked for.
     settings
-        Thresholds.
+        Thresholds of what is fitted.
     least
         Screened gain from which anything is fitted.
     """

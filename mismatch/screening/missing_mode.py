@@ -15,7 +15,7 @@ Real = NDArray[np.float64]
 DAMPINGS = (0.015, 0.05)
 FREQUENCIES = 48
 EVERY = 3
-"""Lines left out of two in the scan, which needs no precision."""
+"""Step between the lines that the scan takes; the scan needs no precision."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,9 @@ class SightedMode:
     pole
         Its pole, rad/s.
     right : (n_responses,)
+        Right vector of the residue ``right left^T``, m/(N s).
     left : (n_excitations,)
-        Vectors of the residue ``right left^T``.
+        Left vector of that residue.
     gain
         Misfit that it would gain.
     """

@@ -26,17 +26,17 @@ class FloorRecord:
     Parameters
     ----------
     lines
-        The recording.
+        Windowed spectrum of the recording.
     residual : (n_lines, n_responses)
-        Windowed lines.
+        Windowed lines of the residual, measured minus predicted.
     through : (n_lines, n_responses, n_excitations)
-        From forces to responses.
+        Matrix from forces to responses at the lines.
     white : (n_lines, n_responses, n_responses)
-        Whitening under the floor.
+        Whitening of each line under the floor, lower triangular.
     slope : (2 * n_lines * n_responses, size)
         Whitened derivative by everything fitted, real above imaginary part.
     rest : (2 * n_lines * n_responses,)
-        Whitened residual.
+        Whitened residual lines, real above imaginary part.
     """
 
     lines: WindowedSpectrum
@@ -58,10 +58,11 @@ class Floor:
     Parameters
     ----------
     records
-        One a recording.
+        Residual of each recording on the floor.
     inverse : (size, size)
-        Of the normal matrix with the lab's belief.
+        Inverse of the normal matrix, the lab's belief included.
     gradient : (size,)
+        Right-hand side of the normal equations, the lab's belief included.
     """
 
     records: tuple[FloorRecord, ...]
@@ -74,7 +75,7 @@ class Floor:
         Parameters
         ----------
         columns
-            For each candidate its column in every recording.
+            Whitened column of each candidate in every recording.
 
         Returns
         -------
@@ -121,7 +122,7 @@ def noise_floor(fitted: Fit, lines: list[WindowedSpectrum]) -> Floor:
 def _floor(
     fitted: Fit, lines: list[WindowedSpectrum], covariance: Callable[[int, Complex, Complex, WindowedSpectrum], Complex]
 ) -> Floor:
-    """Of many lines every few count, each for as many as it stands for."""
+    """Put a residual on a floor; a long recording is thinned, and each line counts for as many as it stands for."""
     records = []
     size = fitted.hypothesis.size
     matrix, gradient = np.zeros((size, size)), np.zeros(size)

@@ -47,7 +47,9 @@ def test_a_package_elsewhere_on_the_path_is_named_by_its_folder(tmp_path: Path) 
     (other / "figures").mkdir(parents=True)
     (other / "figures" / "__init__.py").write_text("")
     code = f"import sys; sys.path.insert(0, {str(other)!r}); import millfrf"
-    ended = _python(ROOT.parent, "-c", code)
+    work = tmp_path / "work"
+    work.mkdir()
+    ended = _python(work, "-c", code)
     line = f"{other / 'figures'} hides the package 'figures' of millfrf: rename it"
     assert ended.stderr.strip().splitlines()[-1] == f"ImportError: {line}"
 

@@ -28,7 +28,7 @@ class CutComparison:
     names
         Names of the causes that can be weighed.
     settings
-        Thresholds.
+        Thresholds of a cut's diagnosis.
     """
 
     cut: MeasuredCut
@@ -113,12 +113,13 @@ class CutComparison:
 def covariance_with_usual_error(cut: MeasuredCut, fitted: CutFit, name: str) -> Real:
     """Covariance of one freed cause's numbers by noise and by the force model's usual error, SI.
 
-    Each line of a right force is off by its share, and all may be off together: so is a number that scales with it.
+    Each line of a right force is off by a share, and all lines may be off together: a number that scales with the
+    force is then off by the same share.
 
     Parameters
     ----------
     cut
-        Gives the usual error.
+        Recordings with the force model's usual error.
     fitted
         A fit with the cause.
     name

@@ -23,9 +23,9 @@ class CutDetails:
     cut
         Recordings, cutter and noise.
     nominal, base, final
-        Fits: as the cutting file says, with coefficients refitted, with the causes that are told.
+        Fits with the numbers of the cutting file, with coefficients refitted, and with the causes that are told.
     chatter
-        What each recording says about the stability of its cut.
+        Judgement of each recording on the stability of its cut.
     settings
         Thresholds that were used.
     """
@@ -82,7 +82,7 @@ def write_improved_cut(path: str | os.PathLike[str], diagnosis: CutDiagnosis) ->
     path
         The file; an older one is replaced.
     diagnosis
-        The diagnosis.
+        The diagnosis whose fit is written.
 
     Raises
     ------

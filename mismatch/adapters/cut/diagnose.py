@@ -51,7 +51,7 @@ def diagnose_cut(
     recordings
         One or more cuts of this process, of at least 80 revolutions.
     settings
-        Thresholds.
+        Thresholds of a cut's diagnosis.
     coefficient_error
         One standard deviation of what a laboratory's coefficients are off, a share; None: as the settings say.
     force_error

@@ -1,4 +1,4 @@
-"""Errors of a cause's numbers that hold its form: between blocks, between bands, and with another cause free."""
+"""Errors of a cause's numbers that include its form: between blocks, between bands, and with another cause free."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -46,7 +46,7 @@ def form_errors(
     final
         Fit with all accepted causes.
     halves
-        The same fitted to either half of the blocks.
+        The same hypothesis fitted to either half of the blocks.
     further
         Fits of the last round; those with one more cause beside the accepted ones are used.
     """

@@ -11,7 +11,7 @@ from .fits import CutFit, CutHypothesis, MeasuredCut, fit_cut
 Real = NDArray[np.float64]
 
 FOLDS = (slice(0, None, 2), slice(1, None, 2))
-"""Every other block; each half is tested with numbers fitted to the other."""
+"""Slices of every other block: each half is tested with numbers fitted to the other."""
 
 Halves = tuple[CutFit, CutFit]
 
@@ -88,9 +88,9 @@ def improvement(cut: MeasuredCut, nominal: Halves, base: Halves, final: Halves, 
     cut
         Recordings with their noise.
     nominal, base, final
-        Fits to either half: as the cutting file says, with coefficients refitted, with causes.
+        Fits to either half with the numbers of the cutting file, with coefficients refitted, and with causes.
     proof
-        Test of the fall.
+        Thresholds of the test that the error falls.
     """
     before, refitted, after = (held_out_powers(cut, one) for one in (nominal, base, final))
     total = sum(float(np.sum(np.abs(spectra.measured) ** 2)) for spectra in cut.spectra)

@@ -24,7 +24,7 @@ def accepted_causes(cut: MeasuredCut, found: Search[CutFit], halves: Halves) -> 
     cut
         Recordings with their noise.
     found
-        The search.
+        The search for causes, as it ended.
     halves
         The last step fitted to either half of the blocks.
     """
@@ -32,7 +32,7 @@ def accepted_causes(cut: MeasuredCut, found: Search[CutFit], halves: Halves) -> 
     further: Sequence[Proposal[CutFit]] = found.rounds[-1].proposals if found.rounds else ()
     form = form_errors(cut, final, halves, further)
     moving = any(final.hypothesis.cause(name).moves for name in final.freed)
-    # what noise of the motion does a second time it has done a first time: the error that no residual shows
+    # noise of the motion shifts numbers, and no residual shows it: added once more, it shifts them as much again
     again = fit_cut(cut.noisier(), final.hypothesis, final.freed) if moving else final
     named = []
     for accepted in found.accepted:
@@ -61,7 +61,7 @@ def odd_coefficients(cut: MeasuredCut, fitted: CutFit, settings: CutSettings) ->
     fitted
         Fit with free coefficients.
     settings
-        Thresholds.
+        Thresholds of a cut's diagnosis.
     """
     off = fitted.hypothesis.deviations
     errors = np.sqrt(np.diag(fitted.covariance)[:6])
@@ -80,7 +80,7 @@ def weighed_candidates(found: Search[CutFit], told: CutFit) -> list[Candidate]:
     Parameters
     ----------
     found
-        The search.
+        The search for causes, as it ended.
     told
         Fit that the diagnosis tells: a cause that was accepted and is not in it is not confirmed.
     """

@@ -1,4 +1,4 @@
-"""What a fit leaves beyond noise and beyond what a right force model is off, and at which spindle orders it sits."""
+"""Residual of a fit beyond noise and beyond the error of a right force model, and the spindle orders that hold it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,12 +24,12 @@ WORTH_TELLING = 0.01
 
 @dataclass(frozen=True)
 class CutRemainder:
-    """What is left of the recordings.
+    """Residual power of a cut beyond noise and usual error, and where it sits.
 
     Parameters
     ----------
     left
-        Power of the lines that stand out: as a share of the residual's power, and in N^2.
+        Power of the lines that stand out, as a share of the residual's power, and in N^2.
     orders
         Spindle orders that hold most of it (multiples of the spindle's frequency), strongest first.
     channels
@@ -51,7 +51,7 @@ def cut_remainder(cut: MeasuredCut, hypothesis: CutHypothesis, settings: CutSett
     hypothesis
         Numbers of the fit.
     settings
-        Chance, and how far a right force may be off.
+        Thresholds: the chance, and how far a right force may be off.
     """
     power, total = 0.0, 0.0
     by_order: dict[float, float] = {}

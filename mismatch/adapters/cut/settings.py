@@ -25,11 +25,12 @@ class CutSettings(Settings):
         Share by which each spectral line of a right computed force is still off; what is smaller is not named. It is
         a choice of this project, no published figure.
     odd
-        Laboratory's errors by which a coefficient must be off to be named: 1 in 370 by chance.
+        Number of a laboratory's standard deviations by which a coefficient must be off to be named; chance alone
+        exceeds it once in 370.
     chance
         Probability that a spectral line of noise passes for something left over: none of some ten thousand lines does.
     usual_errors
-        Times ``force_error`` by which a line of the computed force may be off before it is left over.
+        Multiple of ``force_error`` by which a line of the computed force may be off before it is left over.
     """
 
     coefficient_error: float = 0.15

@@ -25,7 +25,7 @@ class RobotComparison:
     Parameters
     ----------
     settings
-        Thresholds.
+        Thresholds of a diagnosis.
     robot
         The robot in the postures of its recordings.
     changes
@@ -51,7 +51,7 @@ class RobotComparison:
         Parameters
         ----------
         fitted
-            A hypothesis.
+            Hypothesis that was fitted to the recordings.
         """
         return (fitted.cost - self.free.fitted.misfit) / max(fitted.told, 1.0)
 

@@ -61,9 +61,10 @@ def diagnose_robot(
     rigid_links
         Whether the model with its links made rigid is questioned; the file's sections are then a candidate.
     payload_at : (3,), m
-        Where a payload would hang, from the tip in the tool frame; None: its place is fitted with its mass.
+        Place at which a payload would hang, from the tip in the tool frame; None: its place is fitted with its mass.
     sensor : (3,), m
-        Housing sensor from the tip, in the recordings' axes; needed where motion of the housing was recorded.
+        Place of the housing sensor from the tip, in the recordings' axes; needed where motion of the housing
+        was recorded.
     error
         One standard deviation of what the modes of a right model are still off; None: that of ``settings``.
     most_causes
@@ -129,14 +130,14 @@ def _remainder(comparison: RobotComparison, fitted: RobotFit) -> Remainder:
 
 
 def _equivalents(found: Search[RobotFit]) -> tuple[str, ...]:
-    """Names that the recordings cannot tell from the change that was accepted last."""
+    """Names of changes that the recordings cannot tell from the change that was accepted last."""
     named = {one.name for one in found.accepted}
     rounds = [one for one in found.rounds if one.chosen is not None and one.chosen.name in named]
     return rounds[-1].equivalents if rounds else ()
 
 
 def _verdict(comparison: RobotComparison, found: Search[RobotFit], equivalents: Sequence[str]) -> str:
-    """What is left decides, and whether the changes hold on recordings held out."""
+    """The verdict, from what is left and from whether the changes hold on recordings held out."""
     limits, proof = comparison.settings.verdict, comparison.settings.proof
     before, after = (comparison.held_out(one.changes) for one in (found.base, found.current))
     named = bool(found.accepted) and lowers(before, after, proof)
@@ -155,5 +156,5 @@ def _verdict(comparison: RobotComparison, found: Search[RobotFit], equivalents: 
 
 
 def _halved(before: HeldOutTest, after: HeldOutTest, share: float) -> bool:
-    """Whether that share of the squared error beyond noise is gone on recordings held out."""
+    """Whether a share of the squared error beyond noise is gone on recordings held out."""
     return after.beyond <= (1 - share) * before.beyond

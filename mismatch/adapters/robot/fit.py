@@ -31,11 +31,11 @@ class RobotFit:
     deviations
         Deviations u of the modes of each recording, in units of the laboratory's error.
     misfit
-        ``2 sum r^H V^-1 r`` over lines and recordings, V known.
+        ``2 sum r^H V^-1 r`` over lines and recordings, with the noise covariance V known.
     deviation
-        ``sum |u|^2``.
+        Squared deviations of all modes, ``sum |u|^2``.
     doubt
-        ``sum ((number - centre) / spread)^2`` over companions, of which something is believed.
+        ``sum ((number - centre) / spread)^2`` over companions whose numbers are believed to lie near a centre.
     price
         ``ln N`` for each change, and ``2 ln(spread / standard error)`` for each companion: what their freedom costs
         (Bayes' information criterion, and Laplace's approximation where a belief has a width).

@@ -21,7 +21,7 @@ STEP = 1e-3
 
 
 def doubt_of(changes: Changes) -> float:
-    """``sum ((number - centre) / spread)^2`` over companions, of which something is believed.
+    """``sum ((number - centre) / spread)^2`` over companions whose numbers are believed to lie near a centre.
 
     Parameters
     ----------
@@ -84,12 +84,12 @@ class FitProblem:
 
 @dataclass(frozen=True)
 class FitState:
-    """Where a fit stands, and all that follows from it.
+    """State of a fit, and all that follows from it.
 
     Parameters
     ----------
     problem
-        What stays the same in the fit.
+        Recordings, whitening and belief, which stay the same in the fit.
     changes
         Changes with their numbers.
     modes
@@ -127,7 +127,7 @@ class FitState:
 
     @cached_property
     def beside(self) -> list[list[RobotModes]]:
-        """Modes with one coordinate after the other a little off: one list a change, one entry a recording."""
+        """Modes with each coordinate a little off in turn: one list for each change, one entry for each recording."""
         result = []
         for which, (change, number) in enumerate(self.changes):
             changes = list(self.changes)
@@ -140,7 +140,7 @@ class FitState:
         """The state after a step of the numbers' coordinates and then of all deviations.
 
         The recordings fix the modes far better than the robot's numbers, so the step is taken linearly in the modes as
-        seen; deviations are what the new robot needs to show them. Taken linearly in u, it would leave a narrow valley.
+        seen; the deviations then give the new robot these modes. A step linear in u would leave a narrow valley.
 
         Parameters
         ----------

@@ -44,7 +44,7 @@ class Fold:
 
 @dataclass(frozen=True)
 class HeldOutTest:
-    """What changes are worth where they were not fitted.
+    """Errors of changes on recordings to which they were not fitted.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class HeldOutTest:
 
 
 def folds_of(robot: PosedRobot, free: FreeFit, start: Changes) -> tuple[Fold, ...]:
-    """One recording after the other left out; a single one is cut in two.
+    """Leave out one recording after the other; a single one is cut in two.
 
     Parameters
     ----------
@@ -91,12 +91,12 @@ def folds_of(robot: PosedRobot, free: FreeFit, start: Changes) -> tuple[Fold, ..
 
 
 def held_out_test(folds: Sequence[Fold], changes: Changes) -> HeldOutTest:
-    """Fit the changes' numbers to the others of each fold, and predict what was left out.
+    """Fit the changes' numbers to the remaining recordings of each fold, and predict the one left out.
 
     Parameters
     ----------
     folds
-        Recordings left out.
+        Recordings left out, each with the robot in the others.
     changes
         Changes with the numbers to start from.
     """
@@ -122,7 +122,7 @@ def block_errors(modes: RobotModes, spectrum: WindowedSpectrum) -> Real:
     Parameters
     ----------
     modes
-        Modes that predict.
+        Modes that predict the response.
     spectrum
         Windowed spectrum of the recording.
     """

@@ -1,4 +1,4 @@
-"""Errors of a change's number that hold its form: between recordings, and with other changes beside it."""
+"""Errors of a change's number that include its form: between recordings, and with other changes beside it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -52,9 +52,9 @@ def number_errors(
     robot
         The robot and its recordings.
     final
-        The fit.
+        The last fit, with all accepted changes.
     elsewhere
-        Its numbers with one recording left out.
+        Test on recordings left out, with the fit's numbers for each.
     changes
         All changes that are weighed.
     free

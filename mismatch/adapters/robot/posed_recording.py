@@ -77,7 +77,7 @@ def posed(
     responses, excitations
         Degrees of freedom of the columns, at the tip or the housing.
     axes : (3, 3)
-        As :class:`PosedRecording`; None: the base frame.
+        Columns X, Y, Z of the channels in the base frame; None: the channels have the base frame's axes.
     decay
         Decay rate of the slowest mode, 1/s.
 
@@ -123,12 +123,16 @@ def read_posed(
     Parameters
     ----------
     path
-        Recording.
+        File of the recording.
     q : (n_moving,), rad
+        Joint values as stated.
     model
-        The robot's modal model there, modes of the band: it says how fast the recording must be sampled.
-    band, axes
-        As :func:`posed`.
+        The robot's modal model in this posture, with the modes of the band: it says how fast the recording must be
+        sampled.
+    band
+        Lowest and highest frequency that are compared, Hz.
+    axes : (3, 3)
+        Columns X, Y, Z of the channels in the base frame; None: the channels have the base frame's axes.
     stream
         Sample clock; None: the only one.
 

@@ -95,10 +95,17 @@ def posed_robot(
 
     Parameters
     ----------
-    robot, recordings, error, rigid_links
-        As :class:`PosedRobot`.
+    robot
+        The robot as its file has it.
+    recordings
+        One or more recordings with their postures.
+    error
+        One standard deviation of what the modes of a right robot model are still off.
+    rigid_links
+        Whether the model in question has its links made rigid.
     sensor : (3,), m
-        As :class:`PosedRobot`; None where no motion of the housing was recorded.
+        Place of the housing sensor from the tip, in the recordings' axes; None where no motion of the housing was
+        recorded.
 
     Raises
     ------

@@ -34,7 +34,7 @@ class RobotModes:
     damping : (n_modes,), 1
         Damping ratios; above 1 where a mode is overdamped.
     shapes : (n_modes, n_places)
-        Mass-normalised, over ``TIP`` or ``TIP + HOUSING``.
+        Mass-normalised shapes over ``TIP`` or ``TIP + HOUSING``, kg^-1/2.
     rows, columns
         Places of the recording's responses and excitations among them.
     count
@@ -50,12 +50,12 @@ class RobotModes:
 
     @property
     def per_mode(self) -> int:
-        """Deviations of one mode: ln frequency, ln damping ratio, each entry of the shape."""
+        """Number of deviations of one mode: ln frequency, ln damping ratio, each entry of the shape."""
         return 2 + int(self.shapes.shape[1])
 
     @property
     def size(self) -> int:
-        """Deviations altogether."""
+        """Number of deviations of all modes that may be off."""
         return self.count * self.per_mode
 
     def moved(self, u: Real, error: LabError) -> "RobotModes":
@@ -66,7 +66,7 @@ class RobotModes:
         u : (size,)
             Deviations in units of ``error``.
         error
-            One standard deviation of each.
+            One standard deviation of the deviations.
         """
         table = u.reshape(self.count, self.per_mode)
         natural, damping, shapes = self.natural.copy(), self.damping.copy(), self.shapes.copy()
@@ -180,7 +180,7 @@ def robot_modes(robot: SpatialRobot, recording: PosedRecording, offset: Real, se
     robot
         The robot, changed or not.
     recording
-        Its posture, axes and degrees of freedom.
+        Recording with its posture, axes and degrees of freedom.
     offset : (n_moving,), rad
         Angle by which each joint stands elsewhere than stated.
     sensor : (3,), m

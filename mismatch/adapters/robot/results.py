@@ -51,7 +51,7 @@ def number_of(cause: Told) -> float:
     Parameters
     ----------
     cause
-        Of a robot's diagnosis, accepted or weighed.
+        Accepted or weighed cause of a robot's diagnosis.
     """
     return cause.parameters[cause.name]
 
@@ -62,7 +62,8 @@ def standard_error_of(cause: Told) -> float:
     Parameters
     ----------
     cause
-        Of a robot's diagnosis. The error of an accepted cause holds its form; that of a candidate is its fit's.
+        Accepted or weighed cause of a robot's diagnosis. The error of an accepted cause includes that of its form;
+        the error of a candidate is that of its fit alone.
     """
     return cause.standard_errors[cause.name]
 
@@ -73,7 +74,7 @@ def companions_of(cause: Told) -> tuple[CompanionNumber, ...]:
     Parameters
     ----------
     cause
-        Of a robot's diagnosis, accepted or weighed.
+        Accepted or weighed cause of a robot's diagnosis.
     """
     return tuple(
         CompanionNumber(name, one["unit"], cause.parameters[name], cause.standard_errors[name], one["spread"])
@@ -115,7 +116,7 @@ def location_of(change: Change) -> dict[str, Any]:
     Parameters
     ----------
     change
-        The change.
+        Change whose place in the diagnosis is described.
     """
     place: dict[str, Any] = {"kind": change.kind, "unit": change.unit}
     if change.companions:
@@ -131,7 +132,7 @@ def candidate_of(proposal: Proposal[RobotFit], stage: str) -> Candidate:
     proposal
         The fitted change.
     stage
-        How far it was taken.
+        Stage to which the change was taken.
     """
     fitted = proposal.fitted
     numbers, errors = _by_name(fitted, fitted.standard_errors, proposal.name)

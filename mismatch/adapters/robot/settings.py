@@ -11,7 +11,7 @@ ROBOT = Settings(
     proof=ProofSettings(significance=0.01, beaten=0.25),
     verdict=VerdictSettings(noise_like=2.0, explained=0.9, partly=0.5),
 )
-"""What differs for robots.
+"""Thresholds of the core that differ for robots.
 
 The modes of a right robot model are off by one per cent, 15 per cent, and a twentieth of a shape's size, as its
 stiffnesses come from data sheets. Equivalents are within a likelihood ratio of 20. What is left is measured by the cost

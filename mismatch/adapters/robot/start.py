@@ -26,9 +26,9 @@ def numbered(change: Change, number: float) -> Changes:
     Parameters
     ----------
     change
-        The change.
+        Change that gets the number.
     number
-        Its number, in the change's unit.
+        Number of the change, in its unit.
     """
     return ((change, number), *((one, one.neutral) for one in change.companions))
 

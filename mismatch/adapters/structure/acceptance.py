@@ -42,9 +42,9 @@ def possible_gains(proposals: Sequence[Proposal[Fit]], settings: EvidenceSetting
     Parameters
     ----------
     proposals
-        Fitted causes.
+        Fitted causes with their evidence.
     settings
-        Thresholds.
+        Thresholds of the evidence.
     """
     good = [one for one in proposals if one.evidence >= settings.least and not impossible(one, settings.clear)]
     return sorted(good, key=lambda one: -one.evidence)
@@ -91,9 +91,9 @@ def evidence_needed(current: Fit, base: Fit, settings: EvidenceSettings) -> floa
     current
         The fit with the causes found so far.
     base
-        The fit without any.
+        The fit without any cause.
     settings
-        Thresholds.
+        Thresholds of the evidence.
     """
     share = settings.small_after_law if current.hypothesis.laws else settings.small
     return max(settings.least, share * (base.score - current.score))
@@ -102,9 +102,10 @@ def evidence_needed(current: Fit, base: Fit, settings: EvidenceSettings) -> floa
 def worth_it(
     proposal: Proposal[Fit], current: Fit, base: Fit, lines: list[WindowedSpectrum], settings: EvidenceSettings
 ) -> bool:
-    """Whether a cause has enough evidence; of evidence in the lab's belief alone, most of what was odd must go.
+    """Whether a cause has enough evidence, in the misfit or in what the lab believes of the modes.
 
-    It must then be more likely, too, than that the lab was wrong in nothing but all dampings, or all frequencies.
+    A cause that gains in belief alone must take away most of what was odd about the modes. It must then also be more
+    likely than that the lab was wrong in nothing but all dampings, or all frequencies.
 
     Parameters
     ----------
@@ -113,9 +114,9 @@ def worth_it(
     current, base
         Fits with the causes found so far, and without any.
     lines
-        Recordings.
+        Windowed lines of the recordings.
     settings
-        Thresholds.
+        Thresholds of the evidence.
     """
     fitted, needed = proposal.fitted, evidence_needed(current, base, settings)
     if isinstance(fitted.hypothesis.causes[-1].physics, ModePhysics):

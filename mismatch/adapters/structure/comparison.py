@@ -18,18 +18,18 @@ PRUNING = 20
 
 @dataclass(frozen=True)
 class StructureComparison:
-    """Recordings, causes and thresholds.
+    """Recordings, causes and thresholds of one diagnosis of a structure.
 
     Parameters
     ----------
     lines
-        Recordings, mended.
+        Windowed lines of the mended recordings.
     causes
         Causes that are weighed, by name.
     settings
-        Thresholds.
+        Thresholds of the diagnosis.
     before
-        What of the residual moves with the signal without any cause.
+        Part of the residual that moves with the signal when no cause is accepted.
     """
 
     lines: list[WindowedSpectrum]
@@ -38,7 +38,7 @@ class StructureComparison:
     before: Remainder
 
     def finished(self, search: Search[Fit]) -> bool:
-        """Never before a round finds nothing: a small cause may hide behind a large one."""
+        """Whether to stop before a round finds nothing: never, as a small cause may hide behind a large one."""
         return False
 
     def round(self, search: Search[Fit]) -> Round[Fit]:

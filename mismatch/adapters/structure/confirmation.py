@@ -19,7 +19,7 @@ def confirmed(
     comparison
         Thresholds and how fits without a cause are made.
     recordings
-        Mended and as measured.
+        The recordings, mended and as measured.
     found
         Where the search ended.
     faults
@@ -28,7 +28,7 @@ def confirmed(
     Returns
     -------
     found, held_out
-        With fewer causes, or as it was; and what is left is worth on the recording held out.
+        The search with fewer causes, or as it was, and what its causes are worth on the recording held out.
     """
     while True:
         last = found.current
@@ -47,8 +47,8 @@ def helps(gain: Improvement, current: Fit, base: Fit, settings: Settings) -> boo
 
     Causes that gained little where they were fitted but stand nearer to the lab's belief than a general refit need not
     predict better than that; they must predict better than the nominal model, and no worse than the refit where they
-    gained more than chance. (A sensor's gain is a refit of shapes to the last digit: only that the lab was not off by
-    so much in every mode speaks for it.)
+    gained more than chance. (A refit of shapes imitates a sensor's gain exactly. Nothing but the lab's belief, that not
+    every mode is off by so much, speaks for the gain.)
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def helps(gain: Improvement, current: Fit, base: Fit, settings: Settings) -> boo
     current, base
         Fits with and without the causes.
     settings
-        Thresholds.
+        Thresholds of the diagnosis.
     """
     if base.misfit - current.misfit < settings.evidence.least:
         return gain.after < gain.before
@@ -75,7 +75,7 @@ def by_belief(without: Fit, whole: Fit, settings: Settings) -> bool:
     without, whole
         Fits without and with a cause.
     settings
-        Thresholds.
+        Thresholds of the diagnosis.
     """
     least = max(settings.evidence.least, settings.proof.belief_alone * (without.score - whole.score))
     return without.misfit - whole.misfit < least

@@ -53,7 +53,7 @@ def diagnose(
     Parameters
     ----------
     model
-        Nominal receptances.
+        Modal model with the nominal receptances.
     recordings
         Forces and responses of the model's degrees of freedom, in any order.
     settings
@@ -80,7 +80,7 @@ def _diagnosed(
     progress: Progress,
     speeds: Mapping[str, SpindleSpeed],
 ) -> StructureDiagnosis:
-    """One step after the other."""
+    """The diagnosis, one step after the other."""
     decay = float((-model.poles.real).min())
     bands = [compared_band(model, one.rate) for one in recordings]
     lines = [windowed_spectrum(one, band.edges, decay) for one, band in zip(recordings, bands, strict=True)]

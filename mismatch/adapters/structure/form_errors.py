@@ -23,7 +23,7 @@ WIDER, WORSE = 15, 20.0
 """Steps at most of a fit of a wider form, and score by which it may be worse: else it did not end."""
 
 PARTS = 3
-"""Of each recording, by how hard the structure moves: weak, middle, strong."""
+"""Number of parts of each recording, by how hard the structure moves: weak, middle, strong."""
 
 DISAGREE = 0.05
 """Chance below which parts are taken to disagree."""
@@ -35,9 +35,9 @@ NORMAL = 1.959964
 def with_form_spread(fitted: Fit, lines: Sequence[WindowedSpectrum]) -> Fit:
     """A fit whose covariance holds, beside the noise, what its numbers owe to the form of their laws.
 
-    A law that has a wider form, one shape number more, is fitted in that form too: what its numbers then differ, and
-    how much less surely they are known, counts. And a law of another form is matched best by other numbers where the
-    motion is small than where it is large. Each recording is cut into blocks of time, and these are put into a weak, a
+    A law that has a wider form, with one shape number more, is fitted in that form too: the difference of its numbers
+    and the growth of their errors count. Where the true law has another form, the numbers that match it best differ
+    between small and large motion. Each recording is cut into blocks of time, and these are put into a weak, a
     middle and a strong part; each part g has its own answer ``theta_g = theta + N_g^-1 J_g^T V^-1 r_g`` for every
     number, to first order and with the modes held. Where the parts disagree beyond their noise (Cochran's Q), the
     variance between them (DerSimonian & Laird 1986, Controlled Clinical Trials 7) is added, widened by Student's t for
@@ -48,7 +48,7 @@ def with_form_spread(fitted: Fit, lines: Sequence[WindowedSpectrum]) -> Fit:
     fitted
         The final fit.
     lines
-        Its recordings.
+        Windowed lines of the recordings that were fitted.
     """
     shape = fitted.hypothesis.shape
     believed = shape.per_mode * (len(shape.nominal.poles) - shape.added)
@@ -66,7 +66,7 @@ def with_form_spread(fitted: Fit, lines: Sequence[WindowedSpectrum]) -> Fit:
 def _of_wider_forms(fitted: Fit, lines: list[WindowedSpectrum]) -> Real:
     """Variance that each number gains when its law may take a wider form, (size,).
 
-    The wider law is fitted like the named one; what its number differs, squared, and how much less surely it is known
+    The wider law is fitted like the named one. The squared difference of its number and the growth of its variance
     are what the named number owes to the form.
     """
     extra = np.zeros(fitted.hypothesis.size)

@@ -50,9 +50,9 @@ class Recordings:
     Parameters
     ----------
     mended
-        Without tones, clipped samples put back: what causes are fitted to.
+        Recordings without tones and with clipped samples put back, to which causes are fitted.
     measured
-        As they were measured: what errors are counted on.
+        Recordings as they were measured, on which errors are counted.
     """
 
     mended: list[WindowedSpectrum]
@@ -60,11 +60,11 @@ class Recordings:
 
     @property
     def kept(self) -> int:
-        """Number of the one that is held out: the middle level, of two the weaker, so that the others bracket it."""
+        """Number of the recording held out: the middle level (the weaker of two), so that the others bracket it."""
         return (len(self.mended) - 1) // 2
 
     def others(self, which: list[WindowedSpectrum]) -> list[WindowedSpectrum]:
-        """All but that one; all where there is only one."""
+        """All recordings but the one held out; all where there is only one."""
         return [one for k, one in enumerate(which) if k != self.kept] or which
 
 
@@ -75,22 +75,22 @@ def held_out_improvement(
     faults: Sequence[AcceptedCause],
     settings: ProofSettings,
 ) -> HeldOut:
-    """Fit on all recordings but one, compare errors on that one as it was measured.
+    """Fit on all recordings but one, and compare errors on that one as it was measured.
 
     With a single recording nothing can be held out; errors are then those of the fit, the p-value is 1.
 
     Parameters
     ----------
     recordings
-        Mended and as measured.
+        The recordings, mended and as measured.
     final
-        What was found on all of them; its numbers are fitted anew on the others.
+        Hypothesis that was found on all recordings; its numbers are fitted anew on the others.
     noises
         Noise of every recording from the fit on all.
     faults
         Faults of the recordings, which are put into what ``final`` predicts.
     settings
-        Thresholds.
+        Thresholds of the proof on held-out blocks.
     """
     mended, measured = recordings.others(recordings.mended), recordings.others(recordings.measured)
     tasks = [partial(fit, measured, final.nominal, iterations=ITERATIONS)]
@@ -112,7 +112,7 @@ def scored(
     Parameters
     ----------
     recordings
-        Mended and as measured.
+        The recordings, mended and as measured.
     elsewhere
         Modal parameters alone, and the whole hypothesis.
     noises
@@ -120,7 +120,7 @@ def scored(
     faults
         Faults of the recordings.
     settings
-        Thresholds.
+        Thresholds of the proof on held-out blocks.
     """
     linear, improved = elsewhere
     here, kept = recordings.measured[recordings.kept], recordings.kept
@@ -163,13 +163,13 @@ def chance_of_no_gain(
     Parameters
     ----------
     lines
-        The recording.
+        Windowed lines of the recording.
     covariance : (n_lines, n_responses, n_responses)
         Covariance of its noise.
     rival, final : (n_lines, n_responses)
         Residual lines of both hypotheses.
     settings
-        Names the paired test.
+        Thresholds of the proof, with the paired test.
     """
     white = whitening(covariance)
     rival_power, power = (block_powers(lines, np.einsum("kij,kj->ki", white, rest)) for rest in (rival, final))
@@ -182,9 +182,9 @@ def block_powers(lines: WindowedSpectrum, rest: Complex) -> Real:
     Parameters
     ----------
     lines
-        The recording.
+        Windowed lines of the recording.
     rest : (n_lines, n_responses)
-        Residual lines.
+        Residual lines, in the units of the responses.
     """
     spectrum = np.zeros((len(lines.window) // 2 + 1, rest.shape[1]), dtype=complex)
     spectrum[lines.band] = rest
@@ -198,7 +198,7 @@ def block_slices(lines: WindowedSpectrum) -> list[slice]:
     Parameters
     ----------
     lines
-        The recording.
+        Windowed lines of the recording.
     """
     count = max(2, round(len(lines.window) / lines.recording.rate / BLOCK))
     edges = np.linspace(0, len(lines.window), count + 1).astype(int)

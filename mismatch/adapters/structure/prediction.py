@@ -23,15 +23,15 @@ class Prediction:
     Parameters
     ----------
     response : (n_samples, n_responses)
-        In the measured quantities; of frequencies up to half the sampling rate.
+        Predicted responses in the measured quantities, with frequencies up to half the sampling rate.
     run_in
         Samples at the beginning in which the structure's unknown first motion still rings.
     error : (n_responses,)
         Root mean square of measured minus predicted over that of measured, in the model's band after the run-in.
     total_error
-        Of all responses together, each line of the band counting by its power.
+        Error of all responses together; each line of the band counts by its power.
     band
-        Hz.
+        Lowest and highest frequency that are compared, Hz.
     """
 
     response: Real

@@ -21,10 +21,11 @@ def equivalent_receptance(hypothesis: Hypothesis, lines: WindowedSpectrum, frequ
     Parameters
     ----------
     hypothesis
-        As fitted.
+        Hypothesis with its modes and causes as fitted.
     lines
         Recording whose motion counts.
     frequencies : (n,), Hz
+        Frequencies at which the receptances are computed.
 
     Returns
     -------

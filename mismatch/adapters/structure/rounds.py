@@ -1,4 +1,4 @@
-"""One round of the search in a structure: everything is screened, what promises most is fitted."""
+"""One round of the search in a structure: every cause is screened, and those that promise most are fitted."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -32,13 +32,13 @@ class Standing:
     Parameters
     ----------
     lines
-        Recordings.
+        Windowed lines of the recordings.
     current, base
         Fits with the causes found so far, and with none.
     moving, before
-        What of the residual moves with the signal, under ``current`` and under ``base``.
+        Parts of the residuals of ``current`` and of ``base`` that move with the signal.
     settings
-        Thresholds.
+        Thresholds of the diagnosis.
     """
 
     lines: list[WindowedSpectrum]
@@ -68,7 +68,7 @@ class Weighed:
     Parameters
     ----------
     proposals
-        Fitted causes.
+        Fitted causes with their evidence.
     candidates
         All causes, screened and fitted.
     sighted

@@ -22,20 +22,20 @@ def verdict_of_structure(
     gain: Improvement,
     settings: VerdictSettings,
 ) -> str:
-    """``none``, ``explained``, ``partly explained`` or ``unexplained``.
+    """Give the verdict: ``none``, ``explained``, ``partly explained`` or ``unexplained``.
 
     Parameters
     ----------
     hypothesis
-        With all accepted causes.
+        The hypothesis with all accepted causes.
     causes
         Causes that would be told, faults and modal parameters among them.
     left
-        What moves with the signal without any cause, and with all.
+        Parts of the residual that move with the signal, without any cause and with all.
     gain
         Errors on the recording held out.
     settings
-        Thresholds.
+        Thresholds of the verdict.
     """
     before, after = left
     most = settings.most_of_response

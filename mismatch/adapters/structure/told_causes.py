@@ -38,7 +38,7 @@ def told_causes(fitted: Fit, accepted: Sequence[Proposal[Fit]]) -> list[Accepted
     fitted
         The fit with all accepted causes.
     accepted
-        In the order found, which is that of the hypothesis.
+        Accepted causes in the order found, which is that of the hypothesis.
     """
     told = []
     for place, (one, cause) in enumerate(zip(accepted, fitted.hypothesis.causes, strict=True)):
@@ -77,7 +77,7 @@ def accepted_mode(fitted: Fit, physics: ModePhysics, evidence: float) -> Accepte
     physics
         The cause that added it.
     evidence
-        Gain in score.
+        Gain in score by the mode.
     """
     shape, model = fitted.hypothesis.shape, fitted.hypothesis.model
     first = shape.per_mode * (len(model.poles) - 1)

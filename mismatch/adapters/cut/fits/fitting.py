@@ -24,12 +24,12 @@ ALL = slice(None)
 
 @dataclass(frozen=True)
 class CutFit:
-    """A fitted hypothesis.
+    """A hypothesis that was fitted to a cut, with its cost.
 
     Parameters
     ----------
     hypothesis
-        Its numbers.
+        Hypothesis with the fitted numbers.
     freed
         Names of the causes that were fitted.
     misfit

@@ -49,12 +49,12 @@ class FreeNumbers:
 
     @property
     def coefficients(self) -> int:
-        """How many deviations are free: 6 or 0."""
+        """Number of deviations that are free: 6 or 0."""
         return 6 if self.refit else 0
 
     @property
     def physical(self) -> int:
-        """How many coordinates are not the spindle's; they come first."""
+        """Number of coordinates that are not the spindle's; they come first."""
         return self.coefficients + len(self.parameters)
 
     @cached_property

@@ -50,19 +50,19 @@ class CutHypothesis:
         return next(values for cause, values in self.acting if cause.name == name)
 
     def with_values(self, name: str, values: Real) -> "CutHypothesis":
-        """The same with other numbers of one cause.
+        """The same hypothesis with other numbers of one cause.
 
         Parameters
         ----------
         name
             Name of the cause.
         values : (n_numbers,)
-            Its new numbers, SI.
+            New numbers of the cause, SI.
         """
         return replace(self, acting=tuple((one, values if one.name == name else old) for one, old in self.acting))
 
     def with_angle(self, number: int, angle: float) -> "CutHypothesis":
-        """The same with another spindle angle in one recording.
+        """The same hypothesis with another spindle angle in one recording.
 
         Parameters
         ----------

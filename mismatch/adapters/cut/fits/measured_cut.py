@@ -25,12 +25,12 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class MeasuredCut:
-    """Recordings, cutter and depth.
+    """Recordings of a cut with its cutter, depth and noise.
 
     Parameters
     ----------
     belief
-        Cutting process, and what its coefficients may be off.
+        Cutting process, and how far its coefficients may be off.
     depth
         Axial depth, m.
     spectra
@@ -49,7 +49,7 @@ class MeasuredCut:
     _views: dict[tuple[int, SpindleLaw], CutView] = field(default_factory=dict, repr=False, compare=False)
 
     def only(self, number: int) -> "MeasuredCut":
-        """The same with one of the recordings.
+        """The same cut with one of the recordings.
 
         Parameters
         ----------
@@ -60,12 +60,12 @@ class MeasuredCut:
         return replace(self, spectra=self.spectra[one], noise=self.noise[one], _views={})
 
     def noisier(self) -> "MeasuredCut":
-        """The same with the noise of the tip's motion a second time."""
+        """The same cut with the noise of the tip's motion added a second time."""
         spectra = tuple(replace(one, recording=one.recording.noisier()) for one in self.spectra)
         return replace(self, spectra=spectra, _views={})
 
     def with_noise_of(self, hypothesis: CutHypothesis) -> "MeasuredCut":
-        """The same with the noise that a hypothesis leaves.
+        """The same cut with the noise that a hypothesis leaves.
 
         Parameters
         ----------
@@ -80,7 +80,7 @@ class MeasuredCut:
         return replace(self, noise=noise)
 
     def without_band(self, low: float, high: float) -> "MeasuredCut":
-        """The same with spectral lines of one band weighing nothing.
+        """The same cut with the spectral lines of one band given no weight.
 
         Parameters
         ----------

@@ -13,7 +13,7 @@ from .measured_cut import MeasuredCut
 Real = NDArray[np.float64]
 
 ANGLES = 40
-"""Spindle angles that are tried in a pitch."""
+"""Number of spindle angles that are tried in a pitch."""
 
 
 def started(cut: MeasuredCut, acting: Sequence[tuple[CutPhysics, Real]]) -> CutHypothesis:

@@ -42,7 +42,7 @@ class Belief:
 
     @property
     def scales(self) -> Real:
-        """One standard deviation of each, (6,); of ``ktc`` relative."""
+        """One standard deviation of each coefficient, (6,); that of ``ktc`` is relative."""
         one = self.process
         edge = one.ktc * one.feed_per_tooth
         shares = [1.0, max(abs(one.krc), 0.1), max(abs(one.kac), 0.1)]

@@ -56,11 +56,11 @@ def chip_thickness(process: MillingProcess, tooth: ToothView, earlier: int, acti
     Parameters
     ----------
     process
-        Gives the feed per tooth.
+        Process that gives the feed per tooth.
     tooth
         The tooth that cuts.
     earlier
-        Tooth passings that are looked back.
+        Number of tooth passings that are looked back.
     acting
         Causes, each with its numbers (n_numbers,) in SI.
     """

@@ -1,4 +1,4 @@
-"""Noise of force spectra: a smooth floor under the orders, and what a right model is still off."""
+"""Noise of force spectra: a smooth floor under the orders, and the error of a right model."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ ODD = 9.0
 
 @dataclass(frozen=True)
 class ForceNoise:
-    """Noise of one recording.
+    """Noise of the force spectra of one recording.
 
     Parameters
     ----------

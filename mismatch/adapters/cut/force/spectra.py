@@ -26,7 +26,7 @@ class ForceSpectra:
     Parameters
     ----------
     recording
-        The recording.
+        Recording whose forces are transformed.
     first
         Sample at which the first block begins: earlier ones are the run-in.
     size, blocks
@@ -53,9 +53,9 @@ class ForceSpectra:
         Parameters
         ----------
         force : (n_samples * fine, n)
-            Forces, N.
+            Forces along the recording, N.
         fine
-            Instants in each sample.
+            Number of instants of the forces in each sample of the recording.
         """
         window = tukey(self.size * fine, 0.1, sym=False)
         window = window / np.sqrt(np.sum(window[::fine] ** 2)) / fine
@@ -70,7 +70,7 @@ def force_spectra(recording: CutRecording, teeth: int) -> ForceSpectra:
     Parameters
     ----------
     recording
-        The recording.
+        Recording whose forces are transformed.
     teeth
         Number of teeth of its cutter.
     """

@@ -14,7 +14,7 @@ from ..recordings import FINE, CutRecording, SpindleLaw
 Real = NDArray[np.float64]
 
 EARLIER = 4
-"""Tooth passings looked back, or a revolution if that is more: the surface is the deepest that any left."""
+"""Number of tooth passings looked back, or a revolution if that is more: the surface is the deepest of theirs."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +26,11 @@ class CutView:
     count
         Number of instants.
     fine
-        Instants in each sample of the recording.
+        Number of instants in each sample of the recording.
     teeth
         One view for each tooth.
     earlier
-        Tooth passings that are looked back.
+        Number of tooth passings that are looked back.
     """
 
     count: int
@@ -40,12 +40,12 @@ class CutView:
 
 
 def fineness(recording: CutRecording, top: float) -> int:
-    """Instants in each sample that resolve entry and exit.
+    """Number of instants in each sample that resolves entry and exit.
 
     Parameters
     ----------
     recording
-        Gives the sampling rate.
+        Recording that gives the sampling rate.
     top
         Highest frequency that is compared, Hz.
     """
@@ -61,9 +61,9 @@ def view_of(recording: CutRecording, process: MillingProcess, law: SpindleLaw, f
     Parameters
     ----------
     recording
-        Gives instants and, where it is known, the tip's motion.
+        Recording that gives instants and, where it is known, the tip's motion.
     process
-        Gives teeth, diameter, edge angle and immersion.
+        Process that gives teeth, diameter, edge angle and immersion.
     law
         Angle and speed of the spindle.
     fine

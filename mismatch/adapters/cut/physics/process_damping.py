@@ -22,19 +22,19 @@ class ProcessDamping(CutPhysics):
     moves = True
 
     def parameters(self, process: MillingProcess) -> tuple[Parameter, ...]:
-        """The coefficient C."""
+        """The coefficient C as the only number."""
         return (Parameter("coefficient_n_per_m", "N/m", 1e4, 0.0),)
 
     def stated(self, process: MillingProcess) -> Real:
-        """The file's."""
+        """The coefficient C that the cutting file states, (1,), N/m."""
         return np.array([process.process_damping])
 
     def force(self, values: Real, tooth: ToothView) -> Real:
-        """Against the tip's velocity along the normal."""
+        """Force against the tip's velocity along the normal, (m, 3), N per metre of depth."""
         return np.asarray((-values[0] * tooth.velocity / tooth.cutting_speed)[:, None] * tooth.normal)
 
     def improved(self, process: MillingProcess, values: Real) -> MillingProcess:
-        """With this coefficient."""
+        """The cutting file's process with this coefficient."""
         return replace(process, process_damping=float(values[0]))
 
 

@@ -85,7 +85,7 @@ class CutPhysics(ABC):
 
     @abstractmethod
     def parameters(self, process: MillingProcess) -> tuple[Parameter, ...]:
-        """Its numbers, as they are fitted.
+        """The numbers of the cause, as they are fitted.
 
         Parameters
         ----------
@@ -141,7 +141,7 @@ class CutPhysics(ABC):
         values : (n_numbers,)
             The cause's numbers, SI.
         covariance : (n_numbers, n_numbers)
-            Their covariance.
+            Covariance of these numbers, SI.
         process
             The cutting file's process.
         """

@@ -30,18 +30,18 @@ class Runout(CutPhysics):
         return "one tooth alone shows none" if process.teeth < 2 else ""
 
     def parameters(self, process: MillingProcess) -> tuple[Parameter, ...]:
-        """In and across the direction of tooth 0."""
+        """The offset of the axis along and across the direction of tooth 0."""
         both = (Parameter("offset_along_m", "m", 1e-6), Parameter("offset_across_m", "m", 1e-6))
         return both[:1] if process.teeth <= 2 else both
 
     def stated(self, process: MillingProcess) -> Real:
-        """The file's, largest at tooth 0."""
+        """The runout that the cutting file states, m; it is largest at tooth 0."""
         values = np.zeros(len(self.parameters(process)))
         values[0] = process.runout
         return values
 
     def advance(self, values: Real, tooth: ToothView, earlier: int) -> float:
-        """``rho_(j+k) sin(gamma)``."""
+        """How far the edge of tooth j + k stands out, ``rho_(j+k) sin(gamma)``, m."""
         angle = 2 * np.pi * (tooth.number + earlier) / tooth.teeth
         across = float(values[1]) if len(values) > 1 else 0.0
         return float(values[0] * np.cos(angle) + across * np.sin(angle)) * tooth.sine_edge
@@ -63,7 +63,7 @@ class Runout(CutPhysics):
         return dict(zip(names, (radius, angle), strict=True)), dict(zip(names, errors, strict=True))
 
     def improved(self, process: MillingProcess, values: Real) -> MillingProcess:
-        """With this radius; the file's convention puts the angle to zero."""
+        """The cutting file's process with this radius; the file's convention sets the angle to zero."""
         return replace(process, runout=float(np.hypot(values[0], values[1] if len(values) > 1 else 0.0)))
 
 

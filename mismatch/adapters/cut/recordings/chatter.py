@@ -8,7 +8,7 @@ from stability import classify_cut
 from .recording import CutRecording
 
 UNSTABLE = ("hopf", "period-doubling")
-"""Verdicts of :func:`stability.classify_cut` of a cut that is not stable."""
+"""Verdicts that :func:`stability.classify_cut` gives for a cut that is not stable."""
 
 STEADY = 0.01
 """Share by which the speed may change over a recording that is judged; a sweep crosses resonances."""
@@ -29,7 +29,7 @@ class CutChatter:
     share
         Share of the force's root mean square that chatter has.
     reason
-        What the judgement rests on, in one sentence.
+        Reason of the judgement, in one sentence.
     """
 
     name: str

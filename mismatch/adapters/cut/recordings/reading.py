@@ -38,7 +38,7 @@ def read_cut_recording(
     path
         Recording with forces at ``TCP``, X and Y at least; motion at ``TCP`` if it was measured.
     process
-        Cutter.
+        Cutter, engagement and coefficients of the cut.
     speed
         Spindle speed, rad/s, within two per cent; None: as the recording states it.
     model

@@ -20,7 +20,7 @@ MOST_ORDERS = 8
 """Harmonics of the tooth passing up to which forces are compared."""
 
 FINE = 32
-"""Instants a period of the highest frequency that is compared, at least: entry and exit are sharp."""
+"""Least number of samples in a period of the highest frequency that is compared: entry and exit are sharp."""
 
 LEAST_TURNS = 80
 """Revolutions without which blocks to fit and blocks to test cannot both be had."""
@@ -36,17 +36,17 @@ class CutRecording:
     Parameters
     ----------
     name
-        Of the recording.
+        Name of the recording.
     rate
-        Hz, of forces and motion, as far as they are needed.
+        Sample rate of forces and motion, Hz; it is as high as the comparison needs.
     force : (n_samples, n_axes), N
-        On the tool.
+        Forces on the tool.
     axes : (n_axes,)
-        0, 1, 2 for X, Y, Z: the directions that were measured.
+        Directions in which forces were measured: 0, 1, 2 for X, Y, Z.
     motion
-        At the tip; None where it is not known.
+        Motion of the tip; None where it is not known.
     law
-        Spindle, its angle still unknown.
+        Law of the spindle's angle; the angle itself is still unknown.
     run_in
         Seconds at the beginning in which the motion is not right yet: a filter's or a model's past is not known.
     """
@@ -61,11 +61,11 @@ class CutRecording:
 
     @property
     def times(self) -> Real:
-        """(n_samples,), s."""
+        """Instants of the samples, (n_samples,), s."""
         return np.asarray(np.arange(len(self.force)) / self.rate)
 
     def noisier(self) -> "CutRecording":
-        """With the noise of its motion a second time."""
+        """The recording with the noise of its motion added a second time."""
         return self if self.motion is None else replace(self, motion=self.motion.noisier())
 
     @property
@@ -91,16 +91,16 @@ def cut_recording(
     high_passes: Sequence[float] = (),
     model: ModalModel | None = None,
 ) -> CutRecording:
-    """Prepare samples in memory.
+    """Prepare a recording of a cut from samples in memory.
 
     Parameters
     ----------
     name, rate, force, axes
-        As in :class:`CutRecording`.
+        Name, sample rate, forces and their directions, as :class:`CutRecording` describes them.
     process
-        Cutter.
+        Cutter, engagement and coefficients of the cut.
     stated
-        Spindle's speed, roughly.
+        Law of the spindle as stated, its speed known roughly.
     motion
         Samples (n, k), their directions (0, 1, 2), and how often each is differentiated from displacement; measured at
         the tip.

@@ -19,13 +19,13 @@ WITHIN = 0.02
 """Share by which the stated speed may be off."""
 
 HARMONICS = 3
-"""Of the tooth passing, by which the speed is found."""
+"""Number of harmonics of the tooth passing by which the speed is found."""
 
 LEAST_CONTRAST = 5.0
 """Power of the comb at the found speed over its median at other speeds."""
 
 LEAST_SHARE = 0.1
-"""Of the forces' power that the comb must hold: another line's skirt holds less."""
+"""Share of the forces' power that the comb must hold: the skirt of another line holds less."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class SpindleLaw:
         Parameters
         ----------
         times : (n,)
-            Instants, s.
+            Instants since the first sample, s.
         """
         t = times - self.middle
         return np.asarray(self.angle + self.speed * t + 0.5 * self.change * t**2)
@@ -72,19 +72,19 @@ class SpindleLaw:
         Parameters
         ----------
         times : (n,)
-            Instants, s.
+            Instants since the first sample, s.
         """
         return np.asarray(self.speed + self.change * (times - self.middle))
 
     def lag(self, times: Real, turned: float) -> Real:
-        """Seconds s since the spindle stood less far, ``turned = speed s - change s^2 / 2``, (n,).
+        """Time s, (n,), s, in which the spindle has turned by an angle: ``turned = speed s - change s^2 / 2``.
 
         Parameters
         ----------
         times : (n,)
-            Instants, s.
+            Instants since the first sample, s.
         turned
-            Angle that the spindle has turned since, rad.
+            Angle by which the spindle has turned, rad.
         """
         speed = self.speeds(times)
         return np.asarray(2 * turned / (speed + np.sqrt(np.maximum(speed**2 - 2 * self.change * turned, 0.0))))

@@ -22,7 +22,7 @@ QUIET_BELOW = 0.7
 """Share of half the sampling rate above which a filter may have taken the noise away."""
 
 STANDS_OUT = 12.0
-"""Power of a line over that around it from which it is a line of its own: noise reaches it once in 160,000."""
+"""Ratio of a line's power to that around it from which it is no noise: noise reaches it once in 160,000."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class TipMotion:
     displacement, velocity : (n_samples, 3)
         Displacement (m) and velocity (m/s) along X, Y and Z; zero in a direction that was not measured.
     origin
-        Where the motion is from: ``measured`` or ``model``.
+        Origin of the motion: ``measured`` or ``model``.
     noise : (2, n_samples, 3)
         A draw of the noise that is in displacement and velocity; None where it is not known.
     """
@@ -45,7 +45,7 @@ class TipMotion:
     noise: Real | None = None
 
     def noisier(self) -> "TipMotion":
-        """With the noise a second time: what it does to a fit is seen by what it does once more.
+        """The motion with its noise added a second time: the change of a fit shows what the noise does to it.
 
         Cook & Stefanski, Journal of the American Statistical Association 89, 1994.
         """
@@ -57,7 +57,7 @@ class TipMotion:
 def corner_of(rotation: float) -> float:
     """Frequency below which motion is left out, Hz: a tenth of the spindle's, 2 Hz at most.
 
-    What is slower hardly changes from tooth to tooth, and integration would drown it in the sensor's noise.
+    Slower motion hardly changes from tooth to tooth, and integration would drown it in the sensor's noise.
 
     Parameters
     ----------
@@ -70,18 +70,17 @@ def corner_of(rotation: float) -> float:
 def integrated(samples: Real, order: int, rate: float, corner: float, high_pass: float = 0.0) -> tuple[Real, Real]:
     """Displacement and velocity from displacement (order 0), velocity (1) or acceleration (2), in frequency.
 
-    ``X = S / (i w)^order``, a known high-pass undone, faded in from ``corner`` to 2.5 times it.
-    A regression on noisy motion comes out too small;
-    lines are weighed by what they say of the true motion, ``1 - S / P`` with P the power around a line and S that of
-    the quietest lines, on which it does not (Carroll, Ruppert, Stefanski & Crainiceanu, Measurement Error in Nonlinear
-    Models, 2nd ed., chapter 4).
+    ``X = S / (i w)^order``, with a known high-pass undone, faded in from ``corner`` to 2.5 times it. A regression on
+    noisy motion comes out too small. Lines are therefore weighed by what they say of the true motion, ``1 - S / P``:
+    P is the power around a line and S that of the quietest lines (Carroll, Ruppert, Stefanski & Crainiceanu,
+    Measurement Error in Nonlinear Models, 2nd ed., chapter 4). A regression on lines so weighed is not too small.
 
     Parameters
     ----------
     samples : (n, n_channels)
         Samples of one quantity, SI.
     order
-        How often displacement must be differentiated to give the samples.
+        Number of times that displacement is differentiated to give the samples.
     rate, corner
         Sampling rate and corner frequency, Hz.
     """
@@ -100,7 +99,7 @@ def integrated_noise(
     samples : (n, n_channels)
         Samples of one quantity, SI.
     order
-        How often displacement must be differentiated to give the samples.
+        Number of times that displacement is differentiated to give the samples.
     rate, corner
         Sampling rate and corner frequency, Hz.
     seed
@@ -112,7 +111,7 @@ def integrated_noise(
 
 
 def computed(model: ModalModel, force: Real, rate: float, corner: float) -> tuple[Real, Real]:
-    """The same from a model of the tip's receptance, driven by the measured forces.
+    """Displacement and velocity from a model of the tip's receptance, driven by the measured forces.
 
     Noise of the forces would come back as motion that moves with them: lines are weighed as in :func:`integrated`.
 
@@ -134,7 +133,7 @@ def computed(model: ModalModel, force: Real, rate: float, corner: float) -> tupl
 
 
 def _quiet(spectrum: Complex, frequencies: Real) -> Real:
-    """Power of the quietest lines, (n_channels,), as of a sensor's white noise."""
+    """Power of the quietest lines, (n_channels,), taken for that of a sensor's white noise."""
     heard = frequencies < QUIET_BELOW * frequencies[-1]
     power = np.abs(spectrum[heard]) ** 2
     return np.asarray(np.quantile(uniform_filter1d(power, 64, axis=0), 0.05, axis=0))
