@@ -97,11 +97,17 @@ class Search(Generic[Fit]):
 
     @property
     def equivalents(self) -> tuple[str, ...]:
-        """Names that the data cannot tell from the first accepted cause; none where that one was let go."""
-        if not self.accepted:
-            return ()
-        first = [one.equivalents for one in self.rounds if one.chosen is not None and one.equivalents]
-        return first[0] if first else ()
+        """Names that the data cannot tell from an accepted cause: those of the first one that has any.
+
+        Those of a cause that was let go, and those that were accepted themselves, are not among them.
+        """
+        names = {one.name for one in self.accepted}
+        for one in self.rounds:
+            if any(kept is one.chosen for kept in self.accepted):
+                others = tuple(name for name in one.equivalents if name not in names)
+                if others:
+                    return others
+        return ()
 
     @property
     def candidates(self) -> tuple[Candidate, ...]:

@@ -202,5 +202,5 @@ class Diagnosis(Result, Generic[Details]):
 
 def _cause_in_short(cause: AcceptedCause) -> str:
     """Name of a cause with its place, where it has one."""
-    place = ", ".join(f"{key} {value}" for key, value in cause.location.items())
+    place = ", ".join(f"{key} {value}" for key, value in cause.location.items() if value != "")
     return f"{cause.name} ({place})" if place else cause.name

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import pickle
 import sys
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection, wait
@@ -52,17 +53,30 @@ def _in_copies(tasks: Sequence[Callable[[], Result]], workers: int) -> dict[int,
         there.close()
         pipes.append(here)
         copies.append(copy)
-    found: dict[int, Result] = {}
+    found: dict[int, Result] = _received(pipes)
+    for copy in copies:
+        copy.join()
+    return found
+
+
+def _received(pipes: list[Connection]) -> dict[int, Any]:
+    """Results by the task's number, until every copy has closed its pipe."""
+    found: dict[int, Any] = {}
     while pipes:
         for pipe in wait(pipes):
             assert isinstance(pipe, Connection)
             try:
-                number, result = pipe.recv()
-                found[number] = result
-            except EOFError:
+                message = pipe.recv_bytes()
+            except (EOFError, OSError):
+                # the copy has ended, or it died with half a result sent
                 pipes.remove(pipe)
-    for copy in copies:
-        copy.join()
+                continue
+            try:
+                number, result = pickle.loads(message)
+            except Exception:
+                # what cannot be read back is made again by the caller
+                continue
+            found[number] = result
     return found
 
 

@@ -3,6 +3,7 @@
 import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -55,6 +56,29 @@ def test_values_of_mixed_types() -> None:
     assert not same_values((1, 2), (1, 2, 3))
     assert not same_values("a", None)
     assert same_values(np.array(["a", "b"]), np.array(["a", "b"]))
+
+
+class Law:
+    """An object without attributes."""
+
+
+class Counter:
+    """An object with one."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+
+
+def test_what_python_compares_by_identity_is_compared_by_value() -> None:
+    assert same_values(partial(np.add, np.zeros(2), out=None), partial(np.add, np.zeros(2), out=None))
+    assert not same_values(partial(np.add, np.zeros(2)), partial(np.add, np.ones(2)))
+    assert not same_values(partial(np.add, 1.0), partial(np.subtract, 1.0))
+    assert same_values((Law(), 1.0), (Law(), 1.0))
+    assert not same_values(Law(), Counter(0))
+    # a function and an object with a state of its own are equal to themselves alone
+    assert not same_values(lambda: 1, lambda: 1)
+    assert not same_values(object(), object())
+    assert not same_values(Counter(1), Counter(1))
 
 
 def test_four_lines_and_a_table_of_at_most_twenty_rows() -> None:

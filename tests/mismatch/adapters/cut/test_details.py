@@ -1,6 +1,7 @@
 """The files of a diagnosis: what is written is read back, and the improved cutting file holds the truth."""
 
 import math
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -45,6 +46,14 @@ def test_a_written_diagnosis_reads_back(tmp_path: Path) -> None:
     assert cut["recordings"][0]["spindle_speed_rpm"] == pytest.approx(84.0 * 30 / math.pi, rel=1e-4)
     assert cut["recordings"][0]["channels"] == ["TCP:+X", "TCP:+Y", "TCP:+Z"]
     assert cut["chatter"][0]["frequency_hz"] is None
+
+
+def test_a_pickle_comes_back_with_its_fits() -> None:
+    found = _diagnosis()
+    again = pickle.loads(pickle.dumps(found))
+    assert again == found
+    assert again.details.improved_process() == found.details.improved_process()
+    assert again != replace(found, details=replace(found.details, chatter=()))
 
 
 def test_the_improved_cutting_file_holds_the_truth(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """A small diagnosis from end to end: what it says, with which settings, and what its file holds."""
 
 import math
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,6 +50,15 @@ def test_its_file_comes_back(found: RobotDiagnosis, tmp_path: Path) -> None:
     back = read_diagnosis(tmp_path / "robot_diagnosis.json")
     assert back == replace(found, doubts=("a rests.",), details=None)
     assert [one["name"] for one in back.content["robot"]["recordings"]] == ["posture 1", "posture 2"]
+
+
+def test_a_pickle_comes_back_with_its_fits(found: RobotDiagnosis) -> None:
+    """The changes are partial functions, which Python itself compares by identity."""
+    again = pickle.loads(pickle.dumps(found))
+    assert again == found
+    number = found.details.final.changes[0][1]
+    shifted = replace(found.details.final, changes=((found.details.final.changes[0][0], number + 1e-9),))
+    assert again != replace(found, details=replace(found.details, final=shifted))
 
 
 def test_error_and_number_of_causes_stand_above_the_settings() -> None:
