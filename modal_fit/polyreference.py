@@ -133,7 +133,7 @@ def _first_poles(frf: Frf, band: tuple[float, float], order: int, n_modes: int |
     if not kept:
         raise MillfrfError(
             f"no pole is stable over orders 1 to {order} between {band[0]:g} and {band[1]:g} Hz; "
-            "widen the band, raise --max-order or average more"
+            "widen the band, raise max_order (--max-order) or average more"
         )
     return np.array([group.pole for group in sorted(kept, key=_minus_orders)[:n_modes]])
 

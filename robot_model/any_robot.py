@@ -161,7 +161,7 @@ def _planar(case: PlanarCase, driven: Real, links: bool) -> PostureResult:
     left_out = (
         f"the links are taken as rigid: the file's {len(robot.sections)} link sections are left out; with them the "
         f"first mode is at {lower:.2f} Hz instead of {frequencies[0]:.2f} Hz and the tip {share:.2g} % softer "
-        "(--links takes them in)"
+        "(links=True, --links, takes them in)"
     )
     return PostureResult(frequencies, rigid, compliance, TIP_IN_PLANE, (left_out,), planar_sag(robot, driven))
 

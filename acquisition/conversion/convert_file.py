@@ -81,7 +81,7 @@ def _self_described(source: Path) -> Content:
     fields = {} if source.suffix.lower() in (".csv", ".txt", ".npy") else open_arrays(source).fields
     if "format" not in fields:
         raise FileFormatError(
-            f"{source} does not say what its channels are; give a mapping file with --map ([[channels]] of a "
-            "recording, [frf] of FRFs)"
+            f"{source} does not say what its channels are; give a mapping file as mapping_path (--map), with "
+            "[[channels]] of a recording or [frf] of FRFs"
         )
     return from_fields(fields, source)

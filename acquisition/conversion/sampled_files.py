@@ -54,7 +54,7 @@ def read_uff_times(path: Path) -> tuple[dict[str, Any], float]:
     records = [entry for entry in read_uff_sets(path, (58,)) if entry.get("func_type") == _TIME_RESPONSE]
     if not records:
         raise FileFormatError(
-            f"{path} holds no time record (data set 58, function 1); FRFs are converted without --map"
+            f"{path} holds no time record (data set 58, function 1); FRFs are converted without a mapping file"
         )
     steps = {round(float(entry["abscissa_inc"]), 15) for entry in records}
     if len(steps) != 1 or not min(steps) > 0:

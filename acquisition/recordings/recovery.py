@@ -66,7 +66,7 @@ def recover(
     if not source.is_file():
         raise InputError(f"no file {source}; check the name")
     if target.exists():
-        raise InputError(f"{target} exists; choose another name with --out or remove it first")
+        raise InputError(f"{target} exists; choose another name as out (--out) or remove it first")
     if is_being_written(source):
         raise InputError(f"{source} is still being written; stop its writer first")
     with writing_whole_file(target) as temporary:

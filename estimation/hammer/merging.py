@@ -61,7 +61,10 @@ def merge_taps(tests: Sequence[TapSums], time_constant: float | None = None) -> 
     """
     kinds = sorted({test.quantity for test in tests})
     if len(kinds) > 1:
-        raise InputError(f"responses of different quantities ({', '.join(kinds)}); choose one with --response")
+        raise InputError(
+            f"responses of different quantities ({', '.join(kinds)}); "
+            "choose the channels of one (responses, --response)"
+        )
     excitations, responses = labels_of(tests, "excitations"), labels_of(tests, "responses")
     signed = [turned(test, excitations, responses) for test in tests]
     check_whole(signed, responses, excitations)

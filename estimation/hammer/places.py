@@ -64,8 +64,8 @@ def check_whole(tests: Sequence[TapSums], responses: Sequence[str], excitations:
         more = f" and {len(missing) - 6} more" if len(missing) > 6 else ""
         raise InputError(
             f"no tap gives {', '.join(missing[:6])}{more} (response / point hit): {len(missing)} of "
-            f"{len(responses) * len(excitations)} entries are missing; record them, or leave out the files or, with "
-            "--response, the channels whose rows or columns are not whole"
+            f"{len(responses) * len(excitations)} entries are missing; record them, or leave out the files or "
+            "the channels (responses, --response) whose rows or columns are not whole"
         )
 
 

@@ -129,7 +129,7 @@ def _lines(settings: TapSettings, band: Band | None) -> tuple[Real, NDArray[np.b
         assert band is not None
         raise InputError(
             f"no line lies between {band[0]:g} and {band[1]:g} Hz (segments of {settings.duration:g} s have lines up "
-            f"to {f[-1]:g} Hz, {f[1]:.3g} Hz apart); widen --band"
+            f"to {f[-1]:g} Hz, {f[1]:.3g} Hz apart); widen the band"
         )
     return np.asarray(f[chosen], dtype=float), chosen
 
@@ -159,7 +159,7 @@ def _check_places(channels: Sequence[Channel], file: str) -> None:
         place = channel.degree_of_freedom
         if place in there:
             raise InputError(
-                f"{file}: channels {there[place]} and {channel.name} are both at {place}; name one of them with "
-                "--excitation or --response, or say in --points where they were"
+                f"{file}: channels {there[place]} and {channel.name} are both at {place}; name one of them "
+                "(excitations, responses), or give a table that says where they were (points)"
             )
         there[place] = channel.name

@@ -65,7 +65,8 @@ def _fitted(
     if not inside_band(selection.modes, band).any():
         raise MillfrfError(
             f"no pole is stable over orders 1 to {max_order} between {band[0]:g} and {band[1]:g} Hz "
-            "and lowers the misfit by more than noise would; widen the band, raise --max-order or average more"
+            "and lowers the misfit by more than noise would; widen the band, raise max_order (--max-order) "
+            "or average more"
         )
     if lines.stated:
         selection = replace(selection, lines=with_fewest_terms(selection.modes, selection.lines))

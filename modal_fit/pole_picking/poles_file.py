@@ -118,8 +118,8 @@ def _pole(f: float, zeta: float) -> complex:
 def _no_group(number: int, groups: Mapping[int, OfferedGroup]) -> str:
     if not groups:
         return (
-            f"names group {number}, but no groups are offered: name the file that 'millfrf fit --candidates' wrote as "
-            "candidates, or give frequency_hz and damping_ratio"
+            f"names group {number}, but no groups are offered: as candidates name the file that write_pole_candidates "
+            "('millfrf fit --candidates') wrote, or give frequency_hz and damping_ratio"
         )
     return f"names group {number}; there are groups {min(groups)} to {max(groups)}"
 

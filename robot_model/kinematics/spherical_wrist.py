@@ -65,7 +65,7 @@ def _six_frames(mechanism: Mechanism) -> tuple[tuple[Frame, ...], Real]:
     if not has_spherical_wrist(mechanism):
         raise InputError(
             "this robot has no spherical wrist on a shoulder and elbow (six revolute joints), which maps over places "
-            "need; ask for single postures with --joints or --at, in Python with inverse_kinematics"
+            "need; ask for single postures: inverse_kinematics in Python, --joints or --at on the command line"
         )
     tool = np.eye(4)
     for frame in mechanism.frames[6:]:

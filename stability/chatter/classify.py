@@ -107,5 +107,7 @@ def _checked(samples: Real, sample_rate: float, spindle_speed: float, teeth: int
     if not np.isfinite(data).all():
         raise InputError(f"{int((~np.isfinite(data)).sum())} samples are not finite; leave the channel out")
     if not (data.std(axis=0) > 0).any():
-        raise InputError("no channel holds any motion: all samples of each are equal; name others with --response")
+        raise InputError(
+            "no channel holds any motion: all samples of each are equal; take other responses (--response)"
+        )
     return data

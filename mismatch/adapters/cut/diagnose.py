@@ -67,7 +67,7 @@ def diagnose_cut(
     if not recordings:
         raise InputError("no recording given; name one or more")
     if not (math.isfinite(depth) and depth > 0):
-        raise InputError(f"depth = {depth!r} m must be positive; give --depth M in metres, for example 0.001")
+        raise InputError(f"depth = {depth!r} m must be positive; give the depth in metres (--depth), for example 0.001")
     if coefficient_error is not None:
         settings = replace(settings, coefficient_error=coefficient_error)
     if force_error is not None:

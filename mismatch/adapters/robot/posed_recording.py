@@ -96,7 +96,7 @@ def posed(
     if len(spectrum.frequencies) < 50:
         raise InputError(
             f"{recording.name}: {len(spectrum.frequencies)} lines between {band[0]:g} and {band[1]:g} Hz; "
-            "50 are the least: record longer, or widen --band"
+            "50 are the least: record longer, or widen the band"
         )
     turn = np.eye(3) if axes is None else np.asarray(axes, dtype=float)
     return PosedRecording(np.asarray(q, dtype=float), turn, tuple(responses), tuple(excitations), spectrum)

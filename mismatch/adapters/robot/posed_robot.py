@@ -115,14 +115,17 @@ def posed_robot(
     if not recordings:
         raise InputError("no recording given; name one or more, each with its posture")
     if sensor is None and any(label.startswith("HOUSING") for one in recordings for label in one.responses):
-        raise InputError("motion of the housing was recorded; say where the sensor is, from the tip: --sensor X Y Z")
+        raise InputError(
+            "motion of the housing was recorded; say where the sensor is: "
+            "sensor = (x, y, z) in m from the tip (--sensor X Y Z)"
+        )
     counts = []
     for one in recordings:
         natural = modes_at(robot, one.q).frequencies
         counts.append(int(np.sum(natural < LIMITS.reach * one.spectrum.frequencies[-1])))
         if not counts[-1]:
             raise InputError(
-                f"{one.name}: the robot's lowest mode, {natural[0]:.4g} Hz, is above the band; raise --band"
+                f"{one.name}: the robot's lowest mode, {natural[0]:.4g} Hz, is above the band; raise the band"
             )
     place = np.zeros(3) if sensor is None else np.asarray(sensor, dtype=float)
     found = PosedRobot(robot, rigid_links, tuple(recordings), place, error, tuple(counts))

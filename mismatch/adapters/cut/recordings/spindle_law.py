@@ -118,7 +118,10 @@ def stated_law(path: str | os.PathLike[str], speed: float | None = None) -> Spin
     """
     if speed is not None:
         if not (np.isfinite(speed) and speed > 0):
-            raise InputError(f"spindle speed {speed * 30 / np.pi:g} rpm must be positive; correct --speed")
+            raise InputError(
+                f"spindle speed {speed * 30 / np.pi:g} rpm must be positive; "
+                "correct the speed (speed in rad/s, --speed in rpm)"
+            )
         return SpindleLaw(0.0, 0.0, float(speed))
     name = Path(path).name
     swept = _stated_sweep(path)
@@ -127,7 +130,8 @@ def stated_law(path: str | os.PathLike[str], speed: float | None = None) -> Spin
     known = spindle_speed(path)
     if known is None:
         raise InputError(
-            f"{name} states no spindle speed that is constant or swept linearly; give a constant --speed RPM"
+            f"{name} states no spindle speed that is constant or swept linearly; "
+            "give a constant speed (speed in rad/s, --speed in rpm)"
         )
     rates = known.rpm * np.pi / 30
     if len(rates) < 3:
@@ -190,7 +194,7 @@ def found_law(force: Real, rate: float, stated: SpindleLaw, teeth: int) -> Spind
     if powers.max() < LEAST_CONTRAST * np.median(powers[row]) or share < LEAST_SHARE:
         raise InputError(
             f"no tooth passing within {100 * WITHIN:g} % of {law.speed * 30 / np.pi:.4g} rpm stands out of the forces; "
-            "give the right --speed RPM, and a cut of constant engagement"
+            "give the right speed (speed in rad/s, --speed in rpm), and a cut of constant engagement"
         )
     return replace(law, speed=law.speed + float(speeds[column]), change=law.change + float(changes[row]))
 

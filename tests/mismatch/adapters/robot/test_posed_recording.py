@@ -18,7 +18,7 @@ def test_recordings_that_do_not_fit_are_refused() -> None:
     with pytest.raises(InputError, match="no recording"):
         diagnose_robot(ROBOT, [])
     housing = posed(trial, np.radians(POSTURES[0]), BAND, responses=("HOUSING:+X", "HOUSING:+Y", "HOUSING:+Z"))
-    with pytest.raises(InputError, match="--sensor"):
+    with pytest.raises(InputError, match="say where the sensor is"):
         diagnose_robot(ROBOT, [housing])
 
 

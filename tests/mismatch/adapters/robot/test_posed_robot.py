@@ -49,6 +49,6 @@ def test_a_part_has_the_chosen_recordings_and_their_counts() -> None:
 def test_a_band_below_all_modes_is_refused() -> None:
     recording = in_postures(ROBOT, 1, seconds=60.0)[0]
     low = posed(recording.spectrum.recording, recording.q, (0.3, 1.5))
-    with pytest.raises(InputError, match="above the band; raise --band"):
+    with pytest.raises(InputError, match="above the band; raise the band"):
         posed_robot(ROBOT, [low], SETTINGS.lab)
     assert posed_robot(ROBOT, [recording], SETTINGS.lab).recordings[0].spectrum.frequencies[-1] < BAND[1]
