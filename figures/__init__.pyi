@@ -46,9 +46,11 @@ from .style import (
     WIDTH_MM,
     house_style,
     legend_above,
+    legend_height,
     line_style,
     new_figure,
     panel_letter,
+    place_panels,
 )
 
 __all__ = [
@@ -88,11 +90,13 @@ __all__ = [
     "input_figure",
     "law_figure",
     "legend_above",
+    "legend_height",
     "line_style",
     "lobes_figure",
     "mode_figure",
     "new_figure",
     "panel_letter",
+    "place_panels",
     "reciprocity_figure",
     "robot_evidence_figure",
     "robot_spectra_figure",

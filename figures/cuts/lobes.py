@@ -11,7 +11,17 @@ from numpy.typing import NDArray
 
 from stability import StabilityLobes
 
-from ..style import COLOURS, SHADE, house_style, legend_above, line_style, new_figure, panel_letter
+from ..style import (
+    COLOURS,
+    SHADE,
+    house_style,
+    legend_above,
+    legend_height,
+    line_style,
+    new_figure,
+    panel_letter,
+    place_panels,
+)
 
 LIMITS = "limits"
 """Mark of the lines of depth limits, by which a further line finds its number and so its own colour."""
@@ -59,8 +69,8 @@ def lobes_figure(
     Where a cut is stable at all depths asked for, the line is interrupted.
     """
     with house_style():
-        figure = new_figure(115.0)
-        depth, chatter = figure.subplots(2, 1, sharex=True, height_ratios=[1.9, 1.0])
+        figure = new_figure(115.0, None)
+        depth, chatter = figure.subplots(2, 1, sharex=True, height_ratios=[1.9, 1.0], gridspec_kw={"hspace": 0.22})
         for number, (label, lobes) in enumerate(curves.items()):
             draw_limits(depth, lobes, label, number)
             _draw_chatter(chatter, lobes, number)
@@ -79,7 +89,8 @@ def lobes_figure(
         chatter.set_xlabel("Spindle speed (rpm)")
         panel_letter(depth, 0)
         panel_letter(chatter, 1)
-        legend_above(figure, depth, columns=4)
+        place_panels(figure, left=19.0, top=legend_height(depth) + 5.0)
+        legend_above(figure, depth)
     return figure
 
 

@@ -6,11 +6,15 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import NullLocator
+from numpy.typing import NDArray
 
-from ..style import COLOURS, house_style, legend_above, new_figure
+from ..log_axes import decade_axis
+from ..style import COLOURS, house_style, legend_above, legend_height, new_figure, place_panels
 
 LABELS = {"residual": "Nominal model, refitted", "effect": "Final model without its joint law"}
+LEAST_GAP = 0.06
+"""Between two labels of forces, as a share of the axis."""
 REFERENCES = ((0, "dry friction"), (1, "linear"), (3, "cubic"))
 
 
@@ -23,26 +27,27 @@ def growth_figure(content: Mapping[str, Any]) -> Figure:
         ``growth`` of a diagnosis' ``located``.
     """
     with house_style():
-        figure = new_figure(95.0)
+        figure = new_figure(95.0, None)
         axes = figure.subplots()
         shown = [key for key in LABELS if key in content]
         for number, key in enumerate(shown):
             _draw(axes, LABELS[key], content[key], number)
-        _references(axes, content[shown[0]])
-        noise = content[shown[0]]
-        axes.plot(noise["force_rms_n"], noise["noise"], color="#777777", linestyle=":", marker="_", label="Noise")
-        axes.set_xscale("log")
-        axes.set_yscale("log")
+        found = content[shown[0]]
+        forces, noise = np.array(found["force_rms_n"]), 100 * np.array(found["noise"])
+        axes.plot(forces, noise, color="#777777", linestyle=":", marker="_", label="Noise")
+        low, high = _references(axes, found)
+        tops = [100 * np.max(np.add(content[key]["amplitude"], content[key]["standard_error"])) for key in shown]
+        decade_axis(axes, "y", min(low, 0.3 * noise.min()), max(high, 1.5 * max(tops)), label=_plain)
+        _force_axis(axes, forces)
         axes.set_xlabel("Force, root mean square (N)")
         axes.set_ylabel("Residual less noise / response,\nroot mean square (%)")
-        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{100 * value:g}"))
-        axes.xaxis.set_minor_formatter(NullFormatter())
-        forces = np.array(noise["force_rms_n"])
-        axes.set_xticks(forces, [f"{force:.3g}" for force in forces])
-        axes.set_xticks([], minor=True)
-        axes.set_xlim(0.55 * forces.min(), 1.2 * forces.max())
+        place_panels(figure, left=20.0, top=legend_height(axes, 1))
         legend_above(figure, axes, columns=1)
     return figure
+
+
+def _plain(power: int) -> str:
+    return f"{10.0**power:g}"
 
 
 def _draw(axes: Axes, label: str, found: Mapping[str, Any], number: int) -> None:
@@ -52,8 +57,8 @@ def _draw(axes: Axes, label: str, found: Mapping[str, Any], number: int) -> None
         label += f": exponent {round(found['exponent'], 2) + 0.0:.2f} ± {found['exponent_standard_error']:.2f}"
     axes.errorbar(
         force[seen],
-        amplitude[seen],
-        yerr=2 * error[seen],
+        100 * amplitude[seen],
+        yerr=200 * error[seen],
         color=COLOURS[2 * number],
         marker="os"[number],
         markersize=4.5,
@@ -63,14 +68,13 @@ def _draw(axes: Axes, label: str, found: Mapping[str, Any], number: int) -> None
     )
 
 
-def _references(axes: Axes, found: Mapping[str, Any]) -> None:
-    """Thin lines of the slopes 0, 1 and 3 through the point in the middle."""
-    force, amplitude = np.array(found["force_rms_n"]), np.array(found["amplitude"])
+def _references(axes: Axes, found: Mapping[str, Any]) -> tuple[float, float]:
+    """Thin lines of the slopes 0, 1 and 3 through the point in the middle; the range that shows them, in percent."""
+    force, amplitude = np.array(found["force_rms_n"]), 100 * np.array(found["amplitude"])
     seen = amplitude > 0
     if not seen.any():
-        return
+        return np.inf, 0.0
     x0, y0 = (float(np.exp(np.log(values[seen]).mean())) for values in (force, amplitude))
-    low, high = axes.get_ylim()
     ends = np.array([0.8 * force.min(), 1.12 * force.max()])
     for slope, name in REFERENCES:
         line = y0 * (ends / x0) ** slope
@@ -84,4 +88,18 @@ def _references(axes: Axes, found: Mapping[str, Any]) -> None:
             ha="right",
             color="#555555",
         )
-    axes.set_ylim(min(low, 0.3 * float(np.min(found["noise"]))), max(high, 1.5 * y0))
+    return 0.7 * float(amplitude[seen].min()), 1.5 * y0
+
+
+def _force_axis(axes: Axes, forces: NDArray[np.float64]) -> None:
+    """The force of each recording as a tick; labels that would touch are left out."""
+    ends = (0.55 * forces.min(), 1.2 * forces.max())
+    axes.set_xscale("log")
+    axes.set_xlim(ends)
+    labels, last = [], -np.inf
+    for force in np.sort(forces):
+        place = np.log(force / ends[0]) / np.log(ends[1] / ends[0])
+        labels.append(f"{force:.3g}" if place - last > LEAST_GAP else "")
+        last = place if labels[-1] else last
+    axes.set_xticks(np.sort(forces), labels)
+    axes.xaxis.set_minor_locator(NullLocator())

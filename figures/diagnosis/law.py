@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from mismatch import BinnedForce, FreeFormLaw
 
-from ..style import COLOURS, SHADE, house_style, legend_above, new_figure, panel_letter
+from ..style import COLOURS, SHADE, house_style, legend_above, legend_height, new_figure, panel_letter, place_panels
 
 
 def law_figure(found: FreeFormLaw) -> Figure:
@@ -18,8 +18,8 @@ def law_figure(found: FreeFormLaw) -> Figure:
     """
     law = found.name.replace("_", " ")
     with house_style():
-        figure = new_figure(82.0)
-        left, right = figure.subplots(1, 2)
+        figure = new_figure(82.0, None)
+        left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.24})
         _draw(left, found.forward, ("o", COLOURS[0]), "Measured, deflection rising", (f"Law ({law}), rising", "-"), 1e6)
         _draw(left, found.backward, ("v", COLOURS[2]), "Measured, falling", ("Law, falling", (0, (5, 1.5))), 1e6)
         _draw(right, found.damping, ("o", COLOURS[0]), "", ("", "-"), 1e3)
@@ -33,7 +33,8 @@ def law_figure(found: FreeFormLaw) -> Figure:
             axes.axvline(0, color="#999999", linewidth=0.5, zorder=1)
             axes.locator_params(axis="x", nbins=6)
             panel_letter(axes, number)
-        legend_above(figure, left, columns=4)
+        place_panels(figure, left=17.0, top=legend_height(left) + 5.0)
+        legend_above(figure, left)
     return figure
 
 

@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 
 from mismatch import HeldOutSpectra
 
+from ..log_axes import decade_axis, plain_log_axis
 from ..style import COLOURS, WIDTH_MM, house_style, new_figure
 
 UNITS = ("m", "m/s", "m/s²")
@@ -26,16 +27,10 @@ def spectra_figure(spectra: HeldOutSpectra) -> Figure:
             axes.plot(x, spectra.predicted[:, p], color=COLOURS[5], linewidth=0.9, linestyle="--", label="Final model")
             axes.plot(x, spectra.before[:, p], color=COLOURS[1], linestyle=":", label="Left by nominal, refitted")
             axes.plot(x, spectra.after[:, p], color=COLOURS[2], linewidth=1.0, label="Left by final model")
-            axes.set_xscale("log")
-            axes.set_yscale("log")
             shown = [spectra.measured[:, p], spectra.after[:, p], spectra.noise[:, p]]
-            axes.set_ylim(0.4 * float(np.nanmin(shown)), 2.0 * float(np.nanmax(shown)))
-            axes.set_xlim(x[0], x[-1])
+            decade_axis(axes, "y", 0.4 * float(np.nanmin(shown)), 2.0 * float(np.nanmax(shown)))
             axes.set_ylabel(f"{spectra.channels[p]} ({UNITS[int(spectra.powers[p])]}/√Hz)")
-        ticks = np.array([k * 10.0**d for d in range(-3, 6) for k in (1, 2, 5)])
-        inside = ticks[(ticks >= spectra.frequencies[0]) & (ticks <= spectra.frequencies[-1])]
-        panels[-1].set_xticks(inside, [f"{tick:g}" for tick in inside])
-        panels[-1].set_xticks([], minor=True)
+        plain_log_axis(panels[-1], "x", spectra.frequencies[0], spectra.frequencies[-1])
         panels[-1].set_xlabel("Frequency (Hz)")
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="upper center", ncols=len(labels), borderaxespad=0.2)

@@ -1,11 +1,13 @@
 """Effect of a diagnosis on the stability lobes."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cutting import MillingProcess
 from figures import as_data_uri, lobes_figure
 from foundation import InputError
 from mismatch import Hypothesis, StructureDiagnosis, equivalent_receptance
+from modal_fit import ModalModel
 from stability import StabilityLobes, zero_order
 
 from ...tables import Table
@@ -24,7 +26,12 @@ ASSUMED = MillingProcess(
 )
 """A slot in aluminium, where no cut is named."""
 
-SPEEDS, LINES, DEEPEST = 240, 4000, 0.2
+SPEEDS, DEEPEST = 240, 0.2
+
+LINES_PER_WIDTH = 24
+"""Frequencies within a resonance's half-power width: depths are then within 0.2 % of those of a finer grid."""
+
+FEWEST_LINES, MOST_LINES = 600, 4000
 
 
 def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProcess | None) -> Section:
@@ -63,11 +70,19 @@ def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProce
     return Section(title, (sentence,), (table,), (picture,))
 
 
+def _frequencies(model: ModalModel) -> NDArray[np.float64]:
+    """Frequencies from a third of the lowest mode to three times the highest, as dense as the sharpest one needs."""
+    natural, sharpest = model.natural_frequencies, max(float(model.damping_ratios.min()), 1e-6)
+    span = np.log(9 * natural.max() / natural.min())
+    lines = int(np.clip(LINES_PER_WIDTH * span / (2 * sharpest), FEWEST_LINES, MOST_LINES))
+    return np.geomspace(natural.min() / 3, 3 * natural.max(), lines)
+
+
 def _curves(diagnosis: StructureDiagnosis, cut: MillingProcess) -> dict[str, StabilityLobes]:
     final, lines = diagnosis.details.final.hypothesis, diagnosis.details.recordings
     nominal = final.nominal
     natural = nominal.model.natural_frequencies
-    frequencies = np.linspace(natural.min() / 3, 3 * natural.max(), LINES)
+    frequencies = _frequencies(nominal.model)
     tooth = 2 * np.pi / cut.teeth
     speeds = np.geomspace(natural.min() * tooth / 2, 3 * natural.max() * tooth, SPEEDS)
 

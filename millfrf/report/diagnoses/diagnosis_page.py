@@ -14,6 +14,7 @@ from foundation import writing_whole_file
 from mismatch import StructureDiagnosis, in_processes
 
 from ...provenance import versions
+from ..collection_paused import collection_paused
 from ..section import Section
 from .diagnosis_answers import answers, verdict_sentence, warnings
 from .diagnosis_lobes import diagnosis_lobes_section
@@ -52,7 +53,8 @@ def write_diagnosis_report(
     InputError
         The folder cannot be written to.
     """
-    text = report_text(diagnosis, model_name, process)
+    with collection_paused():
+        text = report_text(diagnosis, model_name, process)
     with writing_whole_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
 
