@@ -1,5 +1,5 @@
 from .beyond_modes import beyond_model
-from .leftover_test import leftover
+from .moving_part import leftover
 
 __all__ = [
     "beyond_model",

@@ -24,7 +24,7 @@ from mismatch.inference import AcceptedCause, Improvement, Settings, VerdictSett
 from mismatch.location.errors_by_recording import recording_errors
 from mismatch.models.fitting import Fit, fit
 from mismatch.physics import library
-from mismatch.remainder.leftover_test import leftover
+from mismatch.remainder.moving_part import leftover
 from modal_fit import ModalModel
 
 TONE = 11.37

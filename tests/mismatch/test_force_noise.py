@@ -11,7 +11,7 @@ from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_sp
 from mismatch import Hypothesis, LabError, ModelShape, band_of, diagnose, predict_lines
 from mismatch.inference import VerdictSettings
 from mismatch.records.true_forces import without_force_noise
-from mismatch.remainder.leftover_test import leftover
+from mismatch.remainder.moving_part import leftover
 from modal_fit import ModalModel
 
 RATE, SILENT = 128.0, 26.0
