@@ -2,8 +2,8 @@ from .derivatives import jacobian
 from .fitting import ENOUGH, Fit, fit, modes_are_odd, residual
 from .hypothesis import Cause, Hypothesis, columns_of, direction_of, held_values, line_response, predict_lines, surround
 from .linear_part import with_linear_part
+from .lines import receptance_at
 from .misfit import least_misfit, levels, through_structure, whitened
-from .modal_lines import receptance_at
 from .model_shape import ModelShape
 from .model_terms import hypothesis_of, improved_model
 from .refinement import settled, with_chain

@@ -11,7 +11,7 @@ from estimation import WindowedSpectrum
 from ..inference import Descended, Limits, descend, plain_step
 from ..noise import NoiseModel
 from ..physics import MODAL_PARAMETERS
-from .derivatives import jacobian
+from .derivatives import slopes
 from .hypothesis import Hypothesis, predict_lines
 from .misfit import Misfit, misfit_under, whitened, with_noise
 
@@ -22,6 +22,9 @@ THREADS = 2
 
 ENOUGH, LEFT_OUT = 4000, 3
 """Lines of a recording on which a fit begins if it has more, and the steps on all lines that this saves."""
+
+BLOCK = 512
+"""Lines whose derivatives are worked out together."""
 
 
 @dataclass(frozen=True)
@@ -173,9 +176,16 @@ def residual(fitted: Fit, lines: list[WindowedSpectrum]) -> list[Complex]:
 
 
 def _normal_of(lines: WindowedSpectrum, hypothesis: Hypothesis, seen: Misfit) -> tuple[Real, Real]:
-    slope = whitened(seen.white, jacobian(hypothesis, lines, seen.predicted))
-    small = whitened(seen.white, seen.rest[:, :, None])[:, 0]
-    return 2 * (slope.T @ slope), 2 * (slope.T @ small)
+    """Normal matrix and gradient of one recording's misfit, added up over blocks of lines that a cache holds."""
+    assert seen.linear is not None
+    parts = slopes(hypothesis, lines, seen.predicted, seen.linear)
+    matrix, gradient = np.zeros((hypothesis.size, hypothesis.size)), np.zeros(hypothesis.size)
+    for start in range(0, len(seen.rest), BLOCK):
+        part = slice(start, start + BLOCK)
+        slope = parts.of(part, seen.white).reshape(-1, hypothesis.size)
+        matrix += slope.T @ slope
+        gradient += slope.T @ whitened(seen.white[part], seen.rest[part, :, None])[:, 0]
+    return 2 * matrix, 2 * gradient
 
 
 def _moved(hypothesis: Hypothesis, step: Real) -> Hypothesis:

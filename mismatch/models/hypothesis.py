@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from modal_fit import ModalModel
 
 from ..joints import JointLaw, JointMotion, JointResponse, common_axes, driven_force, joint_response
 from ..physics import Chain, ChainPhysics, JointPhysics, LimitedPhysics, ModePhysics, Physics
-from .modal_lines import displacement_at, receptance_at
+from .lines import closed_loop, displacement_at, line_products, receptance_at
 from .model_shape import ModelShape
 
 Complex = NDArray[np.complex128]
@@ -125,7 +126,7 @@ class Hypothesis:
     u: Real
     causes: tuple[Cause, ...] = ()
 
-    @property
+    @cached_property
     def model(self) -> ModalModel:
         """The modal model at ``u``, without causes."""
         return self.shape.model(self.u)
@@ -193,18 +194,15 @@ class Surround:
 
     def pushed(self, force: Complex) -> Complex:
         """B F, (n_lines, n_excitations)."""
-        return force if self.force is None else np.einsum("kij,kj->ki", self.force, force)
+        return force if self.force is None else line_products(self.force, force)
 
     def closed(self, receptance: Complex) -> Complex:
         """``(I + H K)^-1 H``."""
-        if self.feedback is None:
-            return receptance
-        identity = np.eye(receptance.shape[1])
-        return np.asarray(np.linalg.solve(identity + receptance @ self.feedback, receptance))
+        return receptance if self.feedback is None else closed_loop(receptance, self.feedback)
 
     def shown(self, displacement: Complex) -> Complex:
         """C X for (n_lines, n_responses, ...)."""
-        return displacement if self.response is None else np.einsum("kij,kj...->ki...", self.response, displacement)
+        return displacement if self.response is None else line_products(self.response, displacement)
 
 
 def surround(hypothesis: Hypothesis, frequencies: Real) -> Surround:
@@ -215,9 +213,9 @@ def surround(hypothesis: Hypothesis, frequencies: Real) -> Surround:
         if isinstance(cause.physics, ChainPhysics):
             chain: Chain = cause.physics.chain(s, cause.values, cause.place, hypothesis.shape.nominal)
             if chain.response is not None:
-                response = chain.response if response is None else chain.response @ response
+                response = chain.response if response is None else line_products(chain.response, response)
             if chain.force is not None:
-                force = chain.force if force is None else chain.force @ force
+                force = chain.force if force is None else line_products(chain.force, force)
             if chain.feedback is not None:
                 feedback = chain.feedback if feedback is None else feedback + chain.feedback
     return Surround(response, force, feedback)
@@ -267,7 +265,7 @@ def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Predicted:
     if around.feedback is None:
         displacement = displacement_at(model, frequencies, pushed - joint)
     else:
-        displacement = np.einsum("kpq,kq->kp", around.closed(receptance_at(model, frequencies)), pushed - joint)
+        displacement = line_products(around.closed(receptance_at(model, frequencies)), pushed - joint)
     spectrum = around.shown(displacement * lines.padded_kinematic)
     return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint, tuple(joints))
 
@@ -292,7 +290,7 @@ def line_response(hypothesis: Hypothesis, lines: WindowedSpectrum, joint: Comple
         displacement = displacement_at(hypothesis.model, lines.frequencies, force)
     else:
         closed = around.closed(hypothesis.model.receptance(lines.frequencies))
-        displacement = np.einsum("kpq,kq->kp", closed, force)
+        displacement = line_products(closed, force)
     return around.shown(displacement * lines.kinematic)
 
 

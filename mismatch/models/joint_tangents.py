@@ -1,5 +1,7 @@
 """Derivative of the joints' forces by everything that is fitted, the structure's motion answering."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
@@ -7,11 +9,13 @@ from scipy.fft import irfft, rfft
 from estimation import WindowedSpectrum
 
 from ..joints import JointResponse, common_axes, driven_force, joint_dynamics, stiffness_ramp, tangent_run
+from .driven_changes import driven_mix, driven_signals
 from .hypothesis import TURN_STEP, Cause, Hypothesis, Predicted, across, surround
-from .modal_lines import displacement_at, receptance_at
+from .lines import displacement_at, receptance_at
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+Signals = NDArray[np.float32]
 
 BEYOND = 1.3
 """Changes of motion are followed up to this multiple of the band's end."""
@@ -20,11 +24,47 @@ ASIDE = 0.02
 """Step of a cause's coordinates for a difference quotient at given motion."""
 
 
-def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted) -> Complex:
-    """Derivative of the windowed lines of the joints' force on the structure, (n_lines, n_excitations, size).
+@dataclass(frozen=True)
+class JointChange:
+    """A joint's force at the lines, and its derivative; the structure feels minus the force along the direction.
+
+    Parameters
+    ----------
+    direction : (n_excitations,)
+        Unit vector of the force.
+    turns : (n_excitations, n_angles)
+        Derivative of the direction by the joint's angles.
+    angles
+        Column of the first angle among all that is fitted.
+    force : (n_lines,), N
+        Windowed lines of the force g.
+    change : (n_lines, n_columns), N
+        Derivative of these lines by what is fitted, from column ``first`` on.
+    first
+        The first of these columns.
+    """
+
+    direction: Real
+    turns: Real
+    angles: int
+    force: Complex
+    change: Complex
+    first: int
+
+
+@dataclass(frozen=True)
+class _Driving:
+    """What drives a joint, at padded lines: the outer force and its derivative by all that is fitted."""
+
+    force: Complex
+    change: Complex | None
+
+
+def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted) -> tuple[JointChange, ...]:
+    """Derivative of the windowed lines of each joint's force.
 
     A change of the modal parameters, of the outer force or of an earlier joint changes a joint's driven motion; its
-    tangent run says how its force answers. The sign is the one that the structure feels: minus g along the direction.
+    tangent run says how its force answers.
 
     Parameters
     ----------
@@ -36,35 +76,68 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
         What the hypothesis predicts for the recording.
     """
     frequencies = lines.padded_frequencies
-    frequencies = frequencies[frequencies <= BEYOND * lines.frequencies[-1]]
-    outer, change = _outer_change(hypothesis, lines, len(frequencies))
-    result = np.zeros((len(lines.frequencies), outer.shape[1], hypothesis.size), dtype=complex)
-    answers = iter(predicted.joints)
+    count = int(np.sum(frequencies <= BEYOND * lines.frequencies[-1]))
+    driving = _outer_change(hypothesis, lines, count)
+    _, columns = common_axes(hypothesis.model)
+    forces = lines.cut(lines.signal(np.stack([answer.force for answer in predicted.joints], axis=1))).T
+    found: list[JointChange] = []
     at = hypothesis.shape.size
-    for place, cause in enumerate(hypothesis.causes):
+    for cause in hypothesis.causes:
         own = slice(at, at + cause.size)
         at += cause.size
         if cause.direction is None:
             continue
-        answer = next(answers)
-        _, columns = common_axes(hypothesis.model)
-        outer[:, columns] -= answer.force[: len(frequencies), None] * cause.direction
-        dg = _force_change(hypothesis, lines, (cause, own, answer), outer, change)
-        angles = slice(own.start + len(cause.values), own.stop)
-        turn = TURN_STEP * across(cause.direction)
-        result[:, columns] -= lines.cut(np.asarray(dg))[:, None, :] * cause.direction[:, None]
-        result[:, columns, angles] -= lines.cut(irfft(answer.force, n=lines.padded)[:, None])[:, :, None] * turn
-        if any(later.direction is not None for later in hypothesis.causes[place + 1 :]):
-            change[:, columns] -= rfft(dg, n=lines.padded, axis=0)[: len(frequencies), None] * cause.direction[:, None]
-            change[:, columns, angles] -= answer.force[: len(frequencies), None, None] * turn
-    return result
+        answer = predicted.joints[len(found)]
+        direction, turns = np.zeros(len(hypothesis.model.excitations)), np.zeros((driving.force.shape[1], 0))
+        direction[columns] = cause.direction
+        turns = np.zeros((len(direction), cause.size - len(cause.values)))
+        turns[columns] = TURN_STEP * across(cause.direction)
+        driving = _Driving(driving.force - answer.force[:count, None] * direction, driving.change)
+        signals, mix, first = _force_change(hypothesis, lines, (cause, own, answer), driving)
+        angles = own.start + len(cause.values)
+        change = _mixed(lines.cut(signals), mix)
+        found.append(JointChange(direction, turns, angles, np.ascontiguousarray(forces[len(found)]), change, first))
+        if len(found) < len(predicted.joints):
+            driving = _driven_on(hypothesis, lines, driving, found[-1], (signals, mix, answer))
+    return tuple(found)
 
 
-def _outer_change(hypothesis: Hypothesis, lines: WindowedSpectrum, count: int) -> tuple[Complex, Complex]:
+def _mixed(signals: NDArray[np.complexfloating], mix: Real | None) -> Complex:
+    """Real combinations (n, n_columns) of complex signals (n, n_signals)."""
+    if mix is None:
+        return signals.astype(complex)
+    out = np.empty((len(signals), mix.shape[1]), dtype=complex)
+    out.real, out.imag = signals.real @ mix, signals.imag @ mix
+    return out
+
+
+def _driven_on(
+    hypothesis: Hypothesis,
+    lines: WindowedSpectrum,
+    driving: _Driving,
+    joint: JointChange,
+    written: tuple[Signals, Real | None, JointResponse],
+) -> _Driving:
+    """What drives the joints after one, whose own force changes too."""
+    signals, mix, answer = written
+    count = len(driving.force)
+    change = driving.change
+    if change is None:
+        change = np.zeros((*driving.force.shape, hypothesis.size), dtype=complex)
+    moved = _mixed(rfft(signals, n=lines.padded, axis=0)[:count], mix)
+    change[:, :, joint.first : joint.first + moved.shape[1]] -= moved[:, None] * joint.direction[:, None]
+    angles = slice(joint.angles, joint.angles + joint.turns.shape[1])
+    change[:, :, angles] -= answer.force[:count, None, None] * joint.turns
+    return _Driving(driving.force, change)
+
+
+def _outer_change(hypothesis: Hypothesis, lines: WindowedSpectrum, count: int) -> _Driving:
     """Outer force at padded lines, and its derivative by the numbers of linear causes."""
     frequencies = lines.padded_frequencies[:count]
     force = lines.force_lines[:count]
     outer = np.array(surround(hypothesis, frequencies).pushed(force))
+    if all(cause.direction is not None for cause in hypothesis.causes):
+        return _Driving(outer, None)
     change = np.zeros((*outer.shape, hypothesis.size), dtype=complex)
     here, first = hypothesis.coordinates(), hypothesis.shape.size
     at = 0
@@ -75,31 +148,37 @@ def _outer_change(hypothesis: Hypothesis, lines: WindowedSpectrum, count: int) -
             moved = surround(hypothesis.with_causes(aside), frequencies).pushed(force)
             change[:, :, first + k] = (moved - outer) / ASIDE
         at += cause.size
-    return outer, change
+    return _Driving(outer, change if change.any() else None)
 
 
 def _force_change(
-    hypothesis: Hypothesis,
-    lines: WindowedSpectrum,
-    joint: tuple[Cause, slice, JointResponse],
-    force: Complex,
-    change: Complex,
-) -> NDArray[np.float32]:
-    """Derivative of g at the samples, (n, size)."""
+    hypothesis: Hypothesis, lines: WindowedSpectrum, joint: tuple[Cause, slice, JointResponse], driving: _Driving
+) -> tuple[Signals, Real | None, int]:
+    """Derivative of g at the samples: signals (n, n_signals), their mix (n_signals, n_columns), and the first column.
+
+    Without a mix each signal is a column.
+    """
     cause, own, answer = joint
     often = len(answer.deflection) // (len(lines.recording.force) if cause.seen is not None else lines.padded)
-    n = often * len(lines.recording.force)
-    # a derivative need not be known to more than six digits
-    dg = np.zeros((n, hypothesis.size), dtype=np.float32)
-    dg[:, own] = _law_change(cause, lines, answer, often)
+    by_law = _law_change(cause, lines, answer, often)
     if cause.seen is not None:
-        return dg
-    driven = _driven_change(hypothesis, lines, joint, force, change)
-    spectrum = np.zeros((often * lines.padded // 2 + 1, hypothesis.size), dtype=np.complex64)
-    spectrum[: len(driven)] = often * driven
+        return by_law, None, own.start
+    driven, mix = _driven_change(hypothesis, lines, joint, driving)
+    values = len(cause.values)
+    # the law's numbers change the force at given motion, everything else the motion that drives it
+    spectrum = np.zeros((often * lines.padded // 2 + 1, values + driven.shape[1]), dtype=np.complex64)
+    spectrum[: len(driven), values:] = often * driven
+    by_number = np.zeros((values, hypothesis.size))
+    by_number[:, own.start : own.start + values] = np.eye(values)
+    n = often * len(lines.recording.force)
+    dg = np.zeros((n, spectrum.shape[1]), dtype=np.float32)
+    dg[:, :values] = by_law
     law, step = cause.law(), 1 / (often * lines.recording.rate)
-    s = 2j * np.pi * np.arange(len(spectrum), dtype=np.float32)[:, None] / np.float32(lines.padded * step * often)
+    s = 2j * np.pi * np.arange(len(driven), dtype=np.float32)[:, None] / np.float32(lines.padded * step * often)
     assert cause.direction is not None
+    deflection = irfft(spectrum, n=often * lines.padded, axis=0)
+    spectrum[: len(driven)] *= s
+    velocity = irfft(spectrum, n=often * lines.padded, axis=0)
     tangent_run(
         (answer.deflection[:n], answer.velocity[:n]),
         joint_dynamics(hypothesis.model, cause.direction, step),
@@ -107,16 +186,13 @@ def _force_change(
         (law.reach, law.speed),
         stiffness_ramp(law, n, step, lines.recording.duration),
         (law.springs, law.yields),
-        (
-            irfft(spectrum, n=often * lines.padded, axis=0)[:n],
-            irfft(s * spectrum, n=often * lines.padded, axis=0)[:n],
-        ),
+        (deflection[:n], velocity[:n]),
         dg,
     )
-    return at_samples(dg, often)
+    return at_samples(dg, often), np.vstack([by_number, mix]), 0
 
 
-def at_samples(signal: NDArray[np.float32], often: int) -> NDArray[np.float32]:
+def at_samples(signal: Signals, often: int) -> Signals:
     """Every ``often``-th instant of signals (often n, n_columns), each the mean of those around it, tapered."""
     if often == 1:
         return signal
@@ -128,11 +204,12 @@ def at_samples(signal: NDArray[np.float32], often: int) -> NDArray[np.float32]:
     )
 
 
-def _law_change(cause: Cause, lines: WindowedSpectrum, answer: JointResponse, often: int) -> Real:
-    """Derivative of g at given motion by the cause's own numbers, (n, cause.size); none by angles."""
+def _law_change(cause: Cause, lines: WindowedSpectrum, answer: JointResponse, often: int) -> Signals:
+    """Derivative of g at given motion by the law's numbers, (n, n_values)."""
     n = often * len(lines.recording.force)
     x, v = answer.deflection[:n], answer.velocity[:n]
-    result = np.zeros((n, cause.size))
+    # a derivative need not be known to more than six digits
+    result = np.zeros((n, len(cause.values)), dtype=np.float32)
     here = cause.coordinates()
     plain = driven_force(lines, x, v, cause.law(), often=often)
     for k in range(len(cause.values)):
@@ -143,27 +220,29 @@ def _law_change(cause: Cause, lines: WindowedSpectrum, answer: JointResponse, of
 
 
 def _driven_change(
-    hypothesis: Hypothesis,
-    lines: WindowedSpectrum,
-    joint: tuple[Cause, slice, JointResponse],
-    force: Complex,
-    change: Complex,
-) -> Complex:
-    """Derivative of the driven deflection at padded lines, (n, size): by modes, outer forces and angles."""
+    hypothesis: Hypothesis, lines: WindowedSpectrum, joint: tuple[Cause, slice, JointResponse], driving: _Driving
+) -> tuple[Complex, Real]:
+    """Derivative of the driven deflection at padded lines: signals (n, n_signals) and their mix (n_signals, size)."""
     cause, own, answer = joint
     assert cause.direction is not None
+    force, model = driving.force, hypothesis.model
     frequencies = lines.padded_frequencies[: len(force)]
-    rows, columns = common_axes(hypothesis.model)
-    along = np.einsum("p,kpq->kq", cause.direction, receptance_at(hypothesis.model, frequencies)[:, rows])
-    size = hypothesis.shape.size
-    modes = hypothesis.shape.jacobian(hypothesis.u, frequencies, force)
-    result = np.zeros((len(frequencies), hypothesis.size), dtype=complex)
-    for row, share in zip(rows, cause.direction, strict=True):
-        result[:, :size] += share * modes[:, row]
-    if change.any():
-        result += np.einsum("kq,kqc->kc", along, change)
+    rows, columns = common_axes(model)
+    along = np.zeros(len(model.responses))
+    along[rows] = cause.direction
+    receptance = receptance_at(model, frequencies)
+    driven = driven_signals(hypothesis.shape, model, frequencies, force, along)
+    mix = np.zeros((driven.shape[1], hypothesis.size))
+    mix[:, : hypothesis.shape.size] = driven_mix(hypothesis.shape, model, along)
+    compliance = along @ receptance
     turn = TURN_STEP * across(cause.direction)
-    displacement = displacement_at(hypothesis.model, frequencies, force)[:, rows]
-    angles = displacement @ turn - (along[:, columns] @ turn) * answer.force[: len(force), None]
-    result[:, own.start + len(cause.values) : own.stop] += angles
-    return np.asarray(result)
+    displacement = displacement_at(model, frequencies, force)[:, rows]
+    angles = displacement @ turn - (compliance[:, columns] @ turn) * answer.force[: len(force), None]
+    extra = np.zeros((len(force), hypothesis.size), dtype=complex)
+    extra[:, own.start + len(cause.values) : own.stop] = angles
+    if driving.change is not None:
+        extra += np.einsum("kq,kqc->kc", compliance, driving.change)
+    used = np.flatnonzero(extra.any(axis=0))
+    if len(used) > hypothesis.size // 2:
+        return _mixed(driven, mix) + extra, np.eye(hypothesis.size)
+    return np.concatenate([driven, extra[:, used]], axis=1), np.vstack([mix, np.eye(hypothesis.size)[used]])

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
 
-from ..noise import NoiseModel, fit_noise, whitened_columns, whitening_and_determinant
-from .hypothesis import Hypothesis, Predicted, predict_lines, surround
+from ..noise import NoiseModel, fit_noise, size_of_white, whitened_columns, whitening_and_determinant
+from .hypothesis import Hypothesis, Predicted, predict_lines
+from .linear_lines import LinearLines, linear_lines
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -22,6 +23,8 @@ class Misfit:
     ----------
     predicted
         What the hypothesis predicts for the recording.
+    linear
+        Matrices of its linear part at the lines; None where they cannot be made.
     white : (n_lines, n_responses, n_responses)
         Whitening W of the residual at each line, lower triangular, with ``W^H W = V^-1``.
     rest : (n_lines, n_responses)
@@ -33,6 +36,7 @@ class Misfit:
     """
 
     predicted: Predicted
+    linear: LinearLines | None
     white: Complex
     rest: Complex
     misfit: float
@@ -44,16 +48,27 @@ def misfit_under(lines: WindowedSpectrum, hypothesis: Hypothesis, noise: NoiseMo
     try:
         predicted = predict_lines(hypothesis, lines)
         rest = lines.measured - predicted.response
-        return misfit_of(lines, predicted, rest, through_structure(hypothesis, lines), noise)
+        return _misfit_of(lines, predicted, linear_lines(hypothesis, lines), rest, noise)
     except np.linalg.LinAlgError:
         nothing = np.zeros((0, 0), dtype=complex)
-        return Misfit(Predicted(nothing, nothing, nothing, ()), nothing, nothing, np.inf, noise)
+        return Misfit(Predicted(nothing, nothing, nothing, ()), None, nothing, nothing, np.inf, noise)
 
 
 def with_noise(
     lines: WindowedSpectrum, hypothesis: Hypothesis, noise: NoiseModel | None, seen: Misfit | None = None
 ) -> Misfit:
     """Misfit under the noise that fits the residual best.
+
+    Parameters
+    ----------
+    lines
+        Windowed spectrum of the recording.
+    hypothesis
+        Hypothesis that predicts it.
+    noise
+        Noise that the search begins with; None: taken from the residual.
+    seen
+        The same recording under the same hypothesis and another noise, if it was predicted before.
 
     Raises
     ------
@@ -64,9 +79,9 @@ def with_noise(
     rest = lines.measured - predicted.response
     if not np.isfinite(rest).all():
         raise np.linalg.LinAlgError(f"the response predicted for {lines.recording.name} is not finite")
-    through = through_structure(hypothesis, lines)
-    found = fit_noise(lines.frequencies, rest, through, levels(lines), noise)
-    return misfit_of(lines, predicted, rest, through, found)
+    linear = seen.linear if seen is not None and seen.linear is not None else linear_lines(hypothesis, lines)
+    found = fit_noise(lines.frequencies, rest, linear.through, levels(lines), noise)
+    return _misfit_of(lines, predicted, linear, rest, found)
 
 
 def least_misfit(hypothesis: Hypothesis, lines: WindowedSpectrum) -> float:
@@ -79,11 +94,7 @@ def least_misfit(hypothesis: Hypothesis, lines: WindowedSpectrum) -> float:
 
 def through_structure(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Complex:
     """Matrix from measured forces to measured responses at the lines, (n_lines, n_responses, n_excitations)."""
-    around = surround(hypothesis, lines.frequencies)
-    closed = around.closed(hypothesis.model.receptance(lines.frequencies))
-    if around.force is not None:
-        closed = closed @ around.force
-    return np.asarray(around.shown(closed * lines.kinematic[:, :, None]) @ lines.trust)
+    return linear_lines(hypothesis, lines).through
 
 
 def levels(lines: WindowedSpectrum) -> tuple[Real, Real]:
@@ -101,14 +112,12 @@ def whitened(white: Complex, lines: Complex) -> Real:
     return out.reshape(-1, lines.shape[2])
 
 
-def misfit_of(
-    lines: WindowedSpectrum, predicted: Predicted, rest: Complex, through: Complex, noise: NoiseModel
+def _misfit_of(
+    lines: WindowedSpectrum, predicted: Predicted, linear: LinearLines, rest: Complex, noise: NoiseModel
 ) -> Misfit:
     """Misfit of a residual under a given noise; infinite where it is not finite."""
     if not np.isfinite(rest).all():
-        return Misfit(predicted, rest, rest, np.inf, noise)
-    covariance = noise.covariance(lines.frequencies, through)
-    white, log_determinant = whitening_and_determinant(covariance)
-    small = whitened(white, rest[:, :, None])
-    misfit = 2 * float(log_determinant + np.vdot(small, small))
-    return Misfit(predicted, white, rest, misfit if np.isfinite(misfit) else np.inf, noise)
+        return Misfit(predicted, linear, rest, rest, np.inf, noise)
+    white, log_determinant = whitening_and_determinant(noise.covariance(lines.frequencies, linear.through))
+    misfit = 2 * (log_determinant + size_of_white(white, np.ascontiguousarray(rest), np.empty(len(rest))))
+    return Misfit(predicted, linear, white, rest, misfit if np.isfinite(misfit) else np.inf, noise)

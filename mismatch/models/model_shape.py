@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from modal_fit import ModalModel
 
 from ..inference import LabError
-from .modal_loops import modal_slopes
+from .lines import modal_slopes, outside_slopes
 from .outside_band import OutsideBand, outside_band
 
 Complex = NDArray[np.complex128]
@@ -101,7 +101,7 @@ class ModelShape:
         """Number of all parameters, those for modes outside the band included."""
         return self.modal_size + (self.outside.size if self.outside is not None else 0)
 
-    def _scales(self) -> tuple[Real, Real]:
+    def scales(self) -> tuple[Real, Real]:
         """Unit of a right and of a left entry, each (n_modes,)."""
         right, left = (np.sqrt(np.mean(np.abs(v) ** 2, axis=1)) for v in (self.nominal.right, self.nominal.left))
         return self.lab.shape * right, self.lab.shape * left
@@ -113,7 +113,7 @@ class ModelShape:
         damping = np.clip(self.nominal.damping_ratios * np.exp(self.lab.damping * rows[:, 1]), 1e-5, 0.95)
         poles = omega * (-damping + 1j * np.sqrt(1 - damping**2))
         n, m = self.nominal.right.shape[1], self.nominal.left.shape[1]
-        right_unit, left_unit = self._scales()
+        right_unit, left_unit = self.scales()
         right = self.nominal.right + right_unit[:, None] * (rows[:, 2 : 2 + n] + 1j * rows[:, 2 + n : 2 + 2 * n])
         rest = rows[:, 2 + 2 * n :]
         left = self.nominal.left + left_unit[:, None] * (rest[:, :m] + 1j * rest[:, m:])
@@ -124,7 +124,7 @@ class ModelShape:
             self.nominal, poles=poles, right=right, left=left, residuals=residuals, covariance=None, errors=None
         )
 
-    def jacobian(self, u: Real, frequencies: Real, force: Complex, factor: Complex | None = None) -> Complex:
+    def jacobian(self, u: Real, frequencies: Real, force: Complex) -> Complex:
         """Derivative of the displacement lines by u for force lines, (n_lines, n_responses, size).
 
         Parameters
@@ -135,28 +135,42 @@ class ModelShape:
             Frequencies of the lines.
         force : (n_lines, n_excitations), N
             Force spectrum at the lines.
-        factor : (n_lines, n_responses)
-            Factor that the displacement is multiplied by; None: one.
         """
-        model = self.model(u)
+        n = self.nominal.right.shape[1]
+        parts = np.empty((2, len(frequencies), n, self.size))
+        identity = np.tile(np.eye(n, dtype=complex), (len(frequencies), 1, 1))
+        self.write_slopes(self.model(u), frequencies, force, identity, parts)
+        return np.asarray(parts[0] + 1j * parts[1])
+
+    def write_slopes(self, model: ModalModel, frequencies: Real, force: Complex, factor: Complex, out: Real) -> None:
+        """Write the derivative of ``M (H F)`` by u: the numbers that are fitted come first in a line's columns.
+
+        Parameters
+        ----------
+        model
+            The modal model at which the derivative is taken.
+        frequencies : (n_lines,), Hz
+            Frequencies of the lines.
+        force : (n_lines, n_excitations), N
+            Force spectrum at the lines.
+        factor : (n_lines, n_rows, n_responses)
+            Matrix M that the displacement at each line is multiplied by.
+        out : (2, n_lines, n_rows, size or more)
+            Receives real and imaginary parts.
+        """
+        s = np.asarray(2j * np.pi * frequencies, dtype=complex)
+        force, factor = np.ascontiguousarray(force), np.ascontiguousarray(factor)
+        modes = (model.poles, model.right, model.left)
+        modal_slopes(s, force, modes, (*self.pole_units(model), *self.scales()), factor, out)
+        if self.outside is not None:
+            outside_slopes(self.outside.basis(s), self.outside.units, force, factor, out, self.modal_size)
+
+    def pole_units(self, model: ModalModel) -> tuple[Complex, Complex]:
+        """Change of each pole of the model by a unit of ln frequency and of ln damping ratio, each (n_modes,)."""
         poles = model.poles
         zeta = -poles.real / np.abs(poles)
         along = np.abs(poles) * zeta * self.lab.damping * (-1 - 1j * zeta / np.sqrt(1 - zeta**2))
-        if factor is None:
-            factor = np.ones((len(frequencies), model.right.shape[1]), dtype=complex)
-        result = np.empty((*factor.shape, self.size), dtype=complex)
-        s = np.asarray(2j * np.pi * frequencies, dtype=complex)
-        modal_slopes(
-            s,
-            np.ascontiguousarray(force),
-            (poles, model.right, model.left),
-            (poles * self.lab.frequency, along, *self._scales()),
-            factor,
-            result,
-        )
-        if self.outside is not None:
-            result[:, :, self.modal_size :] = self.outside.slopes(s, force, factor)
-        return result
+        return poles * self.lab.frequency, along
 
 
 def _modes_of(model: ModalModel, chosen: NDArray[np.int64]) -> ModalModel:

@@ -61,25 +61,6 @@ class OutsideBand:
             residues = np.concatenate([residuals.residues, residues])
         return Residuals(upper, lower, poles, residues)
 
-    def slopes(self, s: Complex, force: Complex, factor: Complex) -> Complex:
-        """Derivative of ``factor * (H F)`` by the numbers, (n_lines, n_responses, size).
-
-        Parameters
-        ----------
-        s : (n_lines,), rad/s
-            Laplace variable ``i omega`` of the lines.
-        force : (n_lines, n_excitations), N
-            Force spectrum at the lines.
-        factor : (n_lines, n_responses)
-            Factor that the displacement at each line is multiplied by.
-        """
-        n, m = self.units.shape[1:]
-        result = np.zeros((len(s), n, TERMS, n, m), dtype=complex)
-        basis = self.basis(s)
-        for p in range(n):
-            result[:, p, :, p] = factor[:, p, None, None] * basis.T[:, :, None] * self.units[:, p] * force[:, None, :]
-        return result.reshape(len(s), n, -1)
-
 
 def outside_band(model: ModalModel, share: float) -> OutsideBand | None:
     """Terms for a model that states its band; None for one that does not, which is compared with all its reach.

@@ -67,6 +67,32 @@ def whiten_lines(covariance: Complex) -> float:
 
 
 @compiled
+def size_of_white(white: Complex, lines: Complex, sizes: Real) -> float:
+    """Write ``|W_k r_k|^2`` of each line into sizes (n_lines,), for W (n_lines, n, n) lower triangular; return the sum.
+
+    Parameters
+    ----------
+    white : (n_lines, n, n)
+        Whitening W_k of each line, lower triangular.
+    lines : (n_lines, n)
+        Residual r_k of each line.
+    sizes : (n_lines,)
+        Receives the squares.
+    """
+    total = 0.0
+    for k in range(len(white)):
+        own = 0.0
+        for i in range(white.shape[1]):
+            value = white[k, i, 0] * lines[k, 0]
+            for j in range(1, i + 1):
+                value += white[k, i, j] * lines[k, j]
+            own += value.real**2 + value.imag**2
+        sizes[k] = own
+        total += own
+    return total
+
+
+@compiled
 def whitened_columns(white: Complex, lines: Complex, out: Real) -> None:
     """Write ``W_k A_k`` of each line as real rows: real parts above imaginary ones.
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .line_loops import whiten_lines
+from .line_loops import size_of_white, whiten_lines
 from .noise_loops import line_covariances
 from .noise_search import lumped, most_likely
 
@@ -51,6 +51,13 @@ class NoiseModel:
         result = np.empty((*own.shape, own.shape[1]), dtype=complex)
         line_covariances(own, np.ascontiguousarray(through), np.exp(self.forces), result)
         return result
+
+    def sizes(self, frequencies: Real, residual: Complex, through: Complex) -> Real:
+        """Whitened squares ``r^H V^-1 r`` of residual lines (n_lines, n_responses), (n_lines,)."""
+        sizes = np.empty(len(residual))
+        white = whitening_and_determinant(self.covariance(frequencies, through))[0]
+        size_of_white(white, np.ascontiguousarray(residual), sizes)
+        return sizes
 
     def response_level(self) -> Real:
         """Root mean square noise of each response over the band's knots, (n_responses,)."""
@@ -109,14 +116,13 @@ def fit_noise(
     weights = np.ones(len(frequencies))
     belief = _belief(n, m, levels)
     noise = start
-    for _ in range(1 if warm else 2):
+    for turn in range(1 if warm else 2):
+        if turn:
+            weights = np.minimum(1.0, (4.0 * n + 6.0) / np.maximum(noise.sizes(frequencies, residual, through), 1e-12))
         lumps = lumped(residual, through, weights, hat)
         first = np.concatenate([noise.responses.ravel(), noise.forces])
         best = most_likely(first, lumps, belief, WARM if warm else COLD)
         noise = NoiseModel(knots, best[: n * KNOTS].reshape(n, KNOTS), best[n * KNOTS :])
-        white = whitening(noise.covariance(frequencies, through))
-        size = np.sum(np.abs(np.einsum("kij,kj->ki", white, residual)) ** 2, axis=1)
-        weights = np.minimum(1.0, (4.0 * n + 6.0) / np.maximum(size, 1e-12))
     return noise
 
 

@@ -118,11 +118,11 @@ class ModalModel(Result):
 
     def at(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Evaluate H anywhere in the Laplace plane (rad/s); shape (n_values, n_responses, n_excitations)."""
-        direct = np.einsum("kr,rp,rq->kpq", 1 / (s[:, None] - self.poles), self.right, self.left, optimize=True)
-        conjugate = np.einsum(
-            "kr,rp,rq->kpq", 1 / (s[:, None] - self.poles.conj()), self.right.conj(), self.left.conj(), optimize=True
-        )
-        values = np.asarray(direct + conjugate, dtype=complex)
+        n_modes, n, m = len(self.poles), self.right.shape[1], self.left.shape[1]
+        residues = (self.right[:, :, None] * self.left[:, None, :]).reshape(n_modes, n * m)
+        # one product of matrices: an einsum would look for the best order at each call
+        shares = 1 / (s[:, None] - np.concatenate([self.poles, self.poles.conj()]))
+        values = np.asarray(shares @ np.concatenate([residues, residues.conj()]), dtype=complex).reshape(-1, n, m)
         if self.residuals is not None:
             values += self.residuals.receptance(s)
         return values * np.exp(-s * self.delay)[:, None, None] if self.delay else values

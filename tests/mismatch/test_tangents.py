@@ -12,7 +12,7 @@ from mismatch.joints.joint_law import JointMotion
 from mismatch.joints.joint_simulation import driven_force
 from mismatch.models.derivatives import jacobian
 from mismatch.models.hypothesis import Cause
-from mismatch.models.modal_lines import displacement_at
+from mismatch.models.lines.modal_lines import displacement_at
 from mismatch.noise.line_loops import whiten_lines
 from mismatch.physics import JointPhysics, library
 from modal_fit import ModalModel
