@@ -9,8 +9,10 @@ from .process_pool import in_processes
 from .remainder import Remainder
 from .settings import (
     FAULTS,
+    LOCATION,
     EvidenceSettings,
     FaultSettings,
+    LocationSettings,
     ProofSettings,
     ScreeningSettings,
     SearchSettings,
@@ -22,6 +24,7 @@ from .verdict import Findings, leaves_too_much, share_left, verdict_of
 
 __all__ = [
     "FAULTS",
+    "LOCATION",
     "VERDICTS",
     "AcceptedCause",
     "Candidate",
@@ -36,6 +39,7 @@ __all__ = [
     "Improvement",
     "LabError",
     "Limits",
+    "LocationSettings",
     "Problem",
     "Progress",
     "ProofSettings",

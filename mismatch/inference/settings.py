@@ -206,6 +206,38 @@ class VerdictSettings(Thresholds, shares=("explained", "partly")):
 
 
 @dataclass(frozen=True)
+class LocationSettings(Thresholds, shares=("family_wise", "least_spread")):
+    """Where a mismatch is said to sit.
+
+    Parameters
+    ----------
+    family_wise
+        Probability that any cell of a diagnosis is called significant where only noise is left (Holm, Scand. J.
+        Statistics 6, 1979).
+    least_spread
+        Least relative uncertainty of the noise level, which is never known better than to two per cent.
+    quiet_level, quiet_spread
+        Level and spread of a noise read from the quietest bands, which lie below the mean by chance and hide its
+        colour.
+    seen
+        Standard errors above noise from which a recording's residual counts in its growth with the level.
+    levels_apart
+        Difference of the logarithms of the forces from which recordings show a growth.
+    """
+
+    family_wise: float = 0.01
+    least_spread: float = 0.02
+    quiet_level: float = 1.25
+    quiet_spread: float = 0.5
+    seen: float = 2.0
+    levels_apart: float = 0.1
+
+
+LOCATION = LocationSettings()
+"""The usual thresholds of locating."""
+
+
+@dataclass(frozen=True)
 class Settings(Thresholds):
     """How a diagnosis is made.
 
@@ -215,7 +247,7 @@ class Settings(Thresholds):
         What the believed model is usually off.
     causes
         Causes that are weighed, by name; None: the whole library of the kind of comparison.
-    evidence, search, screening, faults, proof, verdict
+    evidence, search, screening, faults, proof, verdict, location
         Thresholds of each step.
     """
 
@@ -227,3 +259,4 @@ class Settings(Thresholds):
     faults: FaultSettings = FAULTS
     proof: ProofSettings = field(default_factory=ProofSettings)
     verdict: VerdictSettings = field(default_factory=VerdictSettings)
+    location: LocationSettings = LOCATION

@@ -7,13 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import polygamma
 from scipy.stats import f as fisher
 
+from ..inference import LOCATION
+
 Real = NDArray[np.float64]
-
-FAMILY_WISE = 0.01
-"""Probability that any cell of a diagnosis is called significant where only noise is left."""
-
-LEAST_SPREAD = 0.02
-"""Least relative uncertainty of the noise level, which is never known better than to two per cent."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +33,7 @@ class NoiseSpread:
         return np.asarray(fisher.sf(np.asarray(ratio) / self.level, numerator, 2 / self.spread**2))
 
 
-def noise_spread(ratio: Real, count: Real) -> NoiseSpread:
+def noise_spread(ratio: Real, count: Real, least: float = LOCATION.least_spread) -> NoiseSpread:
     """Return level and spread of the cells that the final model leaves, by median and median deviation.
 
     Parameters
@@ -46,12 +42,14 @@ def noise_spread(ratio: Real, count: Real) -> NoiseSpread:
         Residual power over noise power of each cell, any shape.
     count
         Independent complex lines of each cell, in the shape of ``ratio``.
+    least
+        Least spread, however well the cells agree.
     """
     logs = np.log(np.maximum(ratio, 1e-12)).ravel()
     middle = float(np.median(logs))
     scatter = (1.4826 * float(np.median(np.abs(logs - middle)))) ** 2
     chance = float(np.median(polygamma(1, np.maximum(count, 0.5).ravel())))
-    return NoiseSpread(max(1.0, float(np.exp(middle))), float(np.sqrt(max(scatter - chance, LEAST_SPREAD**2))))
+    return NoiseSpread(max(1.0, float(np.exp(middle))), float(np.sqrt(max(scatter - chance, least**2))))
 
 
 def holm(chances: Real) -> Real:

@@ -8,13 +8,11 @@ from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
 
+from ..inference import LOCATION, LocationSettings
 from ..models import Fit, Hypothesis
 from .residual_maps import normalised, overlap
 
 Real = NDArray[np.float64]
-
-SEEN = 2.0
-"""Standard errors above noise from which a recording's residual is used."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +46,7 @@ def growth(
     lines: Sequence[WindowedSpectrum],
     bands: Sequence[tuple[float, float]],
     spread: float,
+    settings: LocationSettings = LOCATION,
 ) -> Growth:
     """Return how a hypothesis's residual grows with the force inside bands.
 
@@ -66,6 +65,8 @@ def growth(
         Bands in which the residual was found, as low and high edge, Hz; empty for all frequencies.
     spread
         Relative standard deviation of the noise's variance, beyond chance.
+    settings
+        From where a residual counts, and how far levels must be apart.
     """
     unit = np.sqrt(np.mean([np.mean(np.abs(one.measured) ** 2, axis=0) for one in lines], axis=0))
     rows = []
@@ -81,8 +82,10 @@ def growth(
     force, excess_, error_, noise = np.array(rows).T
     amplitude = np.sqrt(np.maximum(excess_, 0.0))
     spreads = error_ / (2 * np.maximum(amplitude, np.sqrt(error_)))
-    seen = excess_ > SEEN * error_
-    exponent, exponent_error = _slope(force[seen], amplitude[seen], spreads[seen] / amplitude[seen])
+    seen = excess_ > settings.seen * error_
+    exponent, exponent_error = _slope(
+        force[seen], amplitude[seen], spreads[seen] / amplitude[seen], settings.levels_apart
+    )
     return Growth(force, amplitude, spreads, np.sqrt(noise), exponent, exponent_error)
 
 
@@ -93,9 +96,9 @@ def _inside(frequencies: Real, bands: Sequence[tuple[float, float]]) -> NDArray[
     return inside
 
 
-def _slope(force: Real, amplitude: Real, relative: Real) -> tuple[float, float]:
+def _slope(force: Real, amplitude: Real, relative: Real, apart: float) -> tuple[float, float]:
     """Return the weighted slope of the logarithms and its standard error, enlarged by the misfit of the line."""
-    if len(force) < 2 or np.ptp(np.log(force)) < 0.1:
+    if len(force) < 2 or np.ptp(np.log(force)) < apart:
         return float("nan"), float("nan")
     weight = 1 / np.maximum(relative, 1e-3) ** 2
     x, y = np.log(force), np.log(amplitude)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
-from .family_wise import FAMILY_WISE, holm
+from .family_wise import holm
 from .growth import Growth, growth
 from .spindle_orders import SpindleSpeed, order_powers
 from .time_maps import BlockResidual
@@ -34,7 +34,7 @@ def located(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> dict[str,
     speeds
         Spindle speed by the recording's name, for the recordings that state one.
     """
-    before, after = view.before, view.after
+    before, after, level = view.before, view.after, view.settings.family_wise
     tables = {
         "band": (before.pooled_joint(0), after.pooled_joint(0)),
         "channel": (before.pooled((0, 1)), after.pooled((0, 1))),
@@ -47,16 +47,14 @@ def located(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> dict[str,
     orders = _orders(view, speeds)
     chances.append(np.array([order["p_value"] for order in orders]))
     adjusted = _split(holm(np.concatenate([c.ravel() for c in chances])), chances)
-    bands = _bands(before.edges, tables["band"], adjusted[0])
-    found_orders = [
-        order | {"p_value": float(p)} for order, p in zip(orders, adjusted[-1], strict=True) if p < FAMILY_WISE
-    ]
+    bands = _bands(before.edges, tables["band"], adjusted[0], level)
+    found_orders = [order | {"p_value": float(p)} for order, p in zip(orders, adjusted[-1], strict=True) if p < level]
     return {
         "tests": int(sum(c.size for c in chances)),
-        "family_wise_level": FAMILY_WISE,
+        "family_wise_level": level,
         "noise_level_spread": _plain(view.noise.spread),
         "frequency_bands": bands,
-        "channels": _named("channel", before.channels, tables["channel"], adjusted[1]),
+        "channels": _named("channel", before.channels, tables["channel"], adjusted[1], level),
         "levels": _levels(view, tables["level"], adjusted[2]),
         "cells": _cells(view, adjusted[3]),
         "times": _times(view, blocks, adjusted[4:-1]),
@@ -95,12 +93,12 @@ def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(a), int(b)) for a, b in zip(steps[::2], steps[1::2], strict=True)]
 
 
-def _bands(edges: Real, tables: Tables, p_value: Real) -> list[dict[str, Any]]:
+def _bands(edges: Real, tables: Tables, p_value: Real, level: float) -> list[dict[str, Any]]:
     """Return significant bands with their neighbours joined, most excess first."""
     before, after = tables
     excess = np.maximum(before[0] - 1, 0) * before[1]
     found = []
-    for start, stop in _runs(p_value < FAMILY_WISE):
+    for start, stop in _runs(p_value < level):
         part = slice(start, stop)
         peak = start + int(np.argmax(excess[part]))
         weights = np.maximum(before[1][part], 1e-9), np.maximum(after[1][part], 1e-9)
@@ -118,7 +116,7 @@ def _bands(edges: Real, tables: Tables, p_value: Real) -> list[dict[str, Any]]:
     return sorted(found, key=lambda one: -(one["share"] or 0.0))
 
 
-def _named(key: str, names: Sequence[str], tables: Tables, p_value: Real) -> list[dict[str, Any]]:
+def _named(key: str, names: Sequence[str], tables: Tables, p_value: Real, level: float) -> list[dict[str, Any]]:
     (before, count), (after, _) = tables
     excess = np.maximum(before - 1, 0) * count
     return [
@@ -128,27 +126,27 @@ def _named(key: str, names: Sequence[str], tables: Tables, p_value: Real) -> lis
             "after": _plain(after[k]),
             "share": _plain(excess[k] / max(float(excess.sum()), 1e-300)),
             "p_value": float(p_value[k]),
-            "significant": bool(p_value[k] < FAMILY_WISE),
+            "significant": bool(p_value[k] < level),
         }
         for k, name in enumerate(names)
     ]
 
 
 def _levels(view: ResidualView, tables: Tables, p_value: Real) -> list[dict[str, Any]]:
-    rows = _named("recording", view.before.recordings, tables, p_value)
+    rows = _named("recording", view.before.recordings, tables, p_value, view.settings.family_wise)
     return [row | {"force_rms_n": _plain(one.recording.level)} for row, one in zip(rows, view.measured, strict=True)]
 
 
 def _cells(view: ResidualView, p_value: Real) -> list[list[int]]:
     """Return the significant cells as indices [recording, band, channel]; bands are about sixth octaves."""
-    return [[int(k) for k in cell] for cell in np.argwhere(p_value < FAMILY_WISE)]
+    return [[int(k) for k in cell] for cell in np.argwhere(p_value < view.settings.family_wise)]
 
 
 def _times(view: ResidualView, tables: Sequence[tuple[Real, Real]], p_values: Sequence[Real]) -> list[dict[str, Any]]:
     """Return the stretches of time whose blocks are significant."""
     found = []
     for blocks, (ratio, _), p_value in zip(view.blocks_before, tables, p_values, strict=True):
-        for start, stop in _runs(p_value < FAMILY_WISE):
+        for start, stop in _runs(p_value < view.settings.family_wise):
             found.append(
                 {
                     "recording": blocks.recording,
@@ -167,11 +165,13 @@ def _growth(view: ResidualView, bands: Sequence[Mapping[str, Any]]) -> dict[str,
     if not ranges:
         return {"note": "nothing stands above the noise, so nothing grows"}
     details = view.details
-    refitted = growth(details.base.hypothesis, view.reference, view.measured, ranges, view.noise.spread)
+    refitted = growth(details.base.hypothesis, view.reference, view.measured, ranges, view.noise.spread, view.settings)
     content = {"residual": _growth_content(refitted)}
     bare = linear_part(details)
     if bare is not None:
-        content["effect"] = _growth_content(growth(bare, view.reference, details.recordings, ranges, view.noise.spread))
+        content["effect"] = _growth_content(
+            growth(bare, view.reference, details.recordings, ranges, view.noise.spread, view.settings)
+        )
     return content
 
 

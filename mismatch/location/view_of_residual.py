@@ -7,15 +7,13 @@ import numpy as np
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 
+from ..inference import LOCATION, LocationSettings
 from ..models import Fit, Hypothesis, predict_lines
 from ..noise import NoiseModel
 from .family_wise import NoiseSpread, noise_spread
 from .residual_maps import ResidualMap, band_edges, residual_map
 from .structure_details import StructureDetails
 from .time_maps import BlockResidual, block_residual
-
-QUIET = NoiseSpread(1.25, 0.5)
-"""Level and spread of a noise read from the quietest bands, which lie below the mean by chance and hide its colour."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +35,8 @@ class ResidualView:
         noise, that noise has the level of the quietest fifth of narrow bands instead of the fitted one.
     noise
         Level and spread of that noise: how well it is known.
+    settings
+        Thresholds with which places are named.
     """
 
     details: StructureDetails
@@ -47,10 +47,14 @@ class ResidualView:
     blocks_after: tuple[BlockResidual, ...]
     reference: Fit
     noise: NoiseSpread
+    settings: LocationSettings = LOCATION
 
 
 def residual_view(
-    details: StructureDetails, unexplained: bool, trials: Sequence[BandRecording] | None = None
+    details: StructureDetails,
+    unexplained: bool,
+    trials: Sequence[BandRecording] | None = None,
+    settings: LocationSettings = LOCATION,
 ) -> ResidualView:
     """Return the maps of the residual of a diagnosis.
 
@@ -62,6 +66,8 @@ def residual_view(
         Whether something stayed unexplained and may have been taken for noise.
     trials
         Recordings as read, so that mended tones and clipping are located too; None for those the diagnosis holds.
+    settings
+        Thresholds with which places are named.
     """
     mended = details.recordings
     measured = tuple(_as_measured(one, trials or ()) for one in mended)
@@ -70,6 +76,10 @@ def residual_view(
     if unexplained:
         final = replace(final, noises=tuple(_quiet(final, k, one) for k, one in enumerate(mended)))
     after = residual_map(final.hypothesis, final, mended, edges)
+    noise = NoiseSpread(settings.quiet_level, settings.quiet_spread)
+    if not unexplained:
+        count = np.broadcast_to(after.count[:, :, None], after.ratio.shape)
+        noise = noise_spread(after.ratio, count, settings.least_spread)
     return ResidualView(
         details,
         measured,
@@ -78,9 +88,8 @@ def residual_view(
         tuple(block_residual(base, final, k, one) for k, one in enumerate(measured)),
         tuple(block_residual(final.hypothesis, final, k, one) for k, one in enumerate(mended)),
         final,
-        QUIET
-        if unexplained
-        else noise_spread(after.ratio, np.broadcast_to(after.count[:, :, None], after.ratio.shape)),
+        noise,
+        settings,
     )
 
 

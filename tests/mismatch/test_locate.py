@@ -11,6 +11,7 @@ from scipy.signal import butter, sosfilt
 
 from estimation import BandRecording
 from mismatch import StructureDiagnosis
+from mismatch.inference import LocationSettings
 from mismatch.location.family_wise import holm
 from mismatch.location.locate import located
 from mismatch.location.spindle_orders import SpindleSpeed
@@ -68,6 +69,27 @@ def test_band_channel_and_growth(
     assert growth["exponent"] == pytest.approx(exponent, abs=max(3 * growth["exponent_standard_error"], 0.05))
     assert growth["exponent_standard_error"] < 0.3
     json.dumps(found, allow_nan=False)
+
+
+def test_thresholds_of_the_settings_decide(
+    small_model: ModalModel, quiet: list[BandRecording], hand_made: MakeDiagnosis
+) -> None:
+    details = hand_made(small_model, grown(quiet, 1.0)).details
+
+    def with_these(unexplained: bool = False, **changed: float) -> dict[str, Any]:
+        return located(residual_view(details, unexplained, settings=LocationSettings(**changed)), {})
+
+    usual, never = with_these(), with_these(family_wise=0.0)
+    assert (usual["family_wise_level"], never["family_wise_level"]) == (0.01, 0.0)
+    assert usual["cells"]
+    assert never["cells"] == never["frequency_bands"] == never["times"] == []
+    assert not any(row["significant"] for row in [*never["channels"], *never["levels"]])
+    assert usual["growth"]["residual"]["exponent"] is not None
+    for changed in ({"seen": 1e9}, {"levels_apart": 10.0}):
+        assert with_these(**changed)["growth"]["residual"]["exponent"] is None
+    assert with_these(least_spread=0.3)["noise_level_spread"] == 0.3
+    assert with_these(unexplained=True, quiet_spread=0.7)["noise_level_spread"] == 0.7
+    assert len(with_these(unexplained=True, quiet_level=1e6)["cells"]) == 0
 
 
 def test_nothing_is_located_in_noise(

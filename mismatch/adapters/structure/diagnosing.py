@@ -102,7 +102,7 @@ def _diagnosed(
     band = max(bands, key=lambda band: band.high)
     elsewhere = answer.held_out.linear, answer.held_out.improved
     details = StructureDetails(base, answer.final, tuple(mended), tuple(measured), elsewhere, band)
-    view = residual_view(details, answer.verdict == "unexplained", recordings)
+    view = residual_view(details, answer.verdict == "unexplained", recordings, settings.location)
     candidates = sorted([*found.candidates, *answer.rejected], key=lambda one: -one.evidence)
     return Diagnosis(
         "structure",

@@ -18,9 +18,11 @@ from mismatch.adapters.robot.settings import LIMITS
 from mismatch.faults.tones import sharp_contrast
 from mismatch.inference import (
     FAULTS,
+    LOCATION,
     EvidenceSettings,
     FaultSettings,
     LabError,
+    LocationSettings,
     ProofSettings,
     Proposal,
     Round,
@@ -32,11 +34,12 @@ from mismatch.inference import (
     search,
     signed_ranks,
 )
+from mismatch.location.family_wise import NoiseSpread, holm
 
 Real = NDArray[np.float64]
 
 CLASSES = (LabError, EvidenceSettings, SearchSettings, ScreeningSettings, FaultSettings, ProofSettings,
-           VerdictSettings, Settings)  # fmt: skip
+           VerdictSettings, LocationSettings, Settings)  # fmt: skip
 
 
 def odds(gain: float) -> float:
@@ -85,6 +88,17 @@ def test_a_significance_can_be_reached_by_as_few_blocks_as_counted() -> None:
         for count in range(2, 12):
             falls = np.arange(1.0, count + 1)
             assert (signed_ranks(falls, np.zeros(count)) < significance) is (count >= least)
+
+
+def test_noise_alone_is_placed_anywhere_as_rarely_as_stated() -> None:
+    """Power of n complex lines over a noise level that is itself known to 10 %, in 40 cells of 1 to 60 lines."""
+    rng, runs, spread = np.random.default_rng(2), 20_000, 0.1
+    count = np.resize([1.0, 4.0, 12.0, 60.0], 40)
+    freedom = 2 / spread**2
+    ratio = rng.chisquare(2 * count, (runs, 40)) / (2 * count) / (rng.chisquare(freedom, (runs, 40)) / freedom)
+    chances = NoiseSpread(1.0, spread).chance(ratio, count)
+    alarms = float(np.mean([holm(one).min() < LOCATION.family_wise for one in chances]))
+    assert alarms == pytest.approx(LOCATION.family_wise, abs=4 * math.sqrt(LOCATION.family_wise / runs))
 
 
 def test_a_right_robot_passes_for_noise() -> None:
@@ -165,6 +179,7 @@ def test_no_more_causes_are_accepted_than_allowed() -> None:
 def test_defaults_are_the_same_for_everyone_and_belong_to_no_one() -> None:
     assert Settings() == Settings()
     assert Settings().faults == FAULTS == FaultSettings()
+    assert Settings().location == LOCATION == LocationSettings()
     stricter = replace(Settings(), evidence=EvidenceSettings(least=50.0))
     assert Settings().evidence.least == 20.0
     assert {one.name for one in fields(Settings) if getattr(stricter, one.name) != getattr(Settings(), one.name)} == {

@@ -17,6 +17,7 @@ from mismatch.inference import (
     EvidenceSettings,
     FaultSettings,
     LabError,
+    LocationSettings,
     ProofSettings,
     ScreeningSettings,
     SearchSettings,
@@ -26,8 +27,8 @@ from mismatch.inference import (
 from modal_fit import ModalModel
 
 CLASSES = (
-    EvidenceSettings, SearchSettings, ScreeningSettings, FaultSettings, ProofSettings, VerdictSettings, CutSettings,
-    RobotLimits,
+    EvidenceSettings, SearchSettings, ScreeningSettings, FaultSettings, ProofSettings, VerdictSettings,
+    LocationSettings, CutSettings, RobotLimits,
 )  # fmt: skip
 NUMBERS = [(kind, one.name, one.type) for kind in CLASSES for one in fields(kind) if one.type in (int, float)]
 
