@@ -10,13 +10,19 @@ Real = NDArray[np.float64]
 
 
 @compiled
+def cell_of(table: Real, cells: float, reach: float, at: float) -> int:
+    """Cell of an evenly spaced table over [-reach, reach], ``cells`` of which are one unit long."""
+    return int(min(max((at + reach) * cells, 0.0), len(table) - 2.0))
+
+
+@compiled
 def look_up(table: Real, reach: float, at: float) -> tuple[float, float]:
     """Value and slope of an evenly spaced table over [-reach, reach], straight beyond its ends."""
-    step = 2.0 * reach / (len(table) - 1)
-    place = (at + reach) / step
-    k = int(min(max(place, 0.0), len(table) - 2.0))
-    slope = (table[k + 1] - table[k]) / step
-    return table[k] + (place - k) * step * slope, slope
+    # a loop that always looks into the same table works this out once
+    cells = (len(table) - 1) / (2.0 * reach)
+    k = cell_of(table, cells, reach, at)
+    rise = table[k + 1] - table[k]
+    return table[k] + ((at + reach) * cells - k) * rise, rise * cells
 
 
 @compiled
@@ -31,6 +37,12 @@ def elements_force(springs: Real, yields: Real, stretch: Real, moved: float) -> 
             value += springs[i] * trial
             stiffness += springs[i]
     return value, stiffness
+
+
+@compiled
+def _same_cell(table: Real, cells: float, reach: float, one: float, other: float) -> bool:
+    """Whether a table is straight between two places."""
+    return cell_of(table, cells, reach, one) == cell_of(table, cells, reach, other)
 
 
 @compiled
@@ -78,6 +90,7 @@ def free_run(
     for r in range(len(turn)):
         own_x += 2.0 * (to_x[r] * late[r]).real
         own_v += 2.0 * (to_v[r] * late[r]).real
+    cells_x, cells_v = (len(tables[0]) - 1) / (2.0 * spans[0]), (len(tables[1]) - 1) / (2.0 * spans[1])
     before_x, g = driven[0], 0.0
     for k in range(len(driven)):
         x_free, v_free = driven[k], driven_speed[k]
@@ -85,23 +98,23 @@ def free_run(
             modes[r] = turn[r] * modes[r] - early[r] * g
             x_free += 2.0 * (to_x[r] * modes[r]).real
             v_free += 2.0 * (to_v[r] * modes[r]).real
-        guess = g
+        x, v = x_free - own_x * g, v_free - own_v * g
         for _ in range(8):
-            x, v = x_free - own_x * guess, v_free - own_v * guess
             value, slope_x = look_up(tables[0], spans[0], x)
             damping, slope_v = look_up(tables[1], spans[1], v)
-            value += damping + ramp[k] * x
-            slope_x += ramp[k]
             held, stiff = elements_force(springs, yields, stretch, x - before_x)
-            value += held
-            slope_x += stiff
-            change = (value - guess) / max(0.2, 1.0 + own_x * slope_x + own_v * slope_v)
-            guess += change
-            if abs(change) < 1e-9 * (abs(guess) + 1e-6):
+            whole = 1.0 + own_x * (slope_x + ramp[k] + stiff) + own_v * slope_v
+            change = (value + damping + ramp[k] * x + held - g) / max(0.2, whole)
+            g += change
+            at_x, at_v = x, v
+            x, v = x_free - own_x * g, v_free - own_v * g
+            if abs(change) < 1e-9 * (abs(g) + 1e-6):
                 break
-        g = guess
-        x = x_free - own_x * g
-        deflection[k], velocity[k] = x, v_free - own_v * g
+            # on one straight piece of the law, and without elements that may yield, a whole step is exact
+            exact = len(springs) == 0 and whole > 0.2 and _same_cell(tables[0], cells_x, spans[0], at_x, x)
+            if exact and _same_cell(tables[1], cells_v, spans[1], at_v, v):
+                break
+        deflection[k], velocity[k] = x, v
         for i in range(len(springs)):
             stretch[i] = min(max(stretch[i] + x - before_x, -yields[i]), yields[i])
         before_x = x

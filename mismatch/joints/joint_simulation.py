@@ -88,8 +88,9 @@ def joint_response(
     frequencies = lines.padded_frequencies
     fine = fineness(model, lines.recording.rate)
     n = fine * lines.padded
-    deflection = fine * irfft(free, n=n)
-    velocity = fine * irfft(2j * np.pi * frequencies * free, n=n)
+    finer = fine * free
+    deflection = irfft(finer, n=n)
+    velocity = irfft(2j * np.pi * frequencies * finer, n=n)
     step = 1.0 / (fine * lines.recording.rate)
     written = (np.empty(n), np.empty(n), np.empty(n))
     free_run(
@@ -117,6 +118,8 @@ def driven_force(lines: WindowedSpectrum, deflection: Real, velocity: Real, law:
 
 def stiffness_ramp(law: JointLaw, n: int, step: float, duration: float) -> Real:
     """Change of stiffness (n,), N/m, at instants ``step`` s apart."""
+    if law.ramp == 0.0 and law.bend == 0.0:
+        return np.zeros(n)
     tau = np.minimum(np.arange(n) * step / duration, 1.0) - 0.5
     return np.asarray(law.ramp * tau + law.bend * (4 * tau**2 - 1))
 

@@ -48,9 +48,18 @@ def tangent_run(
     memory = (np.zeros(len(elements[0])), np.ones(len(elements[0]), dtype=np.bool_))
     stuck_at = np.zeros((len(elements[0]), n_columns), force.dtype)
     own_x, own_v = 0.0, 0.0
+    # factors as precise as the columns: mixed kinds of numbers take twice the time
+    factors = np.empty((n_modes, 8), force.dtype)
     for r in range(n_modes):
         own_x += 2.0 * (to_x[r] * late[r]).real
         own_v += 2.0 * (to_v[r] * late[r]).real
+        # the end of the last step and the beginning of this one push with the same force
+        push = early[r] + turn[r] * late[r]
+        factors[r, 0], factors[r, 1], factors[r, 2], factors[r, 3] = turn[r].real, turn[r].imag, push.real, push.imag
+        factors[r, 4], factors[r, 5] = 2.0 * to_x[r].real, 2.0 * to_x[r].imag
+        factors[r, 6], factors[r, 7] = 2.0 * to_v[r].real, 2.0 * to_v[r].imag
+    own, slopes = np.empty(1, force.dtype), np.empty(3, force.dtype)
+    own[0] = own_x
     before_x = motion[0][0]
     for k in range(len(force)):
         x = motion[0][k]
@@ -58,18 +67,26 @@ def tangent_run(
         slope_x += _sticking(elements, memory, x - before_x, dx, (stuck_at, held))
         slope_v = look_up(tables[1], spans[1], motion[1][k])[1]
         before_x = x
+        slopes[0], slopes[1] = slope_x, slope_v
+        slopes[2] = 1.0 / max(0.2, 1.0 + own_x * slope_x + own_v * slope_v)
         dx[:] = change[0][k]
         dv[:] = change[1][k]
         for r in range(n_modes):
-            # the end of the last step and the beginning of this one push with the same force
-            push = early[r] + turn[r] * late[r]
-            _advance((turn[r], push, 2.0 * to_x[r], 2.0 * to_v[r]), (real[r], imaginary[r]), before, (dx, dv))
-        whole = 1.0 / max(0.2, 1.0 + own_x * slope_x + own_v * slope_v)
-        for j in range(n_columns):
-            dg = (force[k, j] + slope_x * dx[j] + slope_v * dv[j] - held[j]) * whole
-            force[k, j] = dg
-            before[j] = dg
-            dx[j] -= own_x * dg
+            _advance(factors[r], real[r], imaginary[r], before, dx, dv)
+        _answer(slopes, own[0], held, force[k], before, dx, dv)
+
+
+@compiled
+def _answer(
+    slopes: Columns, own: float, held: Columns, force: Columns, before: Columns, dx: Columns, dv: Columns
+) -> None:
+    """Overwrite the law's own change by that of the force, which takes its share of the deflection."""
+    slope_x, slope_v, whole = slopes[0], slopes[1], slopes[2]
+    for j in range(len(force)):
+        dg = (force[j] + slope_x * dx[j] + slope_v * dv[j] - held[j]) * whole
+        force[j] = dg
+        before[j] = dg
+        dx[j] -= own * dg
 
 
 @compiled
@@ -100,18 +117,13 @@ def _sticking(
 
 
 @compiled
-def _advance(
-    factors: tuple[complex, complex, complex, complex],
-    state: tuple[Columns, Columns],
-    before: Columns,
-    out: tuple[Columns, Columns],
-) -> None:
+def _advance(factors: Columns, real: Columns, imaginary: Columns, before: Columns, dx: Columns, dv: Columns) -> None:
     """One step of one mode for all columns, added to the changes of deflection and velocity."""
-    turn, push, to_x, to_v = factors
-    real, imaginary = state
+    turn, across, push, pull = factors[0], factors[1], factors[2], factors[3]
+    x_real, x_imaginary, v_real, v_imaginary = factors[4], factors[5], factors[6], factors[7]
     for j in range(len(before)):
-        a = turn.real * real[j] - turn.imag * imaginary[j] - push.real * before[j]
-        b = turn.imag * real[j] + turn.real * imaginary[j] - push.imag * before[j]
+        a = turn * real[j] - across * imaginary[j] - push * before[j]
+        b = across * real[j] + turn * imaginary[j] - pull * before[j]
         real[j], imaginary[j] = a, b
-        out[0][j] += to_x.real * a - to_x.imag * b
-        out[1][j] += to_v.real * a - to_v.imag * b
+        dx[j] += x_real * a - x_imaginary * b
+        dv[j] += v_real * a - v_imaginary * b

@@ -248,8 +248,9 @@ def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Predicted:
     model, frequencies = hypothesis.model, lines.padded_frequencies
     around = surround(hypothesis, frequencies)
     pushed = around.pushed(lines.force_lines)
-    joint = np.zeros_like(pushed)
-    joints = []
+    # one number stands for all where there is no joint
+    joint: Complex = np.broadcast_to(np.zeros((), dtype=complex), pushed.shape)
+    felt, joints = pushed, []
     for cause in hypothesis.causes:
         if cause.direction is not None:
             rows, columns = common_axes(model)
@@ -257,15 +258,17 @@ def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Predicted:
                 x, v = cause.seen[lines.recording.name]
                 answer = JointResponse(rfft(driven_force(lines, x, v, cause.law()), n=lines.padded), x, v)
             else:
-                free = displacement_at(model, frequencies, pushed - joint)[:, rows] @ cause.direction
+                free = displacement_at(model, frequencies, felt)[:, rows] @ cause.direction
                 answer = joint_response(model, lines, free, cause.direction, cause.law())
             joints.append(answer)
-            g = answer.force
-            joint[:, columns] += g[:, None] * cause.direction
+            direction = np.zeros(pushed.shape[1])
+            direction[columns] = cause.direction
+            joint = joint + answer.force[:, None] * direction
+            felt = pushed - joint
     if around.feedback is None:
-        displacement = displacement_at(model, frequencies, pushed - joint)
+        displacement = displacement_at(model, frequencies, felt)
     else:
-        displacement = line_products(around.closed(receptance_at(model, frequencies)), pushed - joint)
+        displacement = line_products(around.closed(receptance_at(model, frequencies)), felt)
     spectrum = around.shown(displacement * lines.padded_kinematic)
     return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint, tuple(joints))
 
