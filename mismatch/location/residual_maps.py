@@ -10,6 +10,7 @@ from estimation import WindowedSpectrum
 
 from ..models import Fit, Hypothesis, predict_lines, through_structure
 from ..noise import whitening
+from .band_means import band_means
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -115,19 +116,13 @@ def residual_map(hypothesis: Hypothesis, reference: Fit, lines: Sequence[Windowe
     ratio, joint, count = [], [], []
     for number, one in enumerate(lines):
         single, white, _ = normalised(hypothesis, reference, number, one)
-        place = np.digitize(one.frequencies, edges[1:-1])
-        held = np.bincount(place, minlength=len(edges) - 1).astype(float)
-        ratio.append(_means(np.abs(single) ** 2, place, held))
-        joint.append(_means(np.abs(white) ** 2, place, held).mean(axis=1))
+        alone, held = band_means(one.frequencies, np.abs(single) ** 2, edges)
+        together, _ = band_means(one.frequencies, np.abs(white) ** 2, edges)
+        ratio.append(np.where(held[:, None] > 0, alone, 1.0))
+        joint.append(np.where(held[:, None] > 0, together, 1.0).mean(axis=1))
         count.append(held / overlap(one.window))
     first = lines[0]
     names = first.recording.channels[-first.measured.shape[1] :]
     return ResidualMap(
         edges, names, tuple(one.recording.name for one in lines), np.array(ratio), np.array(joint), np.array(count)
     )
-
-
-def _means(power: Real, place: NDArray[np.int64], held: Real) -> Real:
-    """Return the mean of power (n_lines, n) in each band, (n_bands, n); 1 where a band holds no line."""
-    sums = np.array([np.bincount(place, power[:, p], len(held)) for p in range(power.shape[1])]).T
-    return np.asarray(np.where(held[:, None] > 0, sums / np.maximum(held, 1)[:, None], 1.0))

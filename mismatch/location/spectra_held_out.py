@@ -10,6 +10,7 @@ from estimation import WindowedSpectrum
 from ..faults import residual_lines
 from ..models import through_structure
 from ..physics import is_fault
+from .band_means import band_means
 from .residual_maps import band_edges
 from .structure_details import StructureDiagnosis
 
@@ -75,8 +76,5 @@ def held_out_spectra(diagnosis: StructureDiagnosis) -> HeldOutSpectra:
 
 def _density(power: Real, lines: WindowedSpectrum, edges: Real) -> Real:
     """Return the root of the mean one-sided density in bands; nan where a band holds no line."""
-    place = np.digitize(lines.frequencies, edges[1:-1])
-    held = np.bincount(place, minlength=len(edges) - 1)
-    sums = np.array([np.bincount(place, power[:, p], len(held)) for p in range(power.shape[1])]).T
-    mean = np.where(held[:, None] > 0, sums / np.maximum(held, 1)[:, None], np.nan)
+    mean, _ = band_means(lines.frequencies, power, edges)
     return np.asarray(np.sqrt(2 * mean / lines.recording.rate))

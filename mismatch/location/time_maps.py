@@ -11,6 +11,7 @@ from estimation import WindowedSpectrum
 
 from ..models import Fit, Hypothesis, predict_lines, through_structure
 from ..noise import whitening
+from .band_means import band_means
 from .residual_maps import overlap
 
 Complex = NDArray[np.complex128]
@@ -52,11 +53,8 @@ class BlockResidual:
 
     def banded(self, edges: Real) -> tuple[Real, Real]:
         """Return mean power (n_blocks, n_bands) and independent lines (n_bands,) in bands; nan in empty bands."""
-        place = np.digitize(self.frequencies, edges[1:-1])
-        held = np.bincount(place, minlength=len(edges) - 1).astype(float)
-        sums = np.array([np.bincount(place, row, len(held)) for row in self.power])
-        means = np.where(held > 0, sums / np.maximum(held, 1), np.nan)
-        return np.asarray(means), np.asarray(held * self.channels / self.overlap)
+        means, held = band_means(self.frequencies, self.power.T, edges)
+        return means.T, np.asarray(held * self.channels / self.overlap)
 
 
 def block_residual(hypothesis: Hypothesis, reference: Fit, number: int, lines: WindowedSpectrum) -> BlockResidual:

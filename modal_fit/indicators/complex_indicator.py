@@ -10,7 +10,7 @@ from estimation import Frf
 from foundation import Band
 
 from ..models import modal_assurance
-from .reference_side import indicated_lines, references_last
+from .reference_side import indicated_columns
 
 _SAME_VECTOR = 0.8  # assurance of a curve's vectors on both sides of a peak; below, two curves may cross there
 _ROUNDING = 1e-12
@@ -127,8 +127,7 @@ def complex_mode_indicator(frf: Frf, band: Band | None = None) -> ComplexModeInd
     >>> complex_mode_indicator(frf).singular_values.tolist()
     [[2.0, 1.9]]
     """
-    frequencies, values = indicated_lines(frf, band)
-    columns, references = references_last(frf, values)
+    frequencies, columns, references = indicated_columns(frf, band)
     _, singular, rows = np.linalg.svd(columns, full_matrices=False)
     return ComplexModeIndicator(frequencies, singular, rows.conj(), references, frf.unit)
 

@@ -9,7 +9,7 @@ from scipy.signal import find_peaks
 from estimation import Frf
 from foundation import Band
 
-from .reference_side import indicated_lines, references_last
+from .reference_side import indicated_columns
 
 _LEAST = 1e-12  # share of the largest eigenvalue below which a combination of forces moves nothing
 
@@ -70,9 +70,9 @@ def multivariate_mode_indicator(frf: Frf, band: Band | None = None) -> Multivari
     >>> multivariate_mode_indicator(frf).values[:, 0].round(6).tolist()
     [0.0, 1.0, 0.5]
     """
-    frequencies, values = indicated_lines(frf, band)
-    columns, references = references_last(frf, values * (1j if frf.quantity == "mobility" else 1.0))
-    real, imaginary = columns.real, columns.imag
+    frequencies, columns, references = indicated_columns(frf, band)
+    turned = columns * (1j if frf.quantity == "mobility" else 1.0)
+    real, imaginary = turned.real, turned.imag
     in_phase = real.transpose(0, 2, 1) @ real
     total = in_phase + imaginary.transpose(0, 2, 1) @ imaginary
     return MultivariateModeIndicator(frequencies, _shares(in_phase, total), references)

@@ -7,8 +7,12 @@ from estimation import Frf
 from foundation import Band, InputError
 
 
-def indicated_lines(frf: Frf, band: Band | None) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Give frequencies above 0 Hz and values of the valid lines inside ``band``.
+def indicated_columns(
+    frf: Frf, band: Band | None
+) -> tuple[NDArray[np.float64], NDArray[np.complex128], tuple[str, ...]]:
+    """Give the valid lines inside a band, with the side of fewer degrees of freedom as columns: the references.
+
+    A roving hammer has many excitations and few sensors; by reciprocity its sensors are the references.
 
     Parameters
     ----------
@@ -19,7 +23,12 @@ def indicated_lines(frf: Frf, band: Band | None) -> tuple[NDArray[np.float64], N
 
     Returns
     -------
-    (n_lines,), Hz, and (n_lines, n_responses, n_excitations)
+    frequencies : (n_lines,), Hz
+        Frequencies of the lines, above 0 Hz.
+    columns : (n_lines, n_others, n_references)
+        Values of the FRF, transposed where there are more excitations than responses.
+    references
+        Degrees of freedom of the columns.
 
     Raises
     ------
@@ -33,14 +42,6 @@ def indicated_lines(frf: Frf, band: Band | None) -> tuple[NDArray[np.float64], N
         raise InputError(
             f"no valid line of the FRF lies between {low:g} and {high:g} Hz; it has {f[0]:g} to {f[-1]:g} Hz"
         )
-    return f[inside], frf.values[inside]
-
-
-def references_last(frf: Frf, values: NDArray[np.complex128]) -> tuple[NDArray[np.complex128], tuple[str, ...]]:
-    """Values with the side of fewer degrees of freedom as columns, and the names of these references.
-
-    A roving hammer has many excitations and few sensors; by reciprocity its sensors are the references.
-    """
     if len(frf.excitations) <= len(frf.responses):
-        return values, frf.excitations
-    return values.transpose(0, 2, 1), frf.responses
+        return f[inside], frf.values[inside], frf.excitations
+    return f[inside], frf.values[inside].transpose(0, 2, 1), frf.responses

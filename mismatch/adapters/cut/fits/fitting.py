@@ -103,9 +103,7 @@ def fit_cut(
     problem = _Problem(free, part)
     end = descend(problem, problem.at(free.begin), LIMITS)
     found = free.hypothesis(end.state.coordinates)
-    blocks = tuple(
-        np.asarray(2 * np.sum(np.abs(cut.residual(k, found)) ** 2, axis=(1, 2))) for k in range(len(cut.spectra))
-    )
+    blocks = tuple(cut.block_misfits(k, found) for k in range(len(cut.spectra)))
     count = sum(2 * spectra.measured[part].size for spectra in cut.spectra)
     return CutFit(
         found,

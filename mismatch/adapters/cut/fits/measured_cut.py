@@ -132,3 +132,15 @@ class MeasuredCut:
         """
         rest = self.spectra[number].measured - self.predicted(number, hypothesis)
         return whitened(self.noise[number], rest) if self.noise else rest
+
+    def block_misfits(self, number: int, hypothesis: CutHypothesis) -> Real:
+        """Misfit ``2 sum |W r|^2`` of every block of a recording, (n_blocks,).
+
+        Parameters
+        ----------
+        number
+            Number of the recording, from 0.
+        hypothesis
+            Numbers from which the force is computed.
+        """
+        return np.asarray(2 * np.sum(np.abs(self.residual(number, hypothesis)) ** 2, axis=(1, 2)))

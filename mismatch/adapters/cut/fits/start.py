@@ -64,7 +64,7 @@ def fit_turned(cut: MeasuredCut, start: CutHypothesis, freed: Sequence[str], *, 
     for k in range(1, len(cut.spectra)):
         angle = found.laws[k].angle
         turned = [found.with_angle(k, angle + turn * 2 * np.pi / teeth) for turn in range(teeth)]
-        left = [float(np.sum(np.abs(cut.residual(k, one)[part]) ** 2)) for one in turned]
+        left = [float(cut.block_misfits(k, one)[part].sum()) for one in turned]
         found = turned[int(np.argmin(left))]
     return fit_cut(cut, found, freed, part=part)
 
