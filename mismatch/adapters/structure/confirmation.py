@@ -4,7 +4,7 @@ from functools import partial
 
 from ...faults import residual_lines
 from ...inference import AcceptedCause, Improvement, Search, Settings, in_processes, released
-from ...models import Fit, fit, least_misfit, through_structure
+from ...models import Fit, Hypothesis, fit, least_misfit, through_structure
 from .comparison import StructureComparison
 from .held_out import ITERATIONS, HeldOut, Recordings, chance_of_no_gain, held_out_improvement
 
@@ -30,9 +30,11 @@ def confirmed(
     found, held_out
         The search with fewer causes, or as it was, and what its causes are worth on the recording held out.
     """
+    linear: Hypothesis | None = None
     while True:
-        last = found.current
-        held_out = held_out_improvement(recordings, last.hypothesis, last.noises, faults, comparison.settings.proof)
+        last, proof = found.current, comparison.settings.proof
+        held_out = held_out_improvement(recordings, last.hypothesis, last.noises, faults, proof, linear)
+        linear = held_out.linear
         if not found.accepted or len(recordings.mended) == 1:
             return found, held_out
         gone = _idle(comparison, recordings, found, held_out)

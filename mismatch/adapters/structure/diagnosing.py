@@ -29,7 +29,7 @@ from ...remainder import beyond_model, leftover
 from .comparison import StructureComparison
 from .confirmation import confirmed
 from .form_errors import with_form_spread
-from .held_out import HeldOut, Recordings, held_out_improvement, scored
+from .held_out import HeldOut, Recordings, scored
 from .structure_verdict import verdict_of_structure
 from .told_causes import modal_deviation, told_causes
 
@@ -181,7 +181,7 @@ def _answer(
         return _Answer(verdict, tuple(causes), current, left, held_out)
     rejected = tuple(Candidate(one.name, one.evidence, "rejected", one.location) for one in causes)
     base, measured = found.base, Recordings(both.measured, both.measured)
-    held_out = held_out_improvement(measured, base.hypothesis, base.noises, (), settings.proof)
+    held_out = scored(measured, (held_out.linear, held_out.linear), base.noises, (), settings.proof)
     return _Answer(verdict, (), base, comparison.before, held_out, rejected)
 
 

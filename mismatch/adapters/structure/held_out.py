@@ -74,6 +74,7 @@ def held_out_improvement(
     noises: tuple[NoiseModel, ...],
     faults: Sequence[AcceptedCause],
     settings: ProofSettings,
+    linear: Hypothesis | None = None,
 ) -> HeldOut:
     """Fit on all recordings but one, and compare errors on that one as it was measured.
 
@@ -91,13 +92,16 @@ def held_out_improvement(
         Faults of the recordings, which are put into what ``final`` predicts.
     settings
         Thresholds of the proof on held-out blocks.
+    linear
+        Modal parameters alone as they were fitted to the other recordings before; None: they are fitted here.
     """
     mended, measured = recordings.others(recordings.mended), recordings.others(recordings.measured)
-    tasks = [partial(fit, measured, final.nominal, iterations=ITERATIONS)]
+    tasks = [partial(fit, measured, final.nominal, iterations=ITERATIONS)] if linear is None else []
     if final.causes or any(a is not b for a, b in zip(mended, measured, strict=True)):
         tasks.append(partial(fit, mended, final, iterations=ITERATIONS))
-    fitted: list[Fit] = in_processes(tasks)
-    return scored(recordings, (fitted[0].hypothesis, fitted[-1].hypothesis), noises, faults, settings)
+    fitted: list[Hypothesis] = [one.hypothesis for one in in_processes(tasks)]
+    elsewhere = fitted if linear is None else [linear, *fitted]
+    return scored(recordings, (elsewhere[0], elsewhere[-1]), noises, faults, settings)
 
 
 def scored(
