@@ -10,7 +10,7 @@ from acquisition import Channel
 OVERLOAD = 0.999
 """Share of full scale from which a sample counts as overloaded."""
 
-_CLIPPED = 4  # equal samples in a row at a channel's largest magnitude
+_LEAST_EQUAL = 4  # equal samples in a row at a channel's largest magnitude
 _REPEATED = 8  # equal rows in a row: a buffer that was handed out twice, or not filled
 
 
@@ -47,7 +47,7 @@ def usable_samples(samples: NDArray[np.floating], channels: Sequence[Channel]) -
             usable &= size < OVERLOAD * channel.full_scale
         for extreme in (np.nanmax(data[:, column], initial=-np.inf), np.nanmin(data[:, column], initial=np.inf)):
             if extreme != 0:
-                usable &= ~_in_runs(data[:, column] == extreme, _CLIPPED)
+                usable &= ~_in_runs(data[:, column] == extreme, _LEAST_EQUAL)
     if len(data) > 1 and data.any():
         same = np.concatenate([[False], (np.diff(data, axis=0) == 0).all(axis=1)])
         usable &= ~_in_runs(same, _REPEATED - 1)

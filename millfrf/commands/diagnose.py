@@ -35,9 +35,9 @@ def diagnose(
     """Locate where a model and recordings disagree, name the physics left out, model it, show that the fit improves."""
     from mismatch import LabError, Settings
 
-    from ..diagnosing import diagnose_files, nominal_from_simulation
     from ..gate import read_checked_cutting
     from ..progress import bar
+    from ..structure import diagnose_files, nominal_from_simulation
 
     check_shares("--lab-error", lab_error, (0.01, 0.12, 0.03))
     model, recordings = (files[0], files[1:]) if simulated is None else (simulated, files)

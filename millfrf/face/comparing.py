@@ -5,8 +5,8 @@ import os
 from foundation import InputError
 from mismatch import Diagnosis, Settings, StructureDiagnosis
 
-from ..diagnosing import diagnose_recordings
 from ..progress import Progress, silent
+from ..structure import diagnose_recordings
 from .given import GivenModel, GivenRecording, files_of, model_of, warn_of
 
 __all__ = ["Diagnosis", "Settings", "diagnose"]

@@ -89,22 +89,23 @@ def read_diagnosis(path: str | os.PathLike[str]) -> Diagnosis[None]:
         said = f"{kind!r} version {content.get('format_version')}" if isinstance(content, dict) else "no JSON object"
         raise FileFormatError(f"{name} is {said}; wanted is {FORMAT!r} up to version {FORMAT_VERSION}")
     try:
-        return _diagnosis(_of_old_robot(content) if kind == OLD_ROBOT_FORMAT else content)
+        if kind == OLD_ROBOT_FORMAT:
+            content = _of_old_robot(content)
+        elif content.get("format_version", 0) < 2:
+            content = _of_version_1(content)
+        return _diagnosis(content)
     except (KeyError, TypeError) as error:
         raise FileFormatError(f"{name} lacks a part of a diagnosis: {error}; diagnose again") from error
 
 
 def _diagnosis(content: Mapping[str, Any]) -> Diagnosis[None]:
-    """The diagnosis that a file's content of version 1 or 2 states."""
-    share = _number(content["leftover_share"])
-    unknown = {"before": {"share": math.nan, "size": math.nan}, "after": {"share": share, "size": math.nan}}
-    left = content.get("remainder", unknown)
-    kind = content.get("compared", "cut" if "cut" in content else "structure")
+    """The diagnosis that a file's content of version 2 states."""
+    left = content["remainder"]
     known = {*Diagnosis.__dataclass_fields__, "format", "format_version", "leftover_share", "remainder", "warnings"}
     gain = _part(content["improvement"])
     gain["interval"] = tuple(gain["interval"])
     return Diagnosis(
-        kind,
+        content["compared"],
         content["verdict"],
         tuple(AcceptedCause(**_part(cause)) for cause in content["physics"]),
         tuple(Candidate(**_part(candidate)) for candidate in content["candidates"]),
@@ -118,6 +119,14 @@ def _diagnosis(content: Mapping[str, Any]) -> Diagnosis[None]:
         tuple(content.get("warnings", ())),
         {key: value for key, value in content.items() if key not in known},
     )
+
+
+def _of_version_1(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Content of version 1 as version 2 has it: version 1 says of the remainder only its share at the end."""
+    unknown = {"share": None, "size": None}
+    left = {"before": unknown, "after": {"share": content["leftover_share"], "size": None}}
+    kind = "cut" if "cut" in content else "structure"
+    return {"compared": kind, "remainder": left} | dict(content)
 
 
 def _of_old_robot(content: Mapping[str, Any]) -> dict[str, Any]:

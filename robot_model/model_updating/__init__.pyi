@@ -1,6 +1,5 @@
 from .causes import Cause, PostureFrequencies, equivalent_causes, explain_frequencies
 from .change import Change, Companion, Numbered
-from .changes import changed_robot, possible_changes, unnamed_changes
 from .variations import (
     with_damping_factor,
     with_joint_factor,
@@ -9,6 +8,7 @@ from .variations import (
     with_payload,
     with_rigid_links,
 )
+from .weighed_changes import changed_robot, possible_changes, unnamed_changes
 
 __all__ = [
     "Cause",

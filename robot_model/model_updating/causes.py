@@ -12,7 +12,7 @@ from foundation import InputError
 
 from ..spatial import SpatialRobot, modes_at
 from .change import Change
-from .changes import possible_changes
+from .weighed_changes import possible_changes
 
 Real = NDArray[np.float64]
 

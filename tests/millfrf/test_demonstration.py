@@ -21,7 +21,7 @@ from millfrf.demonstration.whole_chain import (
     nearest_modes,
     run_demo,
 )
-from millfrf.diagnosing import diagnose_files
+from millfrf.structure import diagnose_files
 from modal_fit import read_modal_model
 from replay_data import default_structure, table_one_model, tip_model
 

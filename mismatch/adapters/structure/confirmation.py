@@ -112,9 +112,10 @@ def _missed(
     (whole, less), settings = fits, comparison.settings
     if by_belief(less, whole, settings):
         return less.score - whole.score > comparison.needed(less, less)
-    here = recordings.mended[recordings.kept]
+    place = recordings.held_out_place
+    here = recordings.mended[place]
     rest, without = residual_lines(held_out.improved, here), residual_lines(less.hypothesis, here)
-    covariance = last.noises[recordings.kept].covariance(here.frequencies, through_structure(last.hypothesis, here))
+    covariance = last.noises[place].covariance(here.frequencies, through_structure(last.hypothesis, here))
     gain = least_misfit(less.hypothesis, here) - least_misfit(held_out.improved, here)
     chance = chance_of_no_gain(here, covariance, without, rest, settings.proof)
     return gain > settings.proof.gain and chance < settings.proof.significance

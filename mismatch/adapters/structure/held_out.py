@@ -13,7 +13,7 @@ from estimation import WindowedSpectrum
 
 from ...faults import residual_lines
 from ...inference import AcceptedCause, Improvement, ProofSettings, in_processes, ratio_interval
-from ...models import Fit, Hypothesis, fit, least_misfit, through_structure
+from ...models import Hypothesis, fit, least_misfit, through_structure
 from ...noise import NoiseModel, whitening
 
 Complex = NDArray[np.complex128]
@@ -59,13 +59,13 @@ class Recordings:
     measured: list[WindowedSpectrum]
 
     @property
-    def kept(self) -> int:
+    def held_out_place(self) -> int:
         """Number of the recording held out: the middle level (the weaker of two), so that the others bracket it."""
         return (len(self.mended) - 1) // 2
 
     def others(self, which: list[WindowedSpectrum]) -> list[WindowedSpectrum]:
         """All recordings but the one held out; all where there is only one."""
-        return [one for k, one in enumerate(which) if k != self.kept] or which
+        return [one for k, one in enumerate(which) if k != self.held_out_place] or which
 
 
 def held_out_improvement(
@@ -127,19 +127,20 @@ def scored(
         Thresholds of the proof on held-out blocks.
     """
     linear, improved = elsewhere
-    here, kept = recordings.measured[recordings.kept], recordings.kept
+    place = recordings.held_out_place
+    here = recordings.measured[place]
     rests = [
         residual_lines(improved.nominal, here),
         residual_lines(linear, here),
         residual_lines(improved, here, faults),
     ]
-    covariance = noises[kept].covariance(here.frequencies, through_structure(improved, here))
+    covariance = noises[place].covariance(here.frequencies, through_structure(improved, here))
     power = float(np.sum(np.abs(here.measured) ** 2))
     before, refitted, after = (float(np.sqrt(np.sum(np.abs(rest) ** 2) / power)) for rest in rests)
     whole, several = improved is not linear, len(recordings.mended) > 1
     evidence = 0.0
     if several and whole:
-        mended = recordings.mended[kept]
+        mended = recordings.mended[place]
         evidence = least_misfit(linear, mended) - least_misfit(improved, mended)
     against = "refitted" if whole and (faults or evidence > settings.gain) else "nominal"
     rival = rests[1] if against == "refitted" else rests[0]

@@ -14,7 +14,7 @@ Real = NDArray[np.float64]
 
 
 class Runout(CutPhysics):
-    """``rho_j = r cos(2 pi j / N - lambda)``: tooth j runs so much large (Altintas, Manufacturing Automation, 2.8).
+    """``rho_j = r cos(2 pi j / N - lambda)``: tooth j runs large (Altintas, Manufacturing Automation, 2nd ed., 4.8).
 
     Fitted as ``p = r cos(lambda)`` and ``q = r sin(lambda)``, in which the force is smooth where there is none. Two
     teeth show ``p`` alone. Which tooth is tooth 0 is free in a recording; ``lambda`` is told from the tooth that

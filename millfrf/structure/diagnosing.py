@@ -19,11 +19,12 @@ from mismatch import (
 )
 from modal_fit import ModalModel, read_modal_model, write_modal_model
 
-from .chain import SUBSPACE, FitOptions, fit_recordings
-from .gate import check_model_and_recordings
-from .progress import Progress, silent
-from .report import write_diagnosis_report
-from .result_folder import refuse_file
+from ..chain import SUBSPACE, FitOptions, fit_recordings
+from ..gate import check_model_and_recordings
+from ..progress import Progress, silent
+from ..report import write_diagnosis_report
+from ..result_folder import refuse_file
+from .diagnosis_words import diagnosis_lines
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,7 @@ def diagnose_files(
     measured = measured_part(whole, recordings, stream=stream).responses
     missing = [label for label in whole.responses if label not in measured]
     note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []
-    return DiagnosisFiles(diagnosis, paths, (*note, *summary(diagnosis)))
+    return DiagnosisFiles(diagnosis, paths, (*note, *diagnosis_lines(diagnosis)))
 
 
 def diagnose_recordings(
@@ -135,48 +136,3 @@ def _speeds(recordings: Sequence[str | os.PathLike[str]]) -> dict[str, SpindleSp
     """Spindle speed by recording's name, where it is stated."""
     stated = {Path(path).stem: spindle_speed(path) for path in recordings}
     return {name: speed for name, speed in stated.items() if speed is not None}
-
-
-def summary(diagnosis: StructureDiagnosis) -> list[str]:
-    """A few lines for the terminal: verdict, causes with numbers, error before and after."""
-    lines = [f"verdict: {diagnosis.verdict}"]
-    lines.append(diagnosis.details.band.sentence)
-    lines += [f"warning: {doubt}" for doubt in diagnosis.doubts]
-    for cause in diagnosis.physics:
-        numbers = ", ".join(
-            f"{name} {value:.4g}" + (f" ± {cause.standard_errors[name]:.2g}" if name in cause.standard_errors else "")
-            for name, value in cause.parameters.items()
-        )
-        place = ", ".join(f"{key} {value}" for key, value in cause.location.items())
-        lines.append(f"{cause.name}{f' ({place})' if place else ''}: {numbers}; evidence {cause.evidence:.0f}")
-    if diagnosis.equivalents:
-        lines.append(f"cannot be told from: {', '.join(diagnosis.equivalents)}")
-    if diagnosis.verdict == "partly explained":
-        lines.append(
-            f"{100 * diagnosis.improvement.after:.3g} % of the held-out response is still not predicted, more than a "
-            "whole explanation may leave"
-        )
-    lines += [
-        f"{one.name} is not told: {one.location['impossible']}"
-        for one in diagnosis.candidates
-        if one.stage == "impossible"
-    ][:1]
-    if diagnosis.verdict == "unexplained":
-        lines.append(
-            f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal: a cause is missing"
-        )
-    lines.append(_error_line(diagnosis))
-    return lines
-
-
-def _error_line(diagnosis: StructureDiagnosis) -> str:
-    """Errors on the recording held out."""
-    gain = diagnosis.improvement
-    said = (
-        f"{100 * gain.before:.3g} % nominal, {100 * gain.refitted:.3g} % refitted, {100 * gain.after:.3g} % improved, "
-        f"noise {100 * gain.noise_floor:.3g} %"
-    )
-    if len(diagnosis.details.recordings) < 2:
-        return f"error on {gain.held_out}, the only recording, so not held out: {said}"
-    test = f", p = {gain.p_value:.2g} that improved is no better than {gain.against}" if diagnosis.physics else ""
-    return f"error on {gain.held_out}, held out: {said}{test}"

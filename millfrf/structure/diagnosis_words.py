@@ -1,0 +1,58 @@
+"""The diagnosis of a structure in words: the lines that `millfrf diagnose` prints."""
+
+from mismatch import AcceptedCause, StructureDiagnosis
+
+
+def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
+    """A few lines for the terminal: verdict, causes with numbers, error before and after.
+
+    Parameters
+    ----------
+    diagnosis
+        The diagnosis of a structure.
+    """
+    lines = [f"verdict: {diagnosis.verdict}"]
+    lines.append(diagnosis.details.band.sentence)
+    lines += [f"warning: {doubt}" for doubt in diagnosis.doubts]
+    lines += [_cause_line(cause) for cause in diagnosis.physics]
+    if diagnosis.equivalents:
+        lines.append(f"cannot be told from: {', '.join(diagnosis.equivalents)}")
+    if diagnosis.verdict == "partly explained":
+        lines.append(
+            f"{100 * diagnosis.improvement.after:.3g} % of the held-out response is still not predicted, more than a "
+            "whole explanation may leave"
+        )
+    lines += [
+        f"{one.name} is not told: {one.location['impossible']}"
+        for one in diagnosis.candidates
+        if one.stage == "impossible"
+    ][:1]
+    if diagnosis.verdict == "unexplained":
+        lines.append(
+            f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal: a cause is missing"
+        )
+    lines.append(_error_line(diagnosis))
+    return lines
+
+
+def _cause_line(cause: AcceptedCause) -> str:
+    """A cause with its place, its numbers with their standard errors, and its evidence."""
+    numbers = ", ".join(
+        f"{name} {value:.4g}" + (f" ± {cause.standard_errors[name]:.2g}" if name in cause.standard_errors else "")
+        for name, value in cause.parameters.items()
+    )
+    place = ", ".join(f"{key} {value}" for key, value in cause.location.items())
+    return f"{cause.name}{f' ({place})' if place else ''}: {numbers}; evidence {cause.evidence:.0f}"
+
+
+def _error_line(diagnosis: StructureDiagnosis) -> str:
+    """Errors on the recording held out."""
+    gain = diagnosis.improvement
+    said = (
+        f"{100 * gain.before:.3g} % nominal, {100 * gain.refitted:.3g} % refitted, {100 * gain.after:.3g} % improved, "
+        f"noise {100 * gain.noise_floor:.3g} %"
+    )
+    if len(diagnosis.details.recordings) < 2:
+        return f"error on {gain.held_out}, the only recording, so not held out: {said}"
+    test = f", p = {gain.p_value:.2g} that improved is no better than {gain.against}" if diagnosis.physics else ""
+    return f"error on {gain.held_out}, held out: {said}{test}"
