@@ -134,19 +134,24 @@ def _hand_over(fields: dict[str, Any], folder: Path) -> None:
 JOBS = {"rehearsal": rehearse, "arrays": read_arrays, "mat": read_mat}
 
 
-def main() -> int:
-    """Do the job; returns the exit code."""
-    job, path, folder = sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3])
+def attempt(job: str, path: Path, folder: Path) -> str:
+    """Do a job under limits of memory and time; returns what is wrong with the file, or an empty text."""
     limit(path.stat().st_size)
     try:
         JOBS[job](path, folder)
     except MemoryError:
-        print("it asks for far more memory than its size", file=sys.stderr)
-        return REFUSED
+        return "it asks for far more memory than its size"
     except Exception as error:  # damaged files make the libraries raise nearly anything
-        print(" ".join(str(error).split()) or type(error).__name__, file=sys.stderr)
-        return REFUSED
-    return 0
+        return " ".join(str(error).split()) or type(error).__name__
+    return ""
+
+
+def main() -> int:
+    """Do the job that the command line names; returns the exit code."""
+    wrong = attempt(sys.argv[1], Path(sys.argv[2]), Path(sys.argv[3]))
+    if wrong:
+        print(wrong, file=sys.stderr)
+    return REFUSED if wrong else 0
 
 
 if __name__ == "__main__":

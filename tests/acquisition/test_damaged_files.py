@@ -8,7 +8,8 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import h5py
@@ -304,6 +305,42 @@ def test_whatever_befalls_the_reading_child_is_one_line(
     with pytest.raises(FileFormatError, match=words) as caught:
         open_arrays(tmp_path / "a.h5")
     assert "\n" not in str(caught.value)
+
+
+@needs_linux
+@pytest.mark.parametrize(
+    ("attempt", "words"),
+    [
+        (lambda *_: os.abort(), "reading it crashes or does not come to an end"),
+        (lambda *_: time.sleep(60), "reading it does not come to an end"),
+        (lambda *_: "the heap is broken", "damaged: the heap is broken; take a copy"),
+    ],
+)
+def test_whatever_befalls_a_copy_of_the_process_is_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, attempt: Callable[..., str], words: str
+) -> None:
+    monkeypatch.setattr(guarded_reading, "attempt", attempt)
+    monkeypatch.setattr(guarded_reading, "_WALL_SECONDS", 0.5)
+    _hdf5(tmp_path / "a.h5")
+    with pytest.raises(FileFormatError, match=words) as caught:
+        guarded_reading.rehearse(tmp_path / "a.h5")
+    assert "\n" not in str(caught.value)
+
+
+@needs_linux
+@pytest.mark.parametrize("alone", [True, False])
+def test_a_copy_and_a_new_process_judge_a_file_alike(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, alone: bool
+) -> None:
+    monkeypatch.setattr(guarded_reading, "_can_be_copied", lambda: alone)
+    _recording_of_others(tmp_path / "a.h5")
+    guarded_reading.rehearse(tmp_path / "a.h5")
+    heap = bytearray((tmp_path / "a.h5").read_bytes())
+    heap[heap.index(b"GCOL") + 88] ^= 64  # leads the library in a circle; the limit of time ends it
+    (tmp_path / "a.h5").write_bytes(heap)
+    monkeypatch.setattr(guarded_reading, "_WALL_SECONDS", 0.5)
+    with pytest.raises(FileFormatError, match="does not come to an end"):
+        guarded_reading.rehearse(tmp_path / "a.h5")
 
 
 @pytest.mark.slow
