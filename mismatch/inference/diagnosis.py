@@ -140,7 +140,7 @@ class Diagnosis(Result, Generic[Details]):
     candidates
         All that were weighed, best first.
     equivalents
-        Names that the data cannot tell from the first accepted cause.
+        Names that the data cannot tell from an accepted cause, none of them accepted itself.
     improvement
         Errors on held-out data.
     before, after

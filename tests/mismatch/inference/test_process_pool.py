@@ -170,12 +170,12 @@ def test_a_copy_that_dies_with_half_a_result_sent_costs_no_result() -> None:
 def test_tasks_inside_a_task_run_there() -> None:
     """There are no copies of copies."""
 
-    def inner() -> list[int]:
-        return in_processes([os.getpid, os.getpid])
+    def inner() -> tuple[int, list[int]]:
+        return os.getpid(), in_processes([os.getpid, os.getpid])
 
-    for pids in in_processes([inner, inner]):
-        assert len(set(pids)) == 1
-        assert HERE not in pids
+    for outer, within in in_processes([inner, inner]):
+        assert within == [outer, outer]
+        assert outer != HERE
 
 
 def test_no_copy_is_left_behind() -> None:
