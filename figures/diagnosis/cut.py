@@ -36,11 +36,11 @@ def cut_turn_figure(found: CutDiagnosis) -> Figure:
         top.plot(degrees, after[:, column], color=COLOURS[1], label="computed, improved")
         low.plot(degrees, measured[:, column] - after[:, column], color=COLOURS[1])
         top.set_title(label)
-        low.set_xlabel("angle of tooth 0 (deg)")
+        low.set_xlabel("Angle of tooth 0 (deg)")
         low.set_xticks([0, 90, 180, 270, 360])
         low.set_xlim(0, 360)
-    panels[0, 0].set_ylabel("force (N)")
-    panels[1, 0].set_ylabel("difference (N)")
+    panels[0, 0].set_ylabel("Force (N)")
+    panels[1, 0].set_ylabel("Difference (N)")
     figure.align_ylabels(panels[:, 0])
     legend_above(figure, panels[0, 0])
     return figure
@@ -62,8 +62,8 @@ def cut_orders_figure(found: CutDiagnosis) -> Figure:
     floor = scale * np.sqrt(noise.floor.sum(axis=1))
     _draw(axes, orders, floor, {"color": "k", "linestyle": (0, (1, 1.2)), "label": "noise"})
     axes.set_xlim(0, orders[-1])
-    axes.set_xlabel("spindle order (frequency / spindle frequency)")
-    axes.set_ylabel("amplitude, all channels (N)")
+    axes.set_xlabel("Spindle order (frequency / spindle frequency)")
+    axes.set_ylabel("Amplitude, all channels (N)")
     legend_above(figure, axes)
     return figure
 

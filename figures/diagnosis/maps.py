@@ -71,7 +71,7 @@ def time_map_figure(view: ResidualView) -> Figure:
         for row, stage in enumerate(stages):
             for k, blocks in enumerate(stage):
                 _draw_blocks(panels[row, k], blocks, edges, shades)
-            panels[row, 0].set_ylabel(f"{STAGES[row]}\nfrequency (Hz)")
+            panels[row, 0].set_ylabel(f"{STAGES[row]}\nFrequency (Hz)")
         for k, one in enumerate(view.measured):
             panels[0, k].set_title(f"{one.recording.name} ({one.recording.level:.3g} N rms)", pad=3)
             panels[1, k].set_xlabel("Time (s)")

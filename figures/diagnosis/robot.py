@@ -41,8 +41,8 @@ def robot_spectra_figure(found: RobotDiagnosis) -> Figure:
             power = _averaged(np.sum(np.abs(values) ** 2, axis=1))
             axes.semilogy(at, 1e6 * np.sqrt(power / force) / shift, **look)
         axes.set_title(recording.name)
-        axes.set_xlabel("frequency (Hz)")
-    panels[0].set_ylabel("receptance, all channels (µm/N)")
+        axes.set_xlabel("Frequency (Hz)")
+    panels[0].set_ylabel("Receptance, all channels (µm/N)")
     legend_above(figure, panels[0])
     return figure
 
@@ -71,6 +71,6 @@ def robot_evidence_figure(found: RobotDiagnosis) -> Figure:
     axes.text(20.0, len(causes) - 0.35, " least that is accepted", va="bottom", ha="left")
     axes.set_xlim(left=min(-20.0, 1.2 * causes[0].evidence))
     axes.set_ylim(top=len(causes) + 0.6)
-    axes.set_xlabel("evidence: gain in score over the robot as modelled")
+    axes.set_xlabel("Evidence: gain in score over the robot as modelled")
     axes.grid(axis="y", visible=False)
     return figure
