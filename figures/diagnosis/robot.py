@@ -19,7 +19,7 @@ MOST_LINES = 250
 def robot_spectra_figure(found: RobotDiagnosis) -> Figure:
     """Response over force, all channels together, a panel a posture: measured, as modelled, with the changes."""
     recordings = found.details.robot.recordings
-    figure = new_figure(55.0 + 12.0 * (len(recordings) > 3))
+    figure = new_figure(62.0 + 12.0 * (len(recordings) > 3))
     panels = figure.subplots(1, len(recordings), squeeze=False, sharey=True)[0]
     before, after = (found.details.robot.modes(one.changes) for one in (found.details.nominal, found.details.final))
     for number, (axes, recording) in enumerate(zip(panels, recordings, strict=True)):
@@ -65,7 +65,7 @@ def robot_evidence_figure(found: RobotDiagnosis) -> Figure:
     axes.set_xscale("symlog", linthresh=20.0, linscale=0.5)
     reach = max(20.0, causes[-1].evidence)
     ticks = [tick for tick in (-10, 0, 10, 20, 50, 100, 200, 500, 1e3, 1e4, 1e5, 1e6) if tick <= 1.2 * reach]
-    axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks], minor=False)
+    axes.set_xticks(ticks, [f"{tick:g}".replace("-", "−") for tick in ticks], minor=False)
     axes.set_xticks([], minor=True)
     axes.axvline(20.0, color="k", linewidth=0.8, linestyle="--")
     axes.text(20.0, len(causes) - 0.35, " least that is accepted", va="bottom", ha="left")
