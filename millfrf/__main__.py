@@ -13,6 +13,7 @@ from foundation import InputError, MillfrfError, MillfrfWarning
 
 from .commands import COMMANDS
 from .cut import cut_app
+from .number_lists import options_of_several, with_lists_apart
 from .robot import robot_app
 from .usage_words import usage_in_words
 
@@ -43,7 +44,8 @@ def run(arguments: Sequence[str]) -> int:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MillfrfWarning)  # each command prints the doubts of its result
-            result = command.main(args=list(arguments), prog_name="millfrf", standalone_mode=False)
+            words = with_lists_apart(arguments, options_of_several(command, arguments))
+            result = command.main(args=words, prog_name="millfrf", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         return _fail(STOPPED, FAILED)
     except Exception as error:

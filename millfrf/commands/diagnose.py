@@ -7,7 +7,7 @@ import typer
 
 from foundation import InputError
 
-from ..options import check_shares
+from ..options import check_band, check_shares
 
 
 def diagnose(
@@ -18,14 +18,21 @@ def diagnose(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for diagnosis.json, model and report.")],
     simulated: Annotated[
         Path | None,
-        typer.Option("--simulated", metavar="SIM.h5", help="Simulated recording to fit the nominal model from."),
+        typer.Option(
+            "--simulated", metavar="SIM.h5", help="Simulated recording to fit the nominal model from, in --band."
+        ),
     ] = None,
     band: Annotated[
-        tuple[float, float] | None, typer.Option("--band", metavar="LO HI", help="Hz, of that fit.")
+        tuple[float, float] | None,
+        typer.Option("--band", metavar="LOW,HIGH", help="Band that is compared, Hz; without it that of the model."),
     ] = None,
     lab_error: Annotated[
         tuple[float, float, float],
-        typer.Option("--lab-error", help="What a lab's own fit is off: frequency, damping, shapes, as shares."),
+        typer.Option(
+            "--lab-error",
+            metavar="F,D,S",
+            help="What a lab's own fit is off, as shares: frequency, damping, shapes; one number stands for all.",
+        ),
     ] = (0.01, 0.12, 0.03),
     cutting: Annotated[
         Path | None, typer.Option("--cutting", metavar="CUT.toml", help="Cut whose stability lobes the report shows.")
@@ -40,18 +47,21 @@ def diagnose(
     from ..structure import diagnose_files, nominal_from_simulation
 
     check_shares("--lab-error", lab_error, (0.01, 0.12, 0.03))
+    check_band(band)
     model, recordings = (files[0], files[1:]) if simulated is None else (simulated, files)
     if not recordings:
         raise InputError("no recording given; name the nominal model and then one or more recordings")
     if simulated is not None:
         if band is None:
-            raise InputError("--simulated needs --band LO HI, the band in which the nominal model is fitted")
+            raise InputError(
+                "--simulated needs --band LOW,HIGH, the band in which the nominal model is fitted and compared"
+            )
         model = nominal_from_simulation(simulated, band, out, stream=stream, progress=bar)
     process, doubts = read_checked_cutting(cutting) if cutting is not None else (None, [])
     for doubt in doubts:
         typer.echo(f"warning: {doubt}", err=True)
     settings = Settings(LabError(*lab_error))
-    result = diagnose_files(model, recordings, out, settings, stream=stream, process=process, progress=bar)
+    result = diagnose_files(model, recordings, out, settings, stream=stream, band=band, process=process, progress=bar)
     for line in result.summary:
         typer.echo(line)
     typer.echo(f"wrote {', '.join(str(path) for path in result.written)}")

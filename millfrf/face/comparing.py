@@ -2,7 +2,7 @@
 
 import os
 
-from foundation import InputError
+from foundation import Band, InputError
 from mismatch import Diagnosis, Settings, StructureDiagnosis
 
 from ..progress import Progress, silent
@@ -17,6 +17,7 @@ def diagnose(
     *recordings: GivenRecording,
     settings: Settings | None = None,
     stream: str | None = None,
+    band: Band | None = None,
     progress: Progress = silent,
 ) -> StructureDiagnosis:
     """Locate where a model and recordings disagree, name the physics left out, and prove it on held-out data.
@@ -31,6 +32,8 @@ def diagnose(
         Thresholds of the decisions; None: the defaults.
     stream
         Name of the sample clock; None: the only one.
+    band
+        Lowest and highest frequency that are compared, Hz; None: the band in which the model holds.
     progress
         Shows progress, such as ``millfrf.progress.bar``.
 
@@ -49,6 +52,6 @@ def diagnose(
     known, _, _ = model_of(model)
     named = model if isinstance(model, str | os.PathLike) else "the model"
     files = files_of(recordings)
-    found = diagnose_recordings(known, files, settings, model_file=named, stream=stream, progress=progress)
+    found = diagnose_recordings(known, files, settings, model_file=named, stream=stream, band=band, progress=progress)
     warn_of(found.doubts)
     return found

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cutting import MillingProcess
+from foundation import Band
 from mismatch import (
     Settings,
     SpindleSpeed,
@@ -43,6 +44,7 @@ def diagnose_files(
     settings: Settings | None = None,
     *,
     stream: str | None = None,
+    band: Band | None = None,
     process: MillingProcess | None = None,
     progress: Progress = silent,
 ) -> DiagnosisFiles:
@@ -57,7 +59,7 @@ def diagnose_files(
     refuse_file(folder)
     whole = read_modal_model(model_path)
     diagnosis = diagnose_recordings(
-        whole, recordings, settings, model_file=model_path, stream=stream, progress=progress
+        whole, recordings, settings, model_file=model_path, stream=stream, band=band, progress=progress
     )
     folder.mkdir(parents=True, exist_ok=True)
     paths = (folder / "diagnosis.json", folder / "improved_model.json", folder / "report.html")
@@ -78,6 +80,7 @@ def diagnose_recordings(
     *,
     model_file: str | os.PathLike[str] = "the model",
     stream: str | None = None,
+    band: Band | None = None,
     progress: Progress = silent,
 ) -> StructureDiagnosis:
     """Judge a nominal model beside recordings, with the doubts of the gate; nothing is written.
@@ -94,6 +97,8 @@ def diagnose_recordings(
         File of the model, whose stored doubts count, and its name in messages.
     stream
         Name of the sample clock; None: the only one.
+    band
+        Band that is compared, Hz; None: that of the model.
     progress
         Shows progress while recordings are read and causes are tried.
 
@@ -104,9 +109,9 @@ def diagnose_recordings(
     """
     compared = measured_part(model, recordings, stream=stream)
     doubts = check_model_and_recordings(model_file, compared, recordings, stream, progress)
-    trials = read_recordings(recordings, compared, stream=stream)
+    trials = read_recordings(recordings, compared, stream=stream, band=band)
     with progress("diagnosing"):
-        found = diagnose(compared, trials, settings, speeds=_speeds(recordings))
+        found = diagnose(compared, trials, settings, speeds=_speeds(recordings), band=band)
     return replace(found, doubts=(*doubts, *found.doubts))
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from foundation import InputError
+from foundation import Band, InputError
 from modal_fit import ModalModel
 
 BELOW, ABOVE = 3.0, 3.0
@@ -48,12 +48,12 @@ class ComparedBand:
         return f"compared from {self.low:.3g} to {self.high:.3g} Hz: {self.why}"
 
 
-def compared_band(model: ModalModel, rate: float) -> ComparedBand:
+def compared_band(model: ModalModel, rate: float, asked: Band | None = None) -> ComparedBand:
     """Return the band in which a model and a recording are compared.
 
-    That is the band in which the model holds, where the model states one: outside, modes that the model does not have
-    would look like left-out physics. A model that states none is compared from a third of its lowest mode to three
-    times its highest.
+    That is the band that is asked for, or else the one in which the model holds: outside, modes that the model does
+    not have would look like left-out physics. A model that states none is compared from a third of its lowest mode to
+    three times its highest.
 
     Parameters
     ----------
@@ -61,11 +61,13 @@ def compared_band(model: ModalModel, rate: float) -> ComparedBand:
         Model of the structure, with or without a band of its own.
     rate
         Sample rate of the recording, Hz.
+    asked
+        Lowest and highest frequency that a user asks for, Hz; None: the model's own band.
 
     Raises
     ------
     InputError
-        The recording is sampled too slowly for the model's highest mode or for its band.
+        The recording is sampled too slowly for the model's highest mode or for the band, or no mode lies in it.
 
     Examples
     --------
@@ -76,6 +78,8 @@ def compared_band(model: ModalModel, rate: float) -> ComparedBand:
     (12.0, 24.0)
     """
     edges = reach_of(model, rate)
+    if asked is not None:
+        return _asked_band(model, rate, asked)
     if model.band is None:
         return ComparedBand(
             *edges, "a third of the lowest to three times the highest mode, as the model states no band"
@@ -90,6 +94,30 @@ def compared_band(model: ModalModel, rate: float) -> ComparedBand:
             f"record at {2.5 * model.band[1]:.0f} Hz or more"
         )
     return ComparedBand(low, high, f"the model holds to {model.band[1]:g} Hz, and {rate:g} samples a second end there")
+
+
+def _asked_band(model: ModalModel, rate: float, asked: Band) -> ComparedBand:
+    """The band that a user asks for, with what the model says of it."""
+    low, high = asked
+    if not 0 <= low < high:
+        raise InputError(f"band {low:g} to {high:g} Hz is empty; give 0 <= low < high")
+    if high > SAMPLED * rate:
+        raise InputError(
+            f"band up to {high:g} Hz: recordings sampled at {rate:g} Hz are compared up to {SAMPLED * rate:.4g} Hz; "
+            "ask for less"
+        )
+    natural = model.natural_frequencies
+    if not ((natural >= low) & (natural <= high)).any():
+        raise InputError(
+            f"band {low:g} to {high:g} Hz holds no mode of the model, which has "
+            f"{natural.min():.4g} to {natural.max():.4g} Hz; ask for a band around one"
+        )
+    why = "the band that was asked for"
+    if model.band is None:
+        why += ", as the model states none"
+    elif low < model.band[0] or high > model.band[1]:
+        why += f", beyond the {model.band[0]:.3g} to {model.band[1]:.3g} Hz in which the model holds"
+    return ComparedBand(low, high, why)
 
 
 def reach_of(model: ModalModel, rate: float) -> tuple[float, float]:

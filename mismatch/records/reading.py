@@ -7,7 +7,7 @@ from pathlib import Path
 
 from acquisition import Recording
 from estimation import DERIVATIVE_ORDERS, BandRecording, channel_at, read_band_recording
-from foundation import InputError
+from foundation import Band, InputError
 from modal_fit import ModalModel
 
 from .common_band import ABOVE, compared_band, reach_of
@@ -37,7 +37,9 @@ def band_of(model: ModalModel, rate: float) -> tuple[float, float]:
     return compared_band(model, rate).edges
 
 
-def read_recording(path: str | os.PathLike[str], model: ModalModel, *, stream: str | None = None) -> BandRecording:
+def read_recording(
+    path: str | os.PathLike[str], model: ModalModel, *, stream: str | None = None, band: Band | None = None
+) -> BandRecording:
     """Read one recording at the degrees of freedom of a model of receptances.
 
     Parameters
@@ -49,13 +51,15 @@ def read_recording(path: str | os.PathLike[str], model: ModalModel, *, stream: s
         Model with which the recordings are compared.
     stream
         Name of the sample clock; None for the only one.
+    band
+        Lowest and highest frequency that are compared, Hz; None: the model's own band.
 
     Raises
     ------
     InputError
         A channel is missing, values are not finite, or the recording is too short or sampled too slowly.
     """
-    return read_at(path, model.excitations, model.responses, model, stream=stream)
+    return read_at(path, model.excitations, model.responses, model, stream=stream, band=band)
 
 
 def read_at(
@@ -65,6 +69,7 @@ def read_at(
     model: ModalModel,
     *,
     stream: str | None = None,
+    band: Band | None = None,
 ) -> BandRecording:
     """Read one recording at given degrees of freedom; the model's modes say how fast and how long it must be.
 
@@ -78,6 +83,8 @@ def read_at(
         Model whose modes and band set the least sample rate and length.
     stream
         Name of the sample clock; None for the only one.
+    band
+        Lowest and highest frequency that are compared, Hz; None: the model's own band.
 
     Raises
     ------
@@ -87,9 +94,11 @@ def read_at(
     highest = ABOVE * float(model.natural_frequencies.max())
     if model.band is not None:
         highest = max(highest, model.band[1])
+    if band is not None:
+        highest = max(highest, band[1])
     recording = read_band_recording(path, excitations, responses, KEPT * highest, stream=stream)
     reach_of(model, recording.rate)
-    compared_band(model, recording.rate)
+    compared_band(model, recording.rate, band)
     least = SHORTEST / float(model.natural_frequencies.min())
     if recording.duration < least:
         raise InputError(
@@ -100,7 +109,11 @@ def read_at(
 
 
 def read_recordings(
-    paths: Sequence[str | os.PathLike[str]], model: ModalModel, *, stream: str | None = None
+    paths: Sequence[str | os.PathLike[str]],
+    model: ModalModel,
+    *,
+    stream: str | None = None,
+    band: Band | None = None,
 ) -> list[BandRecording]:
     """Read recordings for a diagnosis, weakest force first.
 
@@ -112,6 +125,8 @@ def read_recordings(
         Model with which the recordings are compared.
     stream
         Name of the sample clock; None for the only one of each recording.
+    band
+        Lowest and highest frequency that are compared, Hz; None: the model's own band.
 
     Raises
     ------
@@ -124,7 +139,7 @@ def read_recordings(
         raise InputError(
             f"a diagnosis needs a model of receptances, this is one of {model.quantity}; calibrate it first"
         )
-    found = (read_recording(path, model, stream=stream) for path in paths)
+    found = (read_recording(path, model, stream=stream, band=band) for path in paths)
     return sorted(found, key=lambda recording: recording.level)
 
 

@@ -3,6 +3,7 @@
 import importlib.util
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -15,7 +16,7 @@ from mismatch.inference import Diagnosis, Improvement, Remainder
 from mismatch.models.fitting import Fit
 from mismatch.noise.noise_model import KNOTS, NoiseModel
 from mismatch.records.common_band import compared_band
-from modal_fit import ModalModel
+from modal_fit import ModalModel, write_modal_model
 
 
 def _loaded(name: str) -> ModuleType:
@@ -30,6 +31,15 @@ def _loaded(name: str) -> ModuleType:
 
 
 _MODULE = _loaded("concealed_recordings")
+_RIG = _loaded("one_mode_rig")
+
+
+@pytest.fixture(scope="session")
+def rig_files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Path]]:
+    """A linear rig of one mode at 10 Hz: its model, which holds from 4 to 22 Hz, and recordings at two levels."""
+    folder, rig = tmp_path_factory.mktemp("rig"), _RIG.Rig()
+    write_modal_model(folder / "model.json", replace(rig.model, band=(4.0, 22.0)))
+    return folder / "model.json", [_RIG.written(folder, one) for one in rig.recordings((20.0, 60.0), 20.0)]
 
 
 @pytest.fixture(scope="session")

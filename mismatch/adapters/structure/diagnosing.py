@@ -7,6 +7,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
+from foundation import Band
 from modal_fit import ModalModel
 
 from ...faults import repair_faults, with_tones_settled
@@ -24,7 +25,7 @@ from ...inference import (
 from ...location import SpindleSpeed, StructureDetails, StructureDiagnosis, located, residual_view
 from ...models import Fit, Hypothesis, ModelShape, fit, with_linear_part
 from ...physics import is_fault, library
-from ...records import compared_band, without_force_noise
+from ...records import ComparedBand, compared_band, without_force_noise
 from ...remainder import beyond_model, leftover
 from .comparison import StructureComparison
 from .confirmation import confirmed
@@ -47,6 +48,7 @@ def diagnose(
     progress: Progress | None = None,
     *,
     speeds: Mapping[str, SpindleSpeed] | None = None,
+    band: Band | None = None,
 ) -> StructureDiagnosis:
     """Find what a model leaves out of recordings.
 
@@ -62,6 +64,8 @@ def diagnose(
         Called with a short text when a new stage begins.
     speeds
         Spindle speed by the recording's name, where it is known.
+    band
+        Lowest and highest frequency that are compared, Hz; None: the band in which the model holds.
 
     Raises
     ------
@@ -70,19 +74,22 @@ def diagnose(
     """
     # matrices are small: threads inside the linear algebra only get in each other's way
     with threadpool_limits(1, user_api="blas"):
-        return _diagnosed(model, recordings, settings or Settings(), progress or (lambda text: None), speeds or {})
+        bands = [compared_band(model, one.rate, band) for one in recordings]
+        return _diagnosed(
+            model, recordings, bands, settings or Settings(), progress or (lambda text: None), speeds or {}
+        )
 
 
 def _diagnosed(
     model: ModalModel,
     recordings: Sequence[BandRecording],
+    bands: Sequence[ComparedBand],
     settings: Settings,
     progress: Progress,
     speeds: Mapping[str, SpindleSpeed],
 ) -> StructureDiagnosis:
     """The diagnosis, one step after the other."""
     decay = float((-model.poles.real).min())
-    bands = [compared_band(model, one.rate) for one in recordings]
     lines = [windowed_spectrum(one, band.edges, decay) for one, band in zip(recordings, bands, strict=True)]
     progress("modal parameters")
     shape = ModelShape(model, settings.lab)
