@@ -2,16 +2,13 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import irfft
 
-from estimation import WindowedSpectrum
+from estimation import WindowedSpectrum, repeat_of
 
 from ..models import Hypothesis, predict_lines
 
 Real = NDArray[np.float64]
-
-ALIKE = 0.99
-"""Correlation of the forces with themselves a lag later from which they repeat."""
 
 RUNG_OUT = 5.0
 """Time constants of the slowest mode after which noise that rings in it is forgotten."""
@@ -45,28 +42,3 @@ def repeated_share(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Real:
     power = np.mean(first**2 + later**2, axis=0) / 2
     share = np.mean(first * later, axis=0) / np.maximum(power, 1e-300)
     return np.asarray(np.where(share > MOST, share, 0.0))
-
-
-def repeat_of(force: Real, least: int, most: int) -> int | None:
-    """Lag (samples) from ``least`` to ``most`` after which forces (n_samples, n) are the same again; None if none is.
-
-    Examples
-    --------
-    >>> saw = np.tile(np.random.default_rng(0).normal(size=(500, 1)), (6, 1))
-    >>> repeat_of(saw, 100, 1500), repeat_of(np.random.default_rng(1).normal(size=(3000, 1)), 100, 1500)
-    (500, None)
-    """
-    if least >= most:
-        return None
-    centred = force - force.mean(axis=0)
-    n = next_fast_len(2 * len(centred), real=True)
-    own = np.sum(irfft(np.abs(rfft(centred, n=n, axis=0)) ** 2, n=n, axis=0), axis=1)[: most + 1]
-    energy = np.concatenate([[0.0], np.cumsum(np.sum(centred**2, axis=1))])
-    lags = np.arange(least, most + 1)
-    overlap = np.sqrt(energy[len(centred) - lags] * (energy[-1] - energy[lags]))
-    likeness = own[least:] / np.maximum(overlap, 1e-300)
-    alike = np.flatnonzero(likeness > ALIKE)
-    if not len(alike):
-        return None
-    run = alike[: 1 + int(np.argmax(np.diff(alike, append=alike[-1] + 2) > 1))]
-    return int(lags[run[np.argmax(likeness[run])]])
