@@ -1,3 +1,4 @@
+from .amplitude import AmplitudeDependence, LevelFit, ModeChange, amplitude_dependence, fit_level
 from .frf_fit import REFINED
 from .indicators import (
     ComplexModeIndicator,
@@ -42,11 +43,14 @@ from .uff_modes import import_modes_uff, read_modes_uff, write_modes_uff
 
 __all__ = [
     "REFINED",
+    "AmplitudeDependence",
     "CandidateGroup",
     "ComplexModeIndicator",
     "IndicatorPeak",
+    "LevelFit",
     "ModalFit",
     "ModalModel",
+    "ModeChange",
     "ModeErrors",
     "ModePair",
     "ModeReciprocity",
@@ -58,11 +62,13 @@ __all__ = [
     "SubspaceFit",
     "Synthesis",
     "TipCalibration",
+    "amplitude_dependence",
     "calibrate_to_tip",
     "candidate_groups",
     "compare_modes",
     "complex_mode_indicator",
     "derived_covariance",
+    "fit_level",
     "fit_picked_poles",
     "fit_polyreference",
     "fit_subspace",

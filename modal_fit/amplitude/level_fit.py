@@ -1,0 +1,161 @@
+"""Linear fit of one level with a given number of modes; error bars from what the fit leaves, line by line."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from estimation import FRF_ORDERS, LinearApproximation
+from foundation import InputError, MillfrfError
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LevelFit:
+    """Modes of one level.
+
+    Parameters
+    ----------
+    frequencies : (n_modes,), Hz
+        Natural frequencies, in the order of the start.
+    damping : (n_modes,)
+        Damping ratios, 1 for critical damping.
+    covariance : (2 n_modes, 2 n_modes)
+        Covariance of ln frequencies, then of damping ratios.
+    misfit : (n_responses,)
+        Root mean square that the fit leaves of each response, over its root mean square.
+    """
+
+    frequencies: Real
+    damping: Real
+    covariance: Real
+    misfit: Real
+
+    @property
+    def frequency_errors(self) -> Real:
+        """Standard errors of the natural frequencies, (n_modes,), Hz."""
+        n = len(self.frequencies)
+        return np.asarray(self.frequencies * np.sqrt(np.diag(self.covariance)[:n]))
+
+    @property
+    def damping_errors(self) -> Real:
+        """Standard errors of the damping ratios, (n_modes,)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)[len(self.frequencies) :]))
+
+
+def fit_level(linear: LinearApproximation, band: tuple[float, float], frequencies: Real, damping: Real) -> LevelFit:
+    """Fit a given number of modes to the FRF of one level, weighted by the force of each line.
+
+    ``H = sum_r (a_r w_r^2 + b_r w_r s) / (s^2 + 2 zeta_r w_r s + w_r^2) + L / s^2 + U`` with the least
+    ``sum_k |dH_k F_k|^2``, each response in units of its root mean square; a, b, L and U are eliminated (variable
+    projection, Golub & Pereyra, SIAM J. Numer. Anal. 10, 413, 1973).
+
+    A structure that is not linear leaves more than noise, and not evenly. The covariance is the sandwich
+    ``(J^T J)^-1 (sum_k J_k^T r_k r_k^T J_k) (J^T J)^-1`` over lines k with ``r / (1 - leverage)``, which counts what is
+    left where it is left (HC3: MacKinnon & White, J. Econometrics 29, 305, 1985); no variance is below that by noise.
+
+    Parameters
+    ----------
+    linear
+        FRF of the level on its excited lines.
+    band : Hz
+        Lowest and highest frequency fitted.
+    frequencies : (n_modes,), Hz
+        Natural frequencies to begin with.
+    damping : (n_modes,)
+        Damping ratios to begin with.
+
+    Raises
+    ------
+    InputError
+        Fewer lines in the band than the fit needs.
+    MillfrfError
+        The search leaves the band or does not come to an end.
+    """
+    n = len(frequencies)
+    lines = linear.frf.valid & (linear.frf.frequencies >= band[0]) & (linear.frf.frequencies <= band[1])
+    if lines.sum() < 3 * n + 4:
+        raise InputError(
+            f"{int(lines.sum())} excited lines between {band[0]:g} and {band[1]:g} Hz for {n} modes; "
+            f"{3 * n + 4} are needed: widen the band"
+        )
+    s = np.asarray(2j * np.pi * linear.frf.frequencies[lines], dtype=np.complex128)
+    measured, weight, noise = _weighted(linear, lines)
+    order = FRF_ORDERS.get(linear.frf.quantity, 0)
+    start = np.concatenate([np.log(frequencies), np.log(damping)])
+
+    def rest(unknowns: Real) -> Real:
+        return _rest(unknowns, s, measured, weight, order)[0]
+
+    found = least_squares(rest, start, x_scale=np.concatenate([damping, np.full(n, 0.3)]), max_nfev=60)
+    fitted = np.exp(found.x)
+    if not found.success or fitted[:n].min() < 0.8 * band[0] or fitted[:n].max() > 1.2 * band[1]:
+        raise MillfrfError(
+            f"a linear fit of {n} modes at {linear.level:.3g} N rms does not settle within {band[0]:g} to "
+            f"{band[1]:g} Hz; fit fewer modes or another band"
+        )
+    leverage = _rest(found.x, s, measured, weight, order)[1]
+    expected = _flat(np.broadcast_to(noise[:, :, None] / 2, measured.shape))
+    covariance = _sandwich(found.jac, found.fun, leverage, len(s), expected)
+    scale = np.concatenate([np.ones(n), fitted[n:]])  # from ln damping to damping
+    left = found.fun.reshape(2, *measured.shape) ** 2
+    size = np.sum(np.abs(measured) ** 2, axis=(0, 2))
+    return LevelFit(
+        fitted[:n], fitted[n:], covariance * np.outer(scale, scale), np.sqrt(left.sum(axis=(0, 1, 3)) / size)
+    )
+
+
+def _weighted(linear: LinearApproximation, lines: NDArray[np.bool_]) -> tuple[Complex, Real, Real]:
+    """FRF times the size of each force at the lines, responses in units of their root mean square; size; noise."""
+    size = 1 / np.sqrt(np.einsum("kqq->kq", linear.excitation[lines]).real)
+    values = linear.frf.values[lines] * size[:, None, :]
+    unit = np.sqrt(np.mean(np.abs(values) ** 2, axis=(0, 2)))
+    return values / unit[:, None], size, np.einsum("kpp->kp", linear.noise[lines]).real / unit**2
+
+
+def _columns(unknowns: Real, s: Complex, order: int) -> Complex:
+    """What the eliminated numbers multiply, (n_lines, 2 n_modes + 2)."""
+    n = len(unknowns) // 2
+    w, zeta = 2 * np.pi * np.exp(unknowns[:n]), np.exp(unknowns[n:])
+    shares = 1 / (s[:, None] ** 2 + 2 * zeta * w * s[:, None] + w**2)
+    unit = abs(s[-1])
+    modes = [w**2 * shares, w * s[:, None] * shares]
+    columns = np.concatenate([*modes, (unit / s[:, None]) ** 2, np.ones((len(s), 1))], axis=1)
+    return np.asarray(columns * (s[:, None] / unit) ** order)
+
+
+def _rest(unknowns: Real, s: Complex, measured: Complex, weight: Real, order: int) -> tuple[Real, Real]:
+    """What the best eliminated numbers leave, and the leverage of these, (2 n_lines n_responses n_excitations,)."""
+    columns = _columns(unknowns, s, order)
+    left, leverage = np.empty((2, *measured.shape)), np.empty((2, *measured.shape))
+    for q in range(measured.shape[2]):
+        design = columns * weight[:, q, None]
+        real = np.concatenate([design.real, design.imag])
+        orthogonal = np.linalg.qr(real / np.linalg.norm(real, axis=0))[0]
+        target = np.concatenate([measured[:, :, q].real, measured[:, :, q].imag])
+        left[..., q] = (target - orthogonal @ (orthogonal.T @ target)).reshape(2, len(s), -1)
+        leverage[..., q] = np.sum(orthogonal**2, axis=1).reshape(2, len(s), 1)
+    return left.ravel(), leverage.ravel()
+
+
+def _flat(per_line: Real) -> Real:
+    """The same for real and imaginary part, (2 n_lines n_responses n_excitations,)."""
+    return np.concatenate([per_line.ravel(), per_line.ravel()])
+
+
+def _sandwich(jacobian: Real, rest: Real, eliminated: Real, n_lines: int, noise: Real) -> Real:
+    """Covariance of the unknowns from what each line leaves; neighbours count together; not below that of noise."""
+    inverse = np.linalg.pinv(jacobian.T @ jacobian)
+    leverage = eliminated + np.einsum("ij,jk,ik->i", jacobian, inverse, jacobian)
+    scores = jacobian * (rest / np.maximum(1 - leverage, 0.1))[:, None]
+    per_line = scores.reshape(2, n_lines, -1, jacobian.shape[1]).sum(axis=(0, 2))
+    middle = per_line.T @ per_line
+    beside = per_line[1:].T @ per_line[:-1]  # Bartlett's weight of one line's distance (Newey & West 1987)
+    covariance = inverse @ (middle + 0.5 * (beside + beside.T)) @ inverse
+    least = np.diag(inverse @ (jacobian.T @ (jacobian * noise[:, None])) @ inverse)
+    own = np.maximum(np.diag(covariance), 1e-300)
+    raised = np.sqrt(np.maximum(1.0, least / own))
+    return np.asarray(covariance * np.outer(raised, raised))
