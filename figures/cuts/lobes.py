@@ -89,7 +89,7 @@ def lobes_figure(
         chatter.set_xlabel("Spindle speed (rpm)")
         panel_letter(depth, 0)
         panel_letter(chatter, 1)
-        place_panels(figure, left=19.0, top=legend_height(depth) + 5.0)
+        place_panels(figure, left=19.0, top=legend_height(depth) + 5.0, right=5.0)
         legend_above(figure, depth)
     return figure
 
