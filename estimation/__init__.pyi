@@ -19,6 +19,7 @@ from .band_recordings import (
     needed_ratio,
     padded_force,
     read_band_recording,
+    refuse_shared,
     resampled,
     whole_ratio,
     widest_band,
@@ -26,12 +27,15 @@ from .band_recordings import (
 )
 from .estimators import h1, h1_side_by_side, h2, hv, instrumental_variable, local_half_width, local_polynomial
 from .frf_matrix import (
+    EXCITATIONS,
     FRF_ORDERS,
     Frf,
     FrfCovariance,
     correct_high_pass,
+    family_of,
     is_uff_number,
     known_band,
+    quantities_of_unit,
     read_frf,
     to_receptance,
     uff_node_numbers,
@@ -126,6 +130,7 @@ from .sweep_plan import SweepDemand, SweepPlan, plan_sweeps, predicted_spectra
 
 __all__ = [
     "DERIVATIVE_ORDERS",
+    "EXCITATIONS",
     "EXCITING",
     "FRF_ORDERS",
     "RANK_TOLERANCE",
@@ -184,6 +189,7 @@ __all__ = [
     "effective_averages",
     "excitation_map",
     "exponential_window",
+    "family_of",
     "find_repeats",
     "find_taps",
     "force_window",
@@ -225,11 +231,13 @@ __all__ = [
     "plan_sweeps",
     "predicted_spectra",
     "principal_inputs",
+    "quantities_of_unit",
     "read_band_recording",
     "read_frf",
     "read_frf_uff",
     "read_geometry",
     "reciprocity_pairs",
+    "refuse_shared",
     "repeat_of",
     "resampled",
     "screened",

@@ -62,8 +62,8 @@ from .models import (
     predict_lines,
     residual,
 )
-from .physics import JointPhysics, form_of, library
-from .records import band_of, measured_part, read_recording, read_recordings
+from .physics import JointPhysics, Rig, form_of, library, rig_of
+from .records import band_of, in_deflections, measured_part, read_recording, read_recordings
 from .screening import Floor, JointSighting, SeenMotion, find_direction, linear_floor, screen_joints, seen_motion
 
 __all__ = [
@@ -95,6 +95,7 @@ __all__ = [
     "Prediction",
     "ResidualMap",
     "ResidualView",
+    "Rig",
     "RobotDiagnosis",
     "SeenMotion",
     "Settings",
@@ -115,6 +116,7 @@ __all__ = [
     "held_out_spectra",
     "improved_model",
     "improved_model_of",
+    "in_deflections",
     "in_processes",
     "library",
     "linear_floor",
@@ -131,6 +133,7 @@ __all__ = [
     "read_recordings",
     "recording_errors",
     "residual",
+    "rig_of",
     "screen_joints",
     "seen_motion",
     "significant_cells",

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from estimation import BandRecording
-from foundation import InputError, MillfrfError, Result, Summary
+from estimation import BandRecording, family_of
+from foundation import SI_UNITS, InputError, MillfrfError, Result, Summary
 
 from .correlation_blocks import CorrelationBlocks, correlation_blocks
 from .maximum_likelihood import NoiseLevels, best_fit, modal_model_from, record_spectra
@@ -120,12 +120,28 @@ def fit_subspace(
     fit = best_fit(np.array([group.pole for group in kept]), spectra, band, n_smooth=_SMOOTH)
     responses = [channel.degree_of_freedom for channel in recordings[0].responses]
     excitations = [channel.degree_of_freedom for channel in recordings[0].excitations]
-    unit = "m/N" if recordings[0].excitations[0].unit == "N" else f"m/{recordings[0].excitations[0].unit}"
+    unit = _unit(recordings[0])
     model = modal_model_from(fit, band, responses, excitations, unit)
     warnings = (
         () if fit.converged else ("the refinement stopped before it converged; treat the error bars as lower bounds",)
     )
     return SubspaceFit(model, chart, dropped, band, fit.reduced_chi_square, fit.noise, warnings)
+
+
+def _unit(recording: BandRecording) -> str:
+    """Unit of the model: deflections, whatever derivative was measured, over what excites.
+
+    Raises
+    ------
+    InputError
+        Responses, or excitations, of different kinds: a model has one unit.
+    """
+    moving = {family_of(channel.quantity)[0] for channel in recording.responses}
+    driving = {channel.quantity for channel in recording.excitations}
+    for role, kinds in (("responses", moving), ("excitations", driving)):
+        if len(kinds) > 1:
+            raise InputError(f"{role} of different kinds ({', '.join(sorted(kinds))}); choose channels of one kind")
+    return f"{SI_UNITS[moving.pop()]}/{SI_UNITS[driving.pop()]}"
 
 
 def _enough_rows(max_order: int, n_responses: int) -> int:

@@ -1,4 +1,12 @@
-from .channel_matching import MatchedChannel, channel_at, channels_in_words, channels_of, matched_channels, names_at
+from .channel_matching import (
+    MatchedChannel,
+    channel_at,
+    channels_in_words,
+    channels_of,
+    matched_channels,
+    names_at,
+    refuse_shared,
+)
 from .motion_quantities import (
     DERIVATIVE_ORDERS,
     before_high_pass,
@@ -32,6 +40,7 @@ __all__ = [
     "needed_ratio",
     "padded_force",
     "read_band_recording",
+    "refuse_shared",
     "resampled",
     "whole_ratio",
     "widest_band",

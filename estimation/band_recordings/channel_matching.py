@@ -87,6 +87,29 @@ def matched_channels(stream: Stream, labels: Sequence[str], quantities: Collecti
     return tuple(found)
 
 
+def refuse_shared(exciting: Iterable[str], responding: Iterable[str], file: str) -> None:
+    """Refuse channels that would excite and respond at once, as they are of one quantity and place.
+
+    Parameters
+    ----------
+    exciting, responding
+        Names of channels.
+    file
+        Name of the recording, for the message.
+
+    Raises
+    ------
+    InputError
+        With the names and the remedy.
+    """
+    shared = sorted({*exciting} & {*responding})
+    if shared:
+        raise InputError(
+            f"{file}: {', '.join(shared)} would excite and respond at once; give what drives and what answers "
+            "different nodes, such as BASE:+X and TIP:+X, and fit again"
+        )
+
+
 def names_at(channels: Iterable[Channel], labels: Sequence[str], quantities: Collection[str]) -> tuple[str, ...]:
     """Names of all channels of some quantities at any of some degrees of freedom, whichever way they point.
 

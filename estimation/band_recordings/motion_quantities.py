@@ -10,8 +10,8 @@ from acquisition import Channel
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
-DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
-"""Times that a displacement is differentiated to give the quantity."""
+DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2, "angle": 0, "angular_velocity": 1}
+"""Times that a displacement or an angle is differentiated to give the quantity."""
 
 
 def derivative_orders(channels: Sequence[Channel]) -> NDArray[np.int64]:

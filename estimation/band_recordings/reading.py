@@ -5,13 +5,13 @@ from collections.abc import Callable, Sequence
 
 from acquisition import Channel, Recording, Stream
 
-from .channel_matching import MatchedChannel, matched_channels
+from .channel_matching import MatchedChannel, matched_channels, refuse_shared
 from .motion_quantities import DERIVATIVE_ORDERS
 from .reduced_recording import BandRecording, band_recording, before_force_high_pass
 from .resampling import needed_ratio, whole_ratio
 
 EXCITING = ("force", "voltage")
-"""Quantities that drive a structure or a transducer at a degree of freedom."""
+"""Quantities that drive a structure or a transducer at a degree of freedom, where no other is named."""
 
 
 def read_band_recording(
@@ -21,6 +21,8 @@ def read_band_recording(
     needed: float,
     *,
     stream: str | None = None,
+    exciting: Sequence[str] = EXCITING,
+    responding: Sequence[str] = tuple(DERIVATIVE_ORDERS),
 ) -> BandRecording:
     """Read forces and motions at degrees of freedom, in that order and along those directions.
 
@@ -31,23 +33,27 @@ def read_band_recording(
     path
         File of the recording.
     excitations
-        Degrees of freedom (``node:direction``) of forces or voltages.
+        Degrees of freedom (``node:direction``) of what drives the structure.
     responses
-        Degrees of freedom of displacements, velocities or accelerations.
+        Degrees of freedom of what responds.
     needed
         Sample rate that is enough, Hz; a recording that was sampled much faster is brought down to about it.
     stream
         Sample clock; None: the only one.
+    exciting, responding
+        Quantities of :data:`foundation.SI_UNITS` that excitations and responses may have.
 
     Raises
     ------
     InputError
-        A channel is missing, values are not finite, or the recording is shorter than the filter.
+        A channel is missing, or would excite and respond at once; values are not finite, or the recording is shorter
+        than the filter.
     """
     with Recording(path) as recording:
         source = recording.stream(stream)
-        forces = matched_channels(source, excitations, EXCITING)
-        motions = matched_channels(source, responses, tuple(DERIVATIVE_ORDERS))
+        forces = matched_channels(source, excitations, exciting)
+        motions = matched_channels(source, responses, responding)
+        refuse_shared([one.channel.name for one in forces], [one.channel.name for one in motions], source.path.name)
         found = band_recording(source, forces, motions, needed_ratio(source.sample_rate, needed))
     return before_force_high_pass(found)
 

@@ -33,17 +33,23 @@ def growth_figure(content: Mapping[str, Any]) -> Figure:
         for number, key in enumerate(shown):
             _draw(axes, LABELS[key], content[key], number)
         found = content[shown[0]]
-        forces, noise = np.array(found["force_rms_n"]), 100 * np.array(found["noise"])
+        forces, noise = _forces(found), 100 * np.array(found["noise"])
         axes.plot(forces, noise, color="#777777", linestyle=":", marker="_", label="Noise")
         low, high = _references(axes, found)
         tops = [100 * np.max(np.add(content[key]["amplitude"], content[key]["standard_error"])) for key in shown]
         decade_axis(axes, "y", min(low, 0.3 * noise.min()), max(high, 1.5 * max(tops)), label=_plain)
         _force_axis(axes, forces)
-        axes.set_xlabel("Force, root mean square (N)")
+        unit = found.get("drive_unit", "N")
+        axes.set_xlabel(f"{'Force' if unit == 'N' else 'Drive'}, root mean square ({unit})")
         axes.set_ylabel("Residual less noise / response,\nroot mean square (%)")
         place_panels(figure, left=20.0, top=legend_height(axes, 1))
         legend_above(figure, axes, columns=1)
     return figure
+
+
+def _forces(found: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Levels of what drives the rig, in newtons or in the unit that the file names."""
+    return np.array(found["force_rms_n"] if "force_rms_n" in found else found["drive_rms"], dtype=float)
 
 
 def _plain(power: int) -> str:
@@ -51,7 +57,7 @@ def _plain(power: int) -> str:
 
 
 def _draw(axes: Axes, label: str, found: Mapping[str, Any], number: int) -> None:
-    force, amplitude, error = (np.array(found[key]) for key in ("force_rms_n", "amplitude", "standard_error"))
+    force, amplitude, error = _forces(found), *(np.array(found[key]) for key in ("amplitude", "standard_error"))
     seen = amplitude > 0
     if found["exponent"] is not None:
         label += f": exponent {round(found['exponent'], 2) + 0.0:.2f} ± {found['exponent_standard_error']:.2f}"
@@ -70,7 +76,7 @@ def _draw(axes: Axes, label: str, found: Mapping[str, Any], number: int) -> None
 
 def _references(axes: Axes, found: Mapping[str, Any]) -> tuple[float, float]:
     """Thin lines of the slopes 0, 1 and 3 through the point in the middle; the range that shows them, in percent."""
-    force, amplitude = np.array(found["force_rms_n"]), 100 * np.array(found["amplitude"])
+    force, amplitude = _forces(found), 100 * np.array(found["amplitude"])
     seen = amplitude > 0
     if not seen.any():
         return np.inf, 0.0

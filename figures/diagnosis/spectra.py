@@ -8,7 +8,6 @@ from mismatch import HeldOutSpectra
 from ..log_axes import decade_axis, plain_log_axis
 from ..style import COLOURS, WIDTH_MM, house_style, new_figure
 
-UNITS = ("m", "m/s", "m/s²")
 MOST_CHANNELS = 6
 
 
@@ -29,7 +28,8 @@ def spectra_figure(spectra: HeldOutSpectra) -> Figure:
             axes.plot(x, spectra.after[:, p], color=COLOURS[2], linewidth=1.0, label="Left by final model")
             shown = [spectra.measured[:, p], spectra.after[:, p], spectra.noise[:, p]]
             decade_axis(axes, "y", 0.4 * float(np.nanmin(shown)), 2.0 * float(np.nanmax(shown)))
-            axes.set_ylabel(f"{spectra.channels[p]} ({UNITS[int(spectra.powers[p])]}/√Hz)")
+            unit = spectra.units[p].replace("^2", "²")
+            axes.set_ylabel(f"{spectra.channels[p]} ({unit}/√Hz)")
         plain_log_axis(panels[-1], "x", spectra.frequencies[0], spectra.frequencies[-1])
         panels[-1].set_xlabel("Frequency (Hz)")
         handles, labels = panels[0].get_legend_handles_labels()

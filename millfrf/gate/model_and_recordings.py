@@ -5,14 +5,12 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from acquisition import Stream
-from estimation import DERIVATIVE_ORDERS, names_at
+from estimation import family_of, names_at, quantities_of_unit, refuse_shared
 from modal_fit import ModalModel
 
 from ..progress import Progress, silent
 from .models import check_model, stored_doubts
 from .recordings import RECORD_AGAIN, check_channels
-
-EXCITES = ("force", "voltage")
 
 
 def check_model_and_recordings(
@@ -51,9 +49,15 @@ def check_model_and_recordings(
     if not recordings:
         return doubts
 
+    response, excites = quantities_of_unit(model.unit)
+    motions = family_of(response)
+
     def chosen(source: Stream) -> tuple[tuple[str, ...], tuple[str, ...]]:
         # those that are missing are the reader's to refuse
         channels = source.channels
-        return names_at(channels, model.excitations, EXCITES), names_at(channels, model.responses, DERIVATIVE_ORDERS)
+        exciting = names_at(channels, model.excitations, (excites,))
+        responding = names_at(channels, model.responses, motions)
+        refuse_shared(exciting, responding, source.path.name)
+        return exciting, responding
 
     return [*doubts, *check_channels(recordings, chosen, stream, progress=progress, remedy=RECORD_AGAIN)]

@@ -27,6 +27,7 @@ def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
         for one in diagnosis.candidates
         if one.stage == "impossible"
     ][:1]
+    lines += list(diagnosis.content.get("not_asked_for", ()))
     if diagnosis.verdict == "unexplained":
         lines.append(
             f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal: a cause is missing"

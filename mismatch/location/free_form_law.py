@@ -11,7 +11,7 @@ from estimation import WindowedSpectrum
 from ..joints import driven_force
 from ..models import Cause, Fit, Hypothesis, predict_lines, through_structure
 from ..noise import whitening
-from ..physics import answer_name
+from ..physics import answer_name, rig_of
 from ..screening import FloorRecord, SeenMotion, seen_motion
 from .structure_details import StructureDiagnosis
 
@@ -60,6 +60,8 @@ class FreeFormLaw:
         Force against velocity, without the part that depends on deflection.
     explained
         Share of the measured force's power that the law gives.
+    force_unit, deflection_unit
+        Units of force and deflection on the rig.
     """
 
     name: str
@@ -68,6 +70,8 @@ class FreeFormLaw:
     backward: BinnedForce
     damping: BinnedForce
     explained: float
+    force_unit: str = "N"
+    deflection_unit: str = "m"
 
 
 @dataclass(frozen=True)
@@ -101,6 +105,7 @@ def _measured(diagnosis: StructureDiagnosis, cause: Cause) -> FreeFormLaw:
     elastic = _mean_at(samples.x, samples.force, ends), _mean_at(samples.x, samples.law, ends)
     rest = replace(samples, force=samples.force - elastic[0], law=samples.law - elastic[1])
     share = 1 - float(np.mean((samples.force - samples.law) ** 2) / np.mean(samples.force**2))
+    rig = rig_of(diagnosis.details.final.hypothesis.model)
     return FreeFormLaw(
         answer_name(cause.physics),
         cause.direction,
@@ -108,6 +113,8 @@ def _measured(diagnosis: StructureDiagnosis, cause: Cause) -> FreeFormLaw:
         _binned(samples, samples.x, ends, ~up),
         _binned(rest, samples.v, _edges(samples.v), np.ones(len(up), dtype=bool)),
         share,
+        rig.force_unit,
+        rig.deflection_unit,
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
+from ..physics import rig_of
 from .family_wise import holm
 from .growth import Growth, growth
 from .spindle_orders import SpindleSpeed, order_powers
@@ -134,7 +135,15 @@ def _named(key: str, names: Sequence[str], tables: Tables, p_value: Real, level:
 
 def _levels(view: ResidualView, tables: Tables, p_value: Real) -> list[dict[str, Any]]:
     rows = _named("recording", view.before.recordings, tables, p_value, view.settings.family_wise)
-    return [row | {"force_rms_n": _plain(one.recording.level)} for row, one in zip(rows, view.measured, strict=True)]
+    return [row | _drive([one.recording.level], view, one=True) for row, one in zip(rows, view.measured, strict=True)]
+
+
+def _drive(levels: Sequence[float], view: ResidualView, *, one: bool = False) -> dict[str, Any]:
+    """Levels of what drives the rig, with its unit: ``force_rms_n`` in newtons, ``drive_rms`` in any other unit."""
+    unit = rig_of(view.details.final.hypothesis.model).force_unit
+    values = [_plain(level) for level in levels]
+    told = values[0] if one else values
+    return {"force_rms_n": told} if unit == "N" else {"drive_rms": told, "drive_unit": unit}
 
 
 def _cells(view: ResidualView, p_value: Real) -> list[list[int]]:
@@ -166,18 +175,18 @@ def _growth(view: ResidualView, bands: Sequence[Mapping[str, Any]]) -> dict[str,
         return {"note": "nothing stands above the noise, so nothing grows"}
     details = view.details
     refitted = growth(details.base.hypothesis, view.reference, view.measured, ranges, view.noise.spread, view.settings)
-    content = {"residual": _growth_content(refitted)}
+    content = {"residual": _growth_content(refitted, view)}
     bare = linear_part(details)
     if bare is not None:
         content["effect"] = _growth_content(
-            growth(bare, view.reference, details.recordings, ranges, view.noise.spread, view.settings)
+            growth(bare, view.reference, details.recordings, ranges, view.noise.spread, view.settings), view
         )
     return content
 
 
-def _growth_content(found: Growth) -> dict[str, Any]:
+def _growth_content(found: Growth, view: ResidualView) -> dict[str, Any]:
     return {
-        "force_rms_n": [_plain(x) for x in found.force],
+        **_drive([float(x) for x in found.force], view),
         "amplitude": [_plain(x) for x in found.amplitude],
         "standard_error": [_plain(x) for x in found.error],
         "noise": [_plain(x) for x in found.noise],

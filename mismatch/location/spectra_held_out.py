@@ -31,8 +31,8 @@ class HeldOutSpectra:
         Geometric means of the bands' edges.
     channels
         Names of the responses.
-    powers : (n_responses,)
-        Quantity of each response: 0 displacement, 1 velocity, 2 acceleration.
+    units
+        Unit of each response.
     measured, predicted, before, after, noise : (n_bands, n_responses)
         Spectra of the measured response, of the improved model's prediction, of the residuals of the refitted nominal
         and of the improved model, both fitted to the other recordings, and of the noise.
@@ -41,7 +41,7 @@ class HeldOutSpectra:
     recording: str
     frequencies: Real
     channels: tuple[str, ...]
-    powers: NDArray[np.int64]
+    units: tuple[str, ...]
     measured: Real
     predicted: Real
     before: Real
@@ -70,8 +70,9 @@ def held_out_spectra(diagnosis: StructureDiagnosis) -> HeldOutSpectra:
     ]
     densities = [_density(one, here, edges) for one in power]
     channels = here.recording.channels[-here.measured.shape[1] :]
+    units = tuple(channel.unit for channel in here.recording.responses)
     middle = np.sqrt(edges[1:] * edges[:-1])
-    return HeldOutSpectra(here.recording.name, middle, channels, here.recording.orders, *densities)
+    return HeldOutSpectra(here.recording.name, middle, channels, units, *densities)
 
 
 def _density(power: Real, lines: WindowedSpectrum, edges: Real) -> Real:

@@ -31,6 +31,8 @@ class StructureDetails:
         Band in which model and recordings are compared, and why.
     view
         Maps of the residual before and after the causes are added; None until they are made.
+    delay
+        Delay of the measuring chain that the nominal model states, s: it was taken out of the recordings.
     """
 
     base: Fit
@@ -40,6 +42,7 @@ class StructureDetails:
     elsewhere: tuple[Hypothesis, Hypothesis]
     band: ComparedBand
     view: "ResidualView | None" = None
+    delay: float = 0.0
 
 
 StructureDiagnosis: TypeAlias = Diagnosis[StructureDetails]

@@ -81,7 +81,27 @@ def fit(
         Number of steps at most.
     tolerance
         Gain in misfit that counts: the fit ends after two smaller gains, or where less than a tenth of it is expected.
+
+    Returns
+    -------
+    Fit
+        With an infinite misfit and score where the start runs away when it is simulated: nothing then speaks for it.
     """
+    try:
+        return _fit(lines, start, noises, iterations, tolerance)
+    except np.linalg.LinAlgError:
+        size = start.size
+        return Fit(start, noises or (), np.inf, _deviation(start), np.inf, np.zeros((size, size)))
+
+
+def _fit(
+    lines: list[WindowedSpectrum],
+    start: Hypothesis,
+    noises: tuple[NoiseModel, ...] | None,
+    iterations: int,
+    tolerance: float,
+) -> Fit:
+    """The fit of a start that can be simulated."""
     hypothesis, known = start, noises
     with ThreadPoolExecutor(THREADS) as pool:
         rough = [one.thinned(ENOUGH) for one in lines]

@@ -10,7 +10,7 @@ from modal_fit import ModalModel
 
 from ..inference import LabError
 from ..joints import JointMotion
-from ..physics import ChainPhysics, JointPhysics, ModePhysics, Physics, library
+from ..physics import ChainPhysics, JointPhysics, ModePhysics, Physics, Rig, in_units, library, rig_of
 from .hypothesis import Cause, Hypothesis
 from .model_shape import ModelShape
 
@@ -46,7 +46,8 @@ def hypothesis_of(model: ModalModel, causes: dict[str, Physics] | None = None) -
     FileFormatError
         A term of unknown physics, or one that lacks a number.
     """
-    known = causes if causes is not None else library()
+    rig = rig_of(model) if model.physics else Rig()
+    known = causes if causes is not None else {name: in_units(one, rig) for name, one in library().items()}
     found = []
     for term in model.physics:
         name = term.get("name")

@@ -19,6 +19,7 @@ from .protocol import (
     Physics,
     answer_name,
 )
+from .rig import Rig, in_units, offered, rig_of
 from .unmeasured_excitation import PHYSICS as UNMEASURED_EXCITATION
 
 __all__ = [
@@ -35,10 +36,14 @@ __all__ = [
     "ModePhysics",
     "Parameter",
     "Physics",
+    "Rig",
     "answer_name",
     "form_of",
+    "in_units",
     "is_fault",
     "library",
+    "offered",
+    "rig_of",
 ]
 
 
@@ -74,8 +79,17 @@ def is_fault(name: str) -> bool:
     return isinstance(library().get(name), FaultPhysics)
 
 
-def form_of(answer: str, numbers: Collection[str]) -> Physics | None:
+def form_of(answer: str, numbers: Collection[str], rig: Rig | None = None) -> Physics | None:
     """Return the cause that is reported under a name and has these numbers; None where the library has none.
+
+    Parameters
+    ----------
+    answer
+        Name under which the cause is reported.
+    numbers
+        Names of its numbers.
+    rig
+        Rig in whose units the numbers are named; None: newtons and metres.
 
     Examples
     --------
@@ -86,7 +100,7 @@ def form_of(answer: str, numbers: Collection[str]) -> Physics | None:
     """
     forms = [
         physics
-        for physics in library().values()
+        for physics in (in_units(one, rig or Rig()) for one in library().values())
         if answer_name(physics) == answer and {one.name for one in physics.parameters} <= set(numbers)
     ]
     # one form may have all numbers of another, and more

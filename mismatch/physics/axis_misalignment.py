@@ -24,6 +24,7 @@ class AxisMisalignment:
         Parameter("rotation_y_rad", "rad", 0.01, -1.0, 1.0),
         Parameter("rotation_z_rad", "rad", 0.01, -1.0, 1.0),
     )
+    drives = ("force", "moment", "acceleration")
     confusable_with = (
         "modal_parameters",
         "gain_error",

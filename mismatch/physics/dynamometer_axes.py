@@ -24,6 +24,7 @@ class DynamometerAxes:
         Parameter("squared_period_z_s2", "s^2", 2e-7, 0.0, 1e-3),
         Parameter("damping_time_s", "s", 2e-5, -1e-2, 1e-2),
     )
+    drives = ("force", "moment")
     confusable_with = ("channel_delay", "gain_error")
 
     def places(self, model: ModalModel) -> tuple[str, ...]:

@@ -21,6 +21,7 @@ class DynamometerDynamics:
         Parameter("squared_period_s2", "s^2", 2e-7, 0.0, 1e-3),
         Parameter("damping_time_s", "s", 2e-5, -1e-2, 1e-2),
     )
+    drives = ("force", "moment")
     confusable_with = ("channel_delay",)
 
     def places(self, model: ModalModel) -> tuple[str, ...]:

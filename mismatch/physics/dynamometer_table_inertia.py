@@ -18,6 +18,7 @@ class DynamometerTableInertia:
     equation = "F = F_measured - m X''"
     source = "Ewins, Modal Testing, 2nd ed., section 3.7 (mass cancellation)"
     parameters = (Parameter("mass_kg", "kg", 0.05, -100.0, 100.0),)
+    drives, acts_on_motion = ("force", "moment"), True
     confusable_with = ("modal_parameters",)
 
     def places(self, model: ModalModel) -> tuple[str, ...]:
@@ -40,7 +41,10 @@ class DynamometerTableInertia:
         """Say why these numbers are impossible by more than their margins of error; empty where they are possible."""
         if values[0] >= -margin[0]:
             return ""
-        return f"a table cannot have a mass of {values[0]:.3g} kg; a tool lighter than the model's is other modes"
+        return (
+            f"a table cannot have a mass of {values[0]:.3g} {self.parameters[0].unit}; a tool lighter than the model's "
+            "is other modes"
+        )
 
 
 PHYSICS = DynamometerTableInertia()

@@ -22,6 +22,7 @@ class GyroscopicCoupling:
         Parameter("coupling_y_ns_per_m", "N s/m", 20.0),
         Parameter("coupling_z_ns_per_m", "N s/m", 20.0),
     )
+    acts_on_motion = True
     confusable_with = ("modal_parameters",)
 
     def places(self, model: ModalModel) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ class NonProportionalDamping:
     equation = "F = F_outer - C X', C = C^T"
     source = "Caughey & O'Kelly, J. Applied Mechanics 32, 1965; Meirovitch, Fundamentals of Vibrations, section 7.15"
     parameters = tuple(Parameter(f"damping_{'xyz'[i]}{'xyz'[j]}_ns_per_m", "N s/m", 20.0, -1e6, 1e6) for i, j in PLACES)
+    acts_on_motion = True
     confusable_with = ("modal_parameters",)
 
     def places(self, model: ModalModel) -> tuple[str, ...]:

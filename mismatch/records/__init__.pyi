@@ -1,4 +1,5 @@
 from .common_band import ComparedBand, compared_band
+from .deflection_form import in_deflections, without_delay
 from .reading import band_of, measured_part, read_at, read_recording, read_recordings
 from .true_forces import without_force_noise
 
@@ -6,9 +7,11 @@ __all__ = [
     "ComparedBand",
     "band_of",
     "compared_band",
+    "in_deflections",
     "measured_part",
     "read_at",
     "read_recording",
     "read_recordings",
+    "without_delay",
     "without_force_noise",
 ]

@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition import Recording
-from estimation import DERIVATIVE_ORDERS, BandRecording, channel_at, read_band_recording
+from estimation import BandRecording, channel_at, family_of, quantities_of_unit, read_band_recording
 from foundation import Band, InputError
 from modal_fit import ModalModel
 
@@ -40,13 +40,13 @@ def band_of(model: ModalModel, rate: float) -> tuple[float, float]:
 def read_recording(
     path: str | os.PathLike[str], model: ModalModel, *, stream: str | None = None, band: Band | None = None
 ) -> BandRecording:
-    """Read one recording at the degrees of freedom of a model of receptances.
+    """Read one recording at the degrees of freedom of a model.
 
     Parameters
     ----------
     path
-        Recording with a force channel at each of the model's excitations and a displacement, velocity or acceleration
-        at each of its responses.
+        Recording with a channel of what drives the model at each of its excitations (by its unit: force, moment,
+        voltage, acceleration of a base), and one of the model's motion or its derivatives at each of its responses.
     model
         Model with which the recordings are compared.
     stream
@@ -96,7 +96,16 @@ def read_at(
         highest = max(highest, model.band[1])
     if band is not None:
         highest = max(highest, band[1])
-    recording = read_band_recording(path, excitations, responses, KEPT * highest, stream=stream)
+    response, excitation = quantities_of_unit(model.unit)
+    recording = read_band_recording(
+        path,
+        excitations,
+        responses,
+        KEPT * highest,
+        stream=stream,
+        exciting=(excitation,),
+        responding=family_of(response),
+    )
     reach_of(model, recording.rate)
     compared_band(model, recording.rate, band)
     least = SHORTEST / float(model.natural_frequencies.min())
@@ -131,14 +140,12 @@ def read_recordings(
     Raises
     ------
     InputError
-        No recording is given, the model is not one of receptances, or :func:`read_recording` refuses a recording.
+        No recording is given, the model's unit does not say what drives the rig, or :func:`read_recording` refuses a
+        recording.
     """
     if not paths:
         raise InputError("no recording given; name one or more")
-    if model.quantity != "receptance":
-        raise InputError(
-            f"a diagnosis needs a model of receptances, this is one of {model.quantity}; calibrate it first"
-        )
+    quantities_of_unit(model.unit)
     found = (read_recording(path, model, stream=stream, band=band) for path in paths)
     return sorted(found, key=lambda recording: recording.level)
 
@@ -162,14 +169,15 @@ def measured_part(
     InputError
         No response of the model is in all recordings.
     """
-    rows = list(range(len(model.responses)))
+    rows, motions = list(range(len(model.responses))), family_of(quantities_of_unit(model.unit)[0])
     for path in paths:
         with Recording(path) as recording:
             channels = recording.stream(stream).channels
-            rows = [k for k in rows if channel_at(channels, model.responses[k], DERIVATIVE_ORDERS) is not None]
+            rows = [k for k in rows if channel_at(channels, model.responses[k], motions) is not None]
     if not rows:
+        wanted = " or ".join([", ".join(motions[:-1]), motions[-1]] if motions[1:] else motions)
         raise InputError(
-            f"no displacement, velocity or acceleration at {', '.join(model.responses)} is in every recording; "
+            f"no {wanted} at {', '.join(model.responses)} is in every recording; "
             "give recordings of the model's degrees of freedom"
         )
     if len(rows) == len(model.responses):

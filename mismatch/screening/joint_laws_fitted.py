@@ -89,6 +89,7 @@ def joint_candidates(
     enough = max(limits.least_law, least, limits.promising_law * sighted.gain)
     promising = [one for one in sighted.screened if one.gain > enough]
     driven = in_processes([partial(_driven, lines, current, one) for one in promising[: limits.most_laws]])
+    driven = [one for one in driven if np.isfinite(one.score)]
     driven.sort(key=lambda one: one.score)
     gains = [current.score - one.score for one in driven]
     nearly = [limits.nearly * gain for gain in gains[:1]]
@@ -110,6 +111,8 @@ def _driven(lines: list[WindowedSpectrum], current: Fit, screened: Screened) -> 
         fit(rough, current.hypothesis.with_cause(cause), current.noises, iterations=2) for cause in screened.causes[:2]
     ]
     best = min(starts, key=lambda start: start.score)
+    if not np.isfinite(best.score):
+        return best
     return fit(lines, best.hypothesis, best.noises, iterations=4)
 
 
@@ -118,9 +121,8 @@ def _simulated(lines: list[WindowedSpectrum], current: Fit, near: Fit) -> Propos
     last = near.hypothesis.causes[-1]
     free = replace(near.hypothesis, causes=(*near.hypothesis.causes[:-1], replace(last, seen=None)))
     # the one that is accepted is fitted to the end
-    try:
-        fitted = fit(lines, free, near.noises, iterations=10, tolerance=10.0)
-    except np.linalg.LinAlgError:
+    fitted = fit(lines, free, near.noises, iterations=10, tolerance=10.0)
+    if not np.isfinite(fitted.score):
         return None
     location = direction_of(fitted.hypothesis.causes[-1])
     return Proposal(answer_name(last.physics), location, fitted, current.score - fitted.score)

@@ -50,7 +50,7 @@ def linear_candidates(
     alone = mode is not None and not current.hypothesis.has_added_physics
     if alone and mode is not None and mode.gain > max(least, numbers * cost, promising):
         tasks.append(partial(_with_mode, lines, current, mode, settings.resolved))
-    return [one for one in in_processes(tasks) if one is not None]
+    return [one for one in in_processes(tasks) if one is not None and np.isfinite(one.evidence)]
 
 
 def _with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Proposal[Fit]:

@@ -45,12 +45,17 @@ class Rig:
         return self.mass * (2 * np.pi * self.frequency) ** 2
 
     @property
+    def driven(self) -> tuple[str, ...]:
+        """Where it is driven: at its base if that is what moves."""
+        return ("BASE:+X",) if self.excitation == "acceleration" else PLACE
+
+    @property
     def model(self) -> ModalModel:
         """The linear part, as a lab with a perfect modal test believes it."""
         omega, zeta = 2 * np.pi * self.frequency, self.damping
         pole = omega * complex(-zeta, np.sqrt(1 - zeta**2))
         left = np.array([[1 / (2j * pole.imag * self.mass)]])
-        return ModalModel(np.array([pole]), np.ones((1, 1), dtype=complex), left, PLACE, PLACE)
+        return ModalModel(np.array([pole]), np.ones((1, 1), dtype=complex), left, PLACE, self.driven)
 
     def forces(self, level: float, seconds: float, seed: int) -> Real:
         """Random force without anything above 2.5 times the natural frequency, (n,)."""
@@ -92,7 +97,7 @@ class Rig:
         x, v, a = self.motion(force)
         shown = {0: x, 1: v, 2: a}[_ORDERS[self.response]]
         shown = shown + noise * shown.std() * np.random.default_rng(1000 + seed).normal(size=len(shown))
-        channels = channels_of(self.excitation, PLACE, ["drive"]), channels_of(self.response, PLACE, ["answer"])
+        channels = channels_of(self.excitation, self.driven, ["drive"]), channels_of(self.response, PLACE, ["answer"])
         return BandRecording(name, self.rate, force[:, None], shown[:, None], *channels)
 
     def recordings(self, levels: tuple[float, ...], seconds: float = 30.0) -> list[BandRecording]:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from foundation import DegreeOfFreedom
-from mismatch import AcceptedCause, StructureDiagnosis, form_of
+from mismatch import AcceptedCause, StructureDiagnosis, form_of, rig_of
 
 from .next_tests import next_test
 
@@ -166,7 +166,7 @@ def what(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     """Equation and source of each cause, and how the residual grows with the level."""
     said = []
     for cause in diagnosis.physics:
-        physics = form_of(cause.name, cause.parameters)
+        physics = form_of(cause.name, cause.parameters, rig_of(diagnosis.details.final.hypothesis.model))
         equation = f": {physics.equation} ({physics.source})" if physics is not None else ""
         said.append(f"{first_word(cause.name)}{equation}.")
     growth = diagnosis.located.get("growth", {})
@@ -240,7 +240,7 @@ def what_else(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     if others and not diagnosis.physics:
         said.append(f"Nearest, but not accepted: {words(others[0][0])} with evidence {others[0][1]:.0f}.")
     for cause in diagnosis.physics[:1]:
-        physics = form_of(cause.name, cause.parameters)
+        physics = form_of(cause.name, cause.parameters, rig_of(diagnosis.details.final.hypothesis.model))
         if physics is not None and physics.confusable_with:
             names = ", ".join(words(name) for name in physics.confusable_with)
             said.append(f"In general it is easily taken for {names}.")

@@ -52,6 +52,10 @@ def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProce
     title = "What it does to the lobes"
     if diagnosis.verdict != "explained":
         return Section(title)
+    unit = diagnosis.details.final.hypothesis.model.unit
+    if unit != "m/N":
+        said = f"Lobes need a model in m/N; this one is in {unit}."
+        return Section(title, (said,) if process is not None else ())
     cut = process or ASSUMED
     curves = _curves(diagnosis, cut)
     names = list(curves)

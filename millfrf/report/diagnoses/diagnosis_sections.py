@@ -1,6 +1,7 @@
 """Tables and figures of a diagnosis."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -13,6 +14,7 @@ from mismatch import (
     free_form_laws,
     held_out_spectra,
     recording_errors,
+    rig_of,
     significant_cells,
 )
 
@@ -45,8 +47,9 @@ def location_section(diagnosis: StructureDiagnosis) -> Section:
 def growth_section(diagnosis: StructureDiagnosis) -> Section:
     """How the residual grows with the level."""
     growth = diagnosis.located["growth"]
-    if "residual" not in growth or len(diagnosis.details.recordings) < 2:
-        return Section("Growth with the level")
+    reason = _no_growth(growth, len(diagnosis.details.recordings))
+    if reason:
+        return Section("Growth with the level", (reason,))
     caption = (
         "Residual with the power of the noise taken off, relative to the response averaged over all recordings, "
         "against force; bars are two standard errors. Thin lines: slopes of typical omissions."
@@ -54,6 +57,21 @@ def growth_section(diagnosis: StructureDiagnosis) -> Section:
     return Section(
         "Growth with the level", (), (), (_picture(growth_figure(growth), caption, "Growth of the residual"),)
     )
+
+
+def _no_growth(growth: Mapping[str, Any], recordings: int) -> str:
+    """Why there is no figure of the growth; empty where there is one."""
+    if recordings < 2:
+        return "Not drawn: there is a single recording, and how the residual grows needs two levels."
+    if "residual" not in growth:
+        return f"Not drawn: {growth.get('note', 'nothing was located')}."
+    found = [growth[key] for key in ("residual", "effect") if key in growth]
+    if not any((one or 0.0) > 0 for part in found for one in part["amplitude"]):
+        return (
+            "Not drawn: in the bands that stand out, the residual of whole recordings is no larger than their noise "
+            "at any level."
+        )
+    return ""
 
 
 def law_section(diagnosis: StructureDiagnosis) -> Section:
@@ -76,6 +94,7 @@ def law_section(diagnosis: StructureDiagnosis) -> Section:
 
 def held_out_section(diagnosis: StructureDiagnosis) -> Section:
     """Errors and spectra on the recording that was held out."""
+    unit = rig_of(diagnosis.details.final.hypothesis.model).force_unit
     rows = tuple(
         (
             f"{one.recording}{' (held out)' if one.held_out else ''}",
@@ -87,7 +106,7 @@ def held_out_section(diagnosis: StructureDiagnosis) -> Section:
     )
     columns = (
         "recording",
-        "force, rms (N)",
+        f"{'force' if unit == 'N' else 'drive'}, rms ({unit})",
         "nominal (%)",
         "refitted (%)",
         "final (%)",
@@ -140,7 +159,8 @@ def candidate_section(diagnosis: StructureDiagnosis) -> Section:
     table = Table(
         "Causes that were weighed", ("cause", "stage", "evidence", "place", ""), tuple(rows[:MOST_CANDIDATES])
     )
-    return Section("What was weighed", (sentence,), (table,) if rows else ())
+    spared = tuple(f"{one[:1].upper()}{one[1:]}." for one in diagnosis.content.get("not_asked_for", ()))
+    return Section("What was weighed", (sentence, *spared), (table,) if rows else ())
 
 
 def _short_place(one: Candidate) -> str:

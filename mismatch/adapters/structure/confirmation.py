@@ -2,6 +2,8 @@
 
 from functools import partial
 
+import numpy as np
+
 from ...faults import residual_lines
 from ...inference import AcceptedCause, Improvement, Search, Settings, in_processes, released
 from ...models import Fit, Hypothesis, fit, least_misfit, through_structure
@@ -110,6 +112,9 @@ def _missed(
 ) -> bool:
     """Whether the held-out recording misses a cause: with it (first fit) the error is less than without (second)."""
     (whole, less), settings = fits, comparison.settings
+    if not np.isfinite(less.score):
+        # without it the rest runs away
+        return True
     if by_belief(less, whole, settings):
         return less.score - whole.score > comparison.needed(less, less)
     place = recordings.held_out_place

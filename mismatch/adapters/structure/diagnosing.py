@@ -24,8 +24,8 @@ from ...inference import (
 )
 from ...location import SpindleSpeed, StructureDetails, StructureDiagnosis, located, residual_view
 from ...models import Fit, Hypothesis, ModelShape, fit, with_linear_part
-from ...physics import is_fault, library
-from ...records import ComparedBand, compared_band, without_force_noise
+from ...physics import is_fault, library, offered
+from ...records import ComparedBand, compared_band, in_deflections, without_delay, without_force_noise
 from ...remainder import beyond_model, leftover
 from .comparison import StructureComparison
 from .confirmation import confirmed
@@ -74,10 +74,12 @@ def diagnose(
     """
     # matrices are small: threads inside the linear algebra only get in each other's way
     with threadpool_limits(1, user_api="blas"):
+        delay, (model, recordings) = model.delay, without_delay(in_deflections(model), recordings)
         bands = [compared_band(model, one.rate, band) for one in recordings]
-        return _diagnosed(
+        found = _diagnosed(
             model, recordings, bands, settings or Settings(), progress or (lambda text: None), speeds or {}
         )
+    return replace(found, details=replace(found.details, delay=delay))
 
 
 def _diagnosed(
@@ -98,7 +100,8 @@ def _diagnosed(
     progress("tones and clipping")
     mended, base, faults = repair_faults(measured, base, settings)
     before = leftover(base.hypothesis, mended)
-    comparison = StructureComparison(mended, settings.causes or library(), settings, before)
+    causes, left_out = offered(settings.causes or library(), model)
+    comparison = StructureComparison(mended, causes, settings, before)
     found = search(comparison, base, progress)
     progress("held-out recording")
     both = Recordings(mended, measured)
@@ -123,7 +126,7 @@ def _diagnosed(
         located(view, speeds),
         replace(details, view=view),
         doubts=beyond_model(base.hypothesis, mended),
-        content={"compared_band": asdict(band)},
+        content={"compared_band": asdict(band), "not_asked_for": list(left_out)},
     )
 
 

@@ -80,10 +80,7 @@ def _of_wider_forms(fitted: Fit, lines: list[WindowedSpectrum]) -> Real:
         wider = replace(cause, physics=physics, values=np.append(held_values(cause), shape_number))
         causes = list(fitted.hypothesis.causes)
         causes[place] = wider
-        try:
-            again = fit(lines, replace(fitted.hypothesis, causes=tuple(causes)), fitted.noises, iterations=WIDER)
-        except np.linalg.LinAlgError:
-            continue
+        again = fit(lines, replace(fitted.hypothesis, causes=tuple(causes)), fitted.noises, iterations=WIDER)
         if again.score > fitted.score + WORSE:
             continue
         there = again.hypothesis.causes[place].coordinates()[: len(cause.values)]
@@ -108,10 +105,7 @@ def _of_other_forms(fitted: Fit, lines: list[WindowedSpectrum]) -> Real:
         for place, values in cause.physics.other_forms(cause.values, cause.place):
             causes = list(fitted.hypothesis.causes)
             causes[number] = replace(cause, place=place, values=values)
-            try:
-                again = fit(lines, replace(fitted.hypothesis, causes=tuple(causes)), fitted.noises, iterations=WIDER)
-            except np.linalg.LinAlgError:
-                continue
+            again = fit(lines, replace(fitted.hypothesis, causes=tuple(causes)), fitted.noises, iterations=WIDER)
             moved = again.hypothesis.causes[number].coordinates() - cause.coordinates()
             extra[own] += min(1.0, np.exp(-(again.score - fitted.score) / 2)) * moved**2
     return extra

@@ -19,6 +19,9 @@ from ...noise import NoiseModel, whitening
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
+RUNS_AWAY = 10.0
+"""Error, over the response, that a prediction is told to have that runs away when it is simulated."""
+
 BLOCK = 2.0
 """Length of a block for the test of significance, s."""
 
@@ -136,10 +139,12 @@ def scored(
     ]
     covariance = noises[place].covariance(here.frequencies, through_structure(improved, here))
     power = float(np.sum(np.abs(here.measured) ** 2))
+    runs_away = not np.isfinite(rests[2]).all()
+    rests = [np.where(np.isfinite(rest), rest, RUNS_AWAY * np.abs(here.measured)) for rest in rests]
     before, refitted, after = (float(np.sqrt(np.sum(np.abs(rest) ** 2) / power)) for rest in rests)
     whole, several = improved is not linear, len(recordings.mended) > 1
     evidence = 0.0
-    if several and whole:
+    if several and whole and not runs_away:
         mended = recordings.mended[place]
         evidence = least_misfit(linear, mended) - least_misfit(improved, mended)
     against = "refitted" if whole and (faults or evidence > settings.gain) else "nominal"

@@ -1,5 +1,7 @@
 """The model that a diagnosis improves: refitted modes, causes, tones and limits as terms of its file."""
 
+from dataclasses import replace
+
 from modal_fit import ModalModel
 
 from ...location import StructureDiagnosis
@@ -20,4 +22,5 @@ def improved_model_of(diagnosis: StructureDiagnosis) -> ModalModel:
         for cause in diagnosis.physics
         if is_fault(cause.name)
     )
-    return improved_model(diagnosis.details.final.hypothesis, faults)
+    details = diagnosis.details
+    return replace(improved_model(details.final.hypothesis, faults), delay=details.delay)

@@ -11,7 +11,7 @@ from modal_fit import ModalModel
 
 from ...faults import with_faults
 from ...models import hypothesis_of, predict_lines
-from ...records import band_of
+from ...records import band_of, in_deflections, without_delay
 
 Real = NDArray[np.float64]
 
@@ -54,6 +54,7 @@ def predict(model: ModalModel, trial: BandRecording) -> Prediction:
     InputError
         A recording that the model cannot be compared with.
     """
+    model, (trial,) = without_delay(in_deflections(model), [trial])
     hypothesis = hypothesis_of(model)
     band = band_of(model, trial.rate)
     decay = float((-model.poles.real).min())
