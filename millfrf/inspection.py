@@ -29,7 +29,7 @@ from .gate import (
 from .progress import Progress, silent
 from .provenance import read_provenance
 from .reciprocity_tables import pair_table, vector_table
-from .tables import Table, error_table, mode_table, points_in_words, poles_in_words, shape_table
+from .tables import Table, error_table, mode_table, points_in_words, poles_in_words, repeats_in_words, shape_table
 from .taps import tap_concerns
 
 LARGEST = 100.0
@@ -48,12 +48,15 @@ class Findings:
         Tables that show its contents.
     concerns
         Doubts about the file, one sentence each with the remedy; empty where there is none.
+    notes
+        What else was found, one sentence each.
     """
 
     kind: str
     summary: str
     tables: tuple[Table, ...] = ()
     concerns: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def inspect_file(path: str | os.PathLike[str], progress: Progress = silent) -> Findings:
@@ -82,6 +85,7 @@ def inspect_file(path: str | os.PathLike[str], progress: Progress = silent) -> F
 
 def _recording(path: str | os.PathLike[str], progress: Progress) -> Findings:
     tables, concerns = [], []
+    notes: list[str] = []
     with Recording(path) as recording:
         if recording.being_written:
             concerns.append("the recording is still being written")
@@ -95,6 +99,7 @@ def _recording(path: str | os.PathLike[str], progress: Progress) -> Findings:
             seen = look(stream, progress=progress)
             tables.append(level_table(stream, seen.levels))
             concerns += [*seen.concerns(stream.sample_rate), *tap_concerns(stream, seen.levels)]
+            notes += repeats_in_words(stream)
         title = recording.title or "untitled"
         summary = f"recording, {title}, {recording.recorded_at or 'no date'}"
         if recording.events:
@@ -105,7 +110,7 @@ def _recording(path: str | os.PathLike[str], progress: Progress) -> Findings:
                 for name, series in recording.events.items()
                 if series.axis.texts and len(series.read_raw()[0])
             ]
-    return Findings(RECORDING, summary, tuple(tables), tuple(concerns))
+    return Findings(RECORDING, summary, tuple(tables), tuple(concerns), tuple(notes))
 
 
 def _text_table(name: str, values: tuple[np.ndarray, np.ndarray], texts: tuple[str, ...]) -> Table:

@@ -11,7 +11,10 @@ def inspect(
         Path, typer.Argument(metavar="FILE", help="Recording, FRF, model, lobes, cutting file or geometry.")
     ],
 ) -> None:
-    """Say what is in a file, and what looks wrong: levels, overload, dead channels, missing samples."""
+    """Say what is in a file, and what looks wrong: levels, overload, dead channels, missing samples.
+
+    Where forces repeat: their period, the noise between periods, and distortion.
+    """
     from ..inspection import inspect_file
     from ..progress import bar
     from ..tables import show
@@ -20,6 +23,8 @@ def inspect(
     typer.echo(f"{file.name}: {findings.summary}")
     for table in findings.tables:
         show(table)
+    for note in findings.notes:
+        typer.echo(note)
     for concern in findings.concerns:
         typer.echo(f"warning: {concern}")
     if not findings.concerns:

@@ -1,6 +1,7 @@
 from .mode_shapes import shape_table, shapes_of
 from .point_words import points_in_words
 from .poles_table import poles_in_words
+from .repeat_words import repeats_in_words
 from .result_tables import Table, error_table, mode_table, show, with_error
 
 __all__ = [
@@ -9,6 +10,7 @@ __all__ = [
     "mode_table",
     "points_in_words",
     "poles_in_words",
+    "repeats_in_words",
     "shape_table",
     "shapes_of",
     "show",

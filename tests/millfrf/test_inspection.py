@@ -1,5 +1,6 @@
 """What `inspect` says of recordings that went wrong."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -53,3 +54,42 @@ def test_dead_and_overloaded_channels_are_said(tmp_path: Path, capsys: pytest.Ca
     said = capsys.readouterr().out
     assert "fx: every sample is 1 (dead channel)" in said
     assert "at full scale (overload)" in said
+
+
+def periodic(path: Path, cubic: float) -> str:
+    """Six periods of half a second of an odd multisine and its motion: a static spring, then a filter's noise."""
+    lines = np.arange(7, 120, 4)
+    spectrum = np.zeros(1281, dtype=complex)
+    spectrum[lines] = np.exp(2j * np.pi * np.random.default_rng(0).random(len(lines)))
+    force = np.tile(np.fft.irfft(spectrum), 6)
+    force *= 100 / force.std()
+    clean = force + cubic * force**3
+    noise = np.random.default_rng(1).standard_normal((len(force), 2))
+    with RecordingWriter(path, (StreamDescription("main", RATE, 0.0, CHANNELS),)) as writer:
+        writer.append("main", np.column_stack([force + 0.1 * noise[:, 0], 0.1 * clean + 0.1 * noise[:, 1]]))
+    return str(path)
+
+
+def test_forces_that_repeat_tell_noise_and_distortion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["inspect", periodic(tmp_path / "cubic.h5", 1e-6)]) == 0
+    said = capsys.readouterr().out
+    found = re.search(r"force repeats every 0.5 s; noise of one period, 14 to 238 Hz: (.*) % of ax, (.*) % of fx", said)
+    assert found is not None
+    share = np.sqrt((238 - 14) / (RATE / 2))  # of the noise's variance that lies in the band
+    assert float(found[1]) == pytest.approx(100 * 0.1 * share / 10.3, rel=0.1)
+    assert float(found[2]) == pytest.approx(100 * 0.1 * share / 100.0, rel=0.1)
+    assert "Differences between 6 steady periods of 0.5 s." in said
+    assert "distortion at odd lines in the band: -" in said
+    assert "even lines" not in said
+    assert run(["inspect", periodic(tmp_path / "linear.h5", 0.0)]) == 0
+    said = capsys.readouterr().out
+    assert "no distortion beyond noise at lines that were not excited" in said
+    assert "nothing looks wrong" in said
+
+
+def test_forces_that_do_not_repeat_say_nothing_of_periods(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    samples = np.random.default_rng(0).standard_normal((8000, 2))
+    with RecordingWriter(tmp_path / "random.h5", (StreamDescription("main", RATE, 0.0, CHANNELS),)) as writer:
+        writer.append("main", samples)
+    assert run(["inspect", str(tmp_path / "random.h5")]) == 0
+    assert "repeat" not in capsys.readouterr().out
