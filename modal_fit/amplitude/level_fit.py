@@ -98,8 +98,7 @@ def fit_level(linear: LinearApproximation, band: tuple[float, float], frequencie
             f"{band[1]:g} Hz; fit fewer modes or another band"
         )
     leverage = _rest(found.x, s, measured, weight, order)[1]
-    expected = _flat(np.broadcast_to(noise[:, :, None] / 2, measured.shape))
-    covariance = _sandwich(found.jac, found.fun, leverage, len(s), expected)
+    covariance = _sandwich(found.jac, found.fun, leverage, noise)
     scale = np.concatenate([np.ones(n), fitted[n:]])  # from ln damping to damping
     left = found.fun.reshape(2, *measured.shape) ** 2
     size = np.sum(np.abs(measured) ** 2, axis=(0, 2))
@@ -108,12 +107,12 @@ def fit_level(linear: LinearApproximation, band: tuple[float, float], frequencie
     )
 
 
-def _weighted(linear: LinearApproximation, lines: NDArray[np.bool_]) -> tuple[Complex, Real, Real]:
-    """FRF times the size of each force at the lines, responses in units of their root mean square; size; noise."""
+def _weighted(linear: LinearApproximation, lines: NDArray[np.bool_]) -> tuple[Complex, Real, Complex]:
+    """FRF times the size of each force, responses in units of their root mean square; that size; their noise."""
     size = 1 / np.sqrt(np.einsum("kqq->kq", linear.excitation[lines]).real)
     values = linear.frf.values[lines] * size[:, None, :]
     unit = np.sqrt(np.mean(np.abs(values) ** 2, axis=(0, 2)))
-    return values / unit[:, None], size, np.einsum("kpp->kp", linear.noise[lines]).real / unit**2
+    return values / unit[:, None], size, linear.noise[lines] / np.outer(unit, unit)
 
 
 def _columns(unknowns: Real, s: Complex, order: int) -> Complex:
@@ -141,13 +140,9 @@ def _rest(unknowns: Real, s: Complex, measured: Complex, weight: Real, order: in
     return left.ravel(), leverage.ravel()
 
 
-def _flat(per_line: Real) -> Real:
-    """The same for real and imaginary part, (2 n_lines n_responses n_excitations,)."""
-    return np.concatenate([per_line.ravel(), per_line.ravel()])
-
-
-def _sandwich(jacobian: Real, rest: Real, eliminated: Real, n_lines: int, noise: Real) -> Real:
+def _sandwich(jacobian: Real, rest: Real, eliminated: Real, noise: Complex) -> Real:
     """Covariance of the unknowns from what each line leaves; neighbours count together; not below that of noise."""
+    n_lines, n = noise.shape[:2]
     inverse = np.linalg.pinv(jacobian.T @ jacobian)
     leverage = eliminated + np.einsum("ij,jk,ik->i", jacobian, inverse, jacobian)
     scores = jacobian * (rest / np.maximum(1 - leverage, 0.1))[:, None]
@@ -155,7 +150,9 @@ def _sandwich(jacobian: Real, rest: Real, eliminated: Real, n_lines: int, noise:
     middle = per_line.T @ per_line
     beside = per_line[1:].T @ per_line[:-1]  # Bartlett's weight of one line's distance (Newey & West 1987)
     covariance = inverse @ (middle + 0.5 * (beside + beside.T)) @ inverse
-    least = np.diag(inverse @ (jacobian.T @ (jacobian * noise[:, None])) @ inverse)
-    own = np.maximum(np.diag(covariance), 1e-300)
-    raised = np.sqrt(np.maximum(1.0, least / own))
+    slopes = jacobian.reshape(2, n_lines, n, -1, jacobian.shape[1])
+    slope = slopes[0] + 1j * slopes[1]  # noise of the forces moves all responses together
+    by_noise = 0.5 * np.einsum("kpqi,kpu,kuqj->ij", slope.conj(), noise, slope, optimize=True).real
+    least = np.diag(inverse @ by_noise @ inverse)
+    raised = np.sqrt(np.maximum(1.0, least / np.maximum(np.diag(covariance), 1e-300)))
     return np.asarray(covariance * np.outer(raised, raised))

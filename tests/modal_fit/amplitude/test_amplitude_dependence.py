@@ -45,8 +45,8 @@ def test_errors_cover_and_alarms_come_at_their_rate() -> None:
             sum(one.frequency_p_value < 0.05 for one in changes),
             sum(one.damping_p_value < 0.05 for one in changes),
         ]
-    assert np.all((inside >= 176) & (inside <= 199)), inside
-    assert np.all((alarms >= 6) & (alarms <= 40)), alarms  # of 400
+    assert np.all((inside >= 182) & (inside <= 198)), inside
+    assert np.all((alarms >= 8) & (alarms <= 32)), alarms  # of 400
 
 
 def test_a_mode_that_softens_and_one_that_stays() -> None:
