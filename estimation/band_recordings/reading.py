@@ -2,16 +2,21 @@
 
 import os
 from collections.abc import Callable, Sequence
+from fractions import Fraction
 
 from acquisition import Channel, Recording, Stream
 
 from .channel_matching import MatchedChannel, matched_channels, refuse_shared
 from .motion_quantities import DERIVATIVE_ORDERS
-from .reduced_recording import BandRecording, band_recording, before_force_high_pass
+from .reduced_recording import BandRecording, band_recording, before_force_high_pass, from_rest
 from .resampling import needed_ratio, whole_ratio
 
 EXCITING = ("force", "voltage")
 """Quantities that drive a structure or a transducer at a degree of freedom, where no other is named."""
+
+
+MOST_LOOKED_AT = 2_000_000
+"""Samples of a recording that is looked at whole before it is filtered: one with blows of a hammer is short."""
 
 
 def read_band_recording(
@@ -54,8 +59,19 @@ def read_band_recording(
         forces = matched_channels(source, excitations, exciting)
         motions = matched_channels(source, responses, responding)
         refuse_shared([one.channel.name for one in forces], [one.channel.name for one in motions], source.path.name)
-        found = band_recording(source, forces, motions, needed_ratio(source.sample_rate, needed))
+        ratio = needed_ratio(source.sample_rate, needed)
+        found = _from_rest(source, forces, motions, ratio) or band_recording(source, forces, motions, ratio)
     return before_force_high_pass(found)
+
+
+def _from_rest(
+    source: Stream, forces: Sequence[MatchedChannel], motions: Sequence[MatchedChannel], ratio: Fraction
+) -> BandRecording | None:
+    """The recording with its very beginning, if it begins at rest and a filter would cost that; else None."""
+    if ratio == 1 or source.n_samples > MOST_LOOKED_AT:
+        return None
+    raw = band_recording(source, forces, motions, Fraction(1))
+    return from_rest(raw, ratio) if raw.at_rest else None
 
 
 def band_of_channels(

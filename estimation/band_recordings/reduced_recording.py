@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ from foundation import InputError
 
 from .channel_matching import MatchedChannel
 from .motion_quantities import derivative_orders, high_pass_corners, kinematic_factor
-from .resampling import Resampler, widest_band
+from .resampling import Resampler, resampled, widest_band
+from .rest import starts_at_rest
 
 Real = NDArray[np.float64]
 
@@ -55,6 +57,11 @@ class BandRecording:
     def orders(self) -> NDArray[np.int64]:
         """Derivative order of each response, (n_responses,): 0 displacement, 1 velocity, 2 acceleration."""
         return derivative_orders(self.responses)
+
+    @cached_property
+    def at_rest(self) -> bool:
+        """Whether nothing moved before the first force: see :func:`starts_at_rest`."""
+        return starts_at_rest(self.force, self.response, self.rate)
 
     @property
     def usable_band(self) -> float:
@@ -132,6 +139,29 @@ def band_recording(
     channels = tuple(replace(one.as_wanted, input_delay_s=None) for one in matched)
     name = Path(stream.path).stem
     return BandRecording(name, resampler.rate, samples[:, :n], samples[:, n:], channels[:n], channels[n:], start)
+
+
+def from_rest(raw: BandRecording, ratio: Fraction) -> BandRecording:
+    """Bring a recording that begins at rest down to a lower rate, with its very beginning.
+
+    A filter loses half its length at either end, and a blow at the beginning with it. Before rest there was nothing:
+    it is put before the samples.
+
+    Parameters
+    ----------
+    raw
+        The recording as it was sampled.
+    ratio
+        New over old sample rate.
+    """
+    lead = int(Resampler(raw.rate, ratio).start * raw.rate)
+    still = [np.median(one, axis=0) for one in (raw.force, raw.response)]
+    whole = np.hstack(
+        [np.vstack([np.tile(a, (lead, 1)), b]) for a, b in zip(still, (raw.force, raw.response), strict=True)]
+    )
+    samples, rate = resampled(whole, raw.rate, ratio)
+    n, start = raw.force.shape[1], raw.start + Resampler(raw.rate, ratio).start - lead / raw.rate
+    return replace(raw, rate=rate, force=samples[:, :n], response=samples[:, n:], start=start)
 
 
 def before_force_high_pass(recording: BandRecording) -> BandRecording:

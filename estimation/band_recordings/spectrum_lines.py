@@ -17,8 +17,10 @@ Real = NDArray[np.float64]
 class WindowedSpectrum:
     """A recording's window, its padded force spectrum and its measured lines.
 
-    The whole recording is predicted. Its force is ramped in over a second and padded with zeros, so that the structure
-    rings out. Then prediction and measurement are cut and windowed alike: nothing leaks that does not leak in both.
+    The whole recording is predicted. Its force is padded with zeros, so that the structure rings out, and ramped in
+    over a second unless the recording begins at rest: then all its motion is of its own forces, and neither ramp nor
+    run-in takes a blow at its beginning away. Then prediction and measurement are cut and windowed alike: nothing leaks
+    that does not leak in both.
 
     Parameters
     ----------
@@ -120,17 +122,21 @@ def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay
     band
         Lowest and highest frequency compared, Hz.
     decay
-        Decay rate of the slowest mode, 1/s: run-in and padding last seven of its time constants, at most a fifth of it.
+        Decay rate of the slowest mode, 1/s: run-in and padding last seven of its time constants, at most a fifth of it;
+        a recording that begins at rest has no run-in.
     """
     from scipy.signal.windows import tukey  # here, because scipy.signal alone takes 75 MB
 
     n = len(recording.force)
-    run_in = int(min(7.0 / decay * recording.rate, 0.2 * n))
-    padded = next_fast_len(n + run_in, real=True)
+    run_in = 0 if recording.at_rest else int(min(7.0 / decay * recording.rate, 0.2 * n))
+    padded = next_fast_len(n + int(min(7.0 / decay * recording.rate, 0.2 * n)), real=True)
     padded += padded % 2
     rising = _rising(recording)
     kept = prev_fast_len(n - run_in - rising // 2, real=True)
     window = tukey(kept, 0.08)
+    if recording.at_rest:
+        # nothing leaks from before, and a blow may stand here
+        window[: kept // 2] = 1.0
     window /= np.sqrt(np.sum(window**2))
     axis = np.arange(kept // 2 + 1) * recording.rate / kept
     lines = np.flatnonzero((axis >= max(band[0], 3 * recording.rate / kept)) & (axis <= band[1]))
@@ -152,6 +158,8 @@ def _rising(recording: BandRecording) -> int:
 def padded_force(spectrum: WindowedSpectrum) -> Complex:
     """Spectrum of the ramped and padded force."""
     ramp, rising = np.ones(len(spectrum.recording.force)), _rising(spectrum.recording)
-    ramp[:rising] = 0.5 - 0.5 * np.cos(np.pi * np.arange(rising) / rising)
-    ramp[-rising:] = ramp[:rising][::-1]
+    rise = 0.5 - 0.5 * np.cos(np.pi * np.arange(rising) / rising)
+    if not spectrum.recording.at_rest:
+        ramp[:rising] = rise
+    ramp[len(ramp) - rising :] = rise[::-1]
     return np.asarray(rfft(spectrum.recording.force * ramp[:, None], n=spectrum.padded, axis=0))

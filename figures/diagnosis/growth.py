@@ -49,7 +49,7 @@ def growth_figure(content: Mapping[str, Any]) -> Figure:
 
 def _forces(found: Mapping[str, Any]) -> NDArray[np.float64]:
     """Levels of what drives the rig, in newtons or in the unit that the file names."""
-    return np.array(found["force_rms_n"] if "force_rms_n" in found else found["drive_rms"], dtype=float)
+    return np.array(found["drive_rms"] if "drive_rms" in found else found["force_rms_n"], dtype=float)
 
 
 def _plain(power: int) -> str:

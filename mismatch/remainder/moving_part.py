@@ -15,8 +15,8 @@ from .repeated_part import repeated_share
 
 Real = NDArray[np.float64]
 
-SEGMENT = 2.0
-"""Length of a segment, s: its bins lie half a hertz apart."""
+SEGMENT, FEWEST = 2.0, 8
+"""Length of a segment, s: its bins lie half a hertz apart; least number of them in a record, which shortens them."""
 
 BINS = 12
 """Neighbouring bins that share one noise level."""
@@ -95,7 +95,7 @@ def _shifts(count: int) -> list[int]:
 
 def _powers(signal: Real, lines: WindowedSpectrum) -> Real:
     """Power in cells, (n_bins, n_segments), in the band that is compared."""
-    length = int(SEGMENT * lines.recording.rate)
+    length = 2 * int(min(SEGMENT, lines.recording.duration / FEWEST) * lines.recording.rate / 2)
     transform = ShortTimeFFT(hann(length, sym=False), length // 2, lines.recording.rate)
     power = np.abs(transform.stft(signal, p0=1, p1=len(signal) // (length // 2))) ** 2
     inside = (transform.f >= lines.frequencies[0]) & (transform.f <= lines.frequencies[-1])

@@ -7,7 +7,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
-from foundation import Band
+from foundation import Band, InputError
 from modal_fit import ModalModel
 
 from ...faults import repair_faults, with_tones_settled
@@ -36,6 +36,9 @@ from .told_causes import modal_deviation, told_causes
 
 FIRST_FIT = 30
 """Steps at most of the modal parameters: a nominal model may be far off."""
+
+FEWEST_LINES = 24
+"""Least number of lines of a recording that are compared."""
 
 MOSTLY = 0.5
 """Share of a force's power that must be left when its noise is taken out."""
@@ -93,6 +96,8 @@ def _diagnosed(
     """The diagnosis, one step after the other."""
     decay = float((-model.poles.real).min())
     lines = [windowed_spectrum(one, band.edges, decay) for one, band in zip(recordings, bands, strict=True)]
+    for one in lines:
+        _refuse_empty(one)
     progress("modal parameters")
     shape = ModelShape(model, settings.lab)
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=FIRST_FIT)
@@ -128,6 +133,21 @@ def _diagnosed(
         doubts=beyond_model(base.hypothesis, mended),
         content={"compared_band": asdict(band), "not_asked_for": list(left_out)},
     )
+
+
+def _refuse_empty(lines: WindowedSpectrum) -> None:
+    """Refuse a recording whose spectrum has too few lines in the band to say anything, or nothing that drives."""
+    count, recording = len(lines.frequencies), lines.recording
+    if count < FEWEST_LINES:
+        raise InputError(
+            f"{recording.name} lasts {recording.duration:.3g} s: {count} lines in the band that is compared, "
+            f"{FEWEST_LINES} are the least; record longer, or widen the band"
+        )
+    if not lines.force_here.any():
+        raise InputError(
+            f"{recording.name}: nothing drives the structure after the first {lines.start / recording.rate:.3g} s, "
+            "which are left out as it was moving before; record with a quiet beginning (pre-trigger)"
+        )
 
 
 def _with_true_forces(

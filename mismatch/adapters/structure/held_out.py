@@ -22,8 +22,8 @@ Real = NDArray[np.float64]
 RUNS_AWAY = 10.0
 """Error, over the response, that a prediction is told to have that runs away when it is simulated."""
 
-BLOCK = 2.0
-"""Length of a block for the test of significance, s."""
+BLOCK, FEWEST = 2.0, 8
+"""Length of a block for the test of significance, s, and least number of them: of two, no test can tell anything."""
 
 ITERATIONS = 30
 """Steps at most: without the causes the modes may have far to go."""
@@ -210,6 +210,6 @@ def block_slices(lines: WindowedSpectrum) -> list[slice]:
     lines
         Windowed lines of the recording.
     """
-    count = max(2, round(len(lines.window) / lines.recording.rate / BLOCK))
+    count = max(FEWEST, round(len(lines.window) / lines.recording.rate / BLOCK))
     edges = np.linspace(0, len(lines.window), count + 1).astype(int)
     return [slice(int(a), int(b)) for a, b in pairwise(edges)]
