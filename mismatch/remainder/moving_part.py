@@ -15,7 +15,7 @@ from .repeated_part import repeated_share
 
 Real = NDArray[np.float64]
 
-SEGMENT, FEWEST = 2.0, 8
+SEGMENT, FEWEST = 2.0, 6
 """Length of a segment, s: its bins lie half a hertz apart; least number of them in a record, which shortens them."""
 
 BINS = 12

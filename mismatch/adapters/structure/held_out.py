@@ -22,8 +22,8 @@ Real = NDArray[np.float64]
 RUNS_AWAY = 10.0
 """Error, over the response, that a prediction is told to have that runs away when it is simulated."""
 
-BLOCK, FEWEST = 2.0, 8
-"""Length of a block for the test of significance, s, and least number of them: of two, no test can tell anything."""
+BLOCK, FEWEST = 2.0, 5
+"""Length of a block for the test of significance, s, and least number: of fewer, no test of signs gets below 3 %."""
 
 ITERATIONS = 30
 """Steps at most: without the causes the modes may have far to go."""
