@@ -24,6 +24,9 @@ from .diagnosis_answers import number, place, words
 
 MOST_CANDIDATES = 15
 
+LEVELS_APART = 1.05
+"""Strongest over weakest level from which growth is drawn: nearer ones lie on one spot."""
+
 
 def location_section(diagnosis: StructureDiagnosis) -> Section:
     """Maps of the residual."""
@@ -70,6 +73,12 @@ def _no_growth(growth: Mapping[str, Any], recordings: int) -> str:
         return (
             "Not drawn: in the bands that stand out, the residual of whole recordings is no larger than their noise "
             "at any level."
+        )
+    levels, unit = found[0].get("drive_rms") or found[0]["force_rms_n"], found[0].get("drive_unit", "N")
+    if max(levels) < LEVELS_APART * min(levels):
+        return (
+            f"Not drawn: all recordings have nearly one level, {min(levels):.3g} to {max(levels):.3g} {unit}; record "
+            "at half and at twice of it to see how the residual grows."
         )
     return ""
 

@@ -45,6 +45,12 @@ def test_nothing_located_says_so() -> None:
     assert section.sentences == ("Not drawn: nothing stands above the noise, so nothing grows.",)
 
 
+def test_recordings_of_one_level_show_no_growth() -> None:
+    section = told([0.1, 0.2, 0.3], force_rms_n=[20.0, 20.1, 20.3])
+    assert section.pictures == ()
+    assert "nearly one level, 20 to 20.3 N" in section.sentences[0]
+
+
 def test_what_stands_above_the_noise_is_drawn() -> None:
     assert len(told([0.0, 0.0, 0.3]).pictures) == 1
 
