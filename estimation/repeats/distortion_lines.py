@@ -110,12 +110,9 @@ def distortion(periods: SteadyPeriods) -> Distortion:
     excited = excited_lines(periods)
     joint, freedom = covariance_of_periods(periods)
     through, doubt = _between_lines(linear, periods, excited)
-    size = np.sqrt(linear.power.mean(axis=0))
-    drive = np.sqrt(
-        np.mean(
-            [np.mean(np.abs(one.forces.mean(axis=0)[excited]) ** 2, axis=0) for one in periods.realisations], axis=0
-        )
-    )
+    size = np.sqrt(np.maximum(linear.power.mean(axis=0), 1e-300))  # a dead channel has none
+    driven = [np.mean(np.abs(one.forces.mean(axis=0)[excited]) ** 2, axis=0) for one in periods.realisations]
+    drive = np.sqrt(np.maximum(np.mean(driven, axis=0), 1e-300))
     parts = parted(joint, joint.shape[1] - linear.power.shape[1])
     noise = np.einsum("kpp->kp", residual_covariance(*parts, through)).real
     hum = np.einsum("kqq->kq", parts[1]).real
@@ -180,7 +177,7 @@ def _stochastic(linear: LinearApproximation) -> tuple[Real | None, Real | None]:
     noise = np.einsum("kpp->kp", linear.noise).real
     ratio = np.einsum("kpp->kp", linear.total).real / np.maximum(noise, 1e-300)
     p_values = ratio_p_values(ratio, linear.total_freedom, linear.noise_freedom)
-    share = np.sqrt(np.maximum(beyond.mean(axis=0), 0.0) / linear.power.mean(axis=0))
+    share = np.sqrt(np.maximum(beyond.mean(axis=0), 0.0) / np.maximum(linear.power.mean(axis=0), 1e-300))
     return share, np.array([together(p_values[:, p]) for p in range(p_values.shape[1])])
 
 

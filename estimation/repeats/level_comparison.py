@@ -92,7 +92,7 @@ def homogeneity(first: SteadyPeriods, second: SteadyPeriods) -> Homogeneity:
         ratio = np.einsum("kq,kq->k", delta[:, p].conj(), size).real / m
         line_p[:, p], variance[:, p] = ratio_p_values(ratio, m, freedom), traces[0] + traces[1]
     difference = np.sum(np.abs(delta) ** 2, axis=2)
-    whole = np.sum(np.abs(one.frf.values[here]) ** 2, axis=(0, 2))
+    whole = np.maximum(np.sum(np.abs(one.frf.values[here]) ** 2, axis=(0, 2)), 1e-300)
     counted = "noise alone, because both play the same realisation" if same else _counted(one, other)
     return Homogeneity(
         one.frf.frequencies[here],

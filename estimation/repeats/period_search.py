@@ -19,7 +19,7 @@ CANDIDATE = 0.2
 SILENT = 1e-3
 """Share of the mean power below which a force says nothing of its period."""
 
-TRIED = 20
+TRIED = 12
 """Number of lags that are looked at closely."""
 
 
@@ -197,7 +197,8 @@ def _width(period: float) -> int:
 def _refined(first: Real, later: Real, lag: int, m: int) -> tuple[float, float]:
     """Period and its standard error (samples) from the phase of two stretches ``lag``, about m periods, apart."""
     window = np.hanning(len(first))[:, None]
-    a, b = (rfft((x - x.mean(axis=0)) * window, axis=0) for x in (first, later))
+    n = next_fast_len(len(first) + len(first) % 2, real=True)
+    a, b = (rfft((x - x.mean(axis=0)) * window, n=n + n % 2, axis=0) for x in (first, later))
     cross = np.sum(np.conj(a) * b, axis=1)
     w = np.pi * np.arange(len(cross)) / (len(cross) - 1)
     size = np.abs(cross)
@@ -234,8 +235,10 @@ def _moving_mean(values: Real, width: int) -> Real:
 
 
 def _advanced(signals: Real, samples: float) -> Real:
-    """Signals (n_samples, n) a fraction of a sample later in time; edges are those of a periodic signal."""
+    """Signals (n_samples, n) a fraction of a sample later in time; zeros stand beyond its edges."""
     if abs(samples) < 1e-9:
         return signals
-    w = 2 * np.pi * np.fft.rfftfreq(len(signals))
-    return np.asarray(irfft(rfft(signals, axis=0) * np.exp(1j * w * samples)[:, None], n=len(signals), axis=0))
+    n = next_fast_len(len(signals) + 64, real=True)  # zeros stand between the last sample and the first
+    w = 2 * np.pi * np.fft.rfftfreq(n)
+    moved = irfft(rfft(signals, n=n, axis=0) * np.exp(1j * w * samples)[:, None], n=n, axis=0)
+    return np.asarray(moved[: len(signals)])

@@ -16,7 +16,7 @@ from estimation import (
 )
 from foundation import InputError
 
-MOST_VALUES = 3e7
+MOST_VALUES = 1e7
 """Samples times channels up to which a recording is looked at for periods: the whole of it is held in memory."""
 
 FEWEST_LINES = 10
@@ -46,6 +46,8 @@ def repeats_in_words(stream: Stream) -> tuple[str, ...]:
     try:
         periods = steady_periods([recording], repeated)
     except InputError:  # no two whole periods between the edges of the interpolation
+        return ()
+    if not excited_lines(periods).any():
         return ()
     return (_noise_in_words(periods), *_distortion_in_words(periods))
 

@@ -93,3 +93,15 @@ def test_forces_that_do_not_repeat_say_nothing_of_periods(tmp_path: Path, capsys
         writer.append("main", samples)
     assert run(["inspect", str(tmp_path / "random.h5")]) == 0
     assert "repeat" not in capsys.readouterr().out
+
+
+def test_a_dead_response_beside_forces_that_repeat_is_no_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    force = np.tile(np.random.default_rng(0).standard_normal(1000), 5)
+    with RecordingWriter(tmp_path / "dead.h5", (StreamDescription("main", RATE, 0.0, CHANNELS),)) as writer:
+        writer.append("main", np.column_stack([force, np.full(len(force), 2.0)]))
+    assert run(["inspect", str(tmp_path / "dead.h5")]) == 0
+    said = capsys.readouterr().out
+    assert "the force repeats every 0.195312 s" in said
+    assert "dead channel" in said
