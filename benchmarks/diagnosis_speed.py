@@ -3,8 +3,8 @@
 One concealed case of the blind trial (a hardening joint, three recordings) is simulated and read. The floor of one
 prediction is its FFTs: the predicted responses go back to time over the padded record, and their window into lines
 again. Every time is that of the processor, the smallest of five, and stands as a multiple of that floor in the same
-run: one prediction, one Gauss-Newton step (normal equations) of modal parameters alone and beside a joint's law that
-is simulated freely, the fit of the modal parameters, and the whole diagnosis. BLAS threads are pinned to one.
+run: one prediction, one set of derivatives of modal parameters alone and beside a joint's law that is simulated
+freely, and the whole diagnosis. BLAS threads are pinned to one.
 """
 
 import os
@@ -23,8 +23,7 @@ import numpy as np
 from scipy.fft import irfft, rfft
 
 from estimation import WindowedSpectrum
-from mismatch import Settings, StructureDiagnosis, diagnose, read_recordings
-from mismatch.models import Hypothesis, ModelShape, fit, jacobian, predict_lines
+from mismatch import Fit, StructureDiagnosis, diagnose, jacobian, predict_lines, read_recordings
 from modal_fit import ModalModel, read_modal_model
 
 from .blind_trial.case_spec import draw_cases
@@ -69,9 +68,9 @@ def case(folder: Path) -> tuple[ModalModel, list[Path]]:
 def answered(model: ModalModel, files: list[Path]) -> tuple[StructureDiagnosis, float]:
     """The diagnosis, and the processor time that it takes when everything is loaded, s."""
     recordings = read_recordings(files, model)
-    found = diagnose(model, recordings, Settings())
+    found = diagnose(model, recordings)
     began = spent()
-    diagnose(model, recordings, Settings())
+    diagnose(model, recordings)
     return found, spent() - began
 
 
@@ -80,20 +79,21 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         model, files = case(Path(folder))
         found, whole = answered(model, files)
-    lines, final = list(found.details.measured), found.details.final.hypothesis
-    shape = ModelShape(model, Settings().lab)
-    nominal = Hypothesis(shape, np.zeros(shape.size))
+    lines, base, final = list(found.details.measured), found.details.base, found.details.final
     unit = least(lambda: floor(lines))
 
-    def step(hypothesis: Hypothesis) -> Callable[[], object]:
-        return lambda: [jacobian(hypothesis, one, predict_lines(hypothesis, one)) for one in lines]
+    def predicted(fitted: Fit) -> Callable[[], object]:
+        return lambda: [predict_lines(fitted.hypothesis, one) for one in lines]
+
+    def derived(fitted: Fit) -> Callable[[], object]:
+        here = fitted.hypothesis
+        return lambda: [jacobian(here, one, predict_lines(here, one)) for one in lines]
 
     costs = {
-        "one prediction, modal parameters alone": least(lambda: [predict_lines(nominal, one) for one in lines]),
-        "one prediction with the causes found": least(lambda: [predict_lines(final, one) for one in lines]),
-        f"prediction and derivatives, {nominal.size} numbers": least(step(nominal)),
-        f"prediction and derivatives, {final.size} numbers with the causes": least(step(final)),
-        "fit of the modal parameters": least(lambda: fit(lines, nominal, iterations=30)),
+        "one prediction, modal parameters alone": least(predicted(base)),
+        "one prediction with the causes found": least(predicted(final)),
+        f"prediction and derivatives, {base.hypothesis.size} numbers": least(derived(base)),
+        f"prediction and derivatives, {final.hypothesis.size} numbers with the causes": least(derived(final)),
         "whole diagnosis": whole,
     }
     samples = ", ".join(str(len(one.recording.force)) for one in lines)

@@ -59,6 +59,7 @@ from .models import (
     ModelShape,
     fit,
     improved_model,
+    jacobian,
     predict_lines,
     residual,
 )
@@ -118,6 +119,7 @@ __all__ = [
     "improved_model_of",
     "in_deflections",
     "in_processes",
+    "jacobian",
     "library",
     "linear_floor",
     "measured_part",
