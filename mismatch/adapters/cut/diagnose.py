@@ -70,10 +70,11 @@ def diagnose_cut(
         raise InputError(f"depth = {depth!r} m must be positive; give the depth in metres (--depth), for example 0.001")
     if coefficient_error is not None:
         settings = replace(settings, coefficient_error=coefficient_error)
-    if force_error is not None:
-        settings = replace(settings, force_error=force_error)
-    if not 0 <= settings.force_error < 1:
-        raise InputError(f"force error {settings.force_error!r} must be a share from 0 to 1, for example 0.005")
+    if force_error is None:
+        force_error = settings.force_error
+    if not 0 <= force_error < 1:
+        raise InputError(f"force error {force_error!r} must be a share from 0 to 1, for example 0.005")
+    settings = replace(settings, force_error=force_error)
     tell = progress or _silent
     tell("spindle and noise")
     spectra = tuple(force_spectra(recording, process.teeth) for recording in recordings)
