@@ -149,6 +149,7 @@ def test_a_quarter_of_the_response_left_is_not_none(
     tone = [AcceptedCause("unmeasured_excitation", {}, {"frequency_hz": 9.0}, {"frequency_hz": 0.1}, 99.0)]
     assert verdict_of(tone, good) == "explained"
     assert verdict_of(tone, bad) == "partly explained"
+    assert verdict_of(tone, _gain(1.2, 1.2, 1.06, 0.1, 1e-6, 99.0)) == "unexplained"  # it predicts nothing
 
 
 def test_impossible_numbers_are_said_to_be_so() -> None:

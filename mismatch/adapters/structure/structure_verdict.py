@@ -41,5 +41,7 @@ def verdict_of_structure(
     most = settings.most_of_response
     incomplete = leaves_too_much(gain, settings) if causes else min(gain.before, gain.after) > most
     excluded = strained(hypothesis) and not after.noise_like(settings.noise_like)
-    findings = Findings(before, after, bool(causes), excluded=excluded, incomplete=incomplete)
+    # an answer that errs by as much as the response itself predicts nothing
+    predicts = gain.after < 1
+    findings = Findings(before, after, bool(causes), excluded=excluded, incomplete=incomplete, halved=predicts)
     return verdict_of(findings, settings)
