@@ -1,6 +1,6 @@
 """`CaseSpec`: everything that decides a case, and the stratified draw of many."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from itertools import product
 from typing import Any
@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .effects import ALL, FOREIGN, LISTED
+from .further_groups import EXTENDED, FURTHER, further_case
 
 STRENGTHS = (0.5, 1.0, 2.0, 5.0, 20.0)
 NOISES = (0.01, 0.02, 0.03)
@@ -32,7 +33,8 @@ class CaseSpec:
     Parameters
     ----------
     group
-        ``main`` (the grid), ``control`` (nothing to find), ``foreign``, ``pair`` or ``condition``.
+        ``main`` (the grid), ``control`` (nothing to find), ``foreign``, ``pair``, ``condition``, or one of
+        :data:`~benchmarks.blind_trial.further_groups.FURTHER`.
     effect, family, second
         Concealed cause, family of its law, and a further cause (empty: none).
     strength
@@ -82,7 +84,7 @@ def draw_cases(n: int, seed: int, *, only: str = "", whole_grid: bool = False) -
     Parameters
     ----------
     only
-        One effect, group or condition; all ``n`` cases are of it.
+        One effect, group or condition; all ``n`` cases are of it. ``extended``: all groups, the harder ones too.
     """
     rng = np.random.default_rng(seed)
     if whole_grid:
@@ -96,14 +98,16 @@ def draw_cases(n: int, seed: int, *, only: str = "", whole_grid: bool = False) -
     return [_completed(cases[k], index, seed, rng) for index, k in enumerate(order)]
 
 
-def _mixture(n: int, rng: np.random.Generator) -> list[CaseSpec]:
-    counts = {group: round(share * n) for group, share in SHARES.items()}
+def _mixture(n: int, rng: np.random.Generator, shares: Mapping[str, float] = SHARES) -> list[CaseSpec]:
+    counts = {group: round(share * n) for group, share in shares.items()}
     counts["main"] = n - sum(count for group, count in counts.items() if group != "main")
     return [case for group, count in counts.items() for case in _group(group, count, rng)]
 
 
 def _filtered(n: int, only: str, rng: np.random.Generator) -> list[CaseSpec]:
-    if only in SHARES:
+    if only == "extended":
+        return _mixture(n, rng, EXTENDED)
+    if only in EXTENDED:
         return _group(only, n, rng)
     cases: list[CaseSpec] = []
     for _ in range(200):
@@ -115,6 +119,8 @@ def _filtered(n: int, only: str, rng: np.random.Generator) -> list[CaseSpec]:
 
 
 def _group(group: str, n: int, rng: np.random.Generator) -> list[CaseSpec]:
+    if group in FURTHER:
+        return [_further(group, count, rng) for count in range(n)]
     names = {
         "main": (*LISTED, "modal_parameters"),
         "control": ("none",),
@@ -133,6 +139,14 @@ def _group(group: str, n: int, rng: np.random.Generator) -> list[CaseSpec]:
             case = CaseSpec(0, 0, group, effect, "", strength, *common, condition=condition)
             cases.append(_special(case, len(cases), rng))
     return cases[:n]
+
+
+def _further(group: str, count: int, rng: np.random.Generator) -> CaseSpec:
+    """A case of a harder group."""
+    one = further_case(group, count, rng)
+    joint = int(rng.integers(3))
+    case = CaseSpec(0, 0, group, one.effect, "", one.strength, one.noise, one.excitation, joint, 0.0)
+    return replace(case, condition=one.condition)
 
 
 def _special(case: CaseSpec, count: int, rng: np.random.Generator) -> CaseSpec:

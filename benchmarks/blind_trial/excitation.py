@@ -1,4 +1,4 @@
-"""Milling forces of the trial: speed sweeps in three immersions, porous material, both, or one constant speed.
+"""Forces of the trial: speed sweeps in three immersions, porous material, both, one constant speed, or multisines.
 
 A tooth at angle phi that is engaged cuts the chip ``h = feed sin(phi) + runout`` times the material's state;
 tangential, radial and axial forces are ``K a h (1, kr, ka)`` (Altintas, Manufacturing Automation, 2nd ed., section
@@ -6,6 +6,7 @@ tangential, radial and axial forces are ``K a h (1, kr, ka)`` (Altintas, Manufac
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,9 @@ BEFORE, DURATION, AFTER = 3, 48, 1
 """Run-in that is not recorded, recording, and run-out that is not recorded, s."""
 KEPT = slice(BEFORE * RATE, (BEFORE + DURATION) * RATE)
 LEVELS = {"low": 1.0, "mid": 2.2, "high": 3.6, "unseen": 2.8}
-EXCITATIONS = ("sweeps", "porous", "mixed", "constant")
+EXCITATIONS = ("sweeps", "porous", "mixed", "constant", "multisine")
+PERIOD, LOWEST, HIGHEST = 4, 2.0, 110.0
+"""Of the multisine: period, s, and its lines, Hz."""
 
 _FINE = 4096
 _IMMERSIONS = (
@@ -66,6 +69,8 @@ def milling_test(kind: str, level: str, force_scale: float, plan_seed: int, rng:
 
     Tool, speeds and immersions follow from ``plan_seed``: a lab repeats its plan at several depths.
     """
+    if kind == "multisine":
+        return _multisine(LEVELS[level] * force_scale, np.random.default_rng(plan_seed))
     total = BEFORE + DURATION + AFTER
     planned = np.random.default_rng(plan_seed)
     cuts = _plan(kind, planned)
@@ -83,6 +88,25 @@ def milling_test(kind: str, level: str, force_scale: float, plan_seed: int, rng:
     force = _band_limited(np.vstack(pieces))
     force *= LEVELS[level] * force_scale / np.sqrt(np.mean(force[KEPT] ** 2))
     return Test(force * _taper(len(force))[:, None], angle[:: _FINE // RATE])
+
+
+def _multisine(size: float, rng: np.random.Generator) -> Test:
+    """Periodic forces of equal amplitudes and random phases on three shakers, drawn anew every 16 s.
+
+    Three draws make the three inputs independent (Pintelon & Schoukens, System Identification, 2nd ed., section
+    2.7). ``size`` is the RMS of all three forces, N.
+    """
+    total, period = (BEFORE + DURATION + AFTER) * RATE, PERIOD * RATE
+    lines = np.arange(int(LOWEST * PERIOD), int(HIGHEST * PERIOD))
+    force, edges = np.empty((total, 3)), [0, (BEFORE + 16) * RATE, (BEFORE + 32) * RATE, total]
+    for begin, end in pairwise(edges):
+        spectrum = np.zeros((period // 2 + 1, 3), dtype=complex)
+        spectrum[lines] = np.exp(2j * np.pi * rng.random((len(lines), 3)))
+        one = np.fft.irfft(spectrum, period, axis=0)
+        force[begin:end] = np.resize(one, (end - begin, 3))
+    force *= size / np.sqrt(np.mean(force[KEPT] ** 2))
+    angle = 2 * np.pi * rng.uniform(5, 18) * np.arange(total) / RATE
+    return Test(force * _taper(total)[:, None], angle)
 
 
 def _plan(kind: str, rng: np.random.Generator) -> list[Cut]:

@@ -20,7 +20,7 @@ from .structures import Structure
 
 @dataclass(frozen=True)
 class Element:
-    """One force law at the tip.
+    """One force law at the tip, or inside the structure.
 
     Parameters
     ----------
@@ -28,8 +28,8 @@ class Element:
         Number of the law, see :mod:`laws`.
     parameters
         Up to six, in the law's order.
-    sense, act : (3,)
-        Direction of the deflection it feels, and of the force it gives.
+    sense, act : (3,) or (4,)
+        Direction of the deflection it feels, and of the force it gives; a fourth axis is the structure's inner joint.
     schedule : (n,) at 512 Hz, or None
         Course of laws that change with time.
     """
@@ -70,16 +70,16 @@ def _attempt(
         parameters[row, : len(element.parameters)] = element.parameters
         if element.schedule is not None:
             schedules[row, :-1], schedules[row, -1] = element.schedule, element.schedule[-1]
-    sense = np.array([structure.tip @ e.sense for e in elements], dtype=complex).reshape(-1, len(structure.poles))
-    act = np.array([structure.left @ e.act for e in elements], dtype=complex).reshape(-1, len(structure.poles))
-    acts = np.array([e.act for e in elements], dtype=float).reshape(-1, 3)
+    sense = np.array([structure.seen @ e.sense for e in elements], dtype=complex).reshape(-1, len(structure.poles))
+    act = np.array([structure.pushed @ e.act for e in elements], dtype=complex).reshape(-1, len(structure.poles))
     push = _half_steps(fine @ structure.left.T)
     places = (structure.poles, sense, act)
     modal, resisted = march(push, 1 / (RATE * factor), places, codes, parameters, schedules, factor)
     with np.errstate(invalid="ignore", over="ignore"):
         accelerations = 2 * np.real(modal @ (structure.poles[:, None] ** 2 * structure.sensor))
         direct = 2 * np.real(np.einsum("rp,r,rq->pq", structure.sensor, structure.poles, structure.left))
-        accelerations += (fine - resisted @ acts) @ direct.T
+        accelerations += fine @ direct.T
+        accelerations -= resisted @ (2 * np.real((act * structure.poles) @ structure.sensor))
         return _decimated(accelerations, factor)
 
 
@@ -97,12 +97,12 @@ def linear_response(structure: Structure, force: NDArray[np.float64]) -> NDArray
 def tip_motion(
     structure: Structure, force: NDArray[np.float64], direction: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Deflection (m) and speed (m/s) along a direction at the tip, each (n,) at 512 Hz, of the linear structure."""
+    """Deflection (m) and speed (m/s) along a direction of a joint, each (n,) at 512 Hz, of the linear structure."""
     n = 1 << 16
     s = np.asarray(2j * np.pi * np.fft.rfftfreq(n, 1 / RATE), dtype=np.complex128)
     push = np.fft.rfft(force, n, axis=0)
     spectrum = np.zeros(len(s), dtype=complex)
-    for pole, seen, left in zip(structure.poles, structure.tip @ direction, structure.left, strict=True):
+    for pole, seen, left in zip(structure.poles, structure.seen @ direction, structure.left, strict=True):
         spectrum += push @ left * (seen / (s - pole)) + push @ left.conj() * (seen.conj() / (s - pole.conj()))
     deflection, speed = (np.fft.irfft(values, n)[: len(force)] for values in (spectrum, spectrum * s))
     return deflection, speed

@@ -105,6 +105,8 @@ def outcome_of(truth: dict[str, Any], answer: Answer) -> str:
     effects, named = set(truth["effects"]), set(answer.names)
     if effects and truth["spec"]["nominal_off"] >= 0.9 and "modal_parameters" not in effects:
         named -= {"modal_parameters"} if len(named) > 1 or answer.verdict == "unexplained" else set()
+    # a small mode that is really there may be named beside the effect
+    named -= set(truth["accepted_also"]) - effects if len(named) > 1 and effects else set()
     if not effects:
         return _control(set(truth["accepted_also"]), named, answer.verdict)
     if effects == {"unexplained"}:

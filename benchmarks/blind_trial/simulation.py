@@ -99,7 +99,7 @@ def build_case(spec: CaseSpec) -> Case:
     """Simulate one case; the same spec gives the same case to the last bit on the same machine."""
     rng = np.random.default_rng(spec.seed)
     away = spec.condition == "sensor_away"
-    structure = draw_structure(rng, away)
+    structure = draw_structure(rng, away, spec.condition == "inner_joint")
     scale = float(rng.uniform(25, 60))
     plan, other = int(rng.integers(1 << 31)), int(rng.integers(1 << 31))
     tests = {
@@ -107,7 +107,8 @@ def build_case(spec: CaseSpec) -> Case:
         for level in LEVELS
     }
     bench = Bench(structure, tests, spec.seed)
-    scene = _scene(bench, _direction(spec.joint, rng), rng)
+    inside = spec.condition == "inner_joint"
+    scene = _scene(bench, np.array([0.0, 0, 0, 1]) if inside else _direction(spec.joint, rng), rng)
     changes = _changes(spec, bench, scene)
     sensor = str(rng.choice(["head", "head_and_tip"])) if away else "tip"
     nominal = nominal_model(structure, rng, _lab_error(spec), sensor)
@@ -135,7 +136,7 @@ def _direction(joint: int, rng: np.random.Generator) -> NDArray[np.float64]:
 def _scene(bench: Bench, direction: NDArray[np.float64], rng: np.random.Generator) -> Scene:
     force = bench.tests["mid"].force
     deflection, speed = tip_motion(bench.structure, force, direction)
-    other = np.cross(direction, rng.standard_normal(3))
+    other = np.cross(direction[:3], rng.standard_normal(3)) if direction[:3].any() else np.array([1.0, 0, 0])
     return Scene(
         bench.structure,
         direction,
@@ -153,9 +154,9 @@ def _changes(spec: CaseSpec, bench: Bench, scene: Scene) -> list[Change]:
     wanted = [(spec.effect, spec.family, spec.strength)]
     if spec.second:
         wanted.append((spec.second, ALL[spec.second].families[0], spec.strength))
-    if spec.condition == "small_modes":
-        wanted = [("missing_mode", "apart", SMALL_MODES)]
-    changes = []
+    if spec.condition in ("small_modes", "small_mode"):
+        wanted = [*wanted, ("missing_mode", "apart", SMALL_MODES)]
+    changes: list[Change] = []
     for name, family, strength in wanted:
         if name in ("none", "modal_parameters"):
             continue
@@ -201,14 +202,15 @@ def _record(
 def _truth(spec: CaseSpec, scene: Scene, changes: list[Change], facts: dict[str, dict[str, Any]]) -> dict[str, Any]:
     effects = [name for name in (spec.effect, spec.second) if name and name != "none"]
     foreign = [name for name in effects if name in FOREIGN and not ALL[name].answer]
-    also = ["missing_mode"] if spec.condition == "small_modes" else []
+    also = ["missing_mode"] if spec.condition in ("small_modes", "small_mode") else []
     if spec.nominal_off > 1.5 and spec.effect != "modal_parameters":
         also.append("modal_parameters")
+    directed = bool(effects) and ALL[spec.effect].directional and spec.condition != "inner_joint"
     return {
         "spec": spec.to_json(),
         "effects": ["unexplained"] if foreign else [ALL[name].answer or name for name in effects],
         "accepted_also": also,
-        "joint_direction_at_tcp": scene.direction.tolist() if effects and ALL[spec.effect].directional else None,
+        "joint_direction_at_tcp": scene.direction.tolist() if directed else None,
         "parameters": [change.parameters for change in changes],
         "residual_over_noise": facts["mid"]["residual_over_noise"],
         "residual_after_refit_over_noise": facts["mid"].pop("residual_after_refit_over_noise"),

@@ -25,12 +25,26 @@ class Structure:
         Right vectors at the tool tip and where the accelerometers sit.
     left : (n_modes, 3)
         Left vectors for forces at the tool tip.
+    inner : (2, n_modes), or None
+        Right and left vector of a joint inside the structure: its deflection between two points that no channel
+        shows, and the modal force of a pair of forces on them. It is the fourth axis of directions.
     """
 
     poles: NDArray[np.complex128]
     tip: NDArray[np.complex128]
     sensor: NDArray[np.complex128]
     left: NDArray[np.complex128]
+    inner: NDArray[np.complex128] | None = None
+
+    @property
+    def seen(self) -> NDArray[np.complex128]:
+        """Right vectors of all axes that a joint may feel: three at the tip and, if there is one, the inner one."""
+        return self.tip if self.inner is None else np.column_stack([self.tip, self.inner[0]])
+
+    @property
+    def pushed(self) -> NDArray[np.complex128]:
+        """Left vectors of the same axes."""
+        return self.left if self.inner is None else np.column_stack([self.left, self.inner[1]])
 
     def accelerance(self, s: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """``s^2 H(s)`` from tip forces to the accelerometers, shape (n, 3, 3)."""
@@ -45,12 +59,12 @@ class Structure:
         return np.asarray(s[:, None, None] ** 2 * (direct + mirror))
 
     def static_stiffness(self, direction: NDArray[np.float64]) -> float:
-        """``1 / (d^T H(0) d)`` at the tip, N/m."""
-        flexibility = -2 * np.real(np.sum((self.tip @ direction) * (self.left @ direction) / self.poles))
+        """``1 / (d^T H(0) d)`` over the axes of ``seen``, N/m."""
+        flexibility = -2 * np.real(np.sum((self.seen @ direction) * (self.pushed @ direction) / self.poles))
         return float(1 / flexibility)
 
     def with_mode(self, frequency: float, damping: float, shape: NDArray[np.float64]) -> "Structure":
-        """Add an uncoupled real mode (Hz, ratio, mass-normalised shape (3,) at the tip)."""
+        """Add an uncoupled real mode (Hz, ratio, mass-normalised shape (3,) at the tip); an inner joint rests in it."""
         omega = 2 * np.pi * frequency
         damped = omega * np.sqrt(1 - damping**2)
         row = np.asarray(shape, dtype=complex)[None]
@@ -59,10 +73,11 @@ class Structure:
             np.vstack([self.tip, row]),
             np.vstack([self.sensor, row]),
             np.vstack([self.left, row / (2j * damped)]),
+            None if self.inner is None else np.column_stack([self.inner, np.zeros(2)]),
         )
 
 
-def draw_structure(rng: np.random.Generator, sensor_away: bool = False) -> Structure:
+def draw_structure(rng: np.random.Generator, sensor_away: bool = False, inner_joint: bool = False) -> Structure:
     """Four to seven modes between 5 and 80 Hz; drawn anew until every damping ratio is within 0.7-12 %.
 
     ``q'' + C q' + K q = B^T F``, ``x = P q``: K may have a skew part (drives that do not act reciprocally), C one
@@ -70,13 +85,13 @@ def draw_structure(rng: np.random.Generator, sensor_away: bool = False) -> Struc
     2nd ed., sections 2.7-2.8). In such a system ``sum 2 Re(tip left^T) = 0`` holds exactly.
     """
     while True:
-        structure = _attempt(rng, sensor_away)
+        structure = _attempt(rng, sensor_away, inner_joint)
         damping = -structure.poles.real / np.abs(structure.poles)
         if damping.min() > 0.007 and damping.max() < 0.12:
             return structure
 
 
-def _attempt(rng: np.random.Generator, sensor_away: bool) -> Structure:
+def _attempt(rng: np.random.Generator, sensor_away: bool, inner_joint: bool) -> Structure:
     omega = 2 * np.pi * _frequencies(rng)
     n = len(omega)
     damping = np.exp(rng.uniform(np.log(0.01), np.log(0.10), n))
@@ -92,7 +107,9 @@ def _attempt(rng: np.random.Generator, sensor_away: bool) -> Structure:
         skew = rng.uniform(0.005, 0.03) * rng.standard_normal((n, n))
         stiffness = stiffness + (skew - skew.T) * np.outer(omega, omega)
     arms = 0.2 * np.abs(shapes).mean() * rng.standard_normal((3, n)) if sensor_away else np.zeros((3, n))
-    return _modes(viscous, stiffness, shapes, 0.85 * shapes + arms if sensor_away else shapes)
+    sensor = 0.85 * shapes + arms if sensor_away else shapes
+    between = np.sqrt(np.mean(shapes**2)) * rng.standard_normal((1, n)) if inner_joint else None
+    return _modes(viscous, stiffness, shapes, sensor, between)
 
 
 def _frequencies(rng: np.random.Generator) -> NDArray[np.float64]:
@@ -113,6 +130,7 @@ def _modes(
     stiffness: NDArray[np.float64],
     shapes: NDArray[np.float64],
     sensor: NDArray[np.float64],
+    between: NDArray[np.float64] | None,
 ) -> Structure:
     """Eigenvectors of ``[[0, I], [-K, -C]]``: right ones from its columns, left from the inverse's rows."""
     n = len(viscous)
@@ -124,7 +142,10 @@ def _modes(
     left = rows[upper, n:] @ shapes.T
     right = vectors[:n, upper].T
     gauge = np.sqrt(np.linalg.norm(left, axis=1) / np.linalg.norm(right @ shapes.T, axis=1))[:, None]
-    return Structure(poles[upper], right @ shapes.T * gauge, right @ sensor.T * gauge, left / gauge)
+    inner = None
+    if between is not None:
+        inner = np.vstack([(right @ between.T * gauge).T, (rows[upper, n:] @ between.T / gauge).T])
+    return Structure(poles[upper], right @ shapes.T * gauge, right @ sensor.T * gauge, left / gauge, inner)
 
 
 def nominal_model(structure: Structure, rng: np.random.Generator, off: "LabError", sensor: str) -> ModalModel:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from .effects import LISTED
+from .further_groups import FURTHER
 from .scoring import Score, wilson
 
 Rows = list[list[str]]
@@ -40,8 +41,10 @@ def targets(scores: Sequence[Score]) -> Rows:
     half = [s for s in listed if 0.35 <= s.strength < 0.75 and s.expected != "modal_parameters"]
     rows = [
         _rate("false alarms on controls", controls, _wrong, "<= 1 %"),
+        _rate("false alarms where nothing is hidden, all groups", [s for s in scores if _nothing(s)], _wrong, "<= 1 %"),
         _rate("wrong physics named", named, _wrong, "<= 2 %"),
         _rate("right, residual >= noise", strong(listed), _right, ">= 95 %"),
+        _rate("right, residual >= noise, harder groups too", strong(scores), _right, ">= 90 %"),
         _rate("right, residual half the noise", half, _right, ">= 80 %"),
         _rate("right, what no linear refit takes >= noise", [s for s in listed if s.beyond >= 0.9], _right, "-"),
         _rate("foreign effects named wrongly", foreign, _wrong, "<= 10 %"),
@@ -50,6 +53,7 @@ def targets(scores: Sequence[Score]) -> Rows:
         _rate("pairs: one or both, nothing false", _group(scores, "pair"), _partly, "-"),
         _share("joint direction within 10 degrees", sum(a <= 10 for a in angles), len(angles), ">= 95 %"),
         _share("intervals that hold the truth", sum(covered), len(covered), "92-98 %"),
+        _rate("answered within 60 s", scores, lambda s: s.seconds < 60, ">= 95 %"),
         _rate("no answer (crash, time)", scores, lambda s: s.outcome == "failed", "0"),
     ]
     for label, values in (
@@ -131,7 +135,11 @@ def _group(scores: Iterable[Score], group: str) -> list[Score]:
 
 def _named(scores: Iterable[Score]) -> list[Score]:
     """Cases with one listed effect."""
-    return [s for s in scores if s.spec["group"] in ("main", "condition") and s.expected != "none"]
+    return [s for s in scores if s.spec["group"] in ("main", "condition", *FURTHER) and not _nothing(s)]
+
+
+def _nothing(score: Score) -> bool:
+    return score.expected == "none"
 
 
 def _right(score: Score) -> bool:

@@ -20,6 +20,7 @@ from benchmarks.blind_trial.case_spec import SHARES, CaseSpec, draw_cases, full_
 from benchmarks.blind_trial.diagnosis_reading import Answer, read_answer
 from benchmarks.blind_trial.effects import ALL, FOREIGN, LISTED
 from benchmarks.blind_trial.excitation import KEPT, milling_test
+from benchmarks.blind_trial.further_groups import DIRECTIONAL, EXTENDED
 from benchmarks.blind_trial.integrator import Element, linear_response, respond, tip_motion
 from benchmarks.blind_trial.noise import COLOURS, measurement_noise
 from benchmarks.blind_trial.scoring import angle_between, excess_removed, outcome_of, score_case, wilson
@@ -209,6 +210,60 @@ def test_draw_is_stratified_and_repeatable() -> None:
     assert {c.effect for c in cases if c.group == "foreign"} == set(FOREIGN)
     assert len({c.seed for c in cases}) == 1000
     assert len(list(full_grid())) == len({*LISTED, "modal_parameters"}) * 5 * 3 * 3 * 3
+
+
+def test_older_draws_stay_and_the_extended_one_has_every_group() -> None:
+    cases = draw_cases(300, 4, only="extended")
+    assert cases == draw_cases(300, 4, only="extended")
+    assert {c.group for c in cases} == set(EXTENDED)
+    assert {c.effect for c in draw_cases(40, 4, only="inner_joint")} == set(DIRECTIONAL)
+    steady = draw_cases(120, 4, only="steady")
+    assert sum(c.effect == "none" for c in steady) == 60
+    assert {c.excitation for c in steady} == {"constant", "multisine"}
+
+
+def test_a_multisine_repeats_and_drives_three_axes_apart() -> None:
+    force = milling_test("multisine", "mid", 40.0, 5, np.random.default_rng(1)).force[KEPT]
+    period = 4 * 512
+    blocks = [force[first : first + 4 * period] for first in (0, 16 * 512, 32 * 512)]
+    for block in blocks:
+        np.testing.assert_allclose(block[period : 2 * period], block[2 * period : 3 * period], atol=1e-9)
+    spectra = np.stack([np.fft.rfft(block[period : 2 * period], axis=0)[8:440] for block in blocks], axis=1)
+    assert np.linalg.matrix_rank(spectra).min() == 3
+    assert np.sqrt(np.mean(force**2)) == pytest.approx(2.2 * 40.0)
+
+
+def test_a_spring_inside_the_structure_is_a_stiffer_structure() -> None:
+    """``K + k psi psi^T``, solved apart, answers as the march does with a spring at the inner joint."""
+    structure = draw_structure(np.random.default_rng(8), inner_joint=True)
+    assert structure.inner is not None
+    force = milling_test("porous", "mid", 40.0, 5, np.random.default_rng(2)).force
+    axis = np.array([0.0, 0, 0, 1])
+    stiffness = 0.1 * abs(structure.static_stiffness(axis))
+    spring = Element(laws.SCHEDULED, (stiffness,), axis, axis, np.ones(len(force)))
+    stepped = respond(structure, force, [spring])
+    s = 2j * np.pi * np.fft.rfftfreq(1 << 16, 1 / 512)
+
+    def transfer(right: NDArray[np.complex128], left: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        direct = np.einsum("kr,rp,rq->kpq", 1 / (s[:, None] - structure.poles), right, left, optimize=True)
+        other = 1 / (s[:, None] - structure.poles.conj())
+        return np.asarray(direct + np.einsum("kr,rp,rq->kpq", other, right.conj(), left.conj(), optimize=True))
+
+    right, left = structure.inner[0][:, None], structure.inner[1][:, None]
+    here = transfer(right, left)
+    held = transfer(structure.tip, structure.left)
+    held = held - transfer(structure.tip, left) @ transfer(right, structure.left) * stiffness / (1 + stiffness * here)
+    spectrum = (s**2)[:, None] * (held @ np.fft.rfft(force, 1 << 16, axis=0)[:, :, None])[:, :, 0]
+    exact = np.fft.irfft(spectrum, 1 << 16, axis=0)[: len(force)]
+    moved = np.std((linear_response(structure, force) - exact)[KEPT])
+    assert np.std((stepped - exact)[KEPT]) < 1e-3 * moved
+
+
+def test_a_small_mode_may_be_named_beside_the_effect() -> None:
+    truth = build_case(_of("coulomb_friction", 5.0, condition="small_mode")).truth
+    assert truth["effects"] == ["coulomb_friction"]
+    assert outcome_of(truth, Answer("explained", ("coulomb_friction", "missing_mode"))) == "right"
+    assert outcome_of(truth, Answer("explained", ("missing_mode",))) == "wrong"
 
 
 def test_missing_channel_level_and_sensor_away(tmp_path: Path) -> None:

@@ -26,8 +26,8 @@ class Scene:
 
     Parameters
     ----------
-    direction, other : (3,)
-        Unit vectors of two joint coordinates at the tip.
+    direction, other : (3,), or (4,) of a joint inside the structure
+        Unit vectors of two joint coordinates.
     deflection, speed
         RMS along ``direction``, m and m/s.
     stiffness
