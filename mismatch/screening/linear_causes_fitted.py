@@ -47,8 +47,7 @@ def linear_candidates(
         if one.gain > max(least, one.cause.size * cost, promising):
             tasks.append(partial(_with_chain, lines, current, one.cause))
     numbers = current.hypothesis.shape.per_mode - 2
-    alone = mode is not None and not current.hypothesis.has_added_physics
-    if alone and mode is not None and mode.gain > max(least, numbers * cost, promising):
+    if mode is not None and mode.gain > max(least, numbers * cost, promising):
         tasks.append(partial(_with_mode, lines, current, mode, settings.resolved))
     return [one for one in in_processes(tasks) if one is not None and np.isfinite(one.evidence)]
 

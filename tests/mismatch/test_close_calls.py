@@ -8,12 +8,15 @@ import pytest
 from concealed_recordings import RATE, Concealed, forces, late, trial
 
 from estimation import BandRecording
-from mismatch import StructureDiagnosis, diagnose
+from mismatch import LabError, ModelShape, StructureDiagnosis, diagnose
 from mismatch.adapters.structure.acceptance import worth_it
 from mismatch.faults.tones import find_tone
-from mismatch.inference import EvidenceSettings, Proposal
-from mismatch.models.fitting import Fit
+from mismatch.inference import EvidenceSettings, Proposal, ScreeningSettings
+from mismatch.models.fitting import Fit, fit
+from mismatch.models.hypothesis import Cause
+from mismatch.physics.channel_delay import PHYSICS as DELAY
 from mismatch.physics.missing_mode import PHYSICS as MISSING_MODE
+from mismatch.screening import SightedMode, linear_candidates
 from modal_fit import ModalModel
 
 
@@ -79,3 +82,21 @@ def test_the_gain_of_a_tone_is_that_of_its_own_line(
     # a line of a wave of amplitude a over n samples has the power a^2 n / 4, two channels, two recordings
     expected = 2 * 2 * (0.02**2 * len(lines.window) / 4) / 0.02**2
     assert found.gain == pytest.approx(expected, rel=0.5)
+
+
+def test_a_further_mode_is_tried_beside_other_physics(
+    small_model: ModalModel,
+    trial_of: Callable[[ModalModel, str, float, int], BandRecording],
+    hand_made: Callable[[ModalModel, list[BandRecording]], StructureDiagnosis],
+) -> None:
+    """What a delay leaves may be a small mode's: neither explains the recordings alone."""
+    pole = 2 * np.pi * 20.0 * (-0.03 + 1j)
+    right, left = np.full(2, 0.5 / (2j * pole.imag * 40.0)), np.full(2, 0.5 + 0j)
+    with_mode = ModelShape(small_model, LabError()).with_mode(pole, right, left).nominal
+    known = hand_made(small_model, [trial_of(with_mode, "low", 20.0, 1), trial_of(with_mode, "high", 60.0, 2)])
+    lines = list(known.details.recordings)
+    delayed = fit(lines, known.details.base.hypothesis.with_cause(Cause(DELAY, np.array([1e-4]))))
+    mode = SightedMode(MISSING_MODE, pole, right, left, 1e6)
+    found = linear_candidates(lines, delayed, [], mode, ScreeningSettings(), 20.0)
+    assert [one.name for one in found] == ["missing_mode"]
+    assert found[0].evidence > 100.0
