@@ -248,5 +248,5 @@ def _diagnosis(path: str | os.PathLike[str]) -> Findings:
     found = read_diagnosis(path)
     causes = ", ".join(cause.name for cause in found.physics) or "no cause"
     gain = found.improvement
-    error = f"error on {gain.held_out} {100 * gain.before:.3g} % nominal, {100 * gain.after:.3g} % improved"
+    error = f"error on {gain.where} {100 * gain.before:.3g} % nominal, {100 * gain.after:.3g} % improved"
     return Findings(DIAGNOSIS, f"diagnosis of a {found.compared}: {found.verdict}, {causes}; {error}", (), found.doubts)

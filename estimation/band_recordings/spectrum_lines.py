@@ -87,6 +87,27 @@ class WindowedSpectrum:
             trust=_full_trust(self.recording, len(self.band)),
         )
 
+    def between(self, first: float, last: float) -> "WindowedSpectrum":
+        """The same recording compared in a part of its samples alone; it is still predicted from its beginning.
+
+        Parameters
+        ----------
+        first, last
+            Where the part begins and ends, as shares of the samples that are compared.
+        """
+        n, rate = len(self.window), self.recording.rate
+        begin = int(first * n)
+        window = _window(prev_fast_len(int(last * n) - begin, real=True), self.recording.at_rest and begin == 0)
+        axis = np.arange(len(window) // 2 + 1) * rate / len(window)
+        slack = rate / n
+        band = np.flatnonzero((axis >= self.frequencies[0] - slack) & (axis <= self.frequencies[-1] + slack))
+        nearest = np.searchsorted(self.frequencies, axis[band]).clip(0, len(self.frequencies) - 1)
+        part = replace(
+            self, start=self.start + begin, window=window, band=band, frequencies=axis[band], trust=self.trust[nearest]
+        )
+        force = part.signal(self.force_lines)
+        return replace(part, force_here=part.cut(force), measured=part.cut(self.recording.response))
+
     def cut(self, signal: NDArray[np.floating]) -> Complex:
         """Windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the recording."""
         kept = signal[self.start : self.start + len(self.window)]
@@ -125,24 +146,29 @@ def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay
         Decay rate of the slowest mode, 1/s: run-in and padding last seven of its time constants, at most a fifth of it;
         a recording that begins at rest has no run-in.
     """
-    from scipy.signal.windows import tukey  # here, because scipy.signal alone takes 75 MB
-
     n = len(recording.force)
     run_in = 0 if recording.at_rest else int(min(7.0 / decay * recording.rate, 0.2 * n))
     padded = next_fast_len(n + int(min(7.0 / decay * recording.rate, 0.2 * n)), real=True)
     padded += padded % 2
     rising = _rising(recording)
     kept = prev_fast_len(n - run_in - rising // 2, real=True)
-    window = tukey(kept, 0.08)
-    if recording.at_rest:
-        # nothing leaks from before, and a blow may stand here
-        window[: kept // 2] = 1.0
-    window /= np.sqrt(np.sum(window**2))
+    window = _window(kept, recording.at_rest)
     axis = np.arange(kept // 2 + 1) * recording.rate / kept
     lines = np.flatnonzero((axis >= max(band[0], 3 * recording.rate / kept)) & (axis <= band[1]))
     none, trust = np.zeros(0, dtype=complex), _full_trust(recording, len(lines))
     stub = WindowedSpectrum(recording, padded, run_in, window, lines, axis[lines], none, none, none, trust)
     return replace(stub.with_measured_forces(), measured=stub.cut(recording.response))
+
+
+def _window(kept: int, at_rest: bool) -> Real:
+    """Tapered window (kept,) whose squares sum to 1."""
+    from scipy.signal.windows import tukey  # here, because scipy.signal alone takes 75 MB
+
+    window = tukey(kept, 0.08)
+    if at_rest:
+        # nothing leaks from before, and a blow may stand here
+        window[: kept // 2] = 1.0
+    return np.asarray(window / np.sqrt(np.sum(window**2)))
 
 
 def _full_trust(recording: BandRecording, count: int) -> Complex:

@@ -30,7 +30,7 @@ def draw_diagnosis(found: Diagnosis[object], axes: Axes | None = None) -> Axes:
         shown.axvline(noise, color="black", linestyle=(0, (5, 1.5)), linewidth=1.1, label=f"noise, {noise:.3g} %")
         shown.invert_yaxis()
         shown.set_xlim(0, 1.2 * max(*values, noise))
-        shown.set_xlabel(f"Error on {gain.held_out}, share of the root mean square response (%)")
+        shown.set_xlabel(f"Error on {gain.where}, share of the root mean square response (%)")
         shown.set_title(f"Verdict: {found.verdict}")
         size = shown.xaxis.label.get_fontsize()
         shown.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False, fontsize=size)

@@ -53,7 +53,7 @@ def _error_line(diagnosis: StructureDiagnosis) -> str:
         f"{100 * gain.before:.3g} % nominal, {100 * gain.refitted:.3g} % refitted, {100 * gain.after:.3g} % improved, "
         f"noise {100 * gain.noise_floor:.3g} %"
     )
-    if len(diagnosis.details.recordings) < 2:
+    if not diagnosis.details.tested:
         return f"error on {gain.held_out}, the only recording, so not held out: {said}"
     test = f", p = {gain.p_value:.2g} that improved is no better than {gain.against}" if diagnosis.physics else ""
-    return f"error on {gain.held_out}, held out: {said}{test}"
+    return f"error on {gain.where}, held out: {said}{test}"

@@ -111,6 +111,8 @@ class Improvement:
     against
         ``refitted``, or ``nominal`` where nothing but believed numbers was found, or a cause that differs from a refit
         in the belief alone.
+    part
+        Which part of the recording was held out, in words; empty: all of it, or nothing.
     """
 
     held_out: str
@@ -122,6 +124,12 @@ class Improvement:
     interval: tuple[float, float]
     evidence: float = 0.0
     against: str = "refitted"
+    part: str = ""
+
+    @property
+    def where(self) -> str:
+        """What was held out, in words."""
+        return f"{self.held_out} {self.part}".rstrip()
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -183,7 +191,7 @@ class Diagnosis(Result, Generic[Details]):
     def _summary(self) -> Summary:
         causes = [_cause_in_short(cause) for cause in self.physics]
         gain = self.improvement
-        error = f"error on {gain.held_out}: {100 * gain.before:.3g} % nominal, {100 * gain.after:.3g} % improved"
+        error = f"error on {gain.where}: {100 * gain.before:.3g} % nominal, {100 * gain.after:.3g} % improved"
         told = "; ".join(causes) or "no cause"
         if self.equivalents:
             told += f" (cannot be told from {', '.join(self.equivalents)})"

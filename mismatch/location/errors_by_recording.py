@@ -44,7 +44,10 @@ def recording_errors(diagnosis: StructureDiagnosis) -> tuple[RecordingError, ...
     linear, improved = details.elsewhere
     faults = [cause for cause in diagnosis.physics if is_fault(cause.name)]
     found = []
+    unseen = details.held_out
     for one, noise in zip(details.measured, details.final.noises, strict=True):
+        held = one.recording.name == unseen.recording.name
+        one = unseen if held else one
         rests = (
             residual_lines(improved.nominal, one),
             residual_lines(linear, one),
@@ -54,6 +57,9 @@ def recording_errors(diagnosis: StructureDiagnosis) -> tuple[RecordingError, ...
         covariance = noise.covariance(one.frequencies, through_structure(improved, one))
         nominal, refitted, final = (float(np.sqrt(np.sum(np.abs(rest) ** 2) / power)) for rest in rests)
         floor = float(np.sqrt(np.sum(np.trace(covariance, axis1=1, axis2=2).real) / power))
-        held = one.recording.name == diagnosis.improvement.held_out and len(details.recordings) > 1
-        found.append(RecordingError(one.recording.name, held, one.recording.level, nominal, refitted, final, floor))
+        found.append(
+            RecordingError(
+                one.recording.name, held and details.tested, one.recording.level, nominal, refitted, final, floor
+            )
+        )
     return tuple(found)

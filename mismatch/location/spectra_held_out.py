@@ -52,10 +52,9 @@ class HeldOutSpectra:
 def held_out_spectra(diagnosis: StructureDiagnosis) -> HeldOutSpectra:
     """Return spectra of the recording named by the diagnosis' improvement, both models fitted to the others only."""
     details = diagnosis.details
-    lines = list(details.measured)
-    names = [one.recording.name for one in lines]
+    names = [one.recording.name for one in details.measured]
     kept = names.index(diagnosis.improvement.held_out)
-    here, final = lines[kept], details.final
+    here, final = details.held_out, details.final
     before, after = details.elsewhere
     faults = [cause for cause in diagnosis.physics if is_fault(cause.name)]
     rests = residual_lines(before, here), residual_lines(after, here, faults)

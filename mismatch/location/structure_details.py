@@ -27,6 +27,8 @@ class StructureDetails:
         The same recordings as they were measured.
     elsewhere
         Hypothesis with modal parameters alone, and final hypothesis, both fitted without the recording held out.
+    held_out
+        What those fits did not see, as it was measured: a recording, or a part of it.
     band
         Band in which model and recordings are compared, and why.
     view
@@ -40,9 +42,15 @@ class StructureDetails:
     recordings: tuple[WindowedSpectrum, ...]
     measured: tuple[WindowedSpectrum, ...]
     elsewhere: tuple[Hypothesis, Hypothesis]
+    held_out: WindowedSpectrum
     band: ComparedBand
     view: "ResidualView | None" = None
     delay: float = 0.0
+
+    @property
+    def tested(self) -> bool:
+        """Whether there was data that those fits did not see; of a single short recording there is none."""
+        return len(self.recordings) > 1 or self.held_out is not self.measured[0]
 
 
 StructureDiagnosis: TypeAlias = Diagnosis[StructureDetails]

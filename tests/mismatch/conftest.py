@@ -114,7 +114,6 @@ def _hand_made(model: ModalModel, trials: list[BandRecording]) -> StructureDiagn
     fitted = Fit(hypothesis, (noise,) * len(lines), 0.0, 0.0, 0.0, 1e-6 * np.eye(shape.size))
     gain = Improvement(trials[len(trials) // 2].name, 0.3, 0.2, 0.1, 0.09, 0.01, (0.2, 0.4))
     nothing = Remainder(0.0, 0.0)
-    details = StructureDetails(
-        fitted, fitted, lines, lines, (hypothesis, hypothesis), compared_band(model, trials[0].rate)
-    )
+    band, unseen = compared_band(model, trials[0].rate), lines[len(lines) // 2]
+    details = StructureDetails(fitted, fitted, lines, lines, (hypothesis, hypothesis), unseen, band)
     return Diagnosis("structure", "none", (), (), (), gain, nothing, nothing, {}, details)

@@ -198,10 +198,10 @@ def _errors(diagnosis: StructureDiagnosis) -> str:
         f"the error is {100 * gain.before:.3g} % of the response for the nominal model, {100 * gain.refitted:.3g} % "
         f"refitted, {100 * gain.after:.3g} % for the final one; noise is {100 * gain.noise_floor:.3g} %."
     )
-    if len(diagnosis.details.recordings) < 2:
+    if not diagnosis.details.tested:
         return f"On {gain.held_out}, the only recording, {told} Nothing was held out, so nothing confirms this."
     told = (
-        f"On {gain.held_out}, which the fit did not see, {told} Final over nominal: {gain.interval[0]:.3g} to "
+        f"On {gain.where}, which the fit did not see, {told} Final over nominal: {gain.interval[0]:.3g} to "
         f"{gain.interval[1]:.3g} (95 % interval)."
     )
     if not diagnosis.physics:
@@ -259,11 +259,16 @@ def which_test(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
 def warnings(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     """List the warnings of a diagnosis."""
     gain, said = diagnosis.improvement, [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in diagnosis.doubts]
-    if len(diagnosis.details.recordings) < 2:
+    if not diagnosis.details.tested:
         said.append("There is a single recording: nothing could be held out, and errors are those of the fit.")
+    elif len(diagnosis.details.recordings) < 2:
+        said.append(
+            "There is a single recording: its middle half was held out; how the residual grows with the level is not "
+            "known."
+        )
     elif len(diagnosis.details.recordings) < 3:
         said.append("There are two recordings only: how the residual grows with the level is known from two points.")
-    if diagnosis.physics and len(diagnosis.details.recordings) > 1 and gain.p_value > 0.01:
+    if diagnosis.physics and diagnosis.details.tested and gain.p_value > 0.01:
         said.append(f"On the held-out recording the improvement is not significant (p = {gain.p_value:.2g}).")
     if not diagnosis.physics and gain.refitted > max(gain.before, 1.5 * gain.noise_floor):
         said.append(

@@ -123,8 +123,8 @@ def held_out_section(diagnosis: StructureDiagnosis) -> Section:
         "final over noise",
     )
     without = "Error as a share of the response, all channels together"
-    if len(diagnosis.details.recordings) > 1:
-        without += f"; fitted without {diagnosis.improvement.held_out}"
+    if diagnosis.details.tested:
+        without += f"; fitted without {diagnosis.improvement.where}"
     table = Table(without, columns, rows)
     spectra = held_out_spectra(diagnosis)
     caption = (

@@ -37,7 +37,7 @@ def confirmed(
         last, proof = found.current, comparison.settings.proof
         held_out = held_out_improvement(recordings, last.hypothesis, last.noises, faults, proof, linear)
         linear = held_out.linear
-        if not found.accepted or len(recordings.mended) == 1:
+        if not found.accepted or not recordings.tested:
             return found, held_out
         gone = _idle(comparison, recordings, found, held_out)
         if gone is None:
@@ -118,7 +118,7 @@ def _missed(
     if by_belief(less, whole, settings):
         return less.score - whole.score > comparison.needed(less, less)
     place = recordings.held_out_place
-    here = recordings.mended[place]
+    here = recordings.held_out(recordings.mended)
     rest, without = residual_lines(held_out.improved, here), residual_lines(less.hypothesis, here)
     covariance = last.noises[place].covariance(here.frequencies, through_structure(last.hypothesis, here))
     gain = least_misfit(less.hypothesis, here) - least_misfit(held_out.improved, here)

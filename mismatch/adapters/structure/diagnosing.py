@@ -116,7 +116,8 @@ def _diagnosed(
     progress("where the mismatch sits")
     band = max(bands, key=lambda band: band.high)
     elsewhere = answer.held_out.linear, answer.held_out.improved
-    details = StructureDetails(base, answer.final, tuple(mended), tuple(measured), elsewhere, band)
+    unseen = both.held_out(measured)
+    details = StructureDetails(base, answer.final, tuple(mended), tuple(measured), elsewhere, unseen, band)
     view = residual_view(details, answer.verdict == "unexplained", recordings, settings.location)
     candidates = sorted([*found.candidates, *answer.rejected], key=lambda one: -one.evidence)
     return Diagnosis(
