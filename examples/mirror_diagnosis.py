@@ -121,9 +121,9 @@ def ask_library(folder: Path, fitted: ModalModel) -> None:
         print(f"{name}: " + ", ".join(f"{error(one, each):.3f} at {each.recording.name}" for each in lines))
     floor = linear_floor(base, lines)
     seen = find_direction(floor, base.hypothesis)
-    print(f"one direction {np.round(seen.direction, 2)} holds {seen.share:.2f} of what any force would explain")
+    print(f"one direction {np.round(seen.axis.entries, 2)} holds {seen.share:.2f} of what any force would explain")
     laws = [physics for physics in library().values() if isinstance(physics, JointPhysics)]
-    for screened in screen_joints(floor, base.hypothesis, seen.direction, laws)[:3]:
+    for screened in screen_joints(floor, base.hypothesis, seen.axis, laws)[:3]:
         start = replace(base.hypothesis, causes=(screened.causes[0],))
         near = fit(lines, start, base.noises, iterations=3)
         last = replace(near.hypothesis.causes[-1], seen=None)

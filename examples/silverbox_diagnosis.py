@@ -126,10 +126,10 @@ def picture(signals: Signals, nominal: ModalModel, found: StructureDiagnosis) ->
     cause = next(
         cause for cause in found.details.final.hypothesis.causes if cause.physics.name == "stiffness_hardening"
     )
-    assert cause.direction is not None
+    assert cause.axis is not None
     linear = replace(found.details.final, hypothesis=replace(found.details.final.hypothesis, causes=()))
     floor = linear_floor(linear, list(found.details.recordings))
-    seen = [seen_motion(record, linear.hypothesis, cause.direction) for record in floor.records]
+    seen = [seen_motion(record, linear.hypothesis, cause.axis) for record in floor.records]
     kept = slice(found.details.recordings[0].start, -int(2 * RATE))
     x, g = (np.concatenate([getattr(one, name)[kept] for one in seen]) for name in ("deflection", "force"))
     law.plot(1e3 * x[::7], 1e3 * g[::7], ".", ms=1, color="#999999", label="asked for by the residual")

@@ -1,19 +1,31 @@
+from .axis_file import axis_location, axis_of
+from .joint_axis import JointAxis, ModalScales, tip_axes
 from .joint_law import JointLaw, JointMotion
-from .joint_simulation import JointResponse, common_axes, driven_force, joint_dynamics, joint_response, stiffness_ramp
+from .joint_reach import JointPath, JointReach, joint_reach
+from .joint_simulation import JointResponse, driven_force, joint_dynamics, joint_response, stiffness_ramp
+from .reciprocity import modal_scales
 from .saturation import Saturation, rounded, saturated
 from .tangent_loop import tangent_run
 
 __all__ = [
+    "JointAxis",
     "JointLaw",
     "JointMotion",
+    "JointPath",
+    "JointReach",
     "JointResponse",
+    "ModalScales",
     "Saturation",
-    "common_axes",
+    "axis_location",
+    "axis_of",
     "driven_force",
     "joint_dynamics",
+    "joint_reach",
     "joint_response",
+    "modal_scales",
     "rounded",
     "saturated",
     "stiffness_ramp",
     "tangent_run",
+    "tip_axes",
 ]

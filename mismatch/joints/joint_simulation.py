@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 
 from estimation import WindowedSpectrum
-from foundation import DegreeOfFreedom, InputError
 from modal_fit import ModalModel
 
 from .joint_law import JointLaw
@@ -37,25 +36,6 @@ class JointResponse:
     velocity: Real
 
 
-def common_axes(model: ModalModel) -> tuple[list[int], list[int]]:
-    """Responses and excitations that share an axis: where a joint's deflection and its force are both seen.
-
-    Raises
-    ------
-    InputError
-        There are none.
-    """
-    axes = {DegreeOfFreedom.parse(label).axis: place for place, label in reversed(list(enumerate(model.responses)))}
-    pairs = [
-        (axes[axis], place)
-        for place, axis in enumerate(DegreeOfFreedom.parse(label).axis for label in model.excitations)
-        if axis in axes
-    ]
-    if not pairs:
-        raise InputError(f"responses {', '.join(model.responses)} share no axis with {', '.join(model.excitations)}")
-    return [pair[0] for pair in pairs], [pair[1] for pair in pairs]
-
-
 def fineness(model: ModalModel, rate: float) -> int:
     """Instants of the simulation for each sample of the recording."""
     return max(4, int(np.ceil(INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate)))
@@ -68,7 +48,7 @@ def substeps(model: ModalModel, rate: float, fine: int) -> int:
 
 
 def joint_response(
-    model: ModalModel, lines: WindowedSpectrum, free: Complex, direction: Real, law: JointLaw
+    model: ModalModel, lines: WindowedSpectrum, free: Complex, ends: tuple[Real, Real], law: JointLaw
 ) -> JointResponse:
     """Force and motion of a joint, the structure simulated freely under the outer force and the joint's.
 
@@ -80,8 +60,8 @@ def joint_response(
         Windowed spectrum of the recording.
     free : (n_padded_lines,), m
         Spectrum of the joint's deflection under the outer force alone.
-    direction : (n_axes,)
-        Unit vector of the joint over the common axes.
+    ends : (n_responses,) and (n_excitations,)
+        The combination of responses that is the joint's deflection, and the excitations by a unit of its force.
     law
         Force law of the joint.
     """
@@ -96,7 +76,7 @@ def joint_response(
     free_run(
         deflection,
         velocity,
-        joint_dynamics(model, direction, step),
+        joint_dynamics(model, ends, step),
         law.tables(),
         (law.reach, law.speed),
         stiffness_ramp(law, n, step, lines.recording.duration),
@@ -125,21 +105,19 @@ def stiffness_ramp(law: JointLaw, n: int, step: float, duration: float) -> Real:
 
 
 def joint_dynamics(
-    model: ModalModel, direction: Real, step: float
+    model: ModalModel, ends: tuple[Real, Real], step: float
 ) -> tuple[Complex, Complex, Complex, Complex, Complex]:
-    """Exact step of ``q' = p q + left.d g`` for g straight between instants.
+    """Exact step of ``q' = p q + left.b g`` for g straight between instants; ``ends`` as for :func:`joint_response`.
 
     Returns
     -------
     turn, early, late, to_x, to_v : (n_modes,)
         As :func:`mismatch.joints.joint_loop.free_run` takes them.
     """
-    rows, columns = common_axes(model)
     poles = model.poles
     z = poles * step
     turn = np.exp(z)
     whole = (turn - 1) / poles
     late = (turn - 1 - z) / (poles * z)
-    push = model.left[:, columns] @ direction
-    to_x = model.right[:, rows] @ direction
+    to_x, push = model.right @ ends[0], model.left @ ends[1]
     return turn, (whole - late) * push, late * push, to_x, to_x * poles

@@ -8,7 +8,7 @@ from scipy.fft import irfft, rfft
 
 from estimation import WindowedSpectrum
 
-from ..joints import driven_force
+from ..joints import JointAxis, driven_force
 from ..models import Cause, Fit, Hypothesis, predict_lines, through_structure
 from ..noise import whitening
 from ..physics import answer_name, rig_of
@@ -51,8 +51,8 @@ class FreeFormLaw:
     ----------
     name
         Name under which the accepted cause is reported.
-    direction : (n_axes,)
-        Direction along which the joint acts.
+    axis
+        Where the joint gives way.
     forward, backward
         Force against deflection while it rises and while it falls; the two differ where the joint has friction or
         memory.
@@ -65,7 +65,7 @@ class FreeFormLaw:
     """
 
     name: str
-    direction: Real
+    axis: JointAxis
     forward: BinnedForce
     backward: BinnedForce
     damping: BinnedForce
@@ -88,15 +88,13 @@ class _Sample:
 def free_form_laws(diagnosis: StructureDiagnosis) -> tuple[FreeFormLaw, ...]:
     """Return the measured force of each accepted joint cause, with all other causes in the model."""
     return tuple(
-        _measured(diagnosis, cause)
-        for cause in diagnosis.details.final.hypothesis.causes
-        if cause.direction is not None
+        _measured(diagnosis, cause) for cause in diagnosis.details.final.hypothesis.causes if cause.axis is not None
     )
 
 
 def _measured(diagnosis: StructureDiagnosis, cause: Cause) -> FreeFormLaw:
     final = diagnosis.details.final.hypothesis
-    assert cause.direction is not None
+    assert cause.axis is not None
     bare = replace(final, causes=tuple(one for one in final.causes if one is not cause))
     details = diagnosis.details
     samples = _joined([_seen(details.final, bare, cause, k, one) for k, one in enumerate(details.recordings)])
@@ -108,7 +106,7 @@ def _measured(diagnosis: StructureDiagnosis, cause: Cause) -> FreeFormLaw:
     rig = rig_of(diagnosis.details.final.hypothesis.model)
     return FreeFormLaw(
         answer_name(cause.physics),
-        cause.direction,
+        cause.axis,
         _binned(samples, samples.x, ends, up),
         _binned(samples, samples.x, ends, ~up),
         _binned(rest, samples.v, _edges(samples.v), np.ones(len(up), dtype=bool)),
@@ -120,12 +118,12 @@ def _measured(diagnosis: StructureDiagnosis, cause: Cause) -> FreeFormLaw:
 
 def _seen(final: Fit, bare: Hypothesis, cause: Cause, number: int, lines: WindowedSpectrum) -> _Sample:
     """Return motion and force along the joint in one recording, and the law's force for that motion."""
-    assert cause.direction is not None
+    assert cause.axis is not None
     through = through_structure(bare, lines)
     covariance = final.noises[number].covariance(lines.frequencies, through)
     rest = lines.measured - predict_lines(bare, lines).response
     record = FloorRecord(lines, rest, through, whitening(covariance), np.zeros((0, 0)), np.zeros(0))
-    seen: SeenMotion = seen_motion(record, bare, cause.direction)
+    seen: SeenMotion = seen_motion(record, bare, cause.axis)
     law = driven_force(lines, seen.deflection, seen.velocity, cause.law())
     kept = slice(lines.start, len(law) - max(int(lines.recording.rate), 1))
     force, given = _in_band(seen.force, lines)[kept], _in_band(law, lines)[kept]

@@ -105,7 +105,7 @@ def _quiet(final: Fit, number: int, lines: WindowedSpectrum) -> NoiseModel:
 def linear_part(details: StructureDetails) -> Hypothesis | None:
     """Return the final model without the causes of its joints; None where it has none."""
     final = details.final.hypothesis
-    kept = tuple(cause for cause in final.causes if cause.direction is None)
+    kept = tuple(cause for cause in final.causes if cause.axis is None)
     return replace(final, causes=kept) if len(kept) < len(final.causes) else None
 
 

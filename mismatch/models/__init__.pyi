@@ -1,6 +1,7 @@
 from .derivatives import jacobian
 from .fitting import ENOUGH, Fit, fit, modes_are_odd, residual
-from .hypothesis import Cause, Hypothesis, columns_of, direction_of, held_values, line_response, predict_lines, surround
+from .hypothesis import Cause, Hypothesis, direction_of, held_values, line_response, predict_lines, surround
+from .linear_lines import response_to_joint
 from .linear_part import with_linear_part
 from .lines import receptance_at
 from .misfit import least_misfit, levels, through_structure, whitened
@@ -14,7 +15,6 @@ __all__ = [
     "Fit",
     "Hypothesis",
     "ModelShape",
-    "columns_of",
     "direction_of",
     "fit",
     "held_values",
@@ -28,6 +28,7 @@ __all__ = [
     "predict_lines",
     "receptance_at",
     "residual",
+    "response_to_joint",
     "settled",
     "surround",
     "through_structure",

@@ -31,7 +31,7 @@ class Slopes:
     frequencies : (n_lines,), Hz
         Frequencies of the lines.
     force : (n_lines, n_excitations), N
-        Force that the modes feel.
+        Force that the modes feel, on all excitations that joints reach.
     shown : (n_lines, n_responses, n_responses)
         Matrix from displacements to measured responses, with what feedback returns.
     pushed
@@ -65,7 +65,7 @@ class Slopes:
 
         shown = seen(self.shown)
         out = np.empty((2, *shown.shape[:2], hypothesis.size))
-        shape.write_slopes(hypothesis.model, self.frequencies[part], self.force[part], shown, out)
+        shape.write_slopes(hypothesis.reach.model, self.frequencies[part], self.force[part], shown, out)
         out[..., shape.size :] = 0.0
         for response, change, first in self.pushed:
             add_outer(seen(response), change[part], first, out)
@@ -95,12 +95,13 @@ def slopes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted
         Matrices of its linear part at the lines.
     """
     changes = joint_changes(hypothesis, lines, predicted) if predicted.joints else ()
-    felt = linear.around.pushed(lines.force_here)
+    reach = hypothesis.reach
+    felt = reach.forces(linear.around.pushed(lines.force_here))
     for change in changes:
-        felt = felt - change.force[:, None] * change.direction
+        felt = felt - change.force[:, None] * change.push
     force = felt
     if linear.around.feedback is not None:
-        force = felt - line_products(linear.around.feedback, line_products(linear.closed, felt))
+        force = felt - reach.forces(line_products(linear.around.feedback, line_products(linear.closed, felt)))
     return Slopes(
         hypothesis,
         lines.frequencies,
@@ -112,13 +113,13 @@ def slopes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Predicted
 
 
 def _pushed(change: JointChange, linear: LinearLines) -> Iterator[tuple[Complex, Complex, int]]:
-    """What a joint's force and the turns of its direction do, as :class:`Slopes` takes it."""
+    """What a joint's force and the turns of its axis do, as :class:`Slopes` takes it."""
 
-    def response(direction: Real) -> Complex:
+    def response(push: Real) -> Complex:
         # the structure feels a joint's force with a minus sign
-        return line_products(linear.shown, -(linear.closed @ direction))
+        return line_products(linear.shown, -(linear.closed @ push))
 
-    yield response(change.direction), change.change, change.first
+    yield response(change.push), change.change, change.first
     for k, turn in enumerate(change.turns.T):
         yield response(turn), change.force[:, None], change.angles + k
 
@@ -127,18 +128,19 @@ def _direct(
     hypothesis: Hypothesis, lines: WindowedSpectrum, linear: LinearLines, felt: Complex
 ) -> Iterator[tuple[int, Complex]]:
     """Column and difference quotient of each number of a linear cause; ``felt`` is the force at the lines."""
-    linear_ones = [np.full(cause.size, cause.direction is None) for cause in hypothesis.causes]
+    linear_ones = [np.full(cause.size, cause.axis is None) for cause in hypothesis.causes]
     columns = np.flatnonzero(np.concatenate([np.zeros(0, dtype=bool), *linear_ones]))
     if not len(columns):
         return
     receptance = linear.receptance
     if hypothesis.model.residuals is not None and hypothesis.model.residuals.lower.any():
-        receptance = receptance_at(hypothesis.model, lines.frequencies)
-    joint = linear.around.pushed(lines.force_here) - felt
+        receptance = receptance_at(hypothesis.reach.model, lines.frequencies)[:, : receptance.shape[1]]
+    forces = hypothesis.reach.forces
+    joint = forces(linear.around.pushed(lines.force_here)) - felt
 
     def response(around: Surround) -> Complex:
         through = receptance if around.feedback is None else around.closed(linear.receptance)
-        displacement = line_products(through, around.pushed(lines.force_here) - joint)
+        displacement = line_products(through, forces(around.pushed(lines.force_here)) - joint)
         return around.shown(displacement * lines.kinematic)
 
     here, plain = hypothesis.coordinates(), response(linear.around)

@@ -23,27 +23,27 @@ def driven_signals(shape: ModelShape, model: ModalModel, frequencies: Real, forc
     shape
         What u stands for.
     model
-        The modal model at which the derivative is taken.
+        The modal model at which the derivative is taken, or one widened by joints.
     frequencies : (n,), Hz
         Frequencies of the lines.
     force : (n, n_excitations), N
         Force spectrum at the lines.
     along : (n_responses,)
-        Unit vector of the deflection.
+        The combination of responses that is the deflection.
     """
     s = np.asarray(2j * np.pi * frequencies, dtype=complex)
-    m = force.shape[1]
+    m = shape.nominal.left.shape[1]
     signals = np.empty((len(s), len(model.poles) * (2 + 2 * m)), dtype=complex)
-    driven_basis(s, np.ascontiguousarray(force), model.poles, model.left, model.right @ along, signals)
+    driven_basis(s, np.ascontiguousarray(force), (model.poles, model.left, model.right @ along), m, signals)
     if shape.outside is None:
         return signals
     basis = shape.outside.basis(s)
-    return np.concatenate([signals, *(one[:, None] * force for one in basis)], axis=1)
+    return np.concatenate([signals, *(one[:, None] * force[:, :m] for one in basis)], axis=1)
 
 
 def driven_mix(shape: ModelShape, model: ModalModel, along: Real) -> Real:
     """How the signals of :func:`driven_signals` make up the changes by u, (n_signals, size)."""
-    n, m = model.right.shape[1], model.left.shape[1]
+    n, m = shape.nominal.right.shape[1], shape.nominal.left.shape[1]
     each, per = 2 + 2 * m, 2 + 2 * n + 2 * m
     poles = shape.pole_units(model)
     units = shape.scales()
@@ -53,7 +53,7 @@ def driven_mix(shape: ModelShape, model: ModalModel, along: Real) -> Real:
         own = mix[r * each : (r + 1) * each, r * per : (r + 1) * per]
         own[:2, :2] = [[unit[r].real for unit in poles], [unit[r].imag for unit in poles]]
         even, odd = np.arange(2, 2 + m), np.arange(2 + m, each)
-        left, rho = model.left[r], ahead[r]
+        left, rho = model.left[r, :m], ahead[r]
         for p in range(n):
             share = units[0][r] * along[p]
             own[even, 2 + p], own[odd, 2 + p] = share * left.real, share * left.imag
@@ -63,7 +63,7 @@ def driven_mix(shape: ModelShape, model: ModalModel, along: Real) -> Real:
         own[even, first + m], own[odd, first + m] = -units[1][r] * rho.imag, units[1][r] * rho.real
     if shape.outside is None:
         return mix
-    terms = shape.outside.units * along[:, None]
+    terms = shape.outside.units * along[:n, None]
     beyond = np.zeros((len(terms) * m, shape.size - mix.shape[1]))
     for t, q in np.ndindex(len(terms), m):
         beyond[t * m + q, (t * n + np.arange(n)) * m + q] = terms[t, :, q]

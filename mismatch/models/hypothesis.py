@@ -12,16 +12,23 @@ from scipy.fft import rfft
 from estimation import WindowedSpectrum
 from modal_fit import ModalModel
 
-from ..joints import JointLaw, JointMotion, JointResponse, common_axes, driven_force, joint_response
+from ..joints import (
+    JointAxis,
+    JointLaw,
+    JointMotion,
+    JointReach,
+    JointResponse,
+    driven_force,
+    joint_reach,
+    joint_response,
+    modal_scales,
+)
 from ..physics import Chain, ChainPhysics, JointPhysics, LimitedPhysics, ModePhysics, Physics
 from .lines import closed_loop, displacement_at, line_products, receptance_at
 from .model_shape import ModelShape
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
-
-TURN_STEP = 0.02
-"""Angle that one unit of a direction's coordinate stands for in a fit, rad."""
 
 LONGEST_STEP = 15.0
 """Largest change of a cause's coordinate in one step of a fit; one on a linear scale may also change by its half."""
@@ -39,8 +46,8 @@ class Cause:
         Numbers of the cause in SI units, in the order of ``physics.parameters``.
     place
         Place at which a linear cause sits; empty for a joint.
-    direction : (n_axes,)
-        Unit vector of a joint over the axes that forces and responses share; None for a linear cause.
+    axis
+        Where a joint gives way; None for a linear cause.
     motion
         Sizes of the joint's motion in the trials; None for a linear cause.
     seen
@@ -51,14 +58,14 @@ class Cause:
     physics: Physics
     values: Real
     place: str = ""
-    direction: Real | None = None
+    axis: JointAxis | None = None
     motion: JointMotion | None = None
     seen: Mapping[str, tuple[Real, Real]] | None = None
 
     @property
     def size(self) -> int:
-        """Numbers that are fitted: parameters, and angles of the direction."""
-        return len(self.values) + (len(self.direction) - 1 if self.direction is not None else 0)
+        """Numbers that are fitted: parameters, and angles of the axis."""
+        return len(self.values) + (len(self.axis.entries) - 1 if self.axis is not None else 0)
 
     def coordinates(self) -> Real:
         """Coordinates that the fit starts from, (size,); angles are zero."""
@@ -72,15 +79,13 @@ class Cause:
         return np.array(own + [LONGEST_STEP] * (self.size - len(own)))
 
     def moved(self, coordinates: Real) -> "Cause":
-        """The cause at other coordinates; angles turn the direction from where it was."""
+        """The cause at other coordinates; angles turn the axis from where it was."""
         count = len(self.values)
         values = np.array(
             [p.from_fit(float(c)) for p, c in zip(self.physics.parameters, coordinates[:count], strict=True)]
         )
-        if self.direction is None:
-            return replace(self, values=values)
-        turned = self.direction + TURN_STEP * across(self.direction) @ coordinates[count:]
-        return replace(self, values=values, direction=turned / np.linalg.norm(turned))
+        axis = None if self.axis is None else self.axis.turned(coordinates[count:])
+        return replace(self, values=values, axis=axis)
 
     def law(self) -> JointLaw:
         """Force law of a joint."""
@@ -91,8 +96,9 @@ class Cause:
 
 def direction_of(cause: Cause) -> dict[str, Any]:
     """Location of a joint, as a diagnosis states it; the largest entry is positive."""
-    assert cause.direction is not None
-    direction = cause.direction * np.sign(cause.direction[np.argmax(np.abs(cause.direction))])
+    assert cause.axis is not None
+    entries = cause.axis.entries
+    direction = entries * np.sign(entries[np.argmax(np.abs(entries))])
     return {"direction": [round(float(x), 6) for x in direction]}
 
 
@@ -101,11 +107,6 @@ def held_values(cause: Cause) -> Real:
     if isinstance(cause.physics, LimitedPhysics) and cause.motion is not None:
         return cause.physics.held(cause.values, cause.motion)
     return cause.values
-
-
-def across(direction: Real) -> Real:
-    """Orthonormal vectors across a direction, (n, n - 1)."""
-    return np.asarray(np.linalg.svd(direction[None, :])[2][1:].T)
 
 
 @dataclass(frozen=True)
@@ -131,6 +132,15 @@ class Hypothesis:
         """The modal model at ``u``, without causes."""
         return self.shape.model(self.u)
 
+    @cached_property
+    def reach(self) -> JointReach:
+        """The modal model at ``u``, and how each joint acts on it."""
+        return self.reach_with()
+
+    def reach_with(self, *more: JointAxis) -> JointReach:
+        """The modal model at ``u``, and how each joint and then more axes act on it."""
+        return joint_reach(self.model, [*(cause.axis for cause in self.causes if cause.axis is not None), *more])
+
     @property
     def size(self) -> int:
         """Numbers that are fitted."""
@@ -147,14 +157,21 @@ class Hypothesis:
             return replace(self, causes=kept)
         added = sum(isinstance(cause.physics, ModePhysics) for cause in self.causes[:place])
         shape, u = self.shape.without_mode(added, self.u)
-        return Hypothesis(shape, u, kept)
+        gone = self.shape.believed + added
+        rested = (one if one.axis is None else replace(one, axis=one.axis.without_mode(gone)) for one in kept)
+        return Hypothesis(shape, u, tuple(rested))
 
     def with_mode(self, pole: complex, right: Complex, left: Complex, physics: ModePhysics) -> "Hypothesis":
         """The hypothesis with one more mode of ``physics``: pole in rad/s, vectors (n_responses,), (n_excitations,)."""
         shape = self.shape.with_mode(pole, right, left)
         own, outside = self.u[: self.shape.modal_size], self.u[self.shape.modal_size :]
         u = np.concatenate([own, np.zeros(shape.per_mode), outside])
-        return Hypothesis(shape, u, (*self.causes, Cause(physics, np.zeros(0))))
+        known = self.causes
+        if any(cause.axis is not None and cause.axis.scales is not None for cause in known):
+            scales = modal_scales(shape.nominal)
+            axes = (None if one.axis is None else one.axis.with_mode(scales) for one in known)
+            known = tuple(replace(one, axis=axis) for one, axis in zip(known, axes, strict=True))
+        return Hypothesis(shape, u, (*known, Cause(physics, np.zeros(0))))
 
     @property
     def nominal(self) -> "Hypothesis":
@@ -164,7 +181,7 @@ class Hypothesis:
     @property
     def laws(self) -> tuple[Cause, ...]:
         """The causes that are laws of joints."""
-        return tuple(cause for cause in self.causes if cause.direction is not None)
+        return tuple(cause for cause in self.causes if cause.axis is not None)
 
     @property
     def has_added_physics(self) -> bool:
@@ -197,7 +214,7 @@ class Surround:
         return force if self.force is None else line_products(self.force, force)
 
     def closed(self, receptance: Complex) -> Complex:
-        """``(I + H K)^-1 H``."""
+        """``(I + H K)^-1 H``; excitations behind those that K returns to are those of joints."""
         return receptance if self.feedback is None else closed_loop(receptance, self.feedback)
 
     def shown(self, displacement: Complex) -> Complex:
@@ -232,7 +249,8 @@ class Predicted:
     spectrum : (n_padded_lines, n_responses)
         Spectrum of the predicted responses over the whole record, ramped and padded.
     joint : (n_padded_lines, n_excitations), N
-        Spectrum of all joints' forces as their laws give them; the structure feels them with a minus sign.
+        Spectrum of all joints' forces as their laws give them, on the excitations that they reach
+        (:class:`mismatch.joints.JointReach`); the structure feels them with a minus sign.
     joints
         Force and motion of each joint, in the order of the causes.
     """
@@ -245,30 +263,27 @@ class Predicted:
 
 def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Predicted:
     """Response of the whole hypothesis to a recording's forces, cut and windowed like the measurement."""
-    model, frequencies = hypothesis.model, lines.padded_frequencies
+    reach, frequencies = hypothesis.reach, lines.padded_frequencies
+    model, n = reach.model, len(hypothesis.model.responses)
     around = surround(hypothesis, frequencies)
-    pushed = around.pushed(lines.force_lines)
+    pushed = reach.forces(around.pushed(lines.force_lines))
     # one number stands for all where there is no joint
     joint: Complex = np.broadcast_to(np.zeros((), dtype=complex), pushed.shape)
     felt, joints = pushed, []
-    for cause in hypothesis.causes:
-        if cause.direction is not None:
-            rows, columns = common_axes(model)
-            if cause.seen is not None:
-                x, v = cause.seen[lines.recording.name]
-                answer = JointResponse(rfft(driven_force(lines, x, v, cause.law()), n=lines.padded), x, v)
-            else:
-                free = displacement_at(model, frequencies, felt)[:, rows] @ cause.direction
-                answer = joint_response(model, lines, free, cause.direction, cause.law())
-            joints.append(answer)
-            direction = np.zeros(pushed.shape[1])
-            direction[columns] = cause.direction
-            joint = joint + answer.force[:, None] * direction
-            felt = pushed - joint
+    for cause, path in zip(hypothesis.laws, reach.paths, strict=True):
+        if cause.seen is not None:
+            x, v = cause.seen[lines.recording.name]
+            answer = JointResponse(rfft(driven_force(lines, x, v, cause.law()), n=lines.padded), x, v)
+        else:
+            free = displacement_at(model, frequencies, felt) @ path.along
+            answer = joint_response(model, lines, free, path.ends, cause.law())
+        joints.append(answer)
+        joint = joint + answer.force[:, None] * path.push
+        felt = pushed - joint
     if around.feedback is None:
-        displacement = displacement_at(model, frequencies, felt)
+        displacement = displacement_at(model, frequencies, felt)[:, :n]
     else:
-        displacement = line_products(around.closed(receptance_at(model, frequencies)), felt)
+        displacement = line_products(around.closed(receptance_at(model, frequencies)[:, :n]), felt)
     spectrum = around.shown(displacement * lines.padded_kinematic)
     return Predicted(lines.cut(lines.signal(spectrum)), spectrum, joint, tuple(joints))
 
@@ -295,8 +310,3 @@ def line_response(hypothesis: Hypothesis, lines: WindowedSpectrum, joint: Comple
         closed = around.closed(hypothesis.model.receptance(lines.frequencies))
         displacement = line_products(closed, force)
     return around.shown(displacement * lines.kinematic)
-
-
-def columns_of(model: ModalModel) -> list[int]:
-    """Excitations along which a joint's direction is counted."""
-    return common_axes(model)[1]

@@ -8,9 +8,9 @@ from scipy.fft import irfft, rfft
 
 from estimation import WindowedSpectrum
 
-from ..joints import JointResponse, common_axes, driven_force, joint_dynamics, stiffness_ramp, tangent_run
+from ..joints import JointPath, JointResponse, driven_force, joint_dynamics, stiffness_ramp, tangent_run
 from .driven_changes import driven_mix, driven_signals
-from .hypothesis import TURN_STEP, Cause, Hypothesis, Predicted, across, surround
+from .hypothesis import Cause, Hypothesis, Predicted, surround
 from .lines import displacement_at, receptance_at
 
 Complex = NDArray[np.complex128]
@@ -26,14 +26,14 @@ ASIDE = 0.02
 
 @dataclass(frozen=True)
 class JointChange:
-    """A joint's force at the lines, and its derivative; the structure feels minus the force along the direction.
+    """A joint's force at the lines, and its derivative; the structure feels it with a minus sign.
 
     Parameters
     ----------
-    direction : (n_excitations,)
-        Unit vector of the force.
+    push : (n_excitations,)
+        The excitations by a unit of the force.
     turns : (n_excitations, n_angles)
-        Derivative of the direction by the joint's angles.
+        Derivative of these by the joint's angles.
     angles
         Column of the first angle among all that is fitted.
     force : (n_lines,), N
@@ -44,12 +44,22 @@ class JointChange:
         The first of these columns.
     """
 
-    direction: Real
+    push: Real
     turns: Real
     angles: int
     force: Complex
     change: Complex
     first: int
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """A joint's cause, how it reaches the model, its numbers among all that is fitted, and what it does."""
+
+    cause: Cause
+    path: JointPath
+    own: slice
+    answer: JointResponse
 
 
 @dataclass(frozen=True)
@@ -78,25 +88,21 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
     frequencies = lines.padded_frequencies
     count = int(np.sum(frequencies <= BEYOND * lines.frequencies[-1]))
     driving = _outer_change(hypothesis, lines, count)
-    _, columns = common_axes(hypothesis.model)
+    paths = hypothesis.reach.paths
     forces = lines.cut(lines.signal(np.stack([answer.force for answer in predicted.joints], axis=1))).T
     found: list[JointChange] = []
     at = hypothesis.shape.size
     for cause in hypothesis.causes:
         own = slice(at, at + cause.size)
         at += cause.size
-        if cause.direction is None:
+        if cause.axis is None:
             continue
-        answer = predicted.joints[len(found)]
-        direction, turns = np.zeros(len(hypothesis.model.excitations)), np.zeros((driving.force.shape[1], 0))
-        direction[columns] = cause.direction
-        turns = np.zeros((len(direction), cause.size - len(cause.values)))
-        turns[columns] = TURN_STEP * across(cause.direction)
-        driving = _Driving(driving.force - answer.force[:count, None] * direction, driving.change)
-        signals, mix, first = _force_change(hypothesis, lines, (cause, own, answer), driving)
-        angles = own.start + len(cause.values)
+        answer, path = predicted.joints[len(found)], paths[len(found)]
+        driving = _Driving(driving.force - answer.force[:count, None] * path.push, driving.change)
+        signals, mix, first = _force_change(hypothesis, lines, _Joint(cause, path, own, answer), driving)
+        angles, turns = own.start + len(cause.values), path.columns @ path.axis.turns
         change = _mixed(lines.cut(signals), mix)
-        found.append(JointChange(direction, turns, angles, np.ascontiguousarray(forces[len(found)]), change, first))
+        found.append(JointChange(path.push, turns, angles, np.ascontiguousarray(forces[len(found)]), change, first))
         if len(found) < len(predicted.joints):
             driving = _driven_on(hypothesis, lines, driving, found[-1], (signals, mix, answer))
     return tuple(found)
@@ -125,7 +131,7 @@ def _driven_on(
     if change is None:
         change = np.zeros((*driving.force.shape, hypothesis.size), dtype=complex)
     moved = _mixed(rfft(signals, n=lines.padded, axis=0)[:count], mix)
-    change[:, :, joint.first : joint.first + moved.shape[1]] -= moved[:, None] * joint.direction[:, None]
+    change[:, :, joint.first : joint.first + moved.shape[1]] -= moved[:, None] * joint.push[:, None]
     angles = slice(joint.angles, joint.angles + joint.turns.shape[1])
     change[:, :, angles] -= answer.force[:count, None, None] * joint.turns
     return _Driving(driving.force, change)
@@ -134,31 +140,31 @@ def _driven_on(
 def _outer_change(hypothesis: Hypothesis, lines: WindowedSpectrum, count: int) -> _Driving:
     """Outer force at padded lines, and its derivative by the numbers of linear causes."""
     frequencies = lines.padded_frequencies[:count]
-    force = lines.force_lines[:count]
-    outer = np.array(surround(hypothesis, frequencies).pushed(force))
-    if all(cause.direction is not None for cause in hypothesis.causes):
+    force, forces = lines.force_lines[:count], hypothesis.reach.forces
+    outer = np.array(forces(surround(hypothesis, frequencies).pushed(force)))
+    if all(cause.axis is not None for cause in hypothesis.causes):
         return _Driving(outer, None)
     change = np.zeros((*outer.shape, hypothesis.size), dtype=complex)
     here, first = hypothesis.coordinates(), hypothesis.shape.size
     at = 0
     for cause in hypothesis.causes:
-        for k in range(at, at + cause.size if cause.direction is None else at):
+        for k in range(at, at + cause.size if cause.axis is None else at):
             aside = here.copy()
             aside[k] += ASIDE
             moved = surround(hypothesis.with_causes(aside), frequencies).pushed(force)
-            change[:, :, first + k] = (moved - outer) / ASIDE
+            change[:, :, first + k] = (forces(moved) - outer) / ASIDE
         at += cause.size
     return _Driving(outer, change if change.any() else None)
 
 
 def _force_change(
-    hypothesis: Hypothesis, lines: WindowedSpectrum, joint: tuple[Cause, slice, JointResponse], driving: _Driving
+    hypothesis: Hypothesis, lines: WindowedSpectrum, joint: _Joint, driving: _Driving
 ) -> tuple[Signals, Real | None, int]:
     """Derivative of g at the samples: signals (n, n_signals), their mix (n_signals, n_columns), and the first column.
 
     Without a mix each signal is a column.
     """
-    cause, own, answer = joint
+    cause, own, answer = joint.cause, joint.own, joint.answer
     often = len(answer.deflection) // (len(lines.recording.force) if cause.seen is not None else lines.padded)
     by_law = _law_change(cause, lines, answer, often)
     if cause.seen is not None:
@@ -175,13 +181,12 @@ def _force_change(
     dg[:, :values] = by_law
     law, step = cause.law(), 1 / (often * lines.recording.rate)
     s = 2j * np.pi * np.arange(len(driven), dtype=np.float32)[:, None] / np.float32(lines.padded * step * often)
-    assert cause.direction is not None
     deflection = irfft(spectrum, n=often * lines.padded, axis=0)
     spectrum[: len(driven)] *= s
     velocity = irfft(spectrum, n=often * lines.padded, axis=0)
     tangent_run(
         (answer.deflection[:n], answer.velocity[:n]),
-        joint_dynamics(hypothesis.model, cause.direction, step),
+        joint_dynamics(hypothesis.reach.model, joint.path.ends, step),
         law.tables(),
         (law.reach, law.speed),
         stiffness_ramp(law, n, step, lines.recording.duration),
@@ -220,26 +225,21 @@ def _law_change(cause: Cause, lines: WindowedSpectrum, answer: JointResponse, of
 
 
 def _driven_change(
-    hypothesis: Hypothesis, lines: WindowedSpectrum, joint: tuple[Cause, slice, JointResponse], driving: _Driving
+    hypothesis: Hypothesis, lines: WindowedSpectrum, joint: _Joint, driving: _Driving
 ) -> tuple[Complex, Real]:
     """Derivative of the driven deflection at padded lines: signals (n, n_signals) and their mix (n_signals, size)."""
-    cause, own, answer = joint
-    assert cause.direction is not None
-    force, model = driving.force, hypothesis.model
-    frequencies = lines.padded_frequencies[: len(force)]
-    rows, columns = common_axes(model)
-    along = np.zeros(len(model.responses))
-    along[rows] = cause.direction
+    path, own, turns = joint.path, joint.own, joint.path.axis.turns
+    force, model = driving.force, hypothesis.reach.model
+    frequencies, along = lines.padded_frequencies[: len(force)], path.along
     receptance = receptance_at(model, frequencies)
     driven = driven_signals(hypothesis.shape, model, frequencies, force, along)
     mix = np.zeros((driven.shape[1], hypothesis.size))
     mix[:, : hypothesis.shape.size] = driven_mix(hypothesis.shape, model, along)
     compliance = along @ receptance
-    turn = TURN_STEP * across(cause.direction)
-    displacement = displacement_at(model, frequencies, force)[:, rows]
-    angles = displacement @ turn - (compliance[:, columns] @ turn) * answer.force[: len(force), None]
+    displacement = displacement_at(model, frequencies, force) @ (path.rows @ turns)
+    angles = displacement - (compliance @ (path.columns @ turns)) * joint.answer.force[: len(force), None]
     extra = np.zeros((len(force), hypothesis.size), dtype=complex)
-    extra[:, own.start + len(cause.values) : own.stop] = angles
+    extra[:, own.start + len(joint.cause.values) : own.stop] = angles
     if driving.change is not None:
         extra += np.einsum("kq,kqc->kc", compliance, driving.change)
     used = np.flatnonzero(extra.any(axis=0))

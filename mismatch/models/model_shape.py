@@ -148,11 +148,11 @@ class ModelShape:
         Parameters
         ----------
         model
-            The modal model at which the derivative is taken.
+            The modal model at which the derivative is taken, or one widened by joints: what they reach is not fitted.
         frequencies : (n_lines,), Hz
             Frequencies of the lines.
         force : (n_lines, n_excitations), N
-            Force spectrum at the lines.
+            Force spectrum at the lines, on all excitations of that model.
         factor : (n_lines, n_rows, n_responses)
             Matrix M that the displacement at each line is multiplied by.
         out : (2, n_lines, n_rows, size or more)
@@ -160,10 +160,12 @@ class ModelShape:
         """
         s = np.asarray(2j * np.pi * frequencies, dtype=complex)
         force, factor = np.ascontiguousarray(force), np.ascontiguousarray(factor)
-        modes = (model.poles, model.right, model.left)
-        modal_slopes(s, force, modes, (*self.pole_units(model), *self.scales()), factor, out)
+        n, m = self.nominal.right.shape[1], self.nominal.left.shape[1]
+        modes = (model.poles, np.ascontiguousarray(model.right[:, :n]), model.left)
+        modal_slopes(s, force, modes, (*self.pole_units(model), *self.scales()), factor, m, out)
         if self.outside is not None:
-            outside_slopes(self.outside.basis(s), self.outside.units, force, factor, out, self.modal_size)
+            own = np.ascontiguousarray(force[:, :m])
+            outside_slopes(self.outside.basis(s), self.outside.units, own, factor, out, self.modal_size)
 
     def pole_units(self, model: ModalModel) -> tuple[Complex, Complex]:
         """Change of each pole of the model by a unit of ln frequency and of ln damping ratio, each (n_modes,)."""

@@ -9,7 +9,7 @@ from foundation import FileFormatError
 from modal_fit import ModalModel
 
 from ..inference import LabError
-from ..joints import JointMotion
+from ..joints import JointMotion, axis_location, axis_of
 from ..physics import ChainPhysics, JointPhysics, ModePhysics, Physics, Rig, in_units, library, rig_of
 from .hypothesis import Cause, Hypothesis
 from .model_shape import ModelShape
@@ -31,8 +31,8 @@ def improved_model(hypothesis: Hypothesis, faults: tuple[dict[str, Any], ...] = 
             continue
         names = [parameter.name for parameter in cause.physics.parameters]
         location: dict[str, Any] = {"place": cause.place}
-        if cause.direction is not None and cause.motion is not None:
-            location = {"direction": [float(x) for x in cause.direction], "motion": asdict(cause.motion)}
+        if cause.axis is not None and cause.motion is not None:
+            location = {**axis_location(cause.axis), "motion": asdict(cause.motion)}
         values = {name: float(value) for name, value in zip(names, cause.values, strict=True)}
         terms.append({"name": cause.physics.name, "location": location, "parameters": values})
     return replace(hypothesis.model, physics=(*terms, *faults))
@@ -59,9 +59,9 @@ def hypothesis_of(model: ModalModel, causes: dict[str, Physics] | None = None) -
         try:
             values = np.array([float(term["parameters"][parameter.name]) for parameter in physics.parameters])
             location = term["location"]
-            if "direction" in location:
-                motion = JointMotion(**location["motion"])
-                found.append(Cause(physics, values, "", np.array(location["direction"], dtype=float), motion))
+            axis = axis_of(location)
+            if axis is not None:
+                found.append(Cause(physics, values, "", axis, JointMotion(**location["motion"])))
             else:
                 found.append(Cause(physics, values, str(location["place"])))
         except (KeyError, TypeError, ValueError) as error:

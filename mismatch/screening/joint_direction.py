@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, rfft
 from scipy.optimize import minimize
 
-from ..joints import JointMotion, common_axes
-from ..models import Hypothesis, columns_of, predict_lines, receptance_at
+from ..joints import JointAxis, JointMotion, tip_axes
+from ..models import Hypothesis, predict_lines, receptance_at, response_to_joint
 from .whitened_residual import Floor, FloorRecord
 
 Complex = NDArray[np.complex128]
@@ -21,15 +21,15 @@ class JointSighting:
 
     Parameters
     ----------
-    direction : (n_axes,)
-        Unit vector; its largest entry is positive.
+    axis
+        Direction at the tip; its largest entry is positive.
     gain
         Twice the log likelihood that one force along it explains, its spectrum free, beyond what noise gains.
     share
         Gain as a share of what a force in any direction would explain.
     """
 
-    direction: Real
+    axis: JointAxis
     gain: float
     share: float
 
@@ -42,15 +42,16 @@ def find_direction(floor: Floor, hypothesis: Hypothesis) -> JointSighting:
     ``2 n (z - 1 - ln z)`` where z > 1. The start is the first eigenvector of the force that the residual asks for,
     ``sum w Re(F F^H)``, ``F = G^-1 r``.
     """
-    columns = columns_of(hypothesis.model)
-    bands = [_band_statistics(record, columns) for record in floor.records]
-    n = len(columns)
+    columns = tip_axes(hypothesis.model)[1]
+    reaches = [record.through @ columns for record in floor.records]
+    bands = [_band_statistics(record, reach) for record, reach in zip(floor.records, reaches, strict=True)]
+    n = columns.shape[1]
 
     def gain(direction: Real) -> float:
         return sum(_gain(parts, direction / np.linalg.norm(direction)) for parts in bands)
 
     tries = np.random.default_rng(0).normal(size=(60 * n, n))
-    tries = np.vstack([tries, np.eye(n), *(_eigenvectors(record, columns) for record in floor.records)])
+    tries = np.vstack([tries, np.eye(n), *map(_eigenvectors, floor.records, reaches)])
     best = max(tries, key=gain)
     if n > 1:
         answer = minimize(lambda d: -gain(d), best / np.linalg.norm(best), method="Nelder-Mead")
@@ -61,7 +62,14 @@ def find_direction(floor: Floor, hypothesis: Hypothesis) -> JointSighting:
     chance = 0.5 * sum(len(parts.starts) for parts in bands)
     everything = sum(_gain_of_all(parts) for parts in bands) - n * chance
     found = gain(direction) - chance
-    return JointSighting(direction, found, found / max(everything, 1e-12))
+    return JointSighting(JointAxis(direction), found, found / max(everything, 1e-12))
+
+
+def reached_by(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis) -> Complex:
+    """Responses at the lines to a unit force along each entry of an axis, (n_lines, n_responses, n_entries)."""
+    if axis.scales is None:
+        return np.asarray(record.through @ tip_axes(hypothesis.model)[1])
+    return response_to_joint(hypothesis, record.lines, axis)
 
 
 @dataclass(frozen=True)
@@ -74,8 +82,9 @@ class _Bands:
     counts: Real
 
 
-def _band_statistics(record: FloorRecord, columns: list[int]) -> _Bands:
-    reach = record.white @ record.through[:, :, columns]
+def _band_statistics(record: FloorRecord, reached: Complex) -> _Bands:
+    """Statistics for responses (n_lines, n_responses, n_axes) to a unit force along each axis."""
+    reach = record.white @ reached
     rest = np.einsum("kij,kj->ki", record.white, record.residual)
     pull = np.einsum("kij,ki->kj", reach.conj(), rest)
     weight = reach.conj().swapaxes(1, 2) @ reach
@@ -100,10 +109,10 @@ def _gain_of_all(bands: _Bands) -> float:
     return float(2 * n * np.sum(bands.counts * (z - 1 - np.log(z))))
 
 
-def _eigenvectors(record: FloorRecord, columns: list[int]) -> Real:
-    force = np.einsum("kqp,kp->kq", np.linalg.pinv(record.through[:, :, columns]), record.residual)
-    inverse = np.linalg.inv(record.white)
-    spread = np.linalg.pinv(record.through[:, :, columns]) @ inverse
+def _eigenvectors(record: FloorRecord, reached: Complex) -> Real:
+    back = np.linalg.pinv(reached)
+    force = np.einsum("kqp,kp->kq", back, record.residual)
+    spread = back @ np.linalg.inv(record.white)
     weight = 1 / np.maximum(np.sum(np.abs(spread) ** 2, axis=(1, 2)), 1e-300)
     return np.asarray(np.linalg.eigh(np.real((force * weight[:, None]).T @ force.conj()))[1].T)
 
@@ -115,9 +124,9 @@ class SeenMotion:
     Parameters
     ----------
     deflection, velocity : (n_samples,), m, m/s
-        Most likely motion along the joint's direction.
+        Most likely motion along the joint's axis.
     force : (n_samples,), N
-        Most likely force along the direction given its spectrum.
+        Most likely force along the axis given its spectrum.
     """
 
     deflection: Real
@@ -125,14 +134,15 @@ class SeenMotion:
     force: Real
 
 
-def seen_motion(record: FloorRecord, hypothesis: Hypothesis, direction: Real) -> SeenMotion:
-    """Motion along a direction: the model's, corrected by the force that the residual asks for.
+def seen_motion(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis) -> SeenMotion:
+    """Motion along a joint's axis: the model's, corrected by the force that the residual asks for.
 
     The force is the posterior mean ``u = lambda h^H (V + lambda h h^H)^-1 r`` with lambda from the residual's power in
     each band (Wiener's filter), so that noise is not integrated where nothing is seen.
     """
     lines = record.lines
-    rows, columns = common_axes(hypothesis.model)
+    reach = hypothesis.reach_with(axis)
+    path = reach.paths[-1]
     predicted = predict_lines(hypothesis, lines)
     n = len(lines.recording.force)
     frequencies = lines.padded_frequencies
@@ -142,32 +152,32 @@ def seen_motion(record: FloorRecord, hypothesis: Hypothesis, direction: Real) ->
     run_in[: lines.start] = np.linspace(0, 1, lines.start) ** 4
     whole[:n] *= run_in[:, None]
     rest = rfft(whole, axis=0)
-    filtered = _wiener(record, direction, columns)
+    filtered = _wiener(record, reached_by(record, hypothesis, axis) @ axis.entries)
     inside = (frequencies >= lines.frequencies[0]) & (frequencies <= lines.frequencies[-1])
     gains = np.zeros((len(frequencies), filtered.shape[1]), dtype=complex)
     for p in range(filtered.shape[1]):
         gains[inside, p] = np.interp(frequencies[inside], lines.frequencies, filtered[:, p].real)
         gains[inside, p] += 1j * np.interp(frequencies[inside], lines.frequencies, filtered[:, p].imag)
     force = np.einsum("kp,kp->k", gains, rest)
-    receptance = receptance_at(hypothesis.model, frequencies)[:, rows]
-    displacement = np.einsum("kpq,kq->kp", receptance, lines.force_lines - predicted.joint) @ direction
-    displacement = displacement + np.einsum("p,kpq,q->k", direction, receptance[:, :, columns], direction) * force
+    compliance = path.along @ receptance_at(reach.model, frequencies)
+    felt = reach.forces(lines.force_lines) - reach.forces(predicted.joint)
+    displacement = np.einsum("kq,kq->k", compliance, felt) + (compliance @ path.push) * force
     deflection = irfft(displacement, n=lines.padded)[:n]
     velocity = irfft(2j * np.pi * frequencies * displacement, n=lines.padded)[:n]
     return SeenMotion(deflection, velocity, -irfft(force, n=lines.padded)[:n])
 
 
-def _wiener(record: FloorRecord, direction: Real, columns: list[int]) -> Complex:
-    """Row ``lambda h^H (V + lambda h h^H)^-1`` at the lines, (n_lines, n_responses)."""
-    bands = _band_statistics(record, columns)
-    power = np.abs(bands.pull @ direction) ** 2
-    size = np.maximum(np.real(np.einsum("i,kij,j->k", direction, bands.weight, direction)), 1e-300)
+def _wiener(record: FloorRecord, reached: Complex) -> Complex:
+    """Row ``lambda h^H (V + lambda h h^H)^-1`` at the lines for responses h (n_lines, n_responses) to the force."""
+    bands = _band_statistics(record, reached[:, :, None])
+    power = np.abs(bands.pull[:, 0]) ** 2
+    size = np.maximum(np.real(bands.weight[:, 0, 0]), 1e-300)
     z = np.add.reduceat(power / size, bands.starts) / bands.counts
     typical = np.add.reduceat(size, bands.starts) / bands.counts
     excess = np.maximum(z - 1, 0) / typical
     centres = bands.starts + bands.counts / 2
     variance = np.interp(np.arange(len(size)), centres, excess)
-    reach = record.white @ (record.through[:, :, columns] @ direction)[:, :, None]
+    reach = record.white @ reached[:, :, None]
     row = np.einsum("kij,ki->kj", record.white, reach[:, :, 0].conj())
     return np.asarray((variance / (1 + variance * size))[:, None] * row)
 

@@ -52,10 +52,10 @@ def sighted_laws(
     floor = linear_floor(current, lines)
     sighting = find_direction(floor, current.hypothesis)
     # along a single axis there is no direction to stand out, and a broad force looks like a higher floor
-    if not laws or (len(sighting.direction) > 1 and sighting.gain < settings.screening.direction * len(lines)):
+    if not laws or (len(sighting.axis.entries) > 1 and sighting.gain < settings.screening.direction * len(lines)):
         return SightedLaws((), ())
-    location = {"direction": [round(float(x), 6) for x in sighting.direction]}
-    screened = screen_joints(floor, current.hypothesis, sighting.direction, laws)
+    location = {"direction": [round(float(x), 6) for x in sighting.axis.entries]}
+    screened = screen_joints(floor, current.hypothesis, sighting.axis, laws)
     weighed = [Candidate(answer_name(one.causes[0].physics), one.gain, "screened", location) for one in screened]
     return SightedLaws(tuple(screened), tuple(weighed))
 

@@ -1,4 +1,4 @@
-"""Quick ranking of joint laws along a direction: each is driven by the motion that was seen and fitted linearly."""
+"""Quick ranking of joint laws along an axis: each is driven by the motion that was seen and fitted linearly."""
 
 from dataclasses import dataclass, replace
 
@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import rfft
 
-from ..joints import driven_force
-from ..models import Cause, Hypothesis, columns_of, receptance_at
+from ..joints import JointAxis, driven_force
+from ..models import Cause, Hypothesis, receptance_at
 from ..physics import JointPhysics
 from .joint_direction import SeenMotion, motion_of, seen_motion
 from .whitened_residual import Floor, FloorRecord
@@ -17,7 +17,7 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Screened:
-    """A law's shapes along a direction, the most promising first.
+    """A law's shapes along an axis, the most promising first.
 
     Parameters
     ----------
@@ -31,8 +31,8 @@ class Screened:
     gain: float
 
 
-def screen_joints(floor: Floor, hypothesis: Hypothesis, direction: Real, laws: list[JointPhysics]) -> list[Screened]:
-    """Rank laws along a direction, best first; those of the wrong sign are left out.
+def screen_joints(floor: Floor, hypothesis: Hypothesis, axis: JointAxis, laws: list[JointPhysics]) -> list[Screened]:
+    """Rank laws along an axis, best first; those of the wrong sign are left out.
 
     Parameters
     ----------
@@ -40,15 +40,15 @@ def screen_joints(floor: Floor, hypothesis: Hypothesis, direction: Real, laws: l
         Residual of the fit so far.
     hypothesis
         Hypothesis of the fit so far.
-    direction : (n_axes,)
-        Unit vector over the axes that forces and responses share.
+    axis
+        Where the joint gives way.
     laws
         Laws that are tried.
     """
-    seen = [seen_motion(record, hypothesis, direction) for record in floor.records]
-    columns = columns_of(hypothesis.model)
-    static = hypothesis.model.receptance(np.array([hypothesis.model.natural_frequencies.min() / 20]))[0]
-    stiffness = 1 / abs(direction @ static[np.ix_(range(len(columns)), columns)] @ direction)
+    seen = [seen_motion(record, hypothesis, axis) for record in floor.records]
+    reach = hypothesis.reach_with(axis)
+    static = reach.model.receptance(np.array([hypothesis.model.natural_frequencies.min() / 20]))[0]
+    stiffness = 1 / abs(reach.paths[-1].along @ static @ reach.paths[-1].push)
     motion = motion_of(seen, float(stiffness))
     by_name = {
         record.lines.recording.name: (one.deflection, one.velocity)
@@ -56,7 +56,7 @@ def screen_joints(floor: Floor, hypothesis: Hypothesis, direction: Real, laws: l
     }
     found = []
     for law in laws:
-        causes = [Cause(law, start, "", direction, motion, by_name) for start in law.starts(motion)]
+        causes = [Cause(law, start, "", axis, motion, by_name) for start in law.starts(motion)]
         parts = [
             [_column(record, hypothesis, one, cause) for record, one in zip(floor.records, seen, strict=True)]
             for cause in causes
@@ -73,11 +73,11 @@ def screen_joints(floor: Floor, hypothesis: Hypothesis, direction: Real, laws: l
 
 def _column(record: FloorRecord, hypothesis: Hypothesis, seen: SeenMotion, cause: Cause) -> Real:
     """Whitened response to the law's force for the motion that was seen."""
-    assert cause.direction is not None
+    assert cause.axis is not None
     lines = record.lines
     force = driven_force(lines, seen.deflection, seen.velocity, cause.law())
     spectrum = rfft(force, n=lines.padded)
-    columns = columns_of(hypothesis.model)
-    receptance = receptance_at(hypothesis.model, lines.padded_frequencies)[:, :, columns] @ cause.direction
+    reach, n = hypothesis.reach_with(cause.axis), len(hypothesis.model.responses)
+    receptance = receptance_at(reach.model, lines.padded_frequencies)[:, :n] @ reach.paths[-1].push
     response = -receptance * spectrum[:, None] * lines.padded_kinematic
     return record.column(lines.cut(lines.signal(response)))

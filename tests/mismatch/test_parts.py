@@ -81,7 +81,7 @@ def test_free_simulation_of_a_linear_joint_is_its_closed_form(
     }[kind]
     receptance = receptance_at(model, lines.padded_frequencies)
     free = np.einsum("p,kpq,kq->k", direction, receptance, lines.force_lines)
-    found = joint_response(model, lines, free, direction, law).force
+    found = joint_response(model, lines, free, (direction, direction), law).force
     own = np.einsum("p,kpq,q->k", direction, receptance, direction)
     factor = 400 * s if kind == "damper" else k
     expected = factor * free / (1 + factor * own)

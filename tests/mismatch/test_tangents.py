@@ -8,8 +8,10 @@ import pytest
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from mismatch import Hypothesis, LabError, ModelShape, band_of, predict_lines
+from mismatch.joints.joint_axis import JointAxis, ModalScales
 from mismatch.joints.joint_law import JointMotion
 from mismatch.joints.joint_simulation import driven_force
+from mismatch.joints.reciprocity import modal_scales
 from mismatch.models.derivatives import jacobian
 from mismatch.models.hypothesis import Cause
 from mismatch.models.lines.modal_lines import displacement_at
@@ -20,7 +22,7 @@ from modal_fit import ModalModel
 DIRECTION = np.array([0.8, 0.6])
 
 
-def _explanation(model: ModalModel, lines: WindowedSpectrum, name: str) -> Hypothesis:
+def _explanation(model: ModalModel, lines: WindowedSpectrum, name: str, axis: JointAxis) -> Hypothesis:
     """A joint whose force is a third of the elastic one, rms."""
     physics = library()[name]
     assert isinstance(physics, JointPhysics)
@@ -31,15 +33,26 @@ def _explanation(model: ModalModel, lines: WindowedSpectrum, name: str) -> Hypot
     values = physics.starts(motion)[0].copy()
     values[0] *= 0.3 * stiffness * x.std() / driven_force(lines, x, v, physics.law(values, motion)).std()
     shape = ModelShape(model, LabError())
-    return Hypothesis(shape, np.zeros(shape.size), (Cause(physics, values, "", DIRECTION, motion),))
+    return Hypothesis(shape, np.zeros(shape.size), (Cause(physics, values, "", axis, motion),))
 
 
+def _axis(model: ModalModel, inside: bool) -> JointAxis:
+    """The axis at the tip along `DIRECTION`, as a direction or as the modes' parts in it."""
+    if not inside:
+        return JointAxis(DIRECTION)
+    scales = modal_scales(model)
+    parts = np.real(model.right @ DIRECTION / scales.seen)
+    size = float(np.linalg.norm(parts))
+    return JointAxis(parts / size, ModalScales(size * scales.seen, size * scales.pushed))
+
+
+@pytest.mark.parametrize("inside", [False, True])
 @pytest.mark.parametrize(
     "name",
     ["stiffness_hardening", "coulomb_friction", "presliding_friction", "hysteresis", "quadratic_damping", "pose_drift"],
 )
 def test_the_tangent_is_that_of_whole_simulations(
-    small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], BandRecording], name: str
+    small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], BandRecording], name: str, inside: bool
 ) -> None:
     """By frequency, damping, shapes, the law's own numbers and the angle.
 
@@ -49,7 +62,7 @@ def test_the_tangent_is_that_of_whole_simulations(
     omega = np.abs(small_model.poles)
     damped = replace(small_model, poles=omega * (-0.1 + 1j * np.sqrt(1 - 0.01)))
     lines = windowed_spectrum(trial_of(damped, "mid", 50.0, 4), band_of(damped, 128.0), 4.0)
-    hypothesis = _explanation(damped, lines, name)
+    hypothesis = _explanation(damped, lines, name, _axis(damped, inside))
     slope = jacobian(hypothesis, lines, predict_lines(hypothesis, lines))
     size, h = hypothesis.shape.size, 0.03
 

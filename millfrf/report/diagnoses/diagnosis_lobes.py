@@ -94,7 +94,7 @@ def _curves(diagnosis: StructureDiagnosis, cut: MillingProcess) -> dict[str, Sta
         return zero_order(equivalent_receptance(hypothesis, lines[place], frequencies), cut, speeds, DEEPEST)
 
     curves = {"nominal": limits(nominal, 0)}
-    if any(cause.direction is not None for cause in final.causes) and len(lines) > 1:
+    if any(cause.axis is not None for cause in final.causes) and len(lines) > 1:
         for place in (0, len(lines) - 1):
             curves[f"improved, as in {lines[place].recording.name}"] = limits(final, place)
     else:

@@ -57,7 +57,7 @@ class StructureComparison:
         chosen = self._chosen(weighed, search)
         equivalents = () if chosen is None else self._equivalents(weighed, chosen)
         failed = weighed.sighted and not any(
-            one.fitted.hypothesis.causes[-1].direction is not None and one.evidence >= self.settings.evidence.least
+            one.fitted.hypothesis.causes[-1].axis is not None and one.evidence >= self.settings.evidence.least
             for one in weighed.proposals
         )
         return StructureRound(tuple(weighed.proposals), chosen, candidates, equivalents, failed)

@@ -222,6 +222,6 @@ def _deviation(lines: list[WindowedSpectrum], current: Fit) -> AcceptedCause | N
     causes = current.hypothesis.causes
     if found is None or not current.hypothesis.laws:
         return found
-    freed = tuple(with_linear_part(cause) if cause.direction is not None else cause for cause in causes)
+    freed = tuple(with_linear_part(cause) if cause.axis is not None else cause for cause in causes)
     again = fit(lines, replace(current.hypothesis, causes=freed), current.noises, iterations=20)
     return found if modal_deviation(again) is not None else None

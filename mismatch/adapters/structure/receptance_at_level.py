@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from estimation import Frf, WindowedSpectrum
 
-from ...joints import common_axes, driven_force
+from ...joints import driven_force
 from ...models import Hypothesis, predict_lines, surround
 
 Real = NDArray[np.float64]
@@ -32,26 +32,23 @@ def equivalent_receptance(hypothesis: Hypothesis, lines: WindowedSpectrum, frequ
     Frf
         Receptances, m/N.
     """
-    model = hypothesis.model
-    added = np.zeros((len(frequencies), len(model.excitations), len(model.responses)), dtype=complex)
+    model, reach = hypothesis.model, hypothesis.reach
+    n, m = len(model.responses), len(model.excitations)
+    receptance = reach.model.receptance(frequencies)
+    added = np.zeros(receptance.swapaxes(1, 2).shape, dtype=complex)
     feedback = surround(hypothesis, frequencies).feedback
     if feedback is not None:
-        added += feedback
-    rows, columns = common_axes(model)
+        added[:, :m, :n] += feedback
     s = 2j * np.pi * frequencies
-    answers = iter(predict_lines(hypothesis, lines).joints)
-    for cause in hypothesis.causes:
-        if cause.direction is None:
-            continue
-        answer = next(answers)
+    answers = predict_lines(hypothesis, lines).joints
+    for cause, path, answer in zip(hypothesis.laws, reach.paths, answers, strict=True):
         often = max(1, len(answer.deflection) // lines.padded)
         kept = slice(lines.start * often, (lines.start + len(lines.window)) * often)
         x, v = answer.deflection, answer.velocity
         g = driven_force(lines, x, v, cause.law(), often=often)[kept]
         stiffness, damping = (float(g @ y[kept]) / float(y[kept] @ y[kept]) for y in (x, v))
-        outer = np.outer(cause.direction, cause.direction)
-        added[:, np.array(columns)[:, None], rows] += (stiffness + s * damping)[:, None, None] * outer
-    receptance = model.receptance(frequencies)
-    closed = np.asarray(np.linalg.solve(np.eye(receptance.shape[1]) + receptance @ added, receptance))
+        added += (stiffness + s * damping)[:, None, None] * np.outer(path.push, path.along)
+    whole = np.linalg.solve(np.eye(receptance.shape[1]) + receptance @ added, receptance)
+    closed = np.asarray(whole[:, :n, :m], dtype=complex)
     valid = np.ones(len(frequencies), dtype=bool)
     return Frf(frequencies, closed, model.responses, model.excitations, "receptance", "m/N", valid)

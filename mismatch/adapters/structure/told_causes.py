@@ -45,7 +45,7 @@ def told_causes(fitted: Fit, accepted: Sequence[Proposal[Fit]]) -> list[Accepted
         if isinstance(cause.physics, ModePhysics):
             told.append(accepted_mode(fitted, cause.physics, one.evidence))
         else:
-            location = one.location if cause.direction is None else direction_of(cause)
+            location = one.location if cause.axis is None else direction_of(cause)
             told.append(accepted_cause(fitted, location, one.evidence, place))
     return told
 

@@ -54,6 +54,7 @@ def modal_slopes(
     modes: tuple[Complex, Complex, Complex],
     units: tuple[Complex, Complex, Real, Real],
     factor: Complex,
+    fitted: int,
     out: Real,
 ) -> None:
     """Write the derivative of ``M (H F)`` by every number of every mode, as `ModelShape` orders them.
@@ -70,17 +71,19 @@ def modal_slopes(
         Change of each pole by a unit of frequency and of damping, units of right and of left entries, each (n_modes,).
     factor : (n, n_rows, n_responses)
         Matrix M that the displacement at each line is multiplied by.
+    fitted
+        Number of excitations whose left entries are fitted; those behind them only push.
     out : (2, n, n_rows, n_columns)
         Receives real and imaginary parts in the modes' columns; the columns behind them are left alone.
     """
     poles, right, left = modes
-    n, m = right.shape[1], left.shape[1]
+    n, m = right.shape[1], fitted
     size = 2 + 2 * n + 2 * m
     for k in range(len(s)):
         for r in range(len(poles)):
             up, down = over(s[k] - poles[r]), over(s[k] - poles[r].conjugate())
             push, pull = 0.0 + 0.0j, 0.0 + 0.0j
-            for q in range(m):
+            for q in range(left.shape[1]):
                 push += left[r, q] * force[k, q]
                 pull += left[r, q].conjugate() * force[k, q]
             push *= up
@@ -156,7 +159,11 @@ def add_outer(response: Complex, change: Complex, first: int, out: Real) -> None
 
 @compiled
 def driven_basis(
-    s: Complex, force: Complex, poles: Complex, left: Complex, ahead: Complex, out: NDArray[np.complexfloating]
+    s: Complex,
+    force: Complex,
+    modes: tuple[Complex, Complex, Complex],
+    fitted: int,
+    out: NDArray[np.complexfloating],
 ) -> None:
     """Write the real signals that make up every change of a deflection by the modes' numbers, as spectra.
 
@@ -169,22 +176,24 @@ def driven_basis(
         Laplace variable ``i omega`` of the lines.
     force : (n, n_excitations), N
         Force spectrum at the lines.
-    poles, left
-        Poles (n_modes,) and left vectors (n_modes, n_excitations).
-    ahead : (n_modes,)
-        Each mode's right vector along the deflection, rho.
-    out : (n or more, n_modes * (2 + 2 n_excitations))
+    modes
+        Poles (n_modes,), left vectors (n_modes, n_excitations), and each mode's right vector along the deflection, rho.
+    fitted
+        Number m of excitations whose left entries are fitted; those behind them only push.
+    out : (n or more, n_modes * (2 + 2 m))
         Receives the spectra.
     """
-    m = left.shape[1]
+    poles, left, ahead = modes
+    m = fitted
     for k in range(len(s)):
         for r in range(len(poles)):
             first = r * (2 + 2 * m)
             up, down = over(s[k] - poles[r]), over(s[k] - poles[r].conjugate())
             push, pull = 0.0 + 0.0j, 0.0 + 0.0j
-            for q in range(m):
+            for q in range(left.shape[1]):
                 push += left[r, q] * force[k, q]
                 pull += left[r, q].conjugate() * force[k, q]
+            for q in range(m):
                 out[k, first + 2 + q] = (up + down) * force[k, q]
                 out[k, first + 2 + m + q] = 1j * (up - down) * force[k, q]
             push *= ahead[r] * up * up

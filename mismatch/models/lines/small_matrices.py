@@ -30,14 +30,14 @@ def line_products(one: Complex, other: Complex) -> Complex:
 
 
 def closed_loop(receptance: Complex, feedback: Complex) -> Complex:
-    """``(I + H K)^-1 H`` of every line, with H (n_lines, n, m) and K (n_lines, m, n).
+    """``(I + H K)^-1 H`` of every line, with H (n_lines, n, m) and K (n_lines, m, n); further columns of H go along.
 
     Raises
     ------
     numpy.linalg.LinAlgError
         ``I + H K`` is singular at a line.
     """
-    loop = line_products(receptance, feedback)
+    loop = line_products(receptance[:, :, : feedback.shape[1]], feedback)
     diagonal = np.arange(loop.shape[1])
     loop[:, diagonal, diagonal] += 1
     result = np.array(receptance, dtype=complex, order="C")

@@ -1,0 +1,121 @@
+"""`JointReach`: a modal model widened by motions and forces of joints that its own channels do not stand for."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from modal_fit import ModalModel, Residuals
+
+from .joint_axis import JointAxis, tip_axes
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointPath:
+    """How one joint's axis reaches the degrees of freedom of a widened model.
+
+    Parameters
+    ----------
+    axis
+        The joint's axis.
+    rows : (n_responses, n_entries)
+        Matrix from its entries to the widened model's responses.
+    columns : (n_excitations, n_entries)
+        Matrix from its entries to the widened model's excitations.
+    """
+
+    axis: JointAxis
+    rows: Real
+    columns: Real
+
+    @property
+    def along(self) -> Real:
+        """The combination of responses that is the joint's deflection, (n_responses,)."""
+        return np.asarray(self.rows @ self.axis.entries)
+
+    @property
+    def ends(self) -> tuple[Real, Real]:
+        """Both :attr:`along` and :attr:`push`."""
+        return self.along, self.push
+
+    @property
+    def push(self) -> Real:
+        """The excitations by a unit of the joint's force, (n_excitations,)."""
+        return np.asarray(self.columns @ self.axis.entries)
+
+
+@dataclass(frozen=True)
+class JointReach:
+    """A modal model, and how each joint acts on it.
+
+    Where a joint's axis lies in the modes, each mode's own coordinate is one more response, and a force on it one more
+    excitation: everything that holds between forces and responses then holds for the joint.
+
+    Parameters
+    ----------
+    model
+        The model with these responses and excitations behind its own; the model itself where all joints act at the tip.
+    paths
+        How each joint reaches it, in their order.
+    """
+
+    model: ModalModel
+    paths: tuple[JointPath, ...]
+
+    def forces(self, force: Complex) -> Complex:
+        """Forces (n_lines, n) on the model's own excitations as forces on all, (n_lines, n_excitations)."""
+        more = len(self.model.excitations) - force.shape[1]
+        return np.pad(force, ((0, 0), (0, more))) if more else force
+
+
+def joint_reach(model: ModalModel, axes: Sequence[JointAxis]) -> JointReach:
+    """How joints act on a modal model.
+
+    Parameters
+    ----------
+    model
+        Modal model of the linear structure.
+    axes
+        Axes of the joints.
+    """
+    n, m, count = len(model.responses), len(model.excitations), len(model.poles)
+    inner = [axis.scales for axis in axes if axis.scales is not None]
+    more = count * len(inner)
+    widened = model
+    if inner:
+        names = tuple(f"MODE {place % count + 1}:+S" for place in range(more))
+        widened = replace(
+            model,
+            right=np.hstack([model.right, *(np.diag(scales.seen) for scales in inner)]),
+            left=np.hstack([model.left, *(np.diag(scales.pushed) for scales in inner)]),
+            responses=(*model.responses, *names),
+            excitations=(*model.excitations, *names),
+            residuals=_widened_residuals(model, more),
+            covariance=None,
+        )
+    paths, first = [], 0
+    for axis in axes:
+        if axis.scales is None:
+            rows, columns, _ = tip_axes(model)
+            paths.append(JointPath(axis, np.pad(rows, ((0, more), (0, 0))), np.pad(columns, ((0, more), (0, 0)))))
+        else:
+            ends = (np.zeros((size + more, count)) for size in (n, m))
+            rows, columns = ends
+            rows[n + first : n + first + count] = columns[m + first : m + first + count] = np.eye(count)
+            paths.append(JointPath(axis, rows, columns))
+            first += count
+    return JointReach(widened, tuple(paths))
+
+
+def _widened_residuals(model: ModalModel, more: int) -> Residuals | None:
+    """Residuals that say nothing about the added responses and excitations."""
+    own = model.residuals
+    if own is None:
+        return None
+    wide = ((0, more), (0, more))
+    residues = None if own.residues is None else np.pad(own.residues, ((0, 0), *wide))
+    return replace(own, upper=np.pad(own.upper, wide), lower=np.pad(own.lower, wide), residues=residues)

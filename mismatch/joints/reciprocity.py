@@ -1,0 +1,34 @@
+"""Modal scales by reciprocity: how a force inside the structure pushes a mode, from how the mode moves there."""
+
+import numpy as np
+
+from modal_fit import ModalModel
+
+from .joint_axis import Complex, ModalScales, tip_axes
+
+
+def modal_scales(model: ModalModel) -> ModalScales:
+    """Scales in which a mode's part in a joint is one real number.
+
+    A reciprocal structure with real mode shapes ``phi`` has residues ``phi_p phi_q / (2 i omega m)``: along each mode,
+    motion and push at a point are one real number, times a right and a left scale whose product lags by a quarter of a
+    turn where the structure is passive. Their sizes are those of the mode's vectors over the common axes, so that a
+    part of one is that of a joint at the tip which moves as the tip does; their phases are fitted to both vectors.
+
+    Parameters
+    ----------
+    model
+        Modal model whose common axes (:func:`tip_axes`) show right against left vectors.
+    """
+    rows, columns, _ = tip_axes(model)
+    right, left = model.right @ rows, model.left @ columns
+    seen, pushed = np.linalg.norm(right, axis=1), np.linalg.norm(left, axis=1)
+    turn = _doubled_phase(right) - np.conj(_doubled_phase(left))
+    phase = np.exp(0.5j * np.angle(turn))
+    return ModalScales(seen * phase, -1j * pushed * np.conj(phase))
+
+
+def _doubled_phase(vectors: Complex) -> Complex:
+    """Unit numbers with twice the phase that vectors (n_modes, n) are closest to, (n_modes,)."""
+    squares = np.sum(vectors**2, axis=1)
+    return np.asarray(squares / np.maximum(np.abs(squares), 1e-300))
