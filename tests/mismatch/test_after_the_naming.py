@@ -12,6 +12,7 @@ from estimation import BandRecording, windowed_spectrum
 from foundation import InputError
 from mismatch import Hypothesis, LabError, ModelShape, band_of
 from mismatch.adapters.structure.receptance_at_level import equivalent_receptance
+from mismatch.joints import JointAxis
 from mismatch.joints.joint_law import JointLaw, JointMotion
 from mismatch.models.hypothesis import Cause
 from mismatch.models.linear_part import with_linear_part
@@ -52,7 +53,7 @@ def test_a_linear_joint_is_the_structure_with_its_spring_and_damper(
     lines = windowed_spectrum(trial_of(small_model, "mid", 50.0, 4), band_of(small_model, 128.0), 1.0)
     shape = ModelShape(small_model, LabError())
     k, c = 2e4, 100.0
-    cause = Cause(_Spring(), np.array([k, c]), "", DIRECTION, MOTION)
+    cause = Cause(_Spring(), np.array([k, c]), "", JointAxis(DIRECTION), MOTION)
     frequencies = np.linspace(2, 30, 50)
     found = equivalent_receptance(Hypothesis(shape, np.zeros(shape.size), (cause,)), lines, frequencies)
     receptance = small_model.receptance(frequencies)
@@ -79,7 +80,7 @@ def test_faults_of_the_chain_are_no_part_of_the_structure(
 def test_a_law_with_a_linear_part(name: str) -> None:
     """Without numbers it is the law; with them a straight line is added, also beyond the table's end."""
     physics = library()[name]
-    plain = Cause(physics, physics.starts(MOTION)[0], "", DIRECTION, MOTION)
+    plain = Cause(physics, physics.starts(MOTION)[0], "", JointAxis(DIRECTION), MOTION)
     freed = with_linear_part(plain)
     assert freed.size == plain.size + 2
     assert freed.coordinates()[-3:-1].tolist() == [0.0, 0.0]

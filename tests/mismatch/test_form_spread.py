@@ -13,6 +13,7 @@ from concealed_recordings import RATE, forces, linear_acceleration, structure, t
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from mismatch import Hypothesis, JointMotion, LabError, ModelShape, band_of
 from mismatch.adapters.structure.form_errors import with_form_spread
+from mismatch.joints import JointAxis
 from mismatch.models.fitting import Fit, fit
 from mismatch.models.hypothesis import Cause
 from mismatch.physics import library
@@ -63,7 +64,7 @@ def _named(lines: list[WindowedSpectrum], motion: JointMotion) -> Fit:
     shape = ModelShape(structure(), LabError())
     fits = []
     for name, scale in (("coulomb_friction", motion.velocity), ("presliding_friction", motion.deflection)):
-        cause = Cause(library()[name], np.array([9.0, 0.03 * scale]), "", DIRECTION, motion)
+        cause = Cause(library()[name], np.array([9.0, 0.03 * scale]), "", JointAxis(DIRECTION), motion)
         fits.append(fit(lines, Hypothesis(shape, np.zeros(shape.size), (cause,)), iterations=25))
     return min(fits, key=lambda one: one.score)
 

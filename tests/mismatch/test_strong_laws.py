@@ -8,6 +8,7 @@ from one_mode_rig import Real, Rig
 
 from estimation import BandRecording, windowed_spectrum
 from mismatch import Cause, Hypothesis, JointMotion, LabError, ModelShape, band_of, diagnose, fit, library
+from mismatch.joints import JointAxis
 
 LEVELS = (20.0, 40.0, 60.0)
 
@@ -65,7 +66,7 @@ def test_a_start_that_runs_away_is_a_hypothesis_that_is_not_taken(linear: BandRe
     shape = ModelShape(rig.model, LabError())
     plain = Hypothesis(shape, np.zeros(shape.size))
     motion = JointMotion(1e-3, 0.06, 1e-2, 0.6, rig.stiffness)
-    cause = Cause(physics, np.array([-6 * rig.stiffness, -1.0, 0.0]), "", np.ones(1), motion)
+    cause = Cause(physics, np.array([-6 * rig.stiffness, -1.0, 0.0]), "", JointAxis(np.ones(1)), motion)
     with np.errstate(all="ignore"):
         gone = fit(lines, plain.with_cause(cause), iterations=2)
     assert gone.score == np.inf
