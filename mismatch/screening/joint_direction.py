@@ -8,7 +8,8 @@ from scipy.fft import irfft, rfft
 from scipy.optimize import minimize
 
 from ..joints import JointAxis, JointMotion, tip_axes
-from ..models import Hypothesis, predict_lines, receptance_at, response_to_joint
+from ..models import Hypothesis, predict_lines, receptance_at
+from .axis_bands import AxisBands, axis_bands, gain_along, reached_by
 from .whitened_residual import Floor, FloorRecord
 
 Complex = NDArray[np.complex128]
@@ -44,11 +45,11 @@ def find_direction(floor: Floor, hypothesis: Hypothesis) -> JointSighting:
     """
     columns = tip_axes(hypothesis.model)[1]
     reaches = [record.through @ columns for record in floor.records]
-    bands = [_band_statistics(record, reach) for record, reach in zip(floor.records, reaches, strict=True)]
+    bands = [axis_bands(record, reach) for record, reach in zip(floor.records, reaches, strict=True)]
     n = columns.shape[1]
 
     def gain(direction: Real) -> float:
-        return sum(_gain(parts, direction / np.linalg.norm(direction)) for parts in bands)
+        return sum(gain_along(parts, direction / np.linalg.norm(direction)) for parts in bands)
 
     tries = np.random.default_rng(0).normal(size=(60 * n, n))
     tries = np.vstack([tries, np.eye(n), *map(_eigenvectors, floor.records, reaches)])
@@ -65,42 +66,7 @@ def find_direction(floor: Floor, hypothesis: Hypothesis) -> JointSighting:
     return JointSighting(JointAxis(direction), found, found / max(everything, 1e-12))
 
 
-def reached_by(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis) -> Complex:
-    """Responses at the lines to a unit force along each entry of an axis, (n_lines, n_responses, n_entries)."""
-    if axis.scales is None:
-        return np.asarray(record.through @ tip_axes(hypothesis.model)[1])
-    return response_to_joint(hypothesis, record.lines, axis)
-
-
-@dataclass(frozen=True)
-class _Bands:
-    """Statistics G^H V^-1 r and G^H V^-1 G of each line over the joint's axes, and the bands' edges."""
-
-    pull: Complex
-    weight: Complex
-    starts: NDArray[np.int64]
-    counts: Real
-
-
-def _band_statistics(record: FloorRecord, reached: Complex) -> _Bands:
-    """Statistics for responses (n_lines, n_responses, n_axes) to a unit force along each axis."""
-    reach = record.white @ reached
-    rest = np.einsum("kij,kj->ki", record.white, record.residual)
-    pull = np.einsum("kij,ki->kj", reach.conj(), rest)
-    weight = reach.conj().swapaxes(1, 2) @ reach
-    edges = np.unique(np.linspace(0, len(rest), min(150, max(4, len(rest) // 12)) + 1).astype(int))
-    return _Bands(pull, weight, edges[:-1], np.diff(edges).astype(float))
-
-
-def _gain(bands: _Bands, direction: Real) -> float:
-    power = np.abs(bands.pull @ direction) ** 2
-    size = np.real(np.einsum("i,kij,j->k", direction, bands.weight, direction))
-    z = np.add.reduceat(power / np.maximum(size, 1e-300), bands.starts) / bands.counts
-    z = np.maximum(z, 1.0)
-    return float(2 * np.sum(bands.counts * (z - 1 - np.log(z))))
-
-
-def _gain_of_all(bands: _Bands) -> float:
+def _gain_of_all(bands: AxisBands) -> float:
     """Gain of a force that is free in every direction, counted as that many separate forces."""
     inverse = np.linalg.pinv(bands.weight, hermitian=True)
     power = np.real(np.einsum("ki,kij,kj->k", bands.pull.conj(), inverse, bands.pull))
@@ -169,7 +135,7 @@ def seen_motion(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis) ->
 
 def _wiener(record: FloorRecord, reached: Complex) -> Complex:
     """Row ``lambda h^H (V + lambda h h^H)^-1`` at the lines for responses h (n_lines, n_responses) to the force."""
-    bands = _band_statistics(record, reached[:, :, None])
+    bands = axis_bands(record, reached[:, :, None])
     power = np.abs(bands.pull[:, 0]) ** 2
     size = np.maximum(np.real(bands.weight[:, 0, 0]), 1e-300)
     z = np.add.reduceat(power / size, bands.starts) / bands.counts

@@ -10,7 +10,7 @@ from ...models import Fit, fit, settled
 from ...physics import JointPhysics, Physics
 from ...remainder import leftover
 from .acceptance import evidence_needed, impossible, plainest, possible_gains, worth_it
-from .rounds import Standing, StructureRound, Weighed, weigh
+from .rounds import Standing, StructureRound, Weighed, only_modes, weigh
 
 PRUNING = 20
 """Steps at most of a fit without one of its causes."""
@@ -42,25 +42,26 @@ class StructureComparison:
         return False
 
     def round(self, search: Search[Fit]) -> Round[Fit]:
-        """Screen and fit causes; where joint laws failed before, they are tried again only if much has gone since."""
+        """Screen and fit causes; where joint laws failed before, they are tried again if much has gone since.
+
+        They are also tried again where nothing else explains more than a further mode, which may imitate them.
+        """
         current = search.current
         moving = leftover(current.hypothesis, self.lines) if search.accepted else self.before
         standing = Standing(self.lines, current, search.base, moving, self.before, self.settings)
         spared = self._laws_failed_at(search) * self.settings.search.laws_again <= moving.size
         linear = {name: one for name, one in self.causes.items() if not isinstance(one, JointPhysics)}
         weighed = weigh(standing, linear if spared else self.causes)
-        candidates = tuple(weighed.candidates)
-        if spared and not possible_gains(weighed.proposals, self.settings.evidence):
+        if spared and only_modes(possible_gains(weighed.proposals, self.settings.evidence)):
             laws = {name: one for name, one in self.causes.items() if name not in linear}
-            weighed = weigh(standing, laws)
-            candidates += tuple(weighed.candidates)
+            weighed = weighed.with_more(weigh(standing, laws))
         chosen = self._chosen(weighed, search)
         equivalents = () if chosen is None else self._equivalents(weighed, chosen)
         failed = weighed.sighted and not any(
             one.fitted.hypothesis.causes[-1].axis is not None and one.evidence >= self.settings.evidence.least
             for one in weighed.proposals
         )
-        return StructureRound(tuple(weighed.proposals), chosen, candidates, equivalents, failed)
+        return StructureRound(tuple(weighed.proposals), chosen, tuple(weighed.candidates), equivalents, failed)
 
     def without(self, search: Search[Fit], place: int) -> Fit:
         """The last step fitted without one of its causes."""

@@ -1,6 +1,6 @@
 """One round of the search in a structure: every cause is screened, and those that promise most are fitted."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -78,6 +78,21 @@ class Weighed:
     proposals: list[Proposal[Fit]]
     candidates: list[Candidate]
     sighted: bool
+
+    def with_more(self, other: "Weighed") -> "Weighed":
+        """This and what was weighed after it."""
+        return Weighed(self.proposals + other.proposals, self.candidates + other.candidates, other.sighted)
+
+
+def only_modes(proposals: Sequence[Proposal[Fit]]) -> bool:
+    """Whether modes alone were found, or nothing: a few of them imitate a joint that hardens, drifts or rubs.
+
+    Parameters
+    ----------
+    proposals
+        Fitted causes that count.
+    """
+    return all(isinstance(one.fitted.hypothesis.causes[-1].physics, ModePhysics) for one in proposals)
 
 
 def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
