@@ -1,7 +1,7 @@
 from .axis_file import axis_location, axis_of
 from .joint_axis import JointAxis, ModalScales, tip_axes
 from .joint_law import JointLaw, JointMotion
-from .joint_reach import JointPath, JointReach, joint_reach
+from .joint_paths import JointPath, JointReach, joint_reach
 from .joint_simulation import JointResponse, driven_force, joint_dynamics, joint_response, stiffness_ramp
 from .reciprocity import modal_scales
 from .saturation import Saturation, rounded, saturated
