@@ -1,5 +1,6 @@
 from .cuts import LobesBand, ShownCut, TriedCut, chatter_figure, draw_lobes, lobes_figure
 from .diagnosis import (
+    behaviour_figure,
     channel_map_figure,
     cut_orders_figure,
     cut_turn_figure,
@@ -70,6 +71,7 @@ __all__ = [
     "TriedCut",
     "as_data_uri",
     "assurance_figure",
+    "behaviour_figure",
     "channel_map_figure",
     "chatter_figure",
     "coherent_lines",

@@ -23,6 +23,7 @@ from .adapters import (
     standard_error_of,
     write_improved_cut,
 )
+from .behaviour import FAMILIES, Behaviour, BehaviourSettings, ModeTrend, behaviour_of
 from .inference import (
     AcceptedCause,
     Candidate,
@@ -70,8 +71,11 @@ from .screening import Floor, JointSighting, SeenMotion, find_direction, linear_
 __all__ = [
     "COEFFICIENTS",
     "COEFFICIENT_NAMES",
+    "FAMILIES",
     "ROBOT",
     "AcceptedCause",
+    "Behaviour",
+    "BehaviourSettings",
     "BinnedForce",
     "BlockResidual",
     "Candidate",
@@ -91,6 +95,7 @@ __all__ = [
     "JointPhysics",
     "JointSighting",
     "LabError",
+    "ModeTrend",
     "ModelShape",
     "PosedRecording",
     "Prediction",
@@ -105,6 +110,7 @@ __all__ = [
     "StructureDiagnosis",
     "band_edges",
     "band_of",
+    "behaviour_of",
     "companions_of",
     "diagnose",
     "diagnose_cut",

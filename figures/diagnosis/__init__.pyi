@@ -1,3 +1,4 @@
+from .behaviour import behaviour_figure
 from .cut import cut_orders_figure, cut_turn_figure
 from .errors import draw_diagnosis
 from .growth import growth_figure
@@ -7,6 +8,7 @@ from .robot import robot_evidence_figure, robot_spectra_figure
 from .spectra import spectra_figure
 
 __all__ = [
+    "behaviour_figure",
     "channel_map_figure",
     "cut_orders_figure",
     "cut_turn_figure",

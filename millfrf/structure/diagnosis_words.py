@@ -32,6 +32,8 @@ def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
         lines.append(
             f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal: a cause is missing"
         )
+    if diagnosis.details.behaviour is not None:
+        lines.append(f"behaviour by level: {diagnosis.details.behaviour.sentence}")
     lines.append(_error_line(diagnosis))
     return lines
 

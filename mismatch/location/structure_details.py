@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from estimation import WindowedSpectrum
 
+from ..behaviour import Behaviour
 from ..inference import Diagnosis
 from ..models import Fit, Hypothesis
 from ..records import ComparedBand
@@ -35,6 +36,8 @@ class StructureDetails:
         Maps of the residual before and after the causes are added; None until they are made.
     delay
         Delay of the measuring chain that the nominal model states, s: it was taken out of the recordings.
+    behaviour
+        What modes do with the level, whatever law stands behind it; None where it was not asked for.
     """
 
     base: Fit
@@ -46,6 +49,7 @@ class StructureDetails:
     band: ComparedBand
     view: "ResidualView | None" = None
     delay: float = 0.0
+    behaviour: Behaviour | None = None
 
     @property
     def tested(self) -> bool:

@@ -56,7 +56,7 @@ def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
     if diagnosis.verdict == "none":
         return f"Nothing is missing: {next_test('none').meaning}."
     if diagnosis.verdict == "unexplained":
-        return f"Unexplained: {next_test('unexplained').meaning}; no physics is named for it. The model leaves {left}."
+        return f"Unexplained: {next_test('unexplained').meaning}; no law is named for it. The model leaves {left}."
     several = len(diagnosis.physics) > 1
     fall = (
         f"; with {'them' if several else 'it'}, the error on the held-out recording falls from "
@@ -176,6 +176,9 @@ def what(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
             f"It grows as the force to the power {number(found['exponent'], found['exponent_standard_error'])} "
             "(a linear omission: 1, a cubic stiffness: 3, dry friction: 0)."
         )
+    behaviour = diagnosis.details.behaviour
+    if behaviour is not None:
+        said.append(f"Without any law: {behaviour.sentence}")
     return tuple(said) or ("Nothing beyond the refitted modal parameters.",)
 
 

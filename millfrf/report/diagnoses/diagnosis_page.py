@@ -16,6 +16,7 @@ from mismatch import StructureDiagnosis, in_processes
 from ...provenance import versions
 from ..collection_paused import collection_paused
 from ..section import Section
+from .behaviour_section import behaviour_section
 from .diagnosis_answers import answers, verdict_sentence, warnings
 from .diagnosis_lobes import diagnosis_lobes_section
 from .diagnosis_sections import (
@@ -67,9 +68,10 @@ def _drawn_sections(diagnosis: StructureDiagnosis, process: MillingProcess | Non
         lambda: if_possible(lambda: diagnosis_lobes_section(diagnosis, process), "What it does to the lobes"),
         lambda: if_possible(lambda: law_section(diagnosis), "The measured force of the joint"),
         partial(growth_section, diagnosis),
+        partial(behaviour_section, diagnosis),
     ]
-    held_out, location, lobes, law, growth = in_processes(makers)
-    return [law, held_out, lobes, location, growth]
+    held_out, location, lobes, law, growth, behaviour = in_processes(makers)
+    return [behaviour, law, held_out, lobes, location, growth]
 
 
 def report_text(diagnosis: StructureDiagnosis, model_name: str = "", process: MillingProcess | None = None) -> str:

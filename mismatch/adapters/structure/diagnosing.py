@@ -10,6 +10,7 @@ from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from foundation import Band, InputError
 from modal_fit import ModalModel
 
+from ...behaviour import behaviour_of
 from ...faults import repair_faults, with_tones_settled
 from ...inference import (
     AcceptedCause,
@@ -118,6 +119,7 @@ def _diagnosed(
     elsewhere = answer.held_out.linear, answer.held_out.improved
     unseen = both.held_out(measured)
     details = StructureDetails(base, answer.final, tuple(mended), tuple(measured), elsewhere, unseen, band)
+    behaviour = behaviour_of(base.hypothesis, mended)
     view = residual_view(details, answer.verdict == "unexplained", recordings, settings.location)
     candidates = sorted([*found.candidates, *answer.rejected], key=lambda one: -one.evidence)
     return Diagnosis(
@@ -130,9 +132,13 @@ def _diagnosed(
         before,
         answer.left,
         located(view, speeds),
-        replace(details, view=view),
+        replace(details, view=view, behaviour=behaviour),
         doubts=beyond_model(base.hypothesis, mended),
-        content={"compared_band": asdict(band), "not_asked_for": list(left_out)},
+        content={
+            "compared_band": asdict(band),
+            "not_asked_for": list(left_out),
+            "behaviour": behaviour.content(),
+        },
     )
 
 

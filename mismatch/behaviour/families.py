@@ -1,0 +1,117 @@
+"""The family of physics that a mode's frequency and damping speak for, from their signs and errors alone."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from .mode_trend import ModeTrend
+
+FAMILIES: Mapping[str, str] = {
+    "none": "no change beyond the errors",
+    "hardening": "elastic, hardening: a spring that stiffens, a gap that closes or a stop",
+    "softening": "elastic, softening: a spring that weakens, a gap that opens; slip that loses little is not excluded",
+    "softening or slip": "slip in a joint (friction, microslip), or a softening spring whose moving frequency smears "
+    "the resonance as much",
+    "slip": "slip with memory: friction behind a spring, microslip in a bolted joint, or hysteresis",
+    "sliding": "friction beyond its limit: it stuck at the low level, and slides at the high one",
+    "dry": "dissipative, dry: friction, whose damping falls as motion grows",
+    "viscous": "dissipative, faster than velocity: damping of a power above one, as in a fluid",
+    "drift": "time-varying: it drifts while the level stays",
+    "cannot tell": "cannot tell",
+}
+"""Families of behaviour, and what each says."""
+
+
+@dataclass(frozen=True)
+class BehaviourSettings:
+    """Thresholds of the behaviour by level.
+
+    Parameters
+    ----------
+    chance
+        Probability below which a change is told, for all modes of a diagnosis together.
+    apart
+        Ratio of what drives the rig from which two recordings have two levels.
+    smeared
+        Damping ratio that a frequency which moves with the amplitude imitates: ``d min(a, b d / zeta)`` for a shift by
+        the share d at the damping ratio zeta, with (a, b) here. What exceeds it are losses. Springs that stiffen and
+        springs that soften, under random forces, give 0.45 and 0.21 at most.
+    seen
+        Standard error of a frequency, as a share, or of a damping ratio, over itself, above which nothing is seen.
+    """
+
+    chance: float = 0.01
+    apart: float = 1.2
+    smeared: tuple[float, float] = (0.5, 0.35)
+    seen: tuple[float, float] = (0.03, 0.5)
+
+
+def family_of(trend: ModeTrend, tests: int, settings: BehaviourSettings) -> str:
+    """The family of one mode's behaviour.
+
+    Stiffness shows in the frequency, losses in the damping. A frequency that moves with the amplitude smears the
+    resonance, and seems to add damping: that much is not taken for losses.
+
+    Parameters
+    ----------
+    trend
+        The mode by level.
+    tests
+        Number of tests that are made together (Bonferroni).
+    settings
+        Thresholds from which a change is told.
+    """
+    least = settings.chance / tests
+    if len(trend.levels) < 2:
+        return "drift" if trend.drift_p_value < least else "cannot tell"
+    moves, damps = (p < least for p in trend.p_values)
+    if not moves and trend.drift_p_value < least:
+        return "drift"
+    if not moves and not damps:
+        wide = trend.shift_error > settings.seen[0] or trend.gain_error > settings.seen[1]
+        return "cannot tell" if wide else "none"
+    if not moves:
+        return "viscous" if trend.gain > 0 else "dry"
+    if trend.shift > 0:
+        return "hardening"
+    if damps and trend.gain < 0:
+        return "sliding"
+    if not damps:
+        return "softening"
+    at_most, slope = settings.smeared
+    imitated = abs(trend.shift) * min(at_most, slope * abs(trend.shift) / trend.damping[0]) / trend.damping[0]
+    return "slip" if trend.gain - 2 * trend.gain_error > imitated else "softening or slip"
+
+
+def sentence_of(trend: ModeTrend, family: str, unit: str) -> str:
+    """All of one mode in a sentence; errors are two standard errors.
+
+    Parameters
+    ----------
+    trend
+        The mode by level.
+    family
+        Family of its behaviour, one of :data:`FAMILIES`.
+    unit
+        Unit of what drives the rig.
+    """
+    where = f"mode at {trend.frequencies[0]:.4g} Hz"
+    if len(trend.levels) < 2:
+        told = f"it drifts by {100 * trend.drift:+.2g} % over a recording" if family == "drift" else "one level only"
+        return f"{where}: {told}"
+    between = f"between {trend.levels[0]:.3g} and {trend.levels[-1]:.3g} {unit}"
+    shift, gain = f"{100 * abs(trend.shift):.2g}", f"{100 * abs(trend.gain):.2g}"
+    shift_error, gain_error = f"{200 * trend.shift_error:.1g}", f"{200 * trend.gain_error:.2g}"
+    if family in ("none", "cannot tell", "drift"):
+        held = f"frequency {100 * trend.shift:+.2g} ± {shift_error} %, damping {100 * trend.gain:+.2g} ± {gain_error} %"
+        ending = {
+            "none": "moves no further than its error",
+            "cannot tell": "errors are wider than any trend that would tell",
+            "drift": f"drifts by {100 * trend.drift:+.2g} % over a recording",
+        }[family]
+        return f"{where} {ending} ({held} {between})"
+    moved = "stiffens" if trend.shift > 0 else "softens"
+    frequency = f"{moved} by {shift} ± {shift_error} %"
+    if family in ("viscous", "dry"):
+        frequency = f"keeps its frequency ({100 * trend.shift:+.2g} ± {shift_error} %)"
+    damping = f"{'gains' if trend.gain > 0 else 'loses'} {gain} ± {gain_error} % of its damping"
+    return f"{where} {frequency} and {damping} {between}: {FAMILIES[family]}"
