@@ -20,7 +20,7 @@ from .settings import (
     VerdictSettings,
 )
 from .thresholds import LabError, Thresholds
-from .verdict import Findings, leaves_too_much, share_left, verdict_of
+from .verdict import Findings, error_halved, leaves_too_much, share_left, verdict_of
 
 __all__ = [
     "FAULTS",
@@ -57,6 +57,7 @@ __all__ = [
     "descend",
     "diagnosis_content",
     "equivalents_of",
+    "error_halved",
     "in_processes",
     "jackknife_variance",
     "leaves_too_much",

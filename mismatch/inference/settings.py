@@ -18,7 +18,9 @@ Real = NDArray[float64]
 
 
 @dataclass(frozen=True)
-class EvidenceSettings(Thresholds, shares=("small", "small_after_law", "mends_belief")):
+class EvidenceSettings(
+    Thresholds, shares=("as_good_form", "small", "small_after_law", "small_in_part", "mends_belief")
+):
     """When a cause gains enough where it is fitted. Gains are in score: twice the logarithm of a Bayes factor.
 
     Parameters
@@ -29,6 +31,9 @@ class EvidenceSettings(Thresholds, shares=("small", "small_after_law", "mends_be
     as_good
         Gain by which another cause may be worse and is still told as equivalent: 10 is a likelihood ratio of 150, and
         6 one of 20 (from there Kass & Raftery call evidence very strong, and strong).
+    as_good_form
+        Share of the evidence of a joint's law from which another law is told as equivalent: their forms are never quite
+        the true ones, and so small a difference is one of form.
     clear
         Standard errors by which a number of a cause must differ from its value without the cause; chance alone exceeds
         4 once in 16 000.
@@ -39,16 +44,21 @@ class EvidenceSettings(Thresholds, shares=("small", "small_after_law", "mends_be
         Share of the evidence found so far below which a further cause may only mend the form of the first.
     small_after_law
         The same share once a joint's law is accepted, whose form is never quite the true one.
+    small_in_part
+        Share of the evidence of all causes below which one is not told where the answer is partial: it may mend what is
+        left of the others.
     mends_belief
         Share of the odd deviation from the laboratory's model that a cause must remove when it gains no misfit.
     """
 
     least: float = 20.0
     as_good: float = 10.0
+    as_good_form: float = 0.9
     clear: float = 4.0
     unclear: float = 5.0
     small: float = 0.01
     small_after_law: float = 0.1
+    small_in_part: float = 0.25
     mends_belief: float = 0.6
 
 
@@ -178,7 +188,7 @@ class ProofSettings(Thresholds, shares=("significance", "belief_alone", "beaten"
 
 
 @dataclass(frozen=True)
-class VerdictSettings(Thresholds, shares=("explained", "partly")):
+class VerdictSettings(Thresholds, shares=("explained", "partly", "halves")):
     """What an answer may leave.
 
     Parameters
@@ -189,6 +199,9 @@ class VerdictSettings(Thresholds, shares=("explained", "partly")):
         Share of what the hypothesis without causes leaves that causes must remove, if the rest is not noise-like.
     partly
         Share that they must remove to be told at all; 1 tells nothing.
+    halves
+        Share of the held-out power above the noise that a partial answer may leave of what it is compared with,
+        refitted modes or the nominal model: a quarter of the power is half of the error.
     most_of_response
         Error held out, as a share of the response, above which no answer is complete.
     most_over_noise
@@ -199,7 +212,8 @@ class VerdictSettings(Thresholds, shares=("explained", "partly")):
 
     noise_like: float = 0.05
     explained: float = 0.95
-    partly: float = 1.0
+    partly: float = 0.5
+    halves: float = 0.25
     most_of_response: float = 0.25
     most_over_noise: float = 1.5
     most_left: float = 0.1

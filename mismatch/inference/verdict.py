@@ -79,6 +79,30 @@ def leaves_too_much(gain: Improvement, settings: VerdictSettings) -> bool:
     return gain.after > settings.most_over_noise * gain.noise_floor and share_left(gain) > settings.most_left
 
 
+def error_halved(gain: Improvement, settings: VerdictSettings) -> bool:
+    """Whether an answer leaves so little of what its rival leaves above the noise that it may be told in part.
+
+    An answer that errs by as much as the response itself predicts nothing, whatever its rival does.
+
+    Parameters
+    ----------
+    gain
+        Errors on the recording held out.
+    settings
+        Thresholds of what an answer may leave.
+
+    Examples
+    --------
+    >>> error_halved(Improvement("mid", 0.9, 0.5, 0.2, 0.1, 0.01, (0.1, 0.3)), VerdictSettings())
+    True
+    >>> error_halved(Improvement("mid", 0.9, 0.5, 0.3, 0.1, 0.01, (0.1, 0.3)), VerdictSettings())
+    False
+    """
+    rival = gain.refitted if gain.against == "refitted" else gain.before
+    excess, left = (max(one**2 - gain.noise_floor**2, 0.0) for one in (rival, gain.after))
+    return gain.after < 1 and excess > 0 and left <= settings.halves * excess
+
+
 def share_left(gain: Improvement) -> float:
     """Share of the nominal model's power above the noise, on the held-out recording, that the answer leaves.
 

@@ -148,7 +148,8 @@ def test_a_quarter_of_the_response_left_is_not_none(
     assert verdict_of([], bad) == "unexplained"
     tone = [AcceptedCause("unmeasured_excitation", {}, {"frequency_hz": 9.0}, {"frequency_hz": 0.1}, 99.0)]
     assert verdict_of(tone, good) == "explained"
-    assert verdict_of(tone, bad) == "partly explained"
+    assert verdict_of(tone, bad) == "unexplained"  # a tone that takes nothing away
+    assert verdict_of(tone, _gain(0.9, 0.8, 0.3, 0.1, 1e-6, 99.0)) == "partly explained"
     assert verdict_of(tone, _gain(1.2, 1.2, 1.06, 0.1, 1e-6, 99.0)) == "unexplained"  # it predicts nothing
 
 

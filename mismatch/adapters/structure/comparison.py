@@ -7,7 +7,7 @@ from estimation import WindowedSpectrum
 
 from ...inference import Proposal, Remainder, Round, Search, Settings, equivalents_of
 from ...models import Fit, fit, settled
-from ...physics import JointPhysics, Physics
+from ...physics import JointPhysics, Physics, answer_name
 from ...remainder import leftover
 from .acceptance import evidence_needed, impossible, plainest, possible_gains, worth_it
 from .rounds import Standing, StructureRound, Weighed, only_modes, weigh
@@ -36,6 +36,11 @@ class StructureComparison:
     causes: Mapping[str, Physics]
     settings: Settings
     before: Remainder
+
+    @property
+    def laws(self) -> set[str]:
+        """Names under which joint laws are told."""
+        return {answer_name(one) for one in self.causes.values() if isinstance(one, JointPhysics)}
 
     def finished(self, search: Search[Fit]) -> bool:
         """Whether to stop before a round finds nothing: never, as a small cause may hide behind a large one."""
@@ -85,7 +90,12 @@ class StructureComparison:
     def _equivalents(self, weighed: Weighed, chosen: Proposal[Fit]) -> tuple[str, ...]:
         evidence = self.settings.evidence
         possible = [one for one in weighed.proposals if not impossible(one, evidence.clear)]
-        return equivalents_of(possible, chosen, evidence.as_good)
+        near = equivalents_of(possible, chosen, evidence.as_good)
+        if chosen.name not in self.laws:
+            return near
+        laws = [one for one in possible if one.name in self.laws]
+        as_forms_go = equivalents_of(laws, chosen, (1 - evidence.as_good_form) * chosen.evidence)
+        return tuple(dict.fromkeys([*near, *as_forms_go]))
 
     def _laws_failed_at(self, search: Search[Fit]) -> float:
         """Power that moved with the signal when joint laws last failed; infinite where they did not."""

@@ -21,6 +21,7 @@ from ...inference import (
     Remainder,
     Search,
     Settings,
+    released,
     search,
 )
 from ...location import SpindleSpeed, StructureDetails, StructureDiagnosis, located, residual_view
@@ -31,8 +32,8 @@ from ...remainder import beyond_model, leftover
 from .comparison import StructureComparison
 from .confirmation import confirmed
 from .form_errors import with_form_spread
-from .held_out import HeldOut, Recordings, scored
-from .structure_verdict import verdict_of_structure
+from .held_out import HeldOut, Recordings, held_out_improvement, scored
+from .structure_verdict import has_a_sure_name, shown_faults, small_beside_the_rest, verdict_of_structure
 from .told_causes import modal_deviation, told_causes
 
 FIRST_FIT = 30
@@ -114,6 +115,7 @@ def _diagnosed(
     found, held_out = confirmed(comparison, both, found, faults)
     progress("what is left")
     answer = _answer(comparison, both, found, held_out, faults, decay)
+    found = answer.found
     progress("where the mismatch sits")
     band = max(bands, key=lambda band: band.high)
     elsewhere = answer.held_out.linear, answer.held_out.improved
@@ -183,11 +185,12 @@ def _mostly_kept(lines: WindowedSpectrum, before: WindowedSpectrum) -> bool:
 
 @dataclass(frozen=True)
 class _Answer:
-    """What is told: verdict, causes, the fit that holds them, what is left, errors held out, causes turned down."""
+    """What is told: verdict, causes, the fit that holds them, the search, what is left, errors, causes turned down."""
 
     verdict: str
     causes: tuple[AcceptedCause, ...]
     final: Fit
+    found: Search[Fit]
     left: Remainder
     held_out: HeldOut
     rejected: tuple[Candidate, ...] = ()
@@ -201,25 +204,49 @@ def _answer(
     faults: list[AcceptedCause],
     decay: float,
 ) -> _Answer:
-    """The verdict on the causes that a search found; under ``unexplained`` none of them is told."""
+    """The verdict on the causes that a search found; under ``unexplained`` none is told, in part only the large ones.
+
+    What is left may have moved the modes, too: ``modal_parameters`` is no part of a partial answer beside causes.
+    """
     settings, current = comparison.settings, found.current
     spread = with_form_spread(current, both.mended)
     named = [*faults, *told_causes(spread, found.accepted)]
     causes = with_tones_settled(current, both.measured, named, decay, settings.faults)
     faults = [cause for cause in causes if is_fault(cause.name)]
     held_out = scored(both, (held_out.linear, held_out.improved), current.noises, faults, settings.proof)
+    if both.tested and not found.accepted:
+        seen = shown_faults(faults, held_out.improvement, both.mended[-1].frequencies[-1], settings.proof.significance)
+        causes = [cause for cause in causes if cause not in faults or cause in seen]
+        held_out = scored(both, (held_out.linear, held_out.improved), current.noises, seen, settings.proof)
     deviation = _deviation(both.mended, spread)
     causes += [] if deviation is None else [deviation]
     left = leftover(current.hypothesis, both.mended)
     verdict = verdict_of_structure(
         current.hypothesis, causes, (comparison.before, left), held_out.improvement, settings.verdict
     )
+    if verdict == "partly explained" and found.accepted:
+        small = small_beside_the_rest(found, settings.evidence.small_in_part)
+        if small:
+            return _answer(comparison, both, *_without(comparison, both, found, small[-1], faults), faults, decay)
+        causes = [cause for cause in causes if cause is not deviation]
+        if not has_a_sure_name(found, comparison.laws):
+            verdict = "unexplained"
     if verdict != "unexplained":
-        return _Answer(verdict, tuple(causes), current, left, held_out)
+        return _Answer(verdict, tuple(causes), current, found, left, held_out)
     rejected = tuple(Candidate(one.name, one.evidence, "rejected", one.location) for one in causes)
     base, measured = found.base, Recordings(both.measured, both.measured)
     held_out = scored(measured, (held_out.linear, held_out.linear), base.noises, (), settings.proof)
-    return _Answer(verdict, (), base, comparison.before, held_out, rejected)
+    return _Answer(verdict, (), base, found, comparison.before, held_out, rejected)
+
+
+def _without(
+    comparison: StructureComparison, both: Recordings, found: Search[Fit], place: int, faults: list[AcceptedCause]
+) -> tuple[Search[Fit], HeldOut]:
+    """The search without one of its causes, and what the others are worth on what was held out."""
+    loss = found.accepted[place].evidence
+    found = released(found, place, comparison.without(found, place), "small beside what is left", loss)
+    last, proof = found.current, comparison.settings.proof
+    return found, held_out_improvement(both, last.hypothesis, last.noises, faults, proof)
 
 
 def _deviation(lines: list[WindowedSpectrum], current: Fit) -> AcceptedCause | None:

@@ -1,17 +1,20 @@
 """The verdict on a structure: what is left, what the recording held out says, and laws beyond what their names mean."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 from ...inference import (
     AcceptedCause,
     Findings,
     Improvement,
     Remainder,
+    Search,
     VerdictSettings,
+    error_halved,
     leaves_too_much,
     verdict_of,
 )
-from ...models import Hypothesis
+from ...models import Fit, Hypothesis
+from ...physics import ModePhysics
 from .acceptance import strained
 
 
@@ -41,7 +44,67 @@ def verdict_of_structure(
     most = settings.most_of_response
     incomplete = leaves_too_much(gain, settings) if causes else min(gain.before, gain.after) > most
     excluded = strained(hypothesis) and not after.noise_like(settings.noise_like)
-    # an answer that errs by as much as the response itself predicts nothing
-    predicts = gain.after < 1
-    findings = Findings(before, after, bool(causes), excluded=excluded, incomplete=incomplete, halved=predicts)
+    halved = error_halved(gain, settings)
+    findings = Findings(before, after, bool(causes), excluded=excluded, incomplete=incomplete, halved=halved)
     return verdict_of(findings, settings)
+
+
+def shown_faults(
+    faults: Sequence[AcceptedCause], gain: Improvement, highest: float, significance: float
+) -> list[AcceptedCause]:
+    """Faults that the held-out recording shows: none inside the band where they do not lower its error.
+
+    Parameters
+    ----------
+    faults
+        Faults of the recordings, the only causes that were found.
+    gain
+        Errors on the recording held out, with the faults put into the prediction.
+    highest
+        Upper end of the compared band, Hz; tones above it show in no error.
+    significance
+        Chance above which the error has not fallen.
+    """
+    if gain.p_value < significance:
+        return list(faults)
+    return [one for one in faults if one.parameters.get("frequency_hz", 0.0) > highest]
+
+
+def small_beside_the_rest(found: Search[Fit], share: float) -> list[int]:
+    """Places of accepted causes that bring less than a share of all evidence: they may mend what the others leave.
+
+    Parameters
+    ----------
+    found
+        Where the search ended.
+    share
+        Share of the evidence of all causes.
+    """
+    whole = found.base.score - found.current.score
+    return [k for k, one in enumerate(found.accepted) if one.evidence < share * whole]
+
+
+def has_a_sure_name(found: Search[Fit], laws: Collection[str]) -> bool:
+    """Whether what leaves something is still known by its name.
+
+    Further modes imitate much, also what no library holds: alone they are no name. A law of a joint must also be the
+    likeliest on the motion that was seen; where the free simulation prefers another, neither is sure.
+
+    Parameters
+    ----------
+    found
+        Where the search ended.
+    laws
+        Names of the joint laws that were weighed.
+    """
+    causes = found.current.hypothesis.causes
+    if all(isinstance(cause.physics, ModePhysics) for cause in causes):
+        return not causes
+    for one in found.accepted:
+        if one.name not in laws:
+            continue
+        rounds = [each for each in found.rounds if each.chosen is one]
+        seen = [each for each in rounds[0].candidates if each.stage == "screened" and each.name in laws]
+        if seen and max(seen, key=lambda each: each.evidence).name != one.name:
+            return False
+    return True
