@@ -19,8 +19,8 @@ def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
         lines.append(f"cannot be told from: {', '.join(diagnosis.equivalents)}")
     if diagnosis.verdict == "partly explained":
         lines.append(
-            f"{100 * diagnosis.improvement.after:.3g} % of the held-out response is still not predicted, more than a "
-            "whole explanation may leave"
+            f"{100 * diagnosis.improvement.after:.3g} % of the held-out response is still not predicted, and "
+            f"{100 * diagnosis.leftover:.0f} % of that moves with the signal, more than a whole explanation may leave"
         )
     lines += [
         f"{one.name} is not told: {one.location['impossible']}"
