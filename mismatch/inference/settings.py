@@ -78,6 +78,8 @@ class SearchSettings(Thresholds, shares=("within_reach", "laws_again")):
         Factor of a joint law's screened gain over any linear cause's from which laws are fitted first.
     laws_again
         Share of what moved with the signal when joint laws failed, below which they are tried again.
+    levels_apart
+        Factor between the weakest and the strongest recording from which laws are carried from one to the other.
     """
 
     most_causes: int = 3
@@ -85,6 +87,7 @@ class SearchSettings(Thresholds, shares=("within_reach", "laws_again")):
     within_reach: float = 0.5
     laws_first: float = 100.0
     laws_again: float = 0.7
+    levels_apart: float = 1.3
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@ from .chain_screening import ScreenedChain, screen_chains
 from .joint_direction import JointSighting, SeenMotion, find_direction, seen_motion
 from .joint_laws_fitted import SightedLaws, joint_candidates, sighted_laws
 from .joint_screening import screen_joints
+from .level_continuation import laws_by_level
 from .linear_causes_fitted import channel_of, linear_candidates
 from .missing_mode import SightedMode, find_mode
 from .whitened_residual import Floor, FloorRecord, linear_floor, noise_floor
@@ -18,6 +19,7 @@ __all__ = [
     "find_direction",
     "find_mode",
     "joint_candidates",
+    "laws_by_level",
     "linear_candidates",
     "linear_floor",
     "noise_floor",

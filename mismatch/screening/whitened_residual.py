@@ -141,7 +141,9 @@ def _floor(
         matrix += 2 * stacked.T @ stacked
         gradient += 2 * stacked.T @ record.rest
     gradient[: fitted.hypothesis.shape.size] -= fitted.hypothesis.shape.belief * fitted.hypothesis.u
-    return Floor(tuple(records), np.asarray(np.linalg.inv(matrix + np.diag(belief)), dtype=float), gradient)
+    return Floor(
+        tuple(records), np.asarray(np.linalg.pinv(matrix + np.diag(belief), hermitian=True), dtype=float), gradient
+    )
 
 
 def _floor_covariance(rest: Complex, through: Complex, level: tuple[Real, Real]) -> Complex:

@@ -167,5 +167,9 @@ def _variance(steps: Real, variances: Real) -> float:
     q = float(np.sum(weights * (steps - mean) ** 2))
     if freedom < 1 or q < chi2.isf(DISAGREE, freedom):
         return 0.0
-    between = (q - freedom) / float(np.sum(weights) - np.sum(weights**2) / np.sum(weights))
+    shared = float(np.sum(weights) - np.sum(weights**2) / np.sum(weights))
+    if shared <= 0:
+        # one part alone knows the number: the others cannot disagree
+        return 0.0
+    between = (q - freedom) / shared
     return max(between, 0.0) * float(student.ppf(0.975, freedom) / NORMAL) ** 2

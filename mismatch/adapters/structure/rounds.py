@@ -7,9 +7,9 @@ from typing import Any
 from estimation import WindowedSpectrum
 
 from ...inference import Candidate, Proposal, Remainder, Round, Settings, in_processes
-from ...models import Fit
+from ...models import Fit, Hypothesis
 from ...physics import ChainPhysics, JointPhysics, ModePhysics, Physics, answer_name
-from ...remainder import leftover
+from ...remainder import leftover, share_of_response
 from ...screening import (
     ScreenedChain,
     SightedLaws,
@@ -17,6 +17,7 @@ from ...screening import (
     channel_of,
     find_mode,
     joint_candidates,
+    laws_by_level,
     linear_candidates,
     noise_floor,
     screen_chains,
@@ -48,10 +49,16 @@ class Standing:
     before: Remainder
     settings: Settings
 
-    def is_left(self, left: Remainder) -> bool:
-        """Whether more is left than noise and the form of a law make."""
-        small = self.settings.evidence.small
-        return left.share > self.settings.verdict.noise_like and left.size > 3 * small * self.before.size
+    def is_left(self, left: Remainder, hypothesis: Hypothesis) -> bool:
+        """Whether more is left than noise and the form of a law make, or too much of the response for noise.
+
+        What is left may swell with the signal no more than by chance where all of it comes from one resonance, so
+        that a residual of much of the response is never taken for noise before joints were looked for.
+        """
+        small, limits = self.settings.evidence.small, self.settings.verdict
+        if left.share > limits.noise_like and left.size > 3 * small * self.before.size:
+            return True
+        return share_of_response(hypothesis, self.lines) > limits.most_of_response
 
 
 @dataclass(frozen=True)
@@ -107,7 +114,7 @@ def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
     """
     lines, current, settings = standing.lines, standing.current, standing.settings
     laws = [physics for physics in causes.values() if isinstance(physics, JointPhysics)]
-    much = standing.is_left(standing.moving)
+    much = standing.is_left(standing.moving, current.hypothesis)
     chains, mode, sighted = _screened(standing, causes, laws if much else [])
     weighed = [Candidate(answer_name(one.cause.physics), one.gain, "screened", channel_of(one.cause)) for one in chains]
     weighed += [Candidate(mode.physics.name, mode.gain, "screened")] if mode is not None else []
@@ -124,6 +131,8 @@ def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
             best = possible_gains(proposals, settings.evidence)
             gained = best[0].evidence if best else 0.0
             proposals += joint_candidates(lines, current, sighted, settings, least, gained)
+    if much and laws and not _explains(proposals, standing):
+        proposals += laws_by_level(lines, current, laws, settings)
     weighed += sighted.weighed
     weighed += [_candidate(one, settings.evidence.clear) for one in proposals]
     return Weighed(proposals, weighed, sighted.gain > 0)
@@ -160,6 +169,8 @@ def _explains(proposals: list[Proposal[Fit]], standing: Standing) -> bool:
     if not best:
         return False
     hypothesis, limits = best[0].fitted.hypothesis, standing.settings.verdict
+    if share_of_response(hypothesis, standing.lines) > limits.most_of_response:
+        return False
     left = leftover(hypothesis, standing.lines)
     if left.share <= limits.noise_like:
         return True
@@ -170,9 +181,10 @@ def _joints_are_due(proposals: list[Proposal[Fit]], standing: Standing) -> bool:
     """Whether joint laws are tried beside linear causes: none was found, a mode may imitate them, or much is left."""
     best = possible_gains(proposals, standing.settings.evidence)
     if not best:
-        return not standing.current.hypothesis.has_added_physics or standing.is_left(standing.moving)
+        current = standing.current.hypothesis
+        return not current.has_added_physics or standing.is_left(standing.moving, current)
     hypothesis = best[0].fitted.hypothesis
     # modes are many-sided: a joint that drifts or rubs is imitated by a few of them
     if isinstance(hypothesis.causes[-1].physics, ModePhysics):
         return True
-    return standing.is_left(leftover(hypothesis, standing.lines))
+    return standing.is_left(leftover(hypothesis, standing.lines), hypothesis)
