@@ -90,15 +90,16 @@ def _with_motion(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Hypot
     assert last.motion is not None
     joints = [predict_lines(hypothesis, one).joints[-1] for one in lines]
     strongest = max(joints, key=lambda one: float(np.std(one.deflection)))
-    sizes = [
+    motion = JointMotion(
         float(np.std(strongest.deflection)),
         float(np.std(strongest.velocity)),
         2.5 * max(float(np.abs(one.deflection).max()) for one in joints),
         2.5 * max(float(np.abs(one.velocity).max()) for one in joints),
-    ]
-    if not np.isfinite(sizes).all() or sizes[2] > LONGEST_REACH * last.motion.reach:
+        last.motion.stiffness,
+    )
+    # NaN is no smaller
+    if not motion.reach <= LONGEST_REACH * last.motion.reach:
         return hypothesis
-    motion = JointMotion(*sizes, last.motion.stiffness)
     return replace(hypothesis, causes=(*hypothesis.causes[:-1], replace(last, motion=motion)))
 
 
