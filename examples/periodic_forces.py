@@ -78,17 +78,17 @@ def spectra_picture(found: Findings) -> Figure:
         mean = np.abs(periods.realisations[0].responses.mean(axis=0)[:, WING]) * size
         noise = noise_of_periods(periods).responses[:, WING, WING].real / periods.realisations[0].n_periods
         excited, shown = excited_lines(periods), f < 45
-        axes.semilogy(f[excited], mean[excited], "o", color=COLOURS[0], markersize=2.2, label="excited lines")
+        axes.semilogy(f[excited], mean[excited], "o", color=COLOURS[0], markersize=2.2, label="Excited lines")
         others = shown & ~excited & (f > BAND[1])
-        axes.semilogy(f[others], mean[others], "x", color=COLOURS[2], markersize=2.6, label="lines not excited")
+        axes.semilogy(f[others], mean[others], "x", color=COLOURS[2], markersize=2.6, label="Lines not excited")
         axes.semilogy(
             f[shown],
             np.sqrt(noise[shown]) * size,
             color=COLOURS[1],
             linestyle=LINE_STYLES[1],
-            label="noise of the mean of eight periods",
+            label="Noise of the mean of eight periods",
         )
-        axes.set(xlabel="frequency (Hz)", xlim=(0, 45), ylim=(2e-6, 1.0))
+        axes.set(xlabel="Frequency (Hz)", xlim=(0, 45), ylim=(2e-6, 1.0))
         panel_letter(axes, number)
         axes.set_title(f"{periods.level:.3g} N rms")
     panels[0].set_ylabel("WING, rms of a line (m/s²)")
@@ -114,7 +114,7 @@ def levels_picture(found: Findings) -> Figure:
             markersize=3,
             label=f"{periods.level:.3g} N rms",
         )
-    panels[0].set(xlabel="frequency (Hz)", ylabel="PAYLOAD over force (m/s²/N)", xlim=(6.9, 7.7), ylim=(0, 0.31))
+    panels[0].set(xlabel="Frequency (Hz)", ylabel="PAYLOAD over force (m/s²/N)", xlim=(6.9, 7.7), ylim=(0, 0.31))
     panels[0].legend(loc="upper right", ncols=2)
     changes = found.dependence.changes()
     shifts = [(one.frequency, one.frequency_change, one.frequency_error) for one in changes]
@@ -130,7 +130,7 @@ def _changes(axes: Axes, rows: list[tuple[float, float, float]], what: str) -> N
     at, change, error = np.array(rows).T
     axes.axhline(0, color="#808080", linewidth=0.8)
     axes.errorbar(at, 100 * change, 200 * error, fmt="o", color=COLOURS[0], markersize=3.5, capsize=2)
-    axes.set(xlabel="mode at (Hz)", ylabel=f"change of {what}")
+    axes.set(xlabel="Mode at (Hz)", ylabel=f"Change of {what}")
 
 
 def main(folder: Path, pictures: Path | None) -> None:

@@ -33,10 +33,10 @@ def behaviour_figure(behaviour: Behaviour) -> Figure:
         panels[0].axhline(0, color="#808080", linewidth=0.8)
         for number, mode in enumerate(modes):
             _draw(panels, mode, number, number - (len(modes) - 1) / 2)
-        panels[0].set_ylabel("natural frequency, change (%)")
-        panels[1].set_ylabel("damping ratio (%)")
+        panels[0].set_ylabel("Natural frequency, change (%)")
+        panels[1].set_ylabel("Damping ratio (%)")
         panels[1].set_ylim(bottom=0)
-        name = "force" if behaviour.unit == "N" else "drive"
+        name = "Force" if behaviour.unit == "N" else "Drive"
         for number, axes in enumerate(panels):
             panel_letter(axes, number)
             axes.set_xscale("log")

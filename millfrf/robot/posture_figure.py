@@ -44,11 +44,11 @@ def posture_figure(found: PostureMap, max_depth: float, depth: float | None, wha
         chatters = found.reached & ~stable
         level = np.full(int(chatters.sum()), 1e3 * depth)
         upper.plot(angles[chatters], level, "x", color=COLOURS[2], markersize=4.5, label="chatters there")
-    upper.set_ylabel("depth of cut (mm)")
+    upper.set_ylabel("Depth of cut (mm)")
     upper.set_ylim(0, top)
     lower.plot(angles, found.frequencies, color=COLOURS[0], marker="o", markersize=2.5)
-    lower.set_ylabel("lowest natural\nfrequency (Hz)")
-    lower.set_xlabel(f"turn of {what} (degrees)")
+    lower.set_ylabel("Lowest natural\nfrequency (Hz)")
+    lower.set_xlabel(f"Turn of {what} (degrees)")
     lower.set_xlim(angles.min(), angles.max())
     for number, axes in enumerate((upper, lower)):
         panel_letter(axes, number)
