@@ -154,6 +154,8 @@ def _looked_at(force: Real, lag: int) -> tuple[float, RepeatedForce] | None:
     while True:  # a lag of twice as many periods says the fraction twice as well
         far = round(m * period)
         first = force[longest.start : longest.start + round(longest.n_periods * period)]
+        if len(first) - far < _width(period):  # slow forces: two periods by the slack of their ends alone
+            break
         period, error = _refined(first[:-far], first[far:], far, m)
         if 2 * m >= longest.n_periods:
             break

@@ -88,6 +88,7 @@ class ModelShape:
             right=np.vstack([self.nominal.right, right]),
             left=np.vstack([self.nominal.left, left]),
             covariance=None,
+            errors=None,
         )
         return ModelShape(model, self.lab, self.added + 1)
 
@@ -178,5 +179,10 @@ class ModelShape:
 def _modes_of(model: ModalModel, chosen: NDArray[np.int64]) -> ModalModel:
     """A model with some of its modes."""
     return replace(
-        model, poles=model.poles[chosen], right=model.right[chosen], left=model.left[chosen], covariance=None
+        model,
+        poles=model.poles[chosen],
+        right=model.right[chosen],
+        left=model.left[chosen],
+        covariance=None,
+        errors=None,
     )
