@@ -7,7 +7,7 @@ from .lines import receptance_at
 from .misfit import least_misfit, levels, through_structure, whitened
 from .model_shape import ModelShape
 from .model_terms import hypothesis_of, improved_model
-from .refinement import settled, with_chain
+from .refinement import believed, settled, with_chain
 
 __all__ = [
     "ENOUGH",
@@ -15,6 +15,7 @@ __all__ = [
     "Fit",
     "Hypothesis",
     "ModelShape",
+    "believed",
     "direction_of",
     "fit",
     "held_values",

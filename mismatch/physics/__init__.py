@@ -17,6 +17,7 @@ from .protocol import (
     ModePhysics,
     Parameter,
     Physics,
+    TwinPhysics,
     answer_name,
 )
 from .rig import Rig, in_units, offered, rig_of
@@ -37,6 +38,7 @@ __all__ = [
     "Parameter",
     "Physics",
     "Rig",
+    "TwinPhysics",
     "answer_name",
     "form_of",
     "in_units",

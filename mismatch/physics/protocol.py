@@ -120,6 +120,14 @@ class JointPhysics(Protocol):
 
 
 @runtime_checkable
+class TwinPhysics(Protocol):
+    """A joint's law that differs from another, with the same numbers, by a linear spring alone."""
+
+    twin: str
+    """Name of the other law."""
+
+
+@runtime_checkable
 class LimitedPhysics(Protocol):
     """A joint's law that keeps its name only within limits set by the motion; beyond them it is another law."""
 

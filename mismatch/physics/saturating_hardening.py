@@ -19,6 +19,7 @@ class SaturatingHardening:
 
     name = "saturating_hardening"
     answers_as = "stiffness_hardening"
+    twin = "smooth_backlash"
     equation = "g = k (x - x / (1 + |x / x0|^n)^(1/n)): stiffness k is gained beyond the knee x0"
     source = "Worden & Tomlinson, Nonlinearity in Structural Dynamics, section 2.2"
     parameters = (

@@ -18,6 +18,7 @@ class SmoothBacklash:
 
     name = "smooth_backlash"
     answers_as = "backlash"
+    twin = "saturating_hardening"
     equation = "g = -k x / (1 + |x / b|^n)^(1/n): stiffness k is missing inside about |x| < b"
     source = "Worden & Tomlinson, Nonlinearity in Structural Dynamics, section 2.2"
     parameters = (

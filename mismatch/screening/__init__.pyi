@@ -5,6 +5,7 @@ from .joint_screening import screen_joints
 from .level_continuation import laws_by_level
 from .linear_causes_fitted import channel_of, linear_candidates
 from .missing_mode import SightedMode, find_mode
+from .spring_twins import twin_laws
 from .whitened_residual import Floor, FloorRecord, linear_floor, noise_floor
 
 __all__ = [
@@ -27,4 +28,5 @@ __all__ = [
     "screen_joints",
     "seen_motion",
     "sighted_laws",
+    "twin_laws",
 ]

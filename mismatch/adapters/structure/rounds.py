@@ -22,6 +22,7 @@ from ...screening import (
     noise_floor,
     screen_chains,
     sighted_laws,
+    twin_laws,
 )
 from .acceptance import evidence_needed, impossible, possible_gains, strained
 
@@ -133,6 +134,7 @@ def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
             proposals += joint_candidates(lines, current, sighted, settings, least, gained)
     if much and laws and not _explains(proposals, standing):
         proposals += laws_by_level(lines, current, laws, settings)
+    proposals += twin_laws(lines, current, possible_gains(proposals, settings.evidence)[:1], causes)
     weighed += sighted.weighed
     weighed += [_candidate(one, settings.evidence.clear) for one in proposals]
     return Weighed(proposals, weighed, sighted.gain > 0)
