@@ -21,6 +21,7 @@ from mismatch import (
     JointPhysics,
     LabError,
     ModelShape,
+    behaviour_of,
     find_direction,
     fit,
     library,
@@ -119,6 +120,7 @@ def ask_library(folder: Path, fitted: ModalModel) -> None:
     base = fit(lines, nominal, iterations=5)
     for name, one in (("100 mV's model", nominal), ("one refit for all", base.hypothesis)):
         print(f"{name}: " + ", ".join(f"{error(one, each):.3f} at {each.recording.name}" for each in lines))
+    print(f"without any law: {behaviour_of(base.hypothesis, lines).sentence}")
     floor = linear_floor(base, lines)
     seen = find_direction(floor, base.hypothesis)
     print(f"one direction {np.round(seen.axis.entries, 2)} holds {seen.share:.2f} of what any force would explain")

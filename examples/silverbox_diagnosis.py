@@ -10,6 +10,7 @@ Run it: `python examples/silverbox_diagnosis.py FOLDER [PICTURE.png]`; FOLDER ho
 
 import sys
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -19,9 +20,22 @@ from scipy.io import loadmat
 from scipy.optimize import least_squares
 from scipy.signal import csd, welch
 
-from estimation import BandRecording, channels_of
+from estimation import BandRecording, channels_of, windowed_spectrum
 from figures import COLOURS, house_style, new_figure
-from mismatch import StructureDiagnosis, diagnose, improved_model, linear_floor, predict, seen_motion
+from mismatch import (
+    Behaviour,
+    Hypothesis,
+    LabError,
+    ModelShape,
+    StructureDiagnosis,
+    behaviour_of,
+    diagnose,
+    fit,
+    improved_model,
+    linear_floor,
+    predict,
+    seen_motion,
+)
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
@@ -40,6 +54,10 @@ PARTS = {
 }
 """Test parts and how many samples at their beginning do not count (nonlinear_benchmarks by G. Beintema: record from
 sample 100, the first 50 of it for the initial state; the last realisation is no training data here)."""
+
+
+SILENT, ARROW_BAND = 300, (20.0, 200.0)
+"""Samples before the arrowhead swells, and the band in which its parts are refitted, Hz."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +128,16 @@ def study(folder: Path) -> tuple[Signals, ModalModel, StructureDiagnosis]:
     return signals, nominal, diagnose(nominal, trials)
 
 
+def by_level(signals: Signals, nominal: ModalModel) -> Behaviour:
+    """What the mode does with the level: the arrowhead in five parts, each refitted alone."""
+    ends = np.linspace(SILENT, PARTS["arrowhead"][0].stop, 6).astype(int)
+    parts = [as_trial(f"part {k + 1}", signals, slice(a, b)) for k, (a, b) in enumerate(pairwise(ends.tolist()))]
+    decay = float((-nominal.poles.real).min())
+    lines = [windowed_spectrum(one, ARROW_BAND, decay) for one in parts]
+    shape = ModelShape(nominal, LabError())
+    return behaviour_of(fit(lines, Hypothesis(shape, np.zeros(shape.size))).hypothesis, lines)
+
+
 def picture(signals: Signals, nominal: ModalModel, found: StructureDiagnosis) -> Figure:
     """Free-run error over the arrowhead, and the force that the residual asks for over the deflection."""
     figure = new_figure(85)
@@ -156,6 +184,9 @@ def main(folder: Path, target: Path | None) -> None:
     before_errors, after_errors = free_run_errors(nominal, signals), free_run_errors(after, signals)
     for name in PARTS:
         print(f"free run, {name}: {before_errors[name]:.2f} mV before, {after_errors[name]:.3f} mV after")
+    behaviour = by_level(signals, nominal)
+    print(f"without any law, arrowhead: {behaviour.sentence}")
+    print("  " + ", ".join(f"{one:.2f} Hz" for one in behaviour.modes[0].frequencies))
     if target is not None:
         with house_style():
             picture(signals, nominal, found).savefig(target, dpi=150)
