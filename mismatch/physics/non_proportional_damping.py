@@ -33,11 +33,36 @@ class NonProportionalDamping:
 
     def chain(self, s: Complex, values: Real, place: str, model: ModalModel) -> Chain:
         """Return the matrices of the cause at ``s`` (n,), rad/s."""
-        damping = np.zeros((3, 3))
-        for value, (i, j) in zip(values, PLACES, strict=True):
-            damping[i, j] = damping[j, i] = value
+        damping = _matrix(values)
         columns, rows = (["XYZ".index(axis) for axis in axes_of(labels)] for labels in _sides(model))
         return Chain(feedback=s[:, None, None] * damping[np.ix_(columns, rows)])
+
+    def impossible(self, values: Real, margin: Real) -> str:
+        """Say why these numbers are impossible by more than their margins of error; empty where they are possible.
+
+        A damper only takes energy: along no direction d may ``d^T C d`` be negative.
+        """
+        lowest, directions = np.linalg.eigh(_matrix(values))
+        weights = _weights(directions[:, 0])
+        if lowest[0] >= -float(np.linalg.norm(weights * margin)):
+            return ""
+        return (
+            f"a damper that gives energy ({lowest[0]:.3g} N s/m along one direction); less damping than the model's is "
+            "a matter of its modes"
+        )
+
+
+def _matrix(values: Real) -> Real:
+    """The symmetric matrix C, (3, 3), of its six numbers."""
+    damping = np.zeros((3, 3))
+    for value, (i, j) in zip(values, PLACES, strict=True):
+        damping[i, j] = damping[j, i] = value
+    return damping
+
+
+def _weights(direction: Real) -> Real:
+    """Change of ``d^T C d`` with each of the six numbers, (6,)."""
+    return np.array([direction[i] * direction[j] * (1 if i == j else 2) for i, j in PLACES])
 
 
 def _sides(model: ModalModel) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -162,6 +162,10 @@ def test_impossible_numbers_are_said_to_be_so() -> None:
     assert "damping" in force_cell.impossible(np.array([2e-6, -1e-3]), slack)
     assert force_cell.impossible(np.array([2e-6, 1e-4]), slack) == ""
     axes, room = library()["dynamometer_axes"], np.full(4, 1e-5)
+    damper, loose = library()["non_proportional_damping"], np.full(6, 5.0)
+    assert "gives energy" in damper.impossible(np.array([-40.0, 80.0, 60.0, 0.0, 0.0, 0.0]), loose)
+    assert "gives energy" in damper.impossible(np.array([10.0, 10.0, 10.0, 60.0, 0.0, 0.0]), loose)
+    assert damper.impossible(np.array([40.0, 80.0, -4.0, 0.0, 0.0, 0.0]), loose) == ""
     assert "damping" in axes.impossible(np.array([2e-6, 2e-6, 2e-6, -1e-3]), room)
 
 
