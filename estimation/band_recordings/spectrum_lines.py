@@ -2,12 +2,16 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, prev_fast_len, rfft
 
 from .reduced_recording import BandRecording
+
+if TYPE_CHECKING:
+    from ..repeats import MeasuredNoise
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -45,6 +49,8 @@ class WindowedSpectrum:
         the true ones.
     measured : (n_lines, n_responses)
         Spectrum of the windowed response, scaled so that white noise of variance v has variance v a line.
+    noise
+        Noise that the recording shows without a model, in the band; None where it shows none.
     """
 
     recording: BandRecording
@@ -57,6 +63,7 @@ class WindowedSpectrum:
     force_here: Complex
     measured: Complex
     trust: Complex
+    noise: "MeasuredNoise | None" = None
 
     @cached_property
     def padded_frequencies(self) -> Real:

@@ -35,6 +35,7 @@ def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
     if diagnosis.details.behaviour is not None:
         lines.append(f"behaviour by level: {diagnosis.details.behaviour.sentence}")
     lines.append(_error_line(diagnosis))
+    lines += [one["sentence"] for one in diagnosis.content.get("noise", ())]
     return lines
 
 

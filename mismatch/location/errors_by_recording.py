@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..faults import residual_lines
-from ..models import through_structure
+from ..models import known_noise, through_structure
 from ..physics import is_fault
 from .structure_details import StructureDiagnosis
 
@@ -54,7 +54,7 @@ def recording_errors(diagnosis: StructureDiagnosis) -> tuple[RecordingError, ...
             residual_lines(improved, one, faults),
         )
         power = float(np.sum(np.abs(one.measured) ** 2))
-        covariance = noise.covariance(one.frequencies, through_structure(improved, one))
+        covariance = known_noise(one, through_structure(improved, one), noise)
         nominal, refitted, final = (float(np.sqrt(np.sum(np.abs(rest) ** 2) / power)) for rest in rests)
         floor = float(np.sqrt(np.sum(np.trace(covariance, axis1=1, axis2=2).real) / power))
         found.append(

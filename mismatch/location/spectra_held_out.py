@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from estimation import WindowedSpectrum
 
 from ..faults import residual_lines
-from ..models import through_structure
+from ..models import known_noise, through_structure
 from ..physics import is_fault
 from .band_means import band_means
 from .residual_maps import band_edges
@@ -58,7 +58,7 @@ def held_out_spectra(diagnosis: StructureDiagnosis) -> HeldOutSpectra:
     before, after = details.elsewhere
     faults = [cause for cause in diagnosis.physics if is_fault(cause.name)]
     rests = residual_lines(before, here), residual_lines(after, here, faults)
-    covariance = final.noises[kept].covariance(here.frequencies, through_structure(final.hypothesis, here))
+    covariance = known_noise(here, through_structure(final.hypothesis, here), final.noises[kept])
     edges = band_edges([here], BANDS_PER_OCTAVE, 3)
     power = [
         np.abs(here.measured) ** 2,

@@ -4,7 +4,7 @@ from .hypothesis import Cause, Hypothesis, direction_of, held_values, line_respo
 from .linear_lines import response_to_joint
 from .linear_part import with_linear_part
 from .lines import receptance_at
-from .misfit import least_misfit, levels, through_structure, whitened
+from .misfit import known_noise, least_misfit, levels, outdoes_noise, through_structure, whitened
 from .model_shape import ModelShape
 from .model_terms import hypothesis_of, improved_model
 from .refinement import believed, settled, with_chain
@@ -22,10 +22,12 @@ __all__ = [
     "hypothesis_of",
     "improved_model",
     "jacobian",
+    "known_noise",
     "least_misfit",
     "levels",
     "line_response",
     "modes_are_odd",
+    "outdoes_noise",
     "predict_lines",
     "receptance_at",
     "residual",

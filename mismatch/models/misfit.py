@@ -15,6 +15,10 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 
+OUTDONE = 0.7
+"""Power of a residual over that of measured noise below which that was not noise alone."""
+
+
 @dataclass(frozen=True)
 class Misfit:
     """One recording under a hypothesis.
@@ -80,7 +84,8 @@ def with_noise(
     if not np.isfinite(rest).all():
         raise np.linalg.LinAlgError(f"the response predicted for {lines.recording.name} is not finite")
     linear = seen.linear if seen is not None and seen.linear is not None else linear_lines(hypothesis, lines)
-    found = fit_noise(lines.frequencies, rest, linear.through, levels(lines), noise)
+    forces = None if lines.noise is None else np.einsum("kqq->kq", lines.noise.forces).real.mean(axis=0)
+    found = fit_noise(lines.frequencies, rest, linear.through, levels(lines), noise, forces)
     return _misfit_of(lines, predicted, linear, rest, found)
 
 
@@ -95,6 +100,42 @@ def least_misfit(hypothesis: Hypothesis, lines: WindowedSpectrum) -> float:
 def through_structure(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Complex:
     """Matrix from measured forces to measured responses at the lines, (n_lines, n_responses, n_excitations)."""
     return linear_lines(hypothesis, lines).through
+
+
+def known_noise(lines: WindowedSpectrum, through: Complex, noise: NoiseModel) -> Complex:
+    """Covariance of what is noise beyond doubt, (n_lines, n_responses, n_responses): measured, else inferred.
+
+    Parameters
+    ----------
+    lines
+        Windowed lines of the recording.
+    through : (n_lines, n_responses, n_excitations)
+        Matrix from measured forces to responses at the lines.
+    noise
+        Noise that was inferred from a residual, which holds the errors of the model's form, too.
+    """
+    if lines.noise is None:
+        return noise.covariance(lines.frequencies, through)
+    return lines.noise.covariance(lines.frequencies, through)
+
+
+def outdoes_noise(hypothesis: Hypothesis, lines: WindowedSpectrum) -> bool:
+    """Whether a hypothesis leaves clearly less of any response than the noise that was measured, which is then none.
+
+    Forces that repeat only nearly, as at constant speed, change from period to period, and responses with them.
+
+    Parameters
+    ----------
+    hypothesis
+        A fitted hypothesis.
+    lines
+        Windowed lines of the recording.
+    """
+    if lines.noise is None:
+        return False
+    covariance = lines.noise.covariance(lines.frequencies, through_structure(hypothesis, lines))
+    rest = np.sum(np.abs(lines.measured - predict_lines(hypothesis, lines).response) ** 2, axis=0)
+    return bool((rest < OUTDONE * np.einsum("kpp->p", covariance).real).any())
 
 
 def levels(lines: WindowedSpectrum) -> tuple[Real, Real]:

@@ -1,6 +1,6 @@
 """Noise of responses and forces, inferred from what a model leaves over: no share, colour or silent band is assumed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ STIFFNESS = 1.0
 
 FORCE_SHARE = (-0.7, 1.0)
 """Mean and standard deviation of ln(force noise share / response noise share): forces are measured no worse."""
+
+HELD = 1e-3
+"""Standard deviation of the ln variance of a force's noise that was measured."""
 
 WARM, COLD = 12, 60
 """Steps at most if the search begins with a noise that was fitted before, and if it begins with none."""
@@ -85,7 +88,12 @@ def whitening_and_determinant(covariance: Complex) -> tuple[Complex, float]:
 
 
 def fit_noise(
-    frequencies: Real, residual: Complex, through: Complex, levels: tuple[Real, Real], start: NoiseModel | None = None
+    frequencies: Real,
+    residual: Complex,
+    through: Complex,
+    levels: tuple[Real, Real],
+    start: NoiseModel | None = None,
+    forces: Real | None = None,
 ) -> NoiseModel:
     """Most likely noise of residual lines that are Gaussian, outlying lines weighted down.
 
@@ -104,6 +112,8 @@ def fit_noise(
         prior.
     start
         Noise that the search begins with; None: taken from the residual.
+    forces : (n_excitations,)
+        Variance of the forces' noise at a line where it was measured, which is then held; None: estimated.
     """
     knots = np.linspace(np.log(frequencies[0]), np.log(frequencies[-1]), KNOTS)
     n, m = residual.shape[1], through.shape[2]
@@ -114,7 +124,10 @@ def fit_noise(
         start = NoiseModel(knots, np.tile(level[:, None], KNOTS) - 1.0, share - 2.0 + 2 * np.log(levels[1]))
     hat = _hat(knots, frequencies)
     weights = np.ones(len(frequencies))
-    belief = _belief(n, m, levels)
+    held = None if forces is None else np.log(np.maximum(forces, 1e-30))
+    if held is not None:
+        start = replace(start, forces=held)
+    belief = _belief(n, m, levels, held)
     noise = start
     for turn in range(1 if warm else 2):
         if turn:
@@ -132,14 +145,17 @@ def _hat(knots: Real, frequencies: Real) -> Real:
     return np.asarray(np.maximum(0.0, 1.0 - np.abs(place[:, None] - np.arange(len(knots)))))
 
 
-def _belief(n: int, m: int, levels: tuple[Real, Real]) -> tuple[Real, Real]:
-    """Weak prior ``0.5 |A x + b|^2`` of the knots' ln variances and the forces': A and b."""
+def _belief(n: int, m: int, levels: tuple[Real, Real], held: Real | None) -> tuple[Real, Real]:
+    """Weak prior ``0.5 |A x + b|^2`` of the knots' ln variances and the forces', strong where they are held: A, b."""
     size = n * KNOTS + m
     smooth = np.zeros((n * (KNOTS - 1), size))
     for row in range(len(smooth)):
         first = row // (KNOTS - 1) * KNOTS + row % (KNOTS - 1)
         smooth[row, first : first + 2] = -1 / STIFFNESS, 1 / STIFFNESS
     share = np.zeros((m, size))
+    if held is not None:
+        share[np.arange(m), n * KNOTS + np.arange(m)] = 1 / HELD
+        return np.vstack([smooth, share]), np.concatenate([np.zeros(len(smooth)), -held / HELD])
     share[:, : n * KNOTS] = -0.5 / (n * KNOTS)
     share[np.arange(m), n * KNOTS + np.arange(m)] = 0.5
     off = np.log(levels[0]).mean() - np.log(levels[1]) - FORCE_SHARE[0]

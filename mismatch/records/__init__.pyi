@@ -1,5 +1,6 @@
 from .common_band import ComparedBand, compared_band
 from .deflection_form import in_deflections, without_delay
+from .measured_noise import noise_content, with_measured_noise
 from .reading import band_of, measured_part, read_at, read_recording, read_recordings
 from .true_forces import without_force_noise
 
@@ -9,9 +10,11 @@ __all__ = [
     "compared_band",
     "in_deflections",
     "measured_part",
+    "noise_content",
     "read_at",
     "read_recording",
     "read_recordings",
+    "with_measured_noise",
     "without_delay",
     "without_force_noise",
 ]

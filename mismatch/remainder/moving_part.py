@@ -9,7 +9,7 @@ from scipy.signal.windows import hann
 from estimation import WindowedSpectrum
 
 from ..inference import Remainder
-from ..models import Hypothesis, predict_lines
+from ..models import Hypothesis, predict_lines, through_structure
 from .cell_regression import moving_power
 from .repeated_part import repeated_share
 
@@ -25,6 +25,13 @@ SHIFTS, CHANCE = 14, 0.8
 """Times that the prediction is shifted against the residual, and the quantile of what it then carries: the noise of a
 force rings in lightly damped modes, and so few independent swells are easily matched by chance."""
 
+CLEAR, BOTH = 2.0, 3.0
+"""Standard errors by which a residual must exceed measured noise, and the variance of their ratio over that of one
+line: one from the residual, two from the noise of two periods, the fewest."""
+
+EXACT = 0.01
+"""Error, over the response, that is asked of no modal model: with strong signals noise lies far below it."""
+
 
 def leftover(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Remainder:
     """How much of the residual moves with the predicted response.
@@ -35,7 +42,8 @@ def leftover(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Remainder
     prediction is shifted in time against the residual. Where forces were replaced by what they say of the true ones,
     the forces as measured are tried too, and what moves with both counts: the replaced ones lack force where it swells
     from little, the measured ones bring their noise. Where forces repeat, the part of the residual that repeats with
-    them counts too (:func:`repeated_share`): a steady test has no times of more and of less signal.
+    them counts too (:func:`repeated_share`): a steady test has no times of more and of less signal. Where noise was
+    measured no chance is needed: all power above it is left over.
 
     Parameters
     ----------
@@ -52,6 +60,9 @@ def leftover(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Remainder
     """
     found = []
     for one in lines:
+        if one.noise is not None:
+            found.append(_above_noise(hypothesis, one))
+            continue
         moving = _moving(hypothesis, one)
         measured = one.with_measured_forces()
         if not np.array_equal(measured.force_here, one.force_here):
@@ -77,6 +88,20 @@ def _moving(hypothesis: Hypothesis, one: WindowedSpectrum) -> Real:
         share = np.clip(own - np.quantile(shifted, CHANCE), 0.0, whole) / whole
         found.append([share, np.clip(own - np.median(shifted), 0.0, whole) / size])
     return np.array(found)
+
+
+def _above_noise(hypothesis: Hypothesis, one: WindowedSpectrum) -> Real:
+    """Share of the residual's power and of the response's above the measured noise, (n_responses, 2)."""
+    assert one.noise is not None
+    rest = np.sum(np.abs(one.measured - predict_lines(hypothesis, one).response) ** 2, axis=0)
+    whole = np.sum(np.abs(one.measured) ** 2, axis=0)
+    covariance = one.noise.covariance(one.frequencies, through_structure(hypothesis, one))
+    lines = np.einsum("kpp->kp", covariance).real
+    noise = lines.sum(axis=0)
+    # residual and noise are both known from as many lines as carry the noise's power
+    spread = np.sqrt(BOTH * np.sum(lines**2, axis=0)) / noise
+    own = noise * (1 + CLEAR * spread) + EXACT**2 * whole
+    return np.column_stack([np.clip(1 - own / rest, 0.0, 1.0), np.maximum(rest - noise, 0.0) / whole])
 
 
 def _repeating(hypothesis: Hypothesis, one: WindowedSpectrum) -> Real:

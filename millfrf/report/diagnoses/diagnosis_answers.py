@@ -190,6 +190,7 @@ def how_sure(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
         for cause in diagnosis.physics
     ]
     said.append(_errors(diagnosis))
+    said += [one["sentence"] for one in diagnosis.content.get("noise", ())]
     said.append(f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal.")
     return tuple(said)
 

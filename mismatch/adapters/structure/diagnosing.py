@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -25,9 +26,17 @@ from ...inference import (
     search,
 )
 from ...location import SpindleSpeed, StructureDetails, StructureDiagnosis, located, residual_view
-from ...models import Fit, Hypothesis, ModelShape, fit, with_linear_part
+from ...models import Fit, Hypothesis, ModelShape, fit, known_noise, outdoes_noise, through_structure, with_linear_part
 from ...physics import is_fault, library, offered
-from ...records import ComparedBand, compared_band, in_deflections, without_delay, without_force_noise
+from ...records import (
+    ComparedBand,
+    compared_band,
+    in_deflections,
+    noise_content,
+    with_measured_noise,
+    without_delay,
+    without_force_noise,
+)
 from ...remainder import beyond_model, leftover
 from .comparison import StructureComparison
 from .confirmation import confirmed
@@ -97,12 +106,18 @@ def _diagnosed(
 ) -> StructureDiagnosis:
     """The diagnosis, one step after the other."""
     decay = float((-model.poles.real).min())
-    lines = [windowed_spectrum(one, band.edges, decay) for one, band in zip(recordings, bands, strict=True)]
+    lines = [
+        with_measured_noise(windowed_spectrum(one, band.edges, decay))
+        for one, band in zip(recordings, bands, strict=True)
+    ]
     for one in lines:
         _refuse_empty(one)
     progress("modal parameters")
     shape = ModelShape(model, settings.lab)
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=FIRST_FIT)
+    if any(outdoes_noise(base.hypothesis, one) for one in lines):
+        lines = [replace(one, noise=None) for one in lines]
+        base = fit(lines, base.hypothesis, iterations=FIRST_FIT)
     measured, base = _with_true_forces(lines, base, settings.evidence)
     progress("tones and clipping")
     mended, base, faults = repair_faults(measured, base, settings)
@@ -140,8 +155,18 @@ def _diagnosed(
             "compared_band": asdict(band),
             "not_asked_for": list(left_out),
             "behaviour": behaviour.content(),
+            "noise": _noise_of(answer.final, measured),
         },
     )
+
+
+def _noise_of(final: Fit, lines: list[WindowedSpectrum]) -> list[dict[str, Any]]:
+    """What the file says of the noise of each recording."""
+    found = []
+    for one, inferred in zip(lines, final.noises, strict=True):
+        covariance = known_noise(one, through_structure(final.hypothesis, one), inferred)
+        found.append(noise_content(one, covariance))
+    return found
 
 
 def _refuse_empty(lines: WindowedSpectrum) -> None:
@@ -168,6 +193,9 @@ def _with_true_forces(
     forces may have no noise at all.
     """
     found = [(lines, base)]
+    if all(one.noise is not None for one in lines):
+        # how noisy the forces are is measured, and between their lines there is nothing to replace
+        return found[0]
     estimated = [np.exp(noise.forces) for noise in base.noises]
     for variances in (estimated, [np.full(len(variance), np.inf) for variance in estimated]):
         weighed = [without_force_noise(one, variance) for one, variance in zip(lines, variances, strict=True)]

@@ -13,7 +13,7 @@ from estimation import WindowedSpectrum
 
 from ...faults import residual_lines
 from ...inference import AcceptedCause, Improvement, ProofSettings, in_processes, ratio_interval
-from ...models import Hypothesis, fit, least_misfit, through_structure
+from ...models import Hypothesis, fit, known_noise, least_misfit, through_structure
 from ...noise import NoiseModel, whitening
 
 Complex = NDArray[np.complex128]
@@ -163,7 +163,9 @@ def scored(
         residual_lines(linear, here),
         residual_lines(improved, here, faults),
     ]
-    covariance = noises[place].covariance(here.frequencies, through_structure(improved, here))
+    through = through_structure(improved, here)
+    covariance = noises[place].covariance(here.frequencies, through)
+    floor = known_noise(here, through, noises[place])
     power = float(np.sum(np.abs(here.measured) ** 2))
     runs_away = not np.isfinite(rests[2]).all()
     rests = [np.where(np.isfinite(rest), rest, RUNS_AWAY * np.abs(here.measured)) for rest in rests]
@@ -180,7 +182,7 @@ def scored(
         before,
         refitted,
         after,
-        float(np.sqrt(np.sum(np.trace(covariance, axis1=1, axis2=2).real) / power)),
+        float(np.sqrt(np.sum(np.trace(floor, axis1=1, axis2=2).real) / power)),
         chance_of_no_gain(here, covariance, rival, rests[2], settings) if tested else 1.0,
         ratio_interval(block_powers(here, rests[0]), block_powers(here, rests[2])),
         evidence,

@@ -1,0 +1,96 @@
+"""Forces that repeat show the noise without a model: what is above it is left over, whatever moves with the signal."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from one_mode_rig import Rig
+
+from estimation import BandRecording, windowed_spectrum
+from millfrf.structure.diagnosis_words import diagnosis_lines
+from mismatch import Hypothesis, LabError, ModelShape, band_of, diagnose
+from mismatch.models import outdoes_noise
+from mismatch.noise.noise_model import fit_noise
+from mismatch.records import with_measured_noise
+
+NOISE, PERIOD, PERIODS = 0.01, 1024, 8
+
+
+def steady(rig: Rig, name: str, level: float, seed: int) -> BandRecording:
+    """Eight periods of a multisine of 2 to 22 Hz, once the rig has settled."""
+    rng = np.random.default_rng(seed)
+    spectrum = np.zeros(PERIOD // 2 + 1, dtype=complex)
+    lines = np.arange(round(2 * PERIOD / rig.rate), round(22 * PERIOD / rig.rate))
+    spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
+    period = np.fft.irfft(spectrum, n=PERIOD)
+    one = rig.recording(name, np.tile(level * period / period.std(), PERIODS + 2), NOISE, seed)
+    return replace(one, force=one.force[2 * PERIOD :], response=one.response[2 * PERIOD :])
+
+
+@pytest.mark.parametrize("levels", [(1.0, 4.0), (4.0,)])
+def test_nothing_is_found_in_a_linear_rig_that_is_driven_steadily(levels: tuple[float, ...]) -> None:
+    rig = Rig()
+    found = diagnose(rig.model, [steady(rig, f"level_{level:g}", level, 5) for level in levels])
+    assert found.verdict == "none"
+    assert found.after.share == 0.0
+    assert found.improvement.after == pytest.approx(found.improvement.noise_floor, rel=0.05)
+
+
+@pytest.mark.parametrize("levels", [(1.0, 4.0), (4.0,)])
+def test_a_cubic_spring_that_is_driven_steadily_is_told(levels: tuple[float, ...]) -> None:
+    """A tenth of stiffening; before: the periodic residual passed for noise."""
+    rig = Rig().stiffened(0.1, 4.0)
+    found = diagnose(rig.model, [steady(rig, f"level_{level:g}", level, 5) for level in levels])
+    assert found.verdict == "explained"
+    assert [cause.name for cause in found.physics] == ["stiffness_hardening"]
+    assert found.improvement.after < 1.2 * found.improvement.noise_floor
+    assert found.before.share > 0.8
+
+
+def test_what_no_law_explains_is_not_called_noise() -> None:
+    """A third of stiffening at one level, which a search for laws may miss: all but the noise is left over."""
+    rig = Rig().stiffened(0.3, 4.0)
+    found = diagnose(rig.model, [steady(rig, "only", 4.0, 5)])
+    assert found.before.share > 0.99
+    (noise,) = found.content["noise"]
+    assert noise["kind"] == "periods"
+    assert noise["share"] == pytest.approx(NOISE, rel=0.5)
+    assert found.improvement.noise_floor < 1.5 * NOISE
+    assert any(", periods. " in line and "periods of 8 s" in line for line in diagnosis_lines(found))
+
+
+def test_forces_that_hardly_repeat_show_no_noise() -> None:
+    """What the model leaves is less than what differs between periods: the forces differed, not the noise."""
+    rig = Rig()
+    one = steady(rig, "only", 4.0, 5)
+    lines = with_measured_noise(windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0))
+    shape = ModelShape(rig.model, LabError())
+    true = Hypothesis(shape, np.zeros(shape.size))
+    assert lines.noise is not None
+    assert not outdoes_noise(true, lines)
+    louder = replace(lines.noise, responses=2 * lines.noise.responses)
+    assert outdoes_noise(true, replace(lines, noise=louder))
+
+
+def test_random_forces_show_no_noise() -> None:
+    rig = Rig()
+    one = rig.recordings((1.0,))[0]
+    lines = windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0)
+    assert with_measured_noise(lines) is lines
+    found = diagnose(rig.model, [one])
+    assert [each["kind"] for each in found.content["noise"]] == ["inferred"]
+    assert any(", inferred. " in line for line in diagnosis_lines(found))
+
+
+def test_noise_of_forces_that_was_measured_is_held() -> None:
+    """A residual that looks like noise of the force, of which the periods say that there is none."""
+    rng = np.random.default_rng(3)
+    frequencies = np.linspace(2.0, 30.0, 600)
+    through = 1e3 / (1 - (frequencies / 9.0) ** 2 + 0.1j * frequencies / 9.0)[:, None, None]
+    force = rng.normal(size=(600, 2)) @ np.array([1, 1j]) / np.sqrt(2)
+    residual = through[:, :, 0] * force[:, None]
+    levels = np.array([1e4]), np.array([10.0])
+    free, held = (fit_noise(frequencies, residual, through, levels, None, one) for one in (None, np.array([1e-4])))
+    assert np.exp(free.forces)[0] == pytest.approx(1.0, rel=0.2)
+    assert np.exp(held.forces)[0] == pytest.approx(1e-4, rel=0.01)
+    assert held.response_level()[0] > 10 * free.response_level()[0]
