@@ -24,7 +24,8 @@ class Behaviour:
     Parameters
     ----------
     family
-        Family of the modes that move most clearly (:data:`FAMILIES`); ``none`` or ``cannot tell`` where none moves.
+        Family of the modes that move most clearly (:data:`FAMILIES`), or ``none``, ``doubtful`` or ``cannot tell``
+        where none moves for certain.
     sentence
         The family in words, with its reason.
     unit
@@ -95,7 +96,7 @@ def _of_all(modes: list[ModeTrend]) -> str:
     """The family that the clearest modes speak for; each mode counts by how clearly it moves."""
     weight: dict[str, float] = defaultdict(float)
     for one in modes:
-        if one.family not in ("none", "cannot tell"):
+        if one.family not in ("none", "doubtful", "cannot tell"):
             sigmas = (one.shift / max(one.shift_error, 1e-12), one.gain / max(one.gain_error, 1e-12))
             weight[one.family] += min(max(abs(value) for value in sigmas), 100.0)
     if weight:
@@ -103,7 +104,7 @@ def _of_all(modes: list[ModeTrend]) -> str:
         if first == "softening":  # modes whose damping is known say more
             first = next((name for name in ("slip", "softening or slip") if name in weight), first)
         return first
-    return "none" if any(one.family == "none" for one in modes) else "cannot tell"
+    return next((name for name in ("doubtful", "none") if any(one.family == name for one in modes)), "cannot tell")
 
 
 def _sentence(family: str, modes: list[ModeTrend]) -> str:
@@ -114,9 +115,7 @@ def _sentence(family: str, modes: list[ModeTrend]) -> str:
         single = len(modes[0].levels) < 2
         reason = "all recordings have one level" if single else "errors are wider than any trend that would tell"
         return f"Cannot tell: {reason}."
-    first = max(
-        (one for one in modes if one.family == family), key=lambda one: abs(one.shift) / max(one.shift_error, 1e-12)
-    )
+    first = max((one for one in modes if one.family == family), key=lambda one: -min(one.p_values))
     ending = f": {FAMILIES[family]}" if len(first.levels) < 2 or family == "drift" else ""
     return f"{first.sentence[:1].upper()}{first.sentence[1:]}{ending}."
 

@@ -16,6 +16,7 @@ FAMILIES: Mapping[str, str] = {
     "dry": "dissipative, dry: friction, whose damping falls as motion grows",
     "viscous": "dissipative, faster than velocity: damping of a power above one, as in a fluid",
     "drift": "time-varying: it drifts while the level stays",
+    "doubtful": "a change that chance may have made, of all modes that were looked at",
     "cannot tell": "cannot tell",
 }
 """Families of behaviour, and what each says."""
@@ -28,13 +29,17 @@ class BehaviourSettings:
     Parameters
     ----------
     chance
-        Probability below which a change is told, for all modes of a diagnosis together.
+        Probability below which a change is told, for all modes of a diagnosis together; of one mode alone it is
+        doubtful.
     apart
         Ratio of what drives the rig from which two recordings have two levels.
     smeared
         Damping ratio that a frequency which moves with the amplitude imitates: ``d min(a, b d / zeta)`` for a shift by
         the share d at the damping ratio zeta, with (a, b) here. What exceeds it are losses. Springs that stiffen and
         springs that soften, under random forces, give 0.45 and 0.21 at most.
+    dominant
+        Change of the damping ratio over the share by which the frequency moved, from which losses alone are told: the
+        pole then moves along the real axis.
     seen
         Standard error of a frequency, as a share, or of a damping ratio, over itself, above which nothing is seen.
     """
@@ -42,6 +47,7 @@ class BehaviourSettings:
     chance: float = 0.01
     apart: float = 1.2
     smeared: tuple[float, float] = (0.5, 0.35)
+    dominant: float = 3.0
     seen: tuple[float, float] = (0.03, 0.5)
 
 
@@ -67,9 +73,12 @@ def family_of(trend: ModeTrend, tests: int, settings: BehaviourSettings) -> str:
     if not moves and trend.drift_p_value < least:
         return "drift"
     if not moves and not damps:
+        if min(trend.p_values) < settings.chance:
+            return "doubtful"
         wide = trend.shift_error > settings.seen[0] or trend.gain_error > settings.seen[1]
         return "cannot tell" if wide else "none"
-    if not moves:
+    lost = trend.gain * trend.damping[0]
+    if not moves or (damps and abs(lost) > settings.dominant * abs(trend.shift)):
         return "viscous" if trend.gain > 0 else "dry"
     if trend.shift > 0:
         return "hardening"
@@ -101,10 +110,11 @@ def sentence_of(trend: ModeTrend, family: str, unit: str) -> str:
     between = f"between {trend.levels[0]:.3g} and {trend.levels[-1]:.3g} {unit}"
     shift, gain = f"{100 * abs(trend.shift):.2g}", f"{100 * abs(trend.gain):.2g}"
     shift_error, gain_error = f"{200 * trend.shift_error:.1g}", f"{200 * trend.gain_error:.2g}"
-    if family in ("none", "cannot tell", "drift"):
+    if family in ("none", "doubtful", "cannot tell", "drift"):
         held = f"frequency {100 * trend.shift:+.2g} ± {shift_error} %, damping {100 * trend.gain:+.2g} ± {gain_error} %"
         ending = {
             "none": "moves no further than its error",
+            "doubtful": "seems to move, which chance may have made",
             "cannot tell": "errors are wider than any trend that would tell",
             "drift": f"drifts by {100 * trend.drift:+.2g} % over a recording",
         }[family]
@@ -112,6 +122,6 @@ def sentence_of(trend: ModeTrend, family: str, unit: str) -> str:
     moved = "stiffens" if trend.shift > 0 else "softens"
     frequency = f"{moved} by {shift} ± {shift_error} %"
     if family in ("viscous", "dry"):
-        frequency = f"keeps its frequency ({100 * trend.shift:+.2g} ± {shift_error} %)"
+        frequency = f"all but keeps its frequency ({100 * trend.shift:+.2g} ± {shift_error} %)"
     damping = f"{'gains' if trend.gain > 0 else 'loses'} {gain} ± {gain_error} % of its damping"
     return f"{where} {frequency} and {damping} {between}: {FAMILIES[family]}"

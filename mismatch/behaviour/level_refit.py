@@ -47,6 +47,8 @@ class RefittedModes:
         Logarithms of natural frequencies (rad/s), then damping ratios, and their standard errors.
     drift, drift_errors : (2, n_modes)
         Change of the same over the length of the recording, and its standard error; nan where parts are too few.
+    freedom
+        Degrees of freedom of the errors: one less than the parts that they rest on.
     misfit
         Root mean square that the refit leaves, over the response.
     """
@@ -57,6 +59,7 @@ class RefittedModes:
     errors: Real
     drift: Real
     drift_errors: Real
+    freedom: int
     misfit: float
 
 
@@ -88,7 +91,8 @@ def refitted_modes(start: Hypothesis, lines: WindowedSpectrum) -> RefittedModes:
         scatter = np.sum(moves**2, axis=0) / (len(moves) * (len(moves) - 1))
         variance = np.maximum(variance, scatter)
         drift, drift_error = _slope_over_time(moves)
-    return _in_numbers(state.hypothesis, few, state.misfit, (variance, drift, drift_error))
+    freedom = max(len(parts), FEWEST_PARTS) - 1
+    return _in_numbers(state, few, freedom, (variance, drift, drift_error))
 
 
 @dataclass(frozen=True)
@@ -188,12 +192,10 @@ def _slope_over_time(moves: Real) -> tuple[Real, Real]:
     return np.asarray(slope), np.sqrt(scatter / power)
 
 
-def _in_numbers(
-    hypothesis: Hypothesis, lines: WindowedSpectrum, misfit: float, found: tuple[Real, Real, Real]
-) -> RefittedModes:
+def _in_numbers(state: _State, lines: WindowedSpectrum, freedom: int, found: tuple[Real, Real, Real]) -> RefittedModes:
     """Logarithms of frequencies and of damping ratios, from lab errors."""
-    shape = hypothesis.shape
-    model, rows = hypothesis.model, [shape.modal_rows(one)[:, :2].T for one in found]
+    shape = state.hypothesis.shape
+    model, rows = state.hypothesis.model, [shape.modal_rows(one)[:, :2].T for one in found]
     damping = model.damping_ratios
     units = np.stack([np.full(len(damping), shape.lab.frequency), shape.lab.damping * damping])
     return RefittedModes(
@@ -203,5 +205,6 @@ def _in_numbers(
         units * np.sqrt(rows[0]),
         units * rows[1],
         units * rows[2],
-        misfit,
+        freedom,
+        state.misfit,
     )

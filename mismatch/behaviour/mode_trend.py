@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import erfc
+from scipy.special import stdtr
 
 from .level_refit import RefittedModes
 
@@ -73,6 +73,7 @@ def mode_trends(refits: Sequence[RefittedModes], apart: float) -> list[ModeTrend
     groups = _grouped(sorted(refits, key=lambda one: one.level), apart)
     means = [_joined(group) for group in groups]
     levels = tuple(float(np.mean([one.level for one in group])) for group in groups)
+    freedom = tuple(sum(one.freedom for one in group) for group in (groups[0], groups[-1]))
     drift, chance = _drift(refits)
     trends = []
     for r in range(refits[0].values.shape[1]):
@@ -94,12 +95,21 @@ def mode_trends(refits: Sequence[RefittedModes], apart: float) -> list[ModeTrend
                 float(errors_of[0]),
                 float(gain) / lowest if several else 0.0,
                 float(errors_of[1]) / lowest,
-                (_chance(shift / errors_of[0]), _chance(gain / errors_of[1])) if several else (1.0, 1.0),
+                _chances(np.array([shift, gain]), errors[[0, -1]], freedom) if several else (1.0, 1.0),
                 float(drift[r]),
                 float(chance[r]),
             )
         )
     return trends
+
+
+def _chances(change: Real, errors: Real, freedom: tuple[int, ...]) -> tuple[float, float]:
+    """Chance of the change of ln frequency and of damping ratio (2,), with the errors of both levels (2, 2)."""
+    first, last = (
+        _chance(float(change[k] / np.hypot(*errors[:, k])), _welch(errors[:, k], (freedom[0], freedom[1])))
+        for k in range(2)
+    )
+    return first, last
 
 
 def _plain(values: Real) -> tuple[float, ...]:
@@ -141,8 +151,16 @@ def _drift(refits: Sequence[RefittedModes]) -> tuple[Real, Real]:
     error = 1 / np.sqrt(weight.sum(axis=0))
     if len(seen) > 1:
         error = error * np.sqrt(np.maximum(1.0, np.sum(weight * (values - mean) ** 2, axis=0) / (len(seen) - 1)))
-    return np.asarray(mean), np.array([_chance(sigmas) for sigmas in mean / error])
+    freedom = sum(one.freedom - 1 for one in seen)
+    return np.asarray(mean), np.array([_chance(sigmas, freedom) for sigmas in mean / error])
 
 
-def _chance(sigmas: float) -> float:
-    return float(erfc(abs(sigmas) / np.sqrt(2)))
+def _chance(sigmas: float, freedom: float) -> float:
+    """Chance of as many standard errors either way, where these were estimated themselves (Student's t)."""
+    return float(2 * stdtr(freedom, -abs(sigmas)))
+
+
+def _welch(errors: Real, freedom: tuple[int, int]) -> float:
+    """Degrees of freedom of a difference of two means with errors (2,) (Welch, Biometrika 34, 28, 1947)."""
+    first, last = np.maximum(errors, 1e-12) ** 2
+    return float((first + last) ** 2 / (first**2 / freedom[0] + last**2 / freedom[1]))

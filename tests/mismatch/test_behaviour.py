@@ -112,11 +112,11 @@ def test_one_level_cannot_tell() -> None:
 
 def test_a_drift_at_one_level_is_no_matter_of_the_level() -> None:
     rig = Rig()
-    force = rig.forces(30.0, 60.0, 5)
+    force = rig.forces(30.0, 120.0, 5)
     pieces = [
         replace(rig, frequency=rig.frequency * (1 - 0.004 * k)).recording(f"part_{k}", force, seed=k) for k in range(9)
     ]
-    # each tenth of a minute belongs to a slightly softer rig
+    # each ninth of the record belongs to a slightly softer rig
     ends = np.linspace(0, len(force), 10).astype(int)
     response = np.concatenate([one.response[a:b] for one, a, b in zip(pieces, ends[:-1], ends[1:], strict=True)])
     found = told_of([replace(pieces[0], response=response)], rig)
