@@ -1,5 +1,5 @@
 from .derivatives import jacobian
-from .fitting import ENOUGH, Fit, fit, modes_are_odd, residual
+from .fitting import ENOUGH, Fit, fit, modes_are_odd, plain_fit, residual
 from .hypothesis import Cause, Hypothesis, direction_of, held_values, line_response, predict_lines, surround
 from .linear_lines import response_to_joint
 from .linear_part import with_linear_part
@@ -28,6 +28,7 @@ __all__ = [
     "line_response",
     "modes_are_odd",
     "outdoes_noise",
+    "plain_fit",
     "predict_lines",
     "receptance_at",
     "residual",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from estimation import WindowedSpectrum
 
 from ..inference import Descended, Limits, descend, plain_step
-from ..noise import NoiseModel
+from ..noise import NoiseModel, flat_noise
 from ..physics import MODAL_PARAMETERS
 from .derivatives import slopes
 from .hypothesis import Hypothesis, predict_lines
@@ -22,6 +22,9 @@ THREADS = 2
 
 ENOUGH, LEFT_OUT = 4000, 3
 """Lines of a recording on which a fit begins if it has more, and the steps on all lines that this saves."""
+
+EXACT = 0.01
+"""Error, over the response, that a plain fit takes every line to have."""
 
 BLOCK = 512
 """Lines whose derivatives are worked out together."""
@@ -62,6 +65,7 @@ def fit(
     *,
     iterations: int = 8,
     tolerance: float = 3.0,
+    held: bool = False,
 ) -> Fit:
     """Fit a hypothesis to recordings.
 
@@ -81,6 +85,8 @@ def fit(
         Number of steps at most.
     tolerance
         Gain in misfit that counts: the fit ends after two smaller gains, or where less than a tenth of it is expected.
+    held
+        Whether ``noises`` are held, and not estimated.
 
     Returns
     -------
@@ -88,7 +94,7 @@ def fit(
         With an infinite misfit and score where the start runs away when it is simulated: nothing then speaks for it.
     """
     try:
-        return _fit(lines, start, noises, iterations, tolerance)
+        return _fit(lines, start, noises, iterations, tolerance, held)
     except np.linalg.LinAlgError:
         size = start.size
         return Fit(start, noises or (), np.inf, _deviation(start), np.inf, np.zeros((size, size)))
@@ -100,20 +106,22 @@ def _fit(
     noises: tuple[NoiseModel, ...] | None,
     iterations: int,
     tolerance: float,
+    held: bool,
 ) -> Fit:
     """The fit of a start that can be simulated."""
     hypothesis, known = start, noises
     with ThreadPoolExecutor(THREADS) as pool:
         rough = [one.thinned(ENOUGH) for one in lines]
         if any(few is not one for few, one in zip(rough, lines, strict=True)):
-            state = _descended(pool, rough, hypothesis, known, Limits(iterations, tolerance)).state
+            state = _descended(pool, rough, hypothesis, known, Limits(iterations, tolerance), held).state
             hypothesis, known = state.hypothesis, tuple(one.noise for one in state.seen)
             iterations = max(0, iterations - LEFT_OUT)
-        end = _descended(pool, lines, hypothesis, known, Limits(iterations, tolerance))
+        end = _descended(pool, lines, hypothesis, known, Limits(iterations, tolerance), held)
         hypothesis, seen = end.state.hypothesis, end.state.seen
-        cold = list(pool.map(with_noise, lines, [hypothesis] * len(lines), [None] * len(lines), seen))
-    # a noise that crept along from a bad beginning may have stopped short: the better of two searches counts
-    seen = [min(pair, key=lambda one: one.misfit) for pair in zip(seen, cold, strict=True)]
+        if not held:
+            cold = list(pool.map(with_noise, lines, [hypothesis] * len(lines), [None] * len(lines), seen))
+            # a noise that crept along from a bad beginning may have stopped short: the better of two searches counts
+            seen = [min(pair, key=lambda one: one.misfit) for pair in zip(seen, cold, strict=True)]
     misfit, deviation = sum(one.misfit for one in seen), _deviation(hypothesis)
     count = 2 * sum(one.measured.size for one in lines)
     numbers = sum(cause.size for cause in hypothesis.causes)
@@ -143,6 +151,7 @@ class _Problem:
 
     pool: ThreadPoolExecutor
     lines: list[WindowedSpectrum]
+    held: bool
 
     def cost(self, state: _State) -> float:
         """The cost ``misfit + |u|^2``."""
@@ -171,7 +180,9 @@ class _Problem:
         return _State(there, list(self.pool.map(misfit_under, self.lines, [there] * len(self.lines), noises)))
 
     def settled(self, state: _State) -> _State:
-        """The hypothesis under the noise that fits its residual best."""
+        """The hypothesis under the noise that fits its residual best, or under that which is held."""
+        if self.held:
+            return state
         there = [state.hypothesis] * len(self.lines)
         noises = [one.noise for one in state.seen]
         return replace(state, seen=list(self.pool.map(with_noise, self.lines, there, noises, state.seen)))
@@ -183,11 +194,34 @@ def _descended(
     start: Hypothesis,
     noises: tuple[NoiseModel, ...] | None,
     limits: Limits,
+    held: bool,
 ) -> Descended[_State]:
     """Where Gauss-Newton's steps end."""
     current = list(noises) if noises is not None else [None] * len(lines)
-    seen = list(pool.map(with_noise, lines, [start] * len(lines), current))
-    return descend(_Problem(pool, lines), _State(start, seen), limits)
+    if held and noises is not None:
+        seen = list(pool.map(misfit_under, lines, [start] * len(lines), noises))
+    else:
+        seen = list(pool.map(with_noise, lines, [start] * len(lines), current))
+    return descend(_Problem(pool, lines, held), _State(start, seen), limits)
+
+
+def plain_fit(lines: list[WindowedSpectrum], start: Hypothesis, *, iterations: int) -> Fit:
+    """Fit by unweighted least squares: every line counts alike, at whatever frequency and level.
+
+    No noise is inferred. Each response is scaled by its power over all recordings, and the lab's belief hardly counts.
+
+    Parameters
+    ----------
+    lines
+        Windowed spectra of the recordings that are compared.
+    start
+        Hypothesis that the fit begins with.
+    iterations
+        Number of steps at most.
+    """
+    power = np.mean([np.mean(np.abs(one.measured) ** 2, axis=0) for one in lines], axis=0)
+    noises = tuple(flat_noise(one.frequencies, EXACT**2 * power, one.force_here.shape[1]) for one in lines)
+    return fit(lines, start, noises, iterations=iterations, held=True)
 
 
 def residual(fitted: Fit, lines: list[WindowedSpectrum]) -> list[Complex]:

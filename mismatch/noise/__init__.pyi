@@ -1,9 +1,10 @@
 from .line_loops import size_of_white, whitened_columns
-from .noise_model import NoiseModel, fit_noise, whitening, whitening_and_determinant
+from .noise_model import NoiseModel, fit_noise, flat_noise, whitening, whitening_and_determinant
 
 __all__ = [
     "NoiseModel",
     "fit_noise",
+    "flat_noise",
     "size_of_white",
     "whitened_columns",
     "whitening",

@@ -67,6 +67,23 @@ class NoiseModel:
         return np.asarray(np.sqrt(np.exp(self.responses).mean(axis=1)))
 
 
+def flat_noise(frequencies: Real, responses: Real, n_excitations: int) -> NoiseModel:
+    """Noise of the same variance at every line, (n_responses,), and none of the forces.
+
+    Parameters
+    ----------
+    frequencies : (n_lines,), Hz
+        Frequencies of the lines, rising.
+    responses : (n_responses,)
+        Variance of each response's noise at a line.
+    n_excitations
+        Number of forces.
+    """
+    knots = np.linspace(np.log(frequencies[0]), np.log(frequencies[-1]), KNOTS)
+    level = np.tile(np.log(np.maximum(responses, 1e-30))[:, None], KNOTS)
+    return NoiseModel(knots, level, np.full(n_excitations, -80.0))
+
+
 def whitening(covariance: Complex) -> Complex:
     """The W with ``W^H W = V^-1`` for which W r is white, (n_lines, n, n), lower triangular.
 

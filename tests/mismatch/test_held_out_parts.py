@@ -5,10 +5,11 @@ import pytest
 from concealed_recordings import RATE
 from one_mode_rig import Rig
 
-from estimation import BandRecording, windowed_spectrum
+from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from mismatch import Hypothesis, LabError, ModelShape, band_of, diagnose
 from mismatch.adapters.structure.held_out import Recordings
 from mismatch.faults import residual_lines
+from mismatch.models import fit, plain_fit
 from modal_fit import ModalModel
 
 
@@ -51,3 +52,20 @@ def test_a_law_is_confirmed_by_parts_of_its_own_levels(levels: tuple[float, ...]
     assert gain.part
     assert gain.p_value < 0.01
     assert gain.after < 1.3 * gain.noise_floor
+
+
+def test_a_plain_refit_gives_no_recording_up() -> None:
+    """The strong level stiffens by three quarters; inferred noise takes what a linear refit leaves there for noise."""
+    rig = Rig().stiffened(0.78, 4.0)
+    lines = [windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0) for one in rig.recordings((1.0, 4.0), 40.0)]
+    shape = ModelShape(rig.model, LabError())
+    start = Hypothesis(shape, np.zeros(shape.size))
+    plain, weighted = plain_fit(lines, start, iterations=30), fit(lines, start, iterations=30)
+    strong, weak = lines[1], lines[0]
+
+    def left(hypothesis: Hypothesis, one: WindowedSpectrum) -> float:
+        return float(np.sum(np.abs(residual_lines(hypothesis, one)) ** 2))
+
+    assert left(plain.hypothesis, strong) < 0.9 * left(weighted.hypothesis, strong)
+    assert left(plain.hypothesis, weak) > left(weighted.hypothesis, weak)
+    assert np.ptp(plain.noises[1].responses) == 0.0

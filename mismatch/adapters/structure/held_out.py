@@ -13,7 +13,7 @@ from estimation import WindowedSpectrum
 
 from ...faults import residual_lines
 from ...inference import AcceptedCause, Improvement, ProofSettings, in_processes, ratio_interval
-from ...models import Hypothesis, fit, known_noise, least_misfit, through_structure
+from ...models import Hypothesis, fit, known_noise, least_misfit, plain_fit, through_structure
 from ...noise import NoiseModel, whitening
 
 Complex = NDArray[np.complex128]
@@ -109,6 +109,9 @@ def held_out_improvement(
     Two recordings, or one, are fitted in their first and last quarters, and compared in the middle half of the weaker.
     Of a single short one nothing can be held out: errors are then those of the fit, the p-value is 1.
 
+    Modal parameters alone are fitted twice, under inferred noise and by plain least squares: inferred noise makes loud
+    recordings count little that a model predicts badly. The better of both on what was held out is the rival.
+
     Parameters
     ----------
     recordings
@@ -125,12 +128,21 @@ def held_out_improvement(
         Modal parameters alone as they were fitted to the other recordings before; None: they are fitted here.
     """
     mended, measured = recordings.others(recordings.mended), recordings.others(recordings.measured)
-    tasks = [partial(fit, measured, final.nominal, iterations=ITERATIONS)] if linear is None else []
-    if final.causes or any(a is not b for a, b in zip(mended, measured, strict=True)):
+    caused = bool(final.causes) or any(a is not b for a, b in zip(mended, measured, strict=True))
+    rivals = [] if linear is not None else [fit, plain_fit] if caused else [fit]
+    tasks = [partial(one, measured, final.nominal, iterations=ITERATIONS) for one in rivals]
+    if caused:
         tasks.append(partial(fit, mended, final, iterations=ITERATIONS))
     fitted: list[Hypothesis] = [one.hypothesis for one in in_processes(tasks)]
-    elsewhere = fitted if linear is None else [linear, *fitted]
-    return scored(recordings, (elsewhere[0], elsewhere[-1]), noises, faults, settings)
+    if linear is None:
+        linear = _better(fitted[: len(rivals)], recordings)
+    return scored(recordings, (linear, fitted[-1] if caused else linear), noises, faults, settings)
+
+
+def _better(refits: list[Hypothesis], recordings: Recordings) -> Hypothesis:
+    """The refit that predicts what was held out with the smaller error: causes must beat the better one."""
+    here = recordings.held_out(recordings.measured)
+    return min(refits, key=lambda one: float(np.sum(np.abs(residual_lines(one, here)) ** 2)))
 
 
 def scored(
