@@ -22,6 +22,9 @@ SILENT = 1e-3
 TRIED = 12
 """Number of lags that are looked at closely."""
 
+NEAR = 0.1
+"""Share by which the period from the phase may differ from the lag at which forces are alike."""
+
 
 @dataclass(frozen=True)
 class Stretch:
@@ -145,6 +148,8 @@ def _candidates(force: Real, least: int, most: int) -> list[int]:
 def _looked_at(force: Real, lag: int) -> tuple[float, RepeatedForce] | None:
     """Misfit at a lag, and the period with its stretches; None where no two periods are alike."""
     period, error = _refined(force[:-lag], force[lag:], lag, 1)
+    if not abs(period - lag) <= NEAR * lag:  # alike because they are slow: the phase knows of no such period
+        return None
     misfit, runs = _runs(force, period)
     stretches = [one for one in (_stretch(a, b, period) for a, b in runs) if one.n_periods >= 2]
     if not stretches:
@@ -155,6 +160,8 @@ def _looked_at(force: Real, lag: int) -> tuple[float, RepeatedForce] | None:
         far = round(m * period)
         first = force[longest.start : longest.start + round(longest.n_periods * period)]
         if len(first) - far < _width(period):  # slow forces: two periods by the slack of their ends alone
+            if m == 1:
+                return None
             break
         period, error = _refined(first[:-far], first[far:], far, m)
         if 2 * m >= longest.n_periods:

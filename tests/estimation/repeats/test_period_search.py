@@ -85,3 +85,13 @@ def test_periods_between_samples_are_the_signal_there() -> None:
     times = start + period * np.arange(512) / 512
     truth = np.cos(2 * np.pi * np.outer(times / period, k) + phase).sum(axis=1)
     assert np.abs(cut[:, :, 0] - truth).max() < 1e-3 * truth.std()
+
+
+def test_slow_forces_have_no_period_of_less_than_a_sample() -> None:
+    # a joint that follows a path: slow, smooth, and alike at every short lag
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        time = np.arange(1742) / 50.0
+        force = np.interp(time, np.linspace(0, 35, 12), rng.normal(size=12))[:, None]
+        found = find_repeats(force + 0.01 * np.sin(2 * np.pi * 0.1 * time)[:, None])
+        assert found is None or found.period > 50
