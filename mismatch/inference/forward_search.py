@@ -73,9 +73,10 @@ def released(found: Search[Fit], place: int, less: Fit, stage: str, evidence: fl
         Score that the last step loses.
     """
     gone = found.accepted[place]
-    steps = found.steps[:-1] if place == len(found.accepted) - 1 else (
-        *found.steps[: place + 1], *found.steps[place + 2 : -1], less
-    )  # fmt: skip
+    if place == len(found.accepted) - 1:
+        steps = (*found.steps[:place], less) if place else found.steps[:1]
+    else:
+        steps = (*found.steps[: place + 1], *found.steps[place + 2 : -1], less)
     return replace(
         found,
         steps=steps,

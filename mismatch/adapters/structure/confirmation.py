@@ -91,7 +91,7 @@ def _idle(
     """Place of a cause that the held-out recording does not confirm, and the fit on all recordings without it."""
     last, count = found.current, len(found.accepted)
     if not helps(held_out.improvement, last, found.base, comparison.settings):
-        return count - 1, found.steps[-2]
+        return count - 1, _before_last(comparison, found)
     if count == 1:
         return None
     others = recordings.others(recordings.mended)
@@ -101,10 +101,18 @@ def _idle(
         if _missed(comparison, recordings, (whole, less), last, held_out):
             continue
         if k == count - 1:
-            return k, found.steps[-2]
+            return k, _before_last(comparison, found)
         again = fit(recordings.mended, last.hypothesis.without(k), last.noises, iterations=ITERATIONS)
         return k, again
     return None
+
+
+def _before_last(comparison: StructureComparison, found: Search[Fit]) -> Fit:
+    """The fit without the last cause: the step before, unless that still has a cause that was let go since."""
+    step, kept = found.steps[-2], found.current.hypothesis.causes[:-1]
+    if [one.physics for one in step.hypothesis.causes] == [one.physics for one in kept]:
+        return step
+    return comparison.without(found, len(kept))
 
 
 def _missed(

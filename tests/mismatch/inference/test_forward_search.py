@@ -18,6 +18,7 @@ from mismatch.inference import (
     Settings,
     best_first,
     equivalents_of,
+    released,
     search,
 )
 
@@ -133,6 +134,17 @@ def test_pruning_lets_go_of_what_only_imitated_the_others() -> None:
     assert found.candidates[0].evidence == max(one.evidence for one in found.candidates)
     assert problem.told[0] == "causes, round 1"
     assert problem.told[-1] == "causes made needless"
+
+
+def test_a_search_ends_with_the_fit_that_is_left_when_its_last_cause_goes() -> None:
+    """The step before may still hold a cause that was let go in between."""
+    problem = imitated()
+    found = problem.searched()
+    less = problem.fit((found.accepted[0].name,))
+    left = released(found, 1, less, "not confirmed", 0.0)
+    assert left.current is less
+    assert len(left.steps) == len(left.accepted) + 1
+    assert released(left, 0, less, "not confirmed", 0.0).steps == (found.base,)
 
 
 def test_the_last_cause_is_never_pruned() -> None:
