@@ -35,7 +35,7 @@ from .inference import (
     read_diagnosis,
     write_diagnosis,
 )
-from .joints import JointLaw, JointMotion
+from .joints import JointLaw, JointMotion, joint_in_words, tip_axes
 from .location import (
     BinnedForce,
     BlockResidual,
@@ -126,6 +126,7 @@ __all__ = [
     "in_deflections",
     "in_processes",
     "jacobian",
+    "joint_in_words",
     "library",
     "linear_floor",
     "measured_part",
@@ -147,6 +148,7 @@ __all__ = [
     "significant_cells",
     "spindle_speed",
     "standard_error_of",
+    "tip_axes",
     "write_diagnosis",
     "write_improved_cut",
 ]

@@ -1,6 +1,6 @@
 """The diagnosis of a structure in words: the lines that `millfrf diagnose` prints."""
 
-from mismatch import AcceptedCause, StructureDiagnosis
+from mismatch import AcceptedCause, StructureDiagnosis, joint_in_words
 
 
 def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
@@ -45,7 +45,7 @@ def _cause_line(cause: AcceptedCause) -> str:
         f"{name} {value:.4g}" + (f" ± {cause.standard_errors[name]:.2g}" if name in cause.standard_errors else "")
         for name, value in cause.parameters.items()
     )
-    place = ", ".join(f"{key} {value}" for key, value in cause.location.items())
+    place = joint_in_words(cause.location) or ", ".join(f"{key} {value}" for key, value in cause.location.items())
     return f"{cause.name}{f' ({place})' if place else ''}: {numbers}; evidence {cause.evidence:.0f}"
 
 

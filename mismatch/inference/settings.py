@@ -91,7 +91,7 @@ class SearchSettings(Thresholds, shares=("within_reach", "laws_again")):
 
 
 @dataclass(frozen=True)
-class ScreeningSettings(Thresholds, shares=("promising_law", "promising_linear", "nearly", "rival")):
+class ScreeningSettings(Thresholds, shares=("promising_law", "promising_linear", "nearly", "rival", "place")):
     """Which screened candidates are fitted.
 
     Parameters
@@ -106,7 +106,9 @@ class ScreeningSettings(Thresholds, shares=("promising_law", "promising_linear",
         Gain of a law on the motion seen, as a share of the best law's and of the best linear cause's, from which it
         is simulated.
     direction
-        Gain for each recording from which a direction is believed.
+        Gain for each recording from which the place of a joint is believed.
+    place
+        Share by which a joint between points or in the modes must explain more than one at the tip.
     resolved
         Least half-power bandwidth of an added mode, in spacings of lines.
     """
@@ -120,6 +122,7 @@ class ScreeningSettings(Thresholds, shares=("promising_law", "promising_linear",
     nearly: float = 0.6
     rival: float = 0.3
     direction: float = 50.0
+    place: float = 0.01
     resolved: float = 2.0
 
 

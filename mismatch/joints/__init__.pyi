@@ -3,6 +3,7 @@ from .joint_axis import JointAxis, ModalScales, tip_axes
 from .joint_law import JointLaw, JointMotion
 from .joint_paths import JointPath, JointReach, joint_reach
 from .joint_simulation import JointResponse, driven_force, joint_dynamics, joint_response, stiffness_ramp
+from .joint_words import joint_in_words
 from .reciprocity import modal_scales
 from .saturation import Saturation, rounded, saturated
 from .tangent_loop import tangent_run
@@ -20,6 +21,7 @@ __all__ = [
     "axis_of",
     "driven_force",
     "joint_dynamics",
+    "joint_in_words",
     "joint_reach",
     "joint_response",
     "modal_scales",

@@ -1,6 +1,6 @@
 from .derivatives import jacobian
 from .fitting import ENOUGH, Fit, fit, modes_are_odd, plain_fit, residual
-from .hypothesis import Cause, Hypothesis, direction_of, held_values, line_response, predict_lines, surround
+from .hypothesis import Cause, Hypothesis, held_values, line_response, location_of, predict_lines, surround
 from .linear_lines import response_to_joint
 from .linear_part import with_linear_part
 from .lines import receptance_at
@@ -16,7 +16,6 @@ __all__ = [
     "Hypothesis",
     "ModelShape",
     "believed",
-    "direction_of",
     "fit",
     "held_values",
     "hypothesis_of",
@@ -26,6 +25,7 @@ __all__ = [
     "least_misfit",
     "levels",
     "line_response",
+    "location_of",
     "modes_are_odd",
     "outdoes_noise",
     "plain_fit",

@@ -94,12 +94,22 @@ class Cause:
         return self.physics.law(self.values, self.motion)
 
 
-def direction_of(cause: Cause) -> dict[str, Any]:
-    """Location of a joint, as a diagnosis states it; the largest entry is positive."""
-    assert cause.axis is not None
-    entries = cause.axis.entries
-    direction = entries * np.sign(entries[np.argmax(np.abs(entries))])
-    return {"direction": [round(float(x), 6) for x in direction]}
+def location_of(axis: JointAxis, model: ModalModel) -> dict[str, Any]:
+    """Location of a joint, as a diagnosis states it; the largest entry is positive.
+
+    Parameters
+    ----------
+    axis
+        Where the joint gives way.
+    model
+        Model in which it does, whose modes name what takes part.
+    """
+    entries = axis.entries * np.sign(axis.entries[np.argmax(np.abs(axis.entries))])
+    parts = [round(float(x), 6) for x in entries]
+    if axis.scales is None:
+        return {"direction": parts}
+    frequencies = (round(float(frequency), 4) for frequency in model.natural_frequencies)
+    return {"participation": [{"mode_hz": f, "part": part} for f, part in zip(frequencies, parts, strict=True)]}
 
 
 def held_values(cause: Cause) -> Real:

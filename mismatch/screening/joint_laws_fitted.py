@@ -1,16 +1,18 @@
-"""Joint laws of one round: sighted along the likeliest direction, driven by the seen motion, then simulated freely."""
+"""Joint laws of one round: sighted at the likeliest place, driven by the seen motion, then simulated freely."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from estimation import WindowedSpectrum
 
 from ..inference import Candidate, Proposal, Settings, in_processes
-from ..models import Fit, direction_of, fit
+from ..models import Fit, fit, location_of
 from ..physics import JointPhysics, answer_name
-from .joint_direction import find_direction
+from .joint_places import JointPlace, joint_places
 from .joint_screening import Screened, screen_joints
 from .whitened_residual import linear_floor
 
@@ -20,10 +22,11 @@ FEW = 1000
 
 @dataclass(frozen=True)
 class SightedLaws:
-    """Laws along the likeliest direction, best first, and what a diagnosis tells about them."""
+    """Laws at the likeliest place of a joint, best first, what a diagnosis tells about them, and places as likely."""
 
     screened: tuple[Screened, ...]
     weighed: tuple[Candidate, ...]
+    places: tuple[JointPlace, ...] = ()
 
     @property
     def gain(self) -> float:
@@ -34,7 +37,7 @@ class SightedLaws:
 def sighted_laws(
     lines: list[WindowedSpectrum], current: Fit, laws: list[JointPhysics], settings: Settings
 ) -> SightedLaws:
-    """Screen joint laws along the direction that stands out; nothing where none does.
+    """Screen joint laws at the place that stands out; nothing where none does.
 
     Parameters
     ----------
@@ -50,14 +53,15 @@ def sighted_laws(
     taken = {answer_name(cause.physics) for cause in current.hypothesis.causes}
     laws = [law for law in laws if answer_name(law) not in taken]
     floor = linear_floor(current, lines)
-    sighting = find_direction(floor, current.hypothesis)
+    places = joint_places(floor, current.hypothesis, settings.screening.place)
+    axis, gain = places[0].axis, places[0].gain
     # along a single axis there is no direction to stand out, and a broad force looks like a higher floor
-    if not laws or (len(sighting.axis.entries) > 1 and sighting.gain < settings.screening.direction * len(lines)):
+    if not laws or (len(axis.entries) > 1 and gain < settings.screening.direction * len(lines)):
         return SightedLaws((), ())
-    location = {"direction": [round(float(x), 6) for x in sighting.axis.entries]}
-    screened = screen_joints(floor, current.hypothesis, sighting.axis, laws)
+    location = location_of(axis, current.hypothesis.model)
+    screened = screen_joints(floor, current.hypothesis, axis, laws)
     weighed = [Candidate(answer_name(one.causes[0].physics), one.gain, "screened", location) for one in screened]
-    return SightedLaws(tuple(screened), tuple(weighed))
+    return SightedLaws(tuple(screened), tuple(weighed), places)
 
 
 def joint_candidates(
@@ -100,7 +104,11 @@ def joint_candidates(
         for place, (one, gain) in enumerate(zip(driven, gains, strict=True))
         if gain >= enough and (place < limits.most_simulated or gain > gains[0] - settings.evidence.least)
     ]
-    simulated = in_processes([partial(_simulated, lines, current, one) for one in near])
+    # a direction at the tip that nothing else comes near to says all
+    told = {"places": [one.told() for one in sighted.places]}
+    if len(sighted.places) == 1 and sighted.places[0].axis.scales is None:
+        told = {}
+    simulated = in_processes([partial(_simulated, lines, current, one, told) for one in near])
     return [one for one in simulated if one is not None]
 
 
@@ -116,7 +124,7 @@ def _driven(lines: list[WindowedSpectrum], current: Fit, screened: Screened) -> 
     return fit(lines, best.hypothesis, best.noises, iterations=4)
 
 
-def _simulated(lines: list[WindowedSpectrum], current: Fit, near: Fit) -> Proposal[Fit] | None:
+def _simulated(lines: list[WindowedSpectrum], current: Fit, near: Fit, told: Mapping[str, Any]) -> Proposal[Fit] | None:
     """The law of a driven fit, now free to move as it makes the structure move; None if that runs away."""
     last = near.hypothesis.causes[-1]
     free = replace(near.hypothesis, causes=(*near.hypothesis.causes[:-1], replace(last, seen=None)))
@@ -124,5 +132,7 @@ def _simulated(lines: list[WindowedSpectrum], current: Fit, near: Fit) -> Propos
     fitted = fit(lines, free, near.noises, iterations=10, tolerance=10.0)
     if not np.isfinite(fitted.score):
         return None
-    location = direction_of(fitted.hypothesis.causes[-1])
+    axis = fitted.hypothesis.causes[-1].axis
+    assert axis is not None
+    location = {**location_of(axis, fitted.hypothesis.model), **told}
     return Proposal(answer_name(last.physics), location, fitted, current.score - fitted.score)

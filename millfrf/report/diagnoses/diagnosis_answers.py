@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from foundation import DegreeOfFreedom
-from mismatch import AcceptedCause, StructureDiagnosis, form_of, rig_of
+from mismatch import AcceptedCause, StructureDiagnosis, form_of, joint_in_words, rig_of, tip_axes
 
 from .next_tests import next_test
 
@@ -126,9 +126,11 @@ def place(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
     location = cause.location
     if "direction" in location:
         model = diagnosis.details.final.hypothesis.model
-        parts = [DegreeOfFreedom.parse(label) for label in model.excitations][: len(location["direction"])]
-        axes = ", ".join(f"{value:+.3f} {part.axis}" for value, part in zip(location["direction"], parts, strict=False))
-        return f"in a joint that acts along {axes} at {parts[0].node}"
+        _, columns, axes = tip_axes(model)
+        node = DegreeOfFreedom.parse(model.excitations[int(abs(columns[:, 0]).argmax())]).node
+        return f"in a joint at {node} that acts {joint_in_words(location, axes)}"
+    if "participation" in location:
+        return f"in a joint {joint_in_words(location)}"
     if "channel" in location:
         return f"in the {location.get('role', 'response')} channel {location['channel']}"
     if "form" in location:

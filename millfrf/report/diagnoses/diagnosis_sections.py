@@ -13,6 +13,7 @@ from mismatch import (
     StructureDiagnosis,
     free_form_laws,
     held_out_spectra,
+    joint_in_words,
     recording_errors,
     rig_of,
     significant_cells,
@@ -175,6 +176,8 @@ def candidate_section(diagnosis: StructureDiagnosis) -> Section:
 def _short_place(one: Candidate) -> str:
     if "direction" in one.location:
         return "(" + ", ".join(f"{value:.2f}" for value in one.location["direction"]) + ")"
+    if "participation" in one.location:
+        return joint_in_words(one.location)
     return str(one.location.get("impossible", one.location.get("channel", "")))
 
 

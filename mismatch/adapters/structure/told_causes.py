@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...inference import AcceptedCause, Proposal
-from ...models import Cause, Fit, direction_of, held_values, modes_are_odd
+from ...models import Cause, Fit, held_values, location_of, modes_are_odd
 from ...physics import MODAL_PARAMETERS, ModePhysics, answer_name
 
 Real = NDArray[np.float64]
@@ -45,7 +45,9 @@ def told_causes(fitted: Fit, accepted: Sequence[Proposal[Fit]]) -> list[Accepted
         if isinstance(cause.physics, ModePhysics):
             told.append(accepted_mode(fitted, cause.physics, one.evidence))
         else:
-            location = one.location if cause.axis is None else direction_of(cause)
+            location = dict(one.location)
+            if cause.axis is not None:
+                location |= location_of(cause.axis, fitted.hypothesis.model)
             told.append(accepted_cause(fitted, location, one.evidence, place))
     return told
 
