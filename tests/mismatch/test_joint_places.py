@@ -1,0 +1,90 @@
+"""Where a joint is sought: the tip is taken where it says all, parts of the modes where it does not."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_spectrum
+from mismatch import Hypothesis, LabError, ModelShape, band_of, fit, linear_floor, predict_lines
+from mismatch.inference import ScreeningSettings
+from mismatch.joints import JointAxis, JointMotion, joint_in_words, modal_scales
+from mismatch.models import Cause, location_of
+from mismatch.physics import JointPhysics, library
+from mismatch.screening.joint_places import JointPlace, joint_places
+from modal_fit import ModalModel
+
+TrialOf = Callable[[ModalModel, str, float, int], BandRecording]
+MARGIN = ScreeningSettings().place
+
+
+@pytest.fixture(scope="module")
+def armed() -> ModalModel:
+    """Three modes of a structure driven at its tip in X and Y, and seen there and at two points of its arm."""
+    omega, zeta = 2 * np.pi * np.array([6.0, 10.0, 14.0]), np.array([0.03, 0.02, 0.02])
+    poles = omega * (-zeta + 1j * np.sqrt(1 - zeta**2))
+    shapes = np.array([[1.0, 0.4, 0.5, -0.2], [-0.3, 0.9, 0.3, -0.5], [0.6, -0.8, -0.3, -0.9]])
+    return ModalModel(
+        poles,
+        shapes / (2j * poles.imag[:, None] * 40.0),
+        shapes[:, :2].astype(complex),
+        ("TCP:+X", "TCP:+Y", "WING:+X", "PAYLOAD:+X"),
+        ("TCP:+X", "TCP:+Y"),
+    )
+
+
+def _between(model: ModalModel) -> JointAxis:
+    """Between wing and payload."""
+    scales = modal_scales(model)
+    parts = np.real((model.right[:, 2] - model.right[:, 3]) / scales.seen)
+    return JointAxis(parts / np.linalg.norm(parts), scales)
+
+
+def _trial(model: ModalModel, axis: JointAxis, driven: BandRecording, rng: np.random.Generator) -> WindowedSpectrum:
+    """A recording of the structure with a hardening joint under the forces of another, with 1 % noise."""
+    motions = channels_of("acceleration", model.responses, ("ax", "ay", "wing", "payload"))
+    force = replace(driven, response=np.zeros((len(driven.force), 4)), responses=motions)
+    motion = JointMotion(1e-3, 0.06, 1e-2, 0.6, 5e4)
+    physics = library()["stiffness_hardening"]
+    assert isinstance(physics, JointPhysics)
+    values = physics.starts(motion)[0].copy()
+    values[0] = 0.4 * motion.stiffness * motion.deflection
+    shape = ModelShape(model, LabError())
+    hypothesis = Hypothesis(shape, np.zeros(shape.size), (Cause(physics, values, "", axis, motion),))
+    lines = windowed_spectrum(force, band_of(model, 128.0), 4.0)
+    made = lines.signal(predict_lines(hypothesis, lines).spectrum)[: len(force.response)]
+    noisy = made + 0.01 * made.std(axis=0) * rng.normal(size=made.shape)
+    return windowed_spectrum(replace(force, response=noisy), band_of(model, 128.0), 4.0)
+
+
+def _places(model: ModalModel, axis: JointAxis, trial_of: TrialOf) -> tuple[JointPlace, ...]:
+    rng = np.random.default_rng(3)
+    driven = replace(model, right=model.right[:, :2], responses=model.responses[:2])
+    trials = [trial_of(driven, name, level, k) for k, (name, level) in enumerate((("low", 20.0), ("high", 60.0)))]
+    lines = [_trial(model, axis, one, rng) for one in trials]
+    shape = ModelShape(model, LabError())
+    base = fit(lines, Hypothesis(shape, np.zeros(shape.size)))
+    return joint_places(linear_floor(base, lines), base.hypothesis, MARGIN)
+
+
+def test_a_joint_between_two_points_is_found_there(armed: ModalModel, trial_of: TrialOf) -> None:
+    found = _places(armed, _between(armed), trial_of)
+    assert found[0].name == "between WING and PAYLOAD along X"
+    np.testing.assert_allclose(np.abs(found[0].axis.entries), np.abs(_between(armed).entries), atol=0.1)
+    assert "at the tip" not in [one.name for one in found]
+
+
+def test_a_joint_at_the_tip_is_found_there(armed: ModalModel, trial_of: TrialOf) -> None:
+    """The modes' parts are as many-sided, and are not taken for that."""
+    direction = np.array([0.8, 0.6])
+    found = _places(armed, JointAxis(direction), trial_of)
+    assert found[0].name == "at the tip"
+    assert abs(found[0].axis.entries @ direction) > 0.99
+
+
+def test_parts_of_modes_are_told(armed: ModalModel) -> None:
+    location = location_of(_between(armed), armed)
+    assert [one["mode_hz"] for one in location["participation"]] == [6.0, 10.0, 14.0]
+    assert max(one["part"] for one in location["participation"]) > 0.5
+    assert joint_in_words(location).startswith("inside: the mode at ")
