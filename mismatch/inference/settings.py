@@ -49,6 +49,9 @@ class EvidenceSettings(
         left of the others.
     mends_belief
         Share of the odd deviation from the laboratory's model that a cause must remove when it gains no misfit.
+    farthest
+        Errors of a laboratory by which a joint's law may ask a mode's frequency to be off: farther off lies another
+        structure, whose modes bend to any law.
     """
 
     least: float = 20.0
@@ -60,6 +63,7 @@ class EvidenceSettings(
     small_after_law: float = 0.1
     small_in_part: float = 0.25
     mends_belief: float = 0.6
+    farthest: float = 50.0
 
 
 @dataclass(frozen=True)

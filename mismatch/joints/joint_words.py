@@ -24,9 +24,9 @@ def joint_in_words(location: Mapping[str, Any], axes: Sequence[str] = ()) -> str
     >>> parts = [{"mode_hz": 7.3, "part": 0.95}, {"mode_hz": 11.0, "part": -0.3}]
     >>> joint_in_words({"participation": parts})
     'inside: the mode at 7.3 Hz takes part with +0.95, that at 11 Hz with -0.30'
-    >>> places = [{"place": "between WING and PAYLOAD along Z"}, {"place": "inside"}]
+    >>> places = [{"place": "between WING and PAYLOAD along Z"}, {"place": "WING:+Z to ground"}]
     >>> joint_in_words({"participation": parts[:1], "places": places})
-    'between WING and PAYLOAD along Z: the mode at 7.3 Hz takes part with +0.95 (or, as likely, inside)'
+    'between WING and PAYLOAD along Z: the mode at 7.3 Hz takes part with +0.95 (or, as likely, WING:+Z to ground)'
     """
     places = [str(one["place"]) for one in location.get("places", ())]
     other = f" (or, as likely, {', or '.join(places[1:])})" if len(places) > 1 else ""

@@ -23,7 +23,7 @@ STARTS = 3
 """Beginnings from which the parts of the modes are sought."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class JointPlace:
     """A place at which a joint may act.
 
@@ -81,7 +81,8 @@ def joint_places(floor: Floor, hypothesis: Hypothesis, margin: float) -> tuple[J
     ranked = sorted([tip, *points, free], key=lambda one: -one.gain)
     near = [one for one in ranked if one.gain >= ranked[0].gain / (1 + margin)]
     order = [one for one in near if one is tip] + [one for one in near if one in points] + [free]
-    return (order[0], *(one for one in near if one is not order[0]))
+    # free parts imitate every place: that they explain as much says nothing against one
+    return (order[0], *(one for one in near if one not in (order[0], free)))
 
 
 def _points(hypothesis: Hypothesis, scales: ModalScales) -> dict[str, Real]:

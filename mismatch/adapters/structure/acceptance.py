@@ -18,22 +18,35 @@ TO_REST = 60
 """Steps at most for modes to make up for a cause that is taken away."""
 
 
-def impossible(proposal: Proposal[Fit], clear: float) -> str:
-    """Why the numbers of the last cause cannot be, beyond their errors; empty where they can.
+def impossible(proposal: Proposal[Fit], settings: EvidenceSettings) -> str:
+    """Why the numbers of the last cause, or of modes beside a joint's law, cannot be; empty where they can.
 
     Parameters
     ----------
     proposal
         A fitted cause.
-    clear
-        Standard errors by which a number must be wrong.
+    settings
+        Errors by which a number must be wrong.
     """
     cause = proposal.fitted.hypothesis.causes[-1]
+    if cause.axis is not None:
+        return _far_modes(proposal.fitted.hypothesis, settings.farthest)
     said: Callable[[Real, Real], str] | None = getattr(cause.physics, "impossible", None)
     if said is None:
         return ""
     steps = np.array([parameter.unit_step for parameter in cause.physics.parameters])
-    return said(cause.values, clear * _spread(proposal.fitted, cause) * steps)
+    return said(cause.values, settings.clear * _spread(proposal.fitted, cause) * steps)
+
+
+def _far_modes(hypothesis: Hypothesis, farthest: float) -> str:
+    """Which mode is too far from where the laboratory found it; empty where none is."""
+    shape = hypothesis.shape
+    off = shape.modal_rows(hypothesis.u)[: shape.believed, 0]
+    if np.abs(off).max() <= farthest:
+        return ""
+    mode = int(np.argmax(np.abs(off)))
+    before, after = (model.natural_frequencies[mode] for model in (shape.nominal, hypothesis.model))
+    return f"the mode at {before:.4g} Hz would have to lie at {after:.4g} Hz"
 
 
 def possible_gains(proposals: Sequence[Proposal[Fit]], settings: EvidenceSettings) -> list[Proposal[Fit]]:
@@ -46,7 +59,7 @@ def possible_gains(proposals: Sequence[Proposal[Fit]], settings: EvidenceSetting
     settings
         Thresholds of the evidence.
     """
-    good = [one for one in proposals if one.evidence >= settings.least and not impossible(one, settings.clear)]
+    good = [one for one in proposals if one.evidence >= settings.least and not impossible(one, settings)]
     return sorted(good, key=lambda one: -one.evidence)
 
 

@@ -89,7 +89,7 @@ class StructureComparison:
 
     def _equivalents(self, weighed: Weighed, chosen: Proposal[Fit]) -> tuple[str, ...]:
         evidence = self.settings.evidence
-        possible = [one for one in weighed.proposals if not impossible(one, evidence.clear)]
+        possible = [one for one in weighed.proposals if not impossible(one, evidence)]
         near = equivalents_of(possible, chosen, evidence.as_good)
         if chosen.name not in self.laws:
             return near

@@ -6,7 +6,7 @@ from typing import Any
 
 from estimation import WindowedSpectrum
 
-from ...inference import Candidate, Proposal, Remainder, Round, Settings, in_processes
+from ...inference import Candidate, EvidenceSettings, Proposal, Remainder, Round, Settings, in_processes
 from ...models import Fit, Hypothesis
 from ...physics import ChainPhysics, JointPhysics, ModePhysics, Physics, answer_name
 from ...remainder import leftover, share_of_response
@@ -136,7 +136,7 @@ def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
         proposals += laws_by_level(lines, current, laws, settings)
     proposals += twin_laws(lines, current, possible_gains(proposals, settings.evidence)[:1], causes)
     weighed += sighted.weighed
-    weighed += [_candidate(one, settings.evidence.clear) for one in proposals]
+    weighed += [_candidate(one, settings.evidence) for one in proposals]
     return Weighed(proposals, weighed, sighted.gain > 0)
 
 
@@ -158,9 +158,9 @@ def _screened(
     return [one for one in screened if (one.cause.physics.name, one.cause.place) not in taken], mode, sighted
 
 
-def _candidate(one: Proposal[Fit], clear: float) -> Candidate:
+def _candidate(one: Proposal[Fit], evidence: EvidenceSettings) -> Candidate:
     """A fitted cause as it is told; one whose numbers cannot be says so."""
-    reason = impossible(one, clear)
+    reason = impossible(one, evidence)
     place = {**one.location, "impossible": reason} if reason else one.location
     return Candidate(one.name, one.evidence, "impossible" if reason else "fitted", place)
 
