@@ -8,9 +8,10 @@ import pytest
 
 from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_spectrum
 from mismatch import Hypothesis, LabError, ModelShape, band_of, fit, linear_floor, predict_lines
-from mismatch.inference import ScreeningSettings
+from mismatch.adapters.structure.acceptance import impossible
+from mismatch.inference import EvidenceSettings, Proposal, ScreeningSettings
 from mismatch.joints import JointAxis, JointMotion, joint_in_words, modal_scales
-from mismatch.models import Cause, location_of
+from mismatch.models import Cause, Fit, location_of
 from mismatch.physics import JointPhysics, library
 from mismatch.screening.joint_places import JointPlace, joint_places
 from modal_fit import ModalModel
@@ -88,3 +89,18 @@ def test_parts_of_modes_are_told(armed: ModalModel) -> None:
     assert [one["mode_hz"] for one in location["participation"]] == [6.0, 10.0, 14.0]
     assert max(one["part"] for one in location["participation"]) > 0.5
     assert joint_in_words(location).startswith("inside: the mode at ")
+
+
+def test_a_law_that_asks_for_another_structure_is_impossible(armed: ModalModel) -> None:
+    """Modes that lie elsewhere bend to any law: beyond fifty errors of a laboratory the law explains nothing."""
+    shape, settings = ModelShape(armed, LabError()), EvidenceSettings()
+    physics = library()["backlash"]
+    assert isinstance(physics, JointPhysics)
+    motion = JointMotion(1e-3, 0.06, 1e-2, 0.6, 5e4)
+    cause = Cause(physics, physics.starts(motion)[0], "", _between(armed), motion)
+    for off, said in ((20.0, ""), (70.0, "the mode at 14 Hz would have to lie at 28.19 Hz")):
+        u = np.zeros(shape.size)
+        u[2 * shape.per_mode] = off
+        hypothesis = Hypothesis(shape, u, (cause,))
+        fitted = Fit(hypothesis, (), 0.0, 0.0, 0.0, np.eye(hypothesis.size))
+        assert impossible(Proposal("backlash", {}, fitted, 100.0), settings) == said
