@@ -78,14 +78,16 @@ class StructureComparison:
         return evidence_needed(current, base, self.settings.evidence)
 
     def _chosen(self, weighed: Weighed, search: Search[Fit]) -> Proposal[Fit] | None:
-        """The plainest form of the best cause, fitted until it rests, if it is worth it."""
+        """The plainest form of the best cause, fitted until it rests and still possible there, if it is worth it."""
         evidence = self.settings.evidence
-        best = plainest(possible_gains(weighed.proposals, evidence), evidence.as_good)
-        if best is None:
-            return None
-        rested = settled(self.lines, best.fitted)
-        best = replace(best, fitted=rested, evidence=search.current.score - rested.score)
-        return best if worth_it(best, search.current, search.base, self.lines, evidence) else None
+        good = possible_gains(weighed.proposals, evidence)
+        while (best := plainest(good, evidence.as_good)) is not None:
+            rested = settled(self.lines, best.fitted)
+            chosen = replace(best, fitted=rested, evidence=search.current.score - rested.score)
+            if not impossible(chosen, evidence):
+                return chosen if worth_it(chosen, search.current, search.base, self.lines, evidence) else None
+            good = [one for one in good if one is not best]
+        return None
 
     def _equivalents(self, weighed: Weighed, chosen: Proposal[Fit]) -> tuple[str, ...]:
         evidence = self.settings.evidence
