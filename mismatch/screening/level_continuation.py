@@ -16,7 +16,7 @@ from estimation import WindowedSpectrum
 
 from ..inference import Proposal, Settings, in_processes
 from ..joints import JointMotion
-from ..models import Fit, Hypothesis, direction_of, fit, predict_lines
+from ..models import Fit, Hypothesis, fit, location_of, predict_lines
 from ..physics import JointPhysics
 from .joint_laws_fitted import joint_candidates, sighted_laws
 
@@ -80,8 +80,10 @@ def _carried(
     fitted = fit(lines, _with_motion(reached, lines), iterations=TO_END, tolerance=10.0)
     if not np.isfinite(fitted.score):
         return None
-    cause = fitted.hypothesis.causes[-1]
-    return Proposal(first.name, direction_of(cause), fitted, current.score - fitted.score)
+    axis = fitted.hypothesis.causes[-1].axis
+    assert axis is not None
+    location = {**first.location, **location_of(axis, fitted.hypothesis.model)}
+    return Proposal(first.name, location, fitted, current.score - fitted.score)
 
 
 def _with_motion(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Hypothesis:
