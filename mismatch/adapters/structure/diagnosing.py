@@ -136,7 +136,8 @@ def _diagnosed(
     elsewhere = answer.held_out.linear, answer.held_out.improved
     unseen = both.held_out(measured)
     details = StructureDetails(base, answer.final, tuple(mended), tuple(measured), elsewhere, unseen, band)
-    behaviour = behaviour_of(base.hypothesis, mended)
+    # faults that are not told may have been none: a resonance that was taken for a tone
+    behaviour = behaviour_of(base.hypothesis, measured if answer.verdict == "unexplained" else mended)
     view = residual_view(details, answer.verdict == "unexplained", recordings, settings.location)
     candidates = sorted([*found.candidates, *answer.rejected], key=lambda one: -one.evidence)
     return Diagnosis(
