@@ -24,6 +24,10 @@ ASIDE = 0.02
 """Step of a cause's coordinates for a difference quotient at given motion."""
 
 
+LARGEST = 1e30
+"""Change of a motion beyond which it has run away: single precision holds no more."""
+
+
 @dataclass(frozen=True)
 class JointChange:
     """A joint's force at the lines, and its derivative; the structure feels it with a minus sign.
@@ -170,6 +174,8 @@ def _force_change(
     if cause.seen is not None:
         return by_law, None, own.start
     driven, mix = _driven_change(hypothesis, lines, joint, driving)
+    if not np.abs(driven).max() < LARGEST:
+        raise np.linalg.LinAlgError(f"the motion under {cause.physics.name} runs away when it is simulated")
     values = len(cause.values)
     # the law's numbers change the force at given motion, everything else the motion that drives it
     spectrum = np.zeros((often * lines.padded // 2 + 1, values + driven.shape[1]), dtype=np.complex64)
@@ -220,7 +226,10 @@ def _law_change(cause: Cause, lines: WindowedSpectrum, answer: JointResponse, of
     for k in range(len(cause.values)):
         aside = here.copy()
         aside[k] += ASIDE
-        result[:, k] = (driven_force(lines, x, v, cause.moved(aside).law(), often=often) - plain) / ASIDE
+        change = (driven_force(lines, x, v, cause.moved(aside).law(), often=often) - plain) / ASIDE
+        if not np.abs(change).max() < LARGEST:
+            raise np.linalg.LinAlgError(f"the force of {cause.physics.name} runs away when it is simulated")
+        result[:, k] = change
     return result
 
 

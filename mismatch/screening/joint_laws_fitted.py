@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..inference import Candidate, Proposal, Settings, in_processes
-from ..models import Fit, believed, fit, location_of, modes_are_odd
+from ..models import Fit, fit, location_of
 from ..physics import JointPhysics, answer_name
 from .joint_places import JointPlace, joint_places
 from .joint_screening import Screened, screen_joints
@@ -114,15 +113,10 @@ def joint_candidates(
 
 
 def _driven(lines: list[WindowedSpectrum], current: Fit, screened: Screened) -> Fit:
-    """A law fitted to the motion seen, from the better of its two best shapes.
-
-    Modes that look odd may have taken up a part of what the law does: it is begun from the lab's own model too.
-    """
+    """A law fitted to the motion seen, from the better of its two best shapes."""
     rough = [one.thinned(FEW) for one in lines]
-    modes = [current.hypothesis] + ([believed(current.hypothesis)] if modes_are_odd(current) else [])
     starts = [
-        fit(rough, hypothesis.with_cause(cause), current.noises, iterations=2)
-        for hypothesis, cause in product(modes, screened.causes[:2])
+        fit(rough, current.hypothesis.with_cause(cause), current.noises, iterations=2) for cause in screened.causes[:2]
     ]
     best = min(starts, key=lambda start: start.score)
     if not np.isfinite(best.score):
