@@ -173,7 +173,7 @@ FAULTS = FaultSettings()
 
 
 @dataclass(frozen=True)
-class ProofSettings(Thresholds, shares=("significance", "belief_alone", "beaten")):
+class ProofSettings(Thresholds, shares=("significance", "belief_alone", "beaten", "halved")):
     """What data that no fit has seen must confirm.
 
     Parameters
@@ -186,6 +186,9 @@ class ProofSettings(Thresholds, shares=("significance", "belief_alone", "beaten"
         Share of a cause's evidence below which its misfit says nothing, as the belief alone tells it from a refit.
     beaten
         Share of another cause's error held out, at or below which a cause takes its place.
+    overwhelming, halved
+        Gain in misfit on the data held out, and share of the error there without a cause, from which on and down to
+        which the cause is kept whatever the test over blocks says: 1000 is a likelihood ratio of 10^217.
     test
         Paired test over blocks of time: p-value that the second powers are not below the first.
     """
@@ -194,6 +197,8 @@ class ProofSettings(Thresholds, shares=("significance", "belief_alone", "beaten"
     significance: float = 0.05
     belief_alone: float = 0.05
     beaten: float = 0.25
+    overwhelming: float = 1000.0
+    halved: float = 0.5
     test: Callable[[Real, Real], float] = signed_ranks
 
 

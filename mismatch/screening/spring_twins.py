@@ -16,7 +16,7 @@ from ..inference import Proposal, in_processes
 from ..models import Fit, believed, fit
 from ..physics import JointPhysics, Physics, TwinPhysics, answer_name
 
-STEPS = 20
+STEPS = 60
 """Steps at most of the fit of a twin, which begins on the lab's modes."""
 
 
