@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from mismatch.adapters.structure.acceptance import plainest
+from mismatch.adapters.structure.acceptance import plainest, twins_of
 from mismatch.inference import EvidenceSettings, Proposal
 from mismatch.joints.joint_law import JointMotion
 from mismatch.models.fitting import Fit
-from mismatch.models.hypothesis import Hypothesis
+from mismatch.models.hypothesis import Cause, Hypothesis
 from mismatch.models.model_shape import LabError, ModelShape
 from mismatch.physics import JointPhysics, answer_name, library
 from modal_fit import ModalModel
@@ -66,3 +66,21 @@ def test_of_equal_forms_the_one_with_fewer_numbers_is_told(model: ModalModel, wo
     assert best.location["form"] == chosen
     assert best.name == "gap"
     assert plainest([], as_good) is None
+
+
+@pytest.mark.parametrize(("evidence", "told"), [(995.0, "backlash"), (980.0, "stiffness_hardening")])
+def test_of_twins_as_good_as_forms_go_the_one_with_the_less_odd_modes_is_told(
+    model: ModalModel, evidence: float, told: str
+) -> None:
+    """A difference of less than a hundredth of the evidence is a matter of the law's form."""
+    shape = ModelShape(model, LabError())
+
+    def option(name: str, score: float, odd: float) -> Proposal[Fit]:
+        physics = library()[name]
+        here = Hypothesis(shape, np.zeros(shape.size)).with_cause(Cause(physics, np.array([3e5, 1.5e-4, 2.5])))
+        return Proposal(answer_name(physics), {}, Fit(here, (), 0.0, odd, -score, np.zeros((1, 1))), score)
+
+    hardens, play = option("saturating_hardening", 1000.0, 300.0), option("smooth_backlash", evidence, 20.0)
+    other = option("backlash", 999.0, 0.0)
+    assert twins_of(hardens, [hardens, play, other], EvidenceSettings().small)[0].name == told
+    assert twins_of(other, [hardens, play, other], EvidenceSettings().small) == [other]

@@ -10,7 +10,7 @@ from estimation import WindowedSpectrum
 
 from ...inference import EvidenceSettings, Proposal
 from ...models import Cause, Fit, Hypothesis, fit
-from ...physics import ChainPhysics, LimitedPhysics, ModePhysics
+from ...physics import ChainPhysics, LimitedPhysics, ModePhysics, TwinPhysics
 
 Real = NDArray[np.float64]
 
@@ -78,6 +78,32 @@ def plainest(proposals: Sequence[Proposal[Fit]], as_good: float) -> Proposal[Fit
     best = proposals[0]
     forms = [one for one in proposals if one.name == best.name and one.evidence > best.evidence - as_good]
     return min(forms, key=lambda one: (one.fitted.hypothesis.size, one.fitted.score))
+
+
+def twins_of(best: Proposal[Fit], proposals: Sequence[Proposal[Fit]], share: float) -> list[Proposal[Fit]]:
+    """The best law and those that differ from it by a linear spring and explain nearly as much, least odd modes first.
+
+    The form of a law is never quite the true one, and a small share of its evidence may come from there. Such a
+    difference does not decide between stiffness that is gained beyond a knee and stiffness that is missing within it:
+    what they ask of the modes does.
+
+    Parameters
+    ----------
+    best
+        The proposal with most evidence.
+    proposals
+        All fitted causes.
+    share
+        Share of its evidence by which a twin may have less.
+    """
+    physics = best.fitted.hypothesis.causes[-1].physics
+    twin = physics.twin if isinstance(physics, TwinPhysics) else ""
+    near = [
+        one
+        for one in proposals
+        if one.fitted.hypothesis.causes[-1].physics.name == twin and one.evidence > (1 - share) * best.evidence
+    ]
+    return sorted([best, *near], key=lambda one: one.fitted.deviation)
 
 
 def strained(hypothesis: Hypothesis) -> bool:

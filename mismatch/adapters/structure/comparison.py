@@ -9,7 +9,7 @@ from ...inference import Proposal, Remainder, Round, Search, Settings, equivalen
 from ...models import Fit, fit, settled
 from ...physics import JointPhysics, Physics, answer_name
 from ...remainder import leftover
-from .acceptance import evidence_needed, impossible, plainest, possible_gains, worth_it
+from .acceptance import evidence_needed, impossible, plainest, possible_gains, twins_of, worth_it
 from .rounds import Standing, StructureRound, Weighed, only_modes, weigh
 
 PRUNING = 20
@@ -81,7 +81,8 @@ class StructureComparison:
         """The plainest form of the best cause, fitted until it rests and still possible there, if it is worth it."""
         evidence = self.settings.evidence
         good = possible_gains(weighed.proposals, evidence)
-        while (best := plainest(good, evidence.as_good)) is not None:
+        while (first := plainest(good, evidence.as_good)) is not None:
+            best = twins_of(first, good, evidence.small)[0]
             rested = settled(self.lines, best.fitted)
             chosen = replace(best, fitted=rested, evidence=search.current.score - rested.score)
             if not impossible(chosen, evidence):
