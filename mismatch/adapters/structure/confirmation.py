@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 
 from ...faults import residual_lines
-from ...inference import AcceptedCause, Improvement, Search, Settings, in_processes, released
+from ...inference import AcceptedCause, Improvement, ProofSettings, Search, Settings, in_processes, released
 from ...models import Fit, Hypothesis, fit, least_misfit, through_structure
 from .comparison import StructureComparison
 from .held_out import ITERATIONS, HeldOut, Recordings, chance_of_no_gain, held_out_improvement
@@ -136,7 +136,30 @@ def _missed(
     gain = least_misfit(less.hypothesis, here) - least_misfit(held_out.improved, here)
     if gain <= settings.proof.gain:
         return False
-    powers = [float(np.sum(np.abs(one) ** 2 / np.mean(np.abs(here.measured) ** 2, axis=0))) for one in (rest, without)]
-    if gain > settings.proof.overwhelming and powers[0] <= settings.proof.halved**2 * powers[1]:
+    size = np.mean(np.abs(here.measured) ** 2, axis=0)
+    powers = tuple(float(np.sum(np.abs(one) ** 2 / size)) for one in (rest, without))
+    if clearly_halves(gain, powers, settings.proof):
         return True
     return chance_of_no_gain(here, covariance, without, rest, settings.proof) < settings.proof.significance
+
+
+def clearly_halves(gain: float, powers: tuple[float, ...], settings: ProofSettings) -> bool:
+    """Whether a cause is kept whatever the test over blocks says: the error is halved, the likelihood overwhelming.
+
+    Parameters
+    ----------
+    gain
+        Gain in misfit on the recording held out.
+    powers
+        Powers of the residual there with the cause and without it.
+    settings
+        Thresholds of the proof.
+
+    Examples
+    --------
+    >>> clearly_halves(5177.0, (18.2, 238.1), ProofSettings())
+    True
+    >>> clearly_halves(500.0, (18.2, 238.1), ProofSettings()) or clearly_halves(5177.0, (18.2, 40.0), ProofSettings())
+    False
+    """
+    return gain > settings.overwhelming and powers[0] <= settings.halved**2 * powers[1]
