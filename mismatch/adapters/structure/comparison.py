@@ -85,9 +85,13 @@ class StructureComparison:
             best = twins_of(first, good, evidence.small)[0]
             rested = settled(self.lines, best.fitted)
             chosen = replace(best, fitted=rested, evidence=search.current.score - rested.score)
-            if not impossible(chosen, evidence):
-                return chosen if worth_it(chosen, search.current, search.base, self.lines, evidence) else None
             good = [one for one in good if one is not best]
+            if impossible(chosen, evidence):
+                continue
+            if worth_it(chosen, search.current, search.base, self.lines, evidence):
+                return chosen
+            # another form of the same cause may have numbers that the data do tell
+            good = [one for one in good if one.name == best.name]
         return None
 
     def _equivalents(self, weighed: Weighed, chosen: Proposal[Fit]) -> tuple[str, ...]:

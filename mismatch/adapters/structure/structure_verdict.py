@@ -44,7 +44,8 @@ def verdict_of_structure(
     most = settings.most_of_response
     incomplete = leaves_too_much(gain, settings) if causes else min(gain.before, gain.after) > most
     excluded = strained(hypothesis) and not after.noise_like(settings.noise_like)
-    halved = error_halved(gain, settings)
+    # a law that leaves much of the response may stand for another that nobody listed
+    halved = error_halved(gain, settings) and not (hypothesis.laws and gain.after > most)
     findings = Findings(before, after, bool(causes), excluded=excluded, incomplete=incomplete, halved=halved)
     return verdict_of(findings, settings)
 
