@@ -178,6 +178,10 @@ def main(folder: Path, target: Path | None) -> None:
     for cause in found.physics:
         numbers = ", ".join(f"{key} {value:.4g}" for key, value in cause.parameters.items())
         print(f"  {cause.name} {dict(cause.location)}: {numbers}; evidence {cause.evidence:.0f}")
+    told = {cause.name for cause in found.physics}
+    others = [one for one in found.candidates if one.stage == "fitted" and one.name not in told]
+    print("also fitted: " + ", ".join(f"{one.name} {one.evidence:.0f}" for one in others))
+    print("cannot be told from it: " + (", ".join(found.equivalents) or "nothing"))
     behaviour = found.details.behaviour
     assert behaviour is not None
     print(*(one.sentence for one in behaviour.modes), sep="\n")

@@ -172,13 +172,13 @@ def picture(records: dict[str, Motion]) -> Figure:
         figure = new_figure(70)
         panels = figure.subplots(1, len(records), sharey=True)
         for axes, (name, one) in zip(panels, records.items(), strict=True):
-            axes.plot(one.velocity, one.friction, ".", markersize=1.5, color="#999999", label="measured")
+            axes.plot(one.velocity, one.friction, ".", markersize=1.5, color="#999999", label="Measured")
             axes.plot(
-                one.velocity, columns_of(one, True) @ numbers, ".", markersize=1, color=COLOURS[1], label="regression"
+                one.velocity, columns_of(one, True) @ numbers, ".", markersize=1, color=COLOURS[1], label="Regression"
             )
-            axes.set(xlabel="velocity (rad/s)", title=f"case4_{name}.csv")
-        panels[0].set_ylabel("friction torque (N m)")
-        panels[0].legend(loc="upper left", markerscale=6)
+            axes.set(xlabel="Velocity (rad/s)", title=name.capitalize())
+        panels[0].set_ylabel("Friction torque (N m)")
+        panels[-1].legend(loc="lower right", markerscale=6, handletextpad=0.2, frameon=False)
     return figure
 
 

@@ -1,6 +1,6 @@
 """The diagnosis of a structure in words: the lines that `millfrf diagnose` prints."""
 
-from mismatch import AcceptedCause, StructureDiagnosis, joint_in_words
+from mismatch import AcceptedCause, StructureDiagnosis, joint_in_words, tip_axes
 
 
 def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
@@ -14,7 +14,7 @@ def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
     lines = [f"verdict: {diagnosis.verdict}"]
     lines.append(diagnosis.details.band.sentence)
     lines += [f"warning: {doubt}" for doubt in diagnosis.doubts]
-    lines += [_cause_line(cause) for cause in diagnosis.physics]
+    lines += [_cause_line(diagnosis, cause) for cause in diagnosis.physics]
     if diagnosis.equivalents:
         lines.append(f"cannot be told from: {', '.join(diagnosis.equivalents)}")
     if diagnosis.verdict == "partly explained":
@@ -35,17 +35,20 @@ def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
     if diagnosis.details.behaviour is not None:
         lines.append(f"behaviour by level: {diagnosis.details.behaviour.sentence}")
     lines.append(_error_line(diagnosis))
+    offered = diagnosis.content.get("improved_model", {}).get("sentence")
+    lines += [offered] if offered else []
     lines += [one["sentence"] for one in diagnosis.content.get("noise", ())]
     return lines
 
 
-def _cause_line(cause: AcceptedCause) -> str:
+def _cause_line(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
     """A cause with its place, its numbers with their standard errors, and its evidence."""
     numbers = ", ".join(
         f"{name} {value:.4g}" + (f" ± {cause.standard_errors[name]:.2g}" if name in cause.standard_errors else "")
         for name, value in cause.parameters.items()
     )
-    place = joint_in_words(cause.location) or ", ".join(f"{key} {value}" for key, value in cause.location.items())
+    axes = tip_axes(diagnosis.details.final.hypothesis.model)[2] if "direction" in cause.location else ()
+    place = joint_in_words(cause.location, axes) or ", ".join(f"{key} {value}" for key, value in cause.location.items())
     return f"{cause.name}{f' ({place})' if place else ''}: {numbers}; evidence {cause.evidence:.0f}"
 
 

@@ -35,8 +35,10 @@ class BehaviourSettings:
         Ratio of what drives the rig from which two recordings have two levels.
     smeared
         Damping ratio that a frequency which moves with the amplitude imitates: ``d min(a, b d / zeta)`` for a shift by
-        the share d at the damping ratio zeta, with (a, b) here. What exceeds it are losses. Springs that stiffen and
-        springs that soften, under random forces, give 0.45 and 0.21 at most.
+        the share d at the damping ratio zeta, with (a, b) here. What exceeds it are losses. Within a record of random
+        forces the amplitude swells and fades, and the frequency of a spring that stiffens or softens with it: the
+        resonance is wider by a share of the shift, less where the shift is small beside its width. Both numbers are
+        set above what such springs alone imitate, so that a spring is not taken for losses.
     dominant
         Change of the damping ratio over the share by which the frequency moved, from which losses alone are told: the
         pole then moves along the real axis.

@@ -44,7 +44,8 @@ class RefittedModes:
     level
         Root mean square of what drives the rig, all directions together.
     values, errors : (2, n_modes)
-        Logarithms of natural frequencies (rad/s), then damping ratios, and their standard errors.
+        Logarithms of natural frequencies (rad/s), then damping ratios as they are (no logarithms), and the standard
+        errors of both.
     drift, drift_errors : (2, n_modes)
         Change of the same over the length of the recording, and its standard error; nan where parts are too few.
     freedom
@@ -194,7 +195,7 @@ def _slope_over_time(moves: Real) -> tuple[Real, Real]:
 
 
 def _in_numbers(state: _State, lines: WindowedSpectrum, freedom: int, found: tuple[Real, Real, Real]) -> RefittedModes:
-    """Logarithms of frequencies and of damping ratios, from lab errors."""
+    """Logarithms of frequencies, damping ratios as they are, and the errors of both, from lab errors."""
     shape = state.hypothesis.shape
     model, rows = state.hypothesis.model, [shape.modal_rows(one)[:, :2].T for one in found]
     damping = model.damping_ratios

@@ -67,7 +67,8 @@ def with_tones_settled(
     tones = [cause for cause in accepted if cause.name == UNMEASURED_EXCITATION.name]
     gone = [one for one in tones if not stands_out(fitted, lines, one.parameters["frequency_hz"], settings)]
     most = settings.most_tones - len(tones) + len(gone)
-    beyond = tones_beyond(fitted.hypothesis, lines, decay, most, settings)
+    clipped = [cause.location["channel"] for cause in accepted if cause.name == CLIPPING.name]
+    beyond = tones_beyond(fitted.hypothesis, lines, decay, most, settings, clipped)
     return [cause for cause in accepted if cause not in gone] + [_tone_cause(tone, lines[0]) for tone in beyond]
 
 

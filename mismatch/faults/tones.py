@@ -25,6 +25,9 @@ BESIDE = np.array([abs(k) > 3 for k in range(-10, 11)])
 REACH = 10
 """Lines on each side that a tone reaches through the window."""
 
+AS_SHARP = 20
+"""Lines within which the half-power bandwidth of a mode must lie for its resonance to look like a tone."""
+
 
 @dataclass(frozen=True)
 class Tone:
@@ -92,7 +95,7 @@ def find_tone(fitted: Fit, lines: list[WindowedSpectrum], settings: FaultSetting
         if together[k] < settings.contrast:
             return None
         frequency = float(axis[k])
-        if _too_few_left(lines, frequency):
+        if _too_few_left(lines, frequency) or _at_a_sharp_resonance(fitted, lines, frequency):
             continue
         exact = sharp_frequency(_rests(fitted, lines), [one.recording.rate for one in lines], frequency)
         # the lines beside it seemed to stand out as much; how strong it is does not depend on how far it leaks
@@ -258,6 +261,15 @@ def _too_few_left(lines: list[WindowedSpectrum], frequency: float) -> bool:
     """Whether taking the tone out would leave less than three quarters of any recording's lines."""
     reach = [np.abs(one.frequencies - frequency) <= REACH * _step(one) for one in lines]
     return any(near.sum() > 0.25 * len(near) for near in reach)
+
+
+def _at_a_sharp_resonance(fitted: Fit, lines: list[WindowedSpectrum], frequency: float) -> bool:
+    """Whether a mode lies there whose resonance is hardly wider than a tone: a shift of it leaves as sharp a line."""
+    model = fitted.hypothesis.model
+    step = max(_step(one) for one in lines)
+    widths = 2 * model.damping_ratios * model.natural_frequencies
+    near = np.abs(model.natural_frequencies - frequency) < np.maximum(widths, 3 * step)
+    return bool((near & (widths < AS_SHARP * step)).any())
 
 
 def force_contrast(lines: WindowedSpectrum) -> Real:

@@ -1,5 +1,7 @@
 """Steady tones above the band in which model and recording are compared."""
 
+from collections.abc import Collection
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -26,7 +28,12 @@ HIGHEST = 0.45
 
 
 def tones_beyond(
-    hypothesis: Hypothesis, lines: list[WindowedSpectrum], decay: float, most: int, settings: FaultSettings = FAULTS
+    hypothesis: Hypothesis,
+    lines: list[WindowedSpectrum],
+    decay: float,
+    most: int,
+    settings: FaultSettings = FAULTS,
+    clipped: Collection[str] = (),
 ) -> list[Tone]:
     """Lines above the compared band that stand out of the residual in two recordings, and in no force.
 
@@ -46,6 +53,8 @@ def tones_beyond(
     settings
         Thresholds of the tests for tones. No force may show more contrast there than ``quiet_force``: above the modes
         a force's line needs no resonance to be seen in a response.
+    clipped
+        Channels that clip, which are not looked at: a limit makes harmonics of all that repeats.
 
     Returns
     -------
@@ -55,8 +64,13 @@ def tones_beyond(
     above = [_above(one, decay) for one in lines]
     if not above or min(len(one.frequencies) for one in above) < 4 * len(NEAR):
         return []
+    names = above[0].recording.channels[-above[0].measured.shape[1] :]
+    kept = [k for k, name in enumerate(names) if name not in clipped]
+    if not kept:
+        return []
     rests = [one.measured - predict_lines(hypothesis, one).response for one in above]
-    contrasts = [np.mean([sharp_contrast(column) for column in (np.abs(rest) ** 2).T], axis=0) for rest in rests]
+    powers = [np.abs(rest[:, kept]) ** 2 for rest in rests]
+    contrasts = [np.mean([sharp_contrast(column) for column in power.T], axis=0) for power in powers]
     together = seen_together(contrasts, above, settings.quiet_force, settings)
     axis, found = above[0].frequencies, list[Tone]()
     if is_comb(together, settings):

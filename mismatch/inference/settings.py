@@ -221,6 +221,8 @@ class VerdictSettings(Thresholds, shares=("explained", "partly", "halves")):
         Error held out, as a share of the response, above which no answer is complete.
     most_over_noise
         Error held out over the noise above which something may still be missing.
+    most_over_measured
+        Error held out over noise that was measured above which something is missing, whatever the nominal model leaves.
     most_left
         Share of the nominal model's power above the noise that an answer may then leave.
     """
@@ -231,6 +233,7 @@ class VerdictSettings(Thresholds, shares=("explained", "partly", "halves")):
     halves: float = 0.25
     most_of_response: float = 0.25
     most_over_noise: float = 1.5
+    most_over_measured: float = 5.0
     most_left: float = 0.1
 
 

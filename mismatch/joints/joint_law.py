@@ -52,6 +52,11 @@ class JointLaw:
     springs: Real = field(default_factory=_none)
     yields: Real = field(default_factory=_none)
 
+    @property
+    def loses_energy(self) -> bool:
+        """Whether the force depends on velocity or has a memory; else it is that of a spring."""
+        return bool(len(self.damping) or len(self.springs))
+
     def tables(self) -> tuple[Real, Real]:
         """Both tables, zeros where there is none."""
         zero = np.zeros(3)

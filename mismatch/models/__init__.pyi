@@ -4,10 +4,10 @@ from .hypothesis import Cause, Hypothesis, held_values, line_response, location_
 from .linear_lines import response_to_joint
 from .linear_part import with_linear_part
 from .lines import receptance_at
-from .misfit import known_noise, least_misfit, levels, outdoes_noise, through_structure, whitened
+from .misfit import known_noise, least_misfit, levels, outdoes_noise, shares_left, through_structure, whitened
 from .model_shape import ModelShape
 from .model_terms import hypothesis_of, improved_model
-from .refinement import believed, settled, with_chain
+from .refinement import believed, following_all, gives_one_up, settled, with_chain
 
 __all__ = [
     "ENOUGH",
@@ -17,6 +17,8 @@ __all__ = [
     "ModelShape",
     "believed",
     "fit",
+    "following_all",
+    "gives_one_up",
     "held_values",
     "hypothesis_of",
     "improved_model",
@@ -34,6 +36,7 @@ __all__ = [
     "residual",
     "response_to_joint",
     "settled",
+    "shares_left",
     "surround",
     "through_structure",
     "whitened",

@@ -205,7 +205,7 @@ def _descended(
     return descend(_Problem(pool, lines, held), _State(start, seen), limits)
 
 
-def plain_fit(lines: list[WindowedSpectrum], start: Hypothesis, *, iterations: int) -> Fit:
+def plain_fit(lines: list[WindowedSpectrum], start: Hypothesis, *, iterations: int, exact: float = EXACT) -> Fit:
     """Fit by unweighted least squares: every line counts alike, at whatever frequency and level.
 
     No noise is inferred. Each response is scaled by its power over all recordings, and the lab's belief hardly counts.
@@ -218,9 +218,11 @@ def plain_fit(lines: list[WindowedSpectrum], start: Hypothesis, *, iterations: i
         Hypothesis that the fit begins with.
     iterations
         Number of steps at most.
+    exact
+        Error, over the response, that every line is taken to have: the larger it is, the more the lab's belief counts.
     """
     power = np.mean([np.mean(np.abs(one.measured) ** 2, axis=0) for one in lines], axis=0)
-    noises = tuple(flat_noise(one.frequencies, EXACT**2 * power, one.force_here.shape[1]) for one in lines)
+    noises = tuple(flat_noise(one.frequencies, exact**2 * power, one.force_here.shape[1]) for one in lines)
     return fit(lines, start, noises, iterations=iterations, held=True)
 
 

@@ -138,6 +138,20 @@ def outdoes_noise(hypothesis: Hypothesis, lines: WindowedSpectrum) -> bool:
     return bool((rest < OUTDONE * np.einsum("kpp->p", covariance).real).any())
 
 
+def shares_left(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Real:
+    """Power that a hypothesis leaves of each response of one recording, as a share of the response's, (n_responses,).
+
+    Parameters
+    ----------
+    hypothesis
+        What predicts the recording.
+    lines
+        Windowed lines of the recording.
+    """
+    rest = lines.measured - predict_lines(hypothesis, lines).response
+    return np.asarray(np.sum(np.abs(rest) ** 2, axis=0) / np.sum(np.abs(lines.measured) ** 2, axis=0))
+
+
 def levels(lines: WindowedSpectrum) -> tuple[Real, Real]:
     """Root mean square over the lines of each response and of each force."""
     return (

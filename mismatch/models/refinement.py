@@ -1,14 +1,23 @@
-"""Where a fit comes to rest: evidence counts from there."""
+"""Where a fit comes to rest, and other beginnings for one that gives up a recording: evidence counts from there."""
 
 from dataclasses import replace
+
+import numpy as np
 
 from estimation import WindowedSpectrum
 
 from ..physics import ChainPhysics
-from .fitting import Fit, fit, modes_are_odd
+from .fitting import Fit, fit, modes_are_odd, plain_fit
 from .hypothesis import Cause, Hypothesis
+from .misfit import shares_left
 
-ITERATIONS, FROM_BELIEF = 60, 20
+ITERATIONS, FROM_BELIEF, FROM_PLAIN = 60, 20, 20
+
+EXACT = 0.03
+"""Error, over the response, that a plain fit takes every line to have: where a fit that gave up a recording begins."""
+
+FAR_WORSE = 2.0
+"""Share left of one recording over that of another from which the fit has given the first up."""
 
 
 def settled(lines: list[WindowedSpectrum], fitted: Fit) -> Fit:
@@ -29,6 +38,45 @@ def settled(lines: list[WindowedSpectrum], fitted: Fit) -> Fit:
         return rested
     again = fit(lines, believed(rested.hypothesis), rested.noises, iterations=ITERATIONS)
     return min(rested, again, key=lambda one: one.score)
+
+
+def gives_one_up(lines: list[WindowedSpectrum], hypothesis: Hypothesis, most: float) -> bool:
+    """Whether a hypothesis leaves much of one recording and far less of another: the first draws its fit no more.
+
+    Parameters
+    ----------
+    lines
+        Windowed spectra of the recordings that are compared.
+    hypothesis
+        What predicts them.
+    most
+        Root mean square that may be left of a recording, over its response.
+    """
+    left = [float(np.sqrt(np.mean(shares_left(hypothesis, one)))) for one in lines]
+    return max(left) > max(most, FAR_WORSE * min(left))
+
+
+def following_all(lines: list[WindowedSpectrum], fitted: Fit, most: float) -> Fit:
+    """The fit; where it leaves much of one recording, the better of this and of one begun by plain least squares.
+
+    Noise is inferred from what a fit leaves. A recording that a law cannot follow yet counts as noise, so that it
+    draws the fit no more, however well the law would follow it with other numbers. Plain least squares counts all
+    recordings whatever is left of them.
+
+    Parameters
+    ----------
+    lines
+        Windowed spectra of the recordings that are compared.
+    fitted
+        A fit of a few steps.
+    most
+        Root mean square that may be left of a recording, over its response.
+    """
+    if not np.isfinite(fitted.score) or not gives_one_up(lines, fitted.hypothesis, most):
+        return fitted
+    plain = plain_fit(lines, fitted.hypothesis, iterations=FROM_PLAIN, exact=EXACT)
+    again = fit(lines, plain.hypothesis, iterations=FROM_PLAIN)
+    return min(fitted, again, key=lambda one: one.score)
 
 
 def with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Fit:

@@ -1,11 +1,13 @@
 from .common_band import ComparedBand, compared_band
 from .deflection_form import in_deflections, without_delay
+from .held_out_parts import Recordings
 from .measured_noise import noise_content, with_measured_noise
 from .reading import band_of, measured_part, read_at, read_recording, read_recordings
 from .true_forces import without_force_noise
 
 __all__ = [
     "ComparedBand",
+    "Recordings",
     "band_of",
     "compared_band",
     "in_deflections",

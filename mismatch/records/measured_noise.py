@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import WindowedSpectrum, find_repeats, measured_noise
+from estimation import WindowedSpectrum, find_repeats, noise_of_periods, steady_periods
 from foundation import InputError
 
 Complex = NDArray[np.complex128]
@@ -25,10 +25,12 @@ def with_measured_noise(lines: WindowedSpectrum) -> WindowedSpectrum:
     lines
         Windowed lines of one recording.
     """
-    if find_repeats(lines.recording.force) is None:
+    repeated = find_repeats(lines.recording.force)
+    if repeated is None:
         return lines
+    band = float(lines.frequencies[0]), float(lines.frequencies[-1])
     try:
-        noise = measured_noise([lines.recording], (float(lines.frequencies[0]), float(lines.frequencies[-1])))
+        noise = noise_of_periods(steady_periods([lines.recording], repeated).within(band))
         return replace(lines, noise=noise.at(lines.frequencies, lines.recording.rate))
     except InputError:
         # too few steady periods, or too few lines of them in the band

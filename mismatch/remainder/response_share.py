@@ -4,7 +4,7 @@ import numpy as np
 
 from estimation import WindowedSpectrum
 
-from ..models import Hypothesis, predict_lines
+from ..models import Hypothesis, shares_left
 
 
 def share_of_response(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> float:
@@ -19,8 +19,4 @@ def share_of_response(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> 
     lines
         Windowed lines of the recordings.
     """
-    shares = []
-    for one in lines:
-        rest = one.measured - predict_lines(hypothesis, one).response
-        shares.append(np.sum(np.abs(rest) ** 2, axis=0) / np.sum(np.abs(one.measured) ** 2, axis=0))
-    return float(np.sqrt(np.mean(np.concatenate(shares))))
+    return float(np.sqrt(np.mean([shares_left(hypothesis, one) for one in lines])))

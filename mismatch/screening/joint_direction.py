@@ -1,6 +1,8 @@
 """The direction in which a joint acts, and what force it exerts, from the residual of a linear fit."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,10 +150,29 @@ def _wiener(record: FloorRecord, reached: Complex) -> Complex:
     return np.asarray((variance / (1 + variance * size))[:, None] * row)
 
 
-def motion_of(seen: list[SeenMotion], stiffness: float) -> JointMotion:
+class MovingJoint(Protocol):
+    """Motion of a joint in one recording, as it was seen or as a hypothesis predicts it."""
+
+    @property
+    def deflection(self) -> Real:
+        """Deflection of the joint at each instant, m."""
+
+    @property
+    def velocity(self) -> Real:
+        """Velocity of the joint at each instant, m/s."""
+
+
+def motion_of(seen: Sequence[MovingJoint], stiffness: float) -> JointMotion:
     """Sizes of a joint's motion over all recordings.
 
     The reach counts from zero and not from the mean, as play and knees lie where the joint stands.
+
+    Parameters
+    ----------
+    seen
+        The joint's motion in each recording.
+    stiffness
+        Static stiffness of the structure along the joint's direction, N/m.
     """
     deflections = np.concatenate([one.deflection for one in seen])
     velocities = np.concatenate([one.velocity for one in seen])

@@ -1,7 +1,7 @@
 """Joint laws of one round: sighted at the likeliest place, driven by the seen motion, then simulated freely."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -9,15 +9,13 @@ import numpy as np
 
 from estimation import WindowedSpectrum
 
-from ..inference import Candidate, Proposal, Settings, in_processes
-from ..models import Fit, fit, location_of
+from ..inference import Candidate, Proposal, ScreeningSettings, Settings, in_processes
+from ..models import Cause, Fit, following_all, gives_one_up, location_of
 from ..physics import JointPhysics, answer_name
 from .joint_places import JointPlace, joint_places
 from .joint_screening import Screened, screen_joints
+from .joint_starts import begun_at, driven_by_what_was_seen, freed
 from .whitened_residual import linear_floor
-
-FEW = 1000
-"""Lines of a recording on which shapes of a law are compared."""
 
 
 @dataclass(frozen=True)
@@ -89,50 +87,75 @@ def joint_candidates(
     gained
         Score that the best linear cause gains.
     """
-    limits = settings.screening
+    most = settings.verdict.most_of_response
+    strong = gives_one_up(lines, current.hypothesis, most)
+    promising = _promising(sighted, least, strong, settings.screening)
+    driven = in_processes([partial(driven_by_what_was_seen, lines, current, one) for one in promising])
+    driven = sorted((one for one in driven if np.isfinite(one.score)), key=lambda one: one.score)
+    near = _as_good(driven, current, gained, settings)
+    if strong:
+        near += _missing_kinds(near, driven, lambda one: one.hypothesis.causes[-1])
+    simulated = in_processes([partial(_simulated, lines, current, one, sighted.places, most) for one in near])
+    return [one for one in simulated if one is not None]
+
+
+def _promising(sighted: SightedLaws, least: float, strong: bool, limits: ScreeningSettings) -> list[Screened]:
+    """Screened laws that are fitted, best first; of a strong effect at least one of each kind."""
     enough = max(limits.least_law, least, limits.promising_law * sighted.gain)
-    promising = [one for one in sighted.screened if one.gain > enough]
-    driven = in_processes([partial(_driven, lines, current, one) for one in promising[: limits.most_laws]])
-    driven = [one for one in driven if np.isfinite(one.score)]
-    driven.sort(key=lambda one: one.score)
-    gains = [current.score - one.score for one in driven]
+    chosen = [one for one in sighted.screened if one.gain > enough][: limits.most_laws]
+    if not strong:
+        return chosen
+    likely = [one for one in sighted.screened if one.gain > limits.least_law]
+    return chosen + _missing_kinds(chosen, likely, lambda one: one.causes[0])
+
+
+def _as_good(driven: list[Fit], current: Fit, gained: float, settings: Settings) -> list[Fit]:
+    """Laws fitted to the motion seen, best first, that are simulated freely."""
+    limits, gains = settings.screening, [current.score - one.score for one in driven]
     nearly = [limits.nearly * gain for gain in gains[:1]]
     enough = max([settings.evidence.least / 2, limits.rival * gained, *nearly])
     # forms of different causes may differ by a linear spring alone: all that are as good are simulated
-    near = [
+    return [
         one
         for place, (one, gain) in enumerate(zip(driven, gains, strict=True))
         if gain >= enough and (place < limits.most_simulated or gain > gains[0] - settings.evidence.least)
     ]
-    # a direction at the tip that nothing else comes near to says all
-    told = {"places": [one.told() for one in sighted.places]}
-    if len(sighted.places) == 1 and sighted.places[0].axis.scales is None:
-        told = {}
-    simulated = in_processes([partial(_simulated, lines, current, one, told) for one in near])
-    return [one for one in simulated if one is not None]
 
 
-def _driven(lines: list[WindowedSpectrum], current: Fit, screened: Screened) -> Fit:
-    """A law fitted to the motion seen, from the better of its two best shapes."""
-    rough = [one.thinned(FEW) for one in lines]
-    starts = [
-        fit(rough, current.hypothesis.with_cause(cause), current.noises, iterations=2) for cause in screened.causes[:2]
-    ]
-    best = min(starts, key=lambda start: start.score)
-    if not np.isfinite(best.score):
-        return best
-    return fit(lines, best.hypothesis, best.noises, iterations=4)
+def _missing_kinds(chosen: list[Any], ranked: list[Any], cause_of: Callable[[Any], Cause]) -> list[Any]:
+    """The first of the ranked whose law loses energy, and whose law loses none, where none of its kind was chosen.
+
+    Where a law moves a resonance by more than its width, the motion that was seen says little of its form: a joint that
+    slips softens, and so does a spring.
+    """
+    kinds = {cause_of(one).law().loses_energy for one in chosen}
+    more = []
+    for one in ranked:
+        kind = cause_of(one).law().loses_energy
+        if kind not in kinds:
+            more.append(one)
+            kinds.add(kind)
+    return more
 
 
-def _simulated(lines: list[WindowedSpectrum], current: Fit, near: Fit, told: Mapping[str, Any]) -> Proposal[Fit] | None:
+def _simulated(
+    lines: list[WindowedSpectrum], current: Fit, near: Fit, places: Sequence[JointPlace], most: float
+) -> Proposal[Fit] | None:
     """The law of a driven fit, now free to move as it makes the structure move; None if that runs away."""
-    last = near.hypothesis.causes[-1]
-    free = replace(near.hypothesis, causes=(*near.hypothesis.causes[:-1], replace(last, seen=None)))
-    # the one that is accepted is fitted to the end
-    fitted = fit(lines, free, near.noises, iterations=10, tolerance=10.0)
+    law, fitted, order = near.hypothesis.causes[-1].physics, freed(lines, near), list(places)
+    assert isinstance(law, JointPhysics)
+    if np.isfinite(fitted.score) and gives_one_up(lines, fitted.hypothesis, most):
+        for place in places[1:]:
+            other = begun_at(lines, current, law, place.axis)
+            if other is not None and other.score < fitted.score:
+                fitted, order = other, [place, *(one for one in places if one is not place)]
+        fitted = following_all(lines, fitted, most)
     if not np.isfinite(fitted.score):
         return None
     axis = fitted.hypothesis.causes[-1].axis
     assert axis is not None
+    # a direction at the tip that nothing else comes near to says all
+    alone = len(order) == 1 and order[0].axis.scales is None
+    told = {} if alone else {"places": [one.told() for one in order]}
     location = {**location_of(axis, fitted.hypothesis.model), **told}
-    return Proposal(answer_name(last.physics), location, fitted, current.score - fitted.score)
+    return Proposal(answer_name(law), location, fitted, current.score - fitted.score)

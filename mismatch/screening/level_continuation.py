@@ -3,8 +3,8 @@
 A strong law shifts a resonance by more than its width. The refit to all levels is then an average that no level shows,
 and the motion that starts a law is wrong. Hardening and softening shift least where the motion is small, dry friction
 and play where it is large. So modes and law are found in the weakest and in the strongest recording alone, and each
-further recording begins where the ones before ended (continuation in the level, as in Kerschen et al., Past, present
-and future of nonlinear system identification in structural dynamics, MSSP 20, 2006, section 4).
+further recording begins where the ones before ended (continuation in the level: Allgower & Georg, Introduction to
+Numerical Continuation Methods, SIAM 2003).
 """
 
 from dataclasses import replace
@@ -15,9 +15,9 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..inference import Proposal, Settings, in_processes
-from ..joints import JointMotion
 from ..models import Fit, Hypothesis, fit, location_of, predict_lines
 from ..physics import JointPhysics
+from .joint_direction import motion_of
 from .joint_laws_fitted import joint_candidates, sighted_laws
 
 CARRIED = 2
@@ -91,14 +91,7 @@ def _with_motion(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Hypot
     last = hypothesis.causes[-1]
     assert last.motion is not None
     joints = [predict_lines(hypothesis, one).joints[-1] for one in lines]
-    strongest = max(joints, key=lambda one: float(np.std(one.deflection)))
-    motion = JointMotion(
-        float(np.std(strongest.deflection)),
-        float(np.std(strongest.velocity)),
-        2.5 * max(float(np.abs(one.deflection).max()) for one in joints),
-        2.5 * max(float(np.abs(one.velocity).max()) for one in joints),
-        last.motion.stiffness,
-    )
+    motion = motion_of(joints, last.motion.stiffness)
     # NaN is no smaller
     if not motion.reach <= LONGEST_REACH * last.motion.reach:
         return hypothesis
@@ -107,4 +100,5 @@ def _with_motion(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Hypot
 
 def _level(lines: WindowedSpectrum) -> float:
     """Root mean square of what drives the recording in the compared band."""
+    # not `BandRecording.level`: it counts force outside the band, which says little of how far these modes move
     return float(np.sqrt(np.mean(np.abs(lines.force_here) ** 2)))

@@ -141,8 +141,11 @@ def test_a_quarter_of_the_response_left_is_not_none(
     left = leftover(known.details.final.hypothesis, list(known.details.recordings))
     good, bad = _gain(0.1, 0.1, 0.1, 0.1, 1.0, 0.0), _gain(0.5, 0.5, 0.5, 0.5, 1.0, 0.0)
 
-    def verdict_of(causes: list[AcceptedCause], gain: Improvement) -> str:
-        return verdict_of_structure(known.details.final.hypothesis, causes, (left, left), gain, VerdictSettings())
+    def verdict_of(
+        causes: list[AcceptedCause], gain: Improvement, whole: Improvement | None = None, *, measured: bool = False
+    ) -> str:
+        final, limits = known.details.final.hypothesis, VerdictSettings()
+        return verdict_of_structure(final, causes, (left, left), gain, limits, everywhere=whole, measured=measured)
 
     assert verdict_of([], good) == "none"
     assert verdict_of([], bad) == "unexplained"
@@ -151,6 +154,13 @@ def test_a_quarter_of_the_response_left_is_not_none(
     assert verdict_of(tone, bad) == "unexplained"  # a tone that takes nothing away
     assert verdict_of(tone, _gain(0.9, 0.8, 0.3, 0.1, 1e-6, 99.0)) == "partly explained"
     assert verdict_of(tone, _gain(1.2, 1.2, 1.06, 0.1, 1e-6, 99.0)) == "unexplained"  # it predicts nothing
+    # an aircraft: nine times the noise that its periods show; a linear refit follows the upper level alone
+    upper, both_levels = _gain(0.963, 0.114, 0.066, 0.007, 0.002, 506.0), _gain(0.68, 0.42, 0.085, 0.006, 0.002, 506.0)
+    assert verdict_of(tone, upper) == "explained"
+    assert verdict_of(tone, upper, measured=True) == "unexplained"
+    assert verdict_of(tone, upper, both_levels, measured=True) == "partly explained"
+    worse = _gain(0.963, 0.06, 0.066, 0.007, 0.002, 506.0)
+    assert verdict_of(tone, worse, both_levels, measured=True) == "unexplained"  # no better where it is told of
 
 
 def test_impossible_numbers_are_said_to_be_so() -> None:

@@ -1,4 +1,4 @@
-"""What is held out of two recordings, or of one: the middle half of the weaker, predicted from its beginning."""
+"""What is held out of two recordings, or of one: the middle half of that which modal parameters follow worst."""
 
 import numpy as np
 import pytest
@@ -6,10 +6,11 @@ from concealed_recordings import RATE
 from one_mode_rig import Rig
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, band_of, diagnose
-from mismatch.adapters.structure.held_out import Recordings
+from mismatch import Hypothesis, LabError, ModelShape, Settings, band_of, diagnose
+from mismatch.adapters.structure.held_out import recordings_of, scored
 from mismatch.faults import residual_lines
-from mismatch.models import fit, plain_fit
+from mismatch.models import fit, following_all, gives_one_up, plain_fit
+from mismatch.records import Recordings
 from modal_fit import ModalModel
 
 
@@ -69,3 +70,42 @@ def test_a_plain_refit_gives_no_recording_up() -> None:
     assert left(plain.hypothesis, strong) < 0.9 * left(weighted.hypothesis, strong)
     assert left(plain.hypothesis, weak) > left(weighted.hypothesis, weak)
     assert np.ptp(plain.noises[1].responses) == 0.0
+
+
+def test_of_two_levels_the_one_that_modes_follow_worst_is_held_out() -> None:
+    rig = Rig().stiffened(0.78, 4.0)
+    lines = [windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0) for one in rig.recordings((1.0, 4.0), 40.0)]
+    shape = ModelShape(rig.model, LabError())
+    true_when_weak = Hypothesis(shape, np.zeros(shape.size))
+    assert recordings_of(lines, lines, true_when_weak).held_out_place == 1
+    assert recordings_of(lines[::-1], lines[::-1], true_when_weak).held_out_place == 0
+
+
+def test_a_fit_that_gives_no_recording_up_stays_as_it_is() -> None:
+    rig = Rig().stiffened(0.78, 4.0)
+    lines = [windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0) for one in rig.recordings((1.0, 4.0), 40.0)]
+    shape = ModelShape(rig.model, LabError())
+    alone = fit(lines[:1], Hypothesis(shape, np.zeros(shape.size)), iterations=30)
+    assert not gives_one_up(lines[:1], alone.hypothesis, 0.25)
+    assert following_all(lines[:1], alone, 0.25) is alone
+    both = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=30)
+    assert gives_one_up(lines, both.hypothesis, 0.25)
+    assert following_all(lines, both, 0.25).score <= both.score
+
+
+def test_what_is_left_everywhere_counts_the_middle_of_both_levels() -> None:
+    """Without a law: the modes that are true at the weak level leave nothing there, and much at the strong one."""
+    rig = Rig().stiffened(0.78, 4.0)
+    lines = [windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0) for one in rig.recordings((1.0, 4.0), 40.0)]
+    shape = ModelShape(rig.model, LabError())
+    true_when_weak = Hypothesis(shape, np.zeros(shape.size))
+    noises = fit(lines, true_when_weak, iterations=1).noises
+    both = recordings_of(lines, lines, true_when_weak)
+    found = scored(both, (true_when_weak, true_when_weak), noises, (), Settings().proof)
+    weak = lines[0].between(0.25, 0.75)
+    there = np.sqrt(np.sum(np.abs(residual_lines(true_when_weak, weak)) ** 2) / np.sum(np.abs(weak.measured) ** 2))
+    strong = found.improvement.after
+    assert found.improvement.held_out == "level_2"
+    assert there < 0.5 * strong
+    assert found.everywhere.after == pytest.approx(np.sqrt((there**2 + strong**2) / 2))
+    assert not found.measured

@@ -14,6 +14,7 @@ from mismatch.joints import JointAxis, JointMotion, joint_in_words, modal_scales
 from mismatch.models import Cause, Fit, location_of
 from mismatch.physics import JointPhysics, library
 from mismatch.screening.joint_places import JointPlace, joint_places
+from mismatch.screening.joint_starts import begun_at
 from modal_fit import ModalModel
 
 TrialOf = Callable[[ModalModel, str, float, int], BandRecording]
@@ -59,14 +60,33 @@ def _trial(model: ModalModel, axis: JointAxis, driven: BandRecording, rng: np.ra
     return windowed_spectrum(replace(force, response=noisy), band_of(model, 128.0), 4.0)
 
 
-def _places(model: ModalModel, axis: JointAxis, trial_of: TrialOf) -> tuple[JointPlace, ...]:
+def _refitted(model: ModalModel, axis: JointAxis, trial_of: TrialOf) -> tuple[list[WindowedSpectrum], Fit]:
+    """Two recordings of the structure with a joint along an axis, and the linear refit of both."""
     rng = np.random.default_rng(3)
     driven = replace(model, right=model.right[:, :2], responses=model.responses[:2])
     trials = [trial_of(driven, name, level, k) for k, (name, level) in enumerate((("low", 20.0), ("high", 60.0)))]
     lines = [_trial(model, axis, one, rng) for one in trials]
     shape = ModelShape(model, LabError())
-    base = fit(lines, Hypothesis(shape, np.zeros(shape.size)))
+    return lines, fit(lines, Hypothesis(shape, np.zeros(shape.size)))
+
+
+def _places(model: ModalModel, axis: JointAxis, trial_of: TrialOf) -> tuple[JointPlace, ...]:
+    lines, base = _refitted(model, axis, trial_of)
     return joint_places(linear_floor(base, lines), base.hypothesis, MARGIN)
+
+
+def test_a_law_that_begins_where_the_joint_is_gains_most(armed: ModalModel, trial_of: TrialOf) -> None:
+    lines, base = _refitted(armed, _between(armed), trial_of)
+    law, softer = library()["stiffness_hardening"], library()["stiffness_softening"]
+    assert isinstance(law, JointPhysics)
+    assert isinstance(softer, JointPhysics)
+    there = begun_at(lines, base, law, _between(armed))
+    elsewhere = begun_at(lines, base, law, JointAxis(np.array([0.0, 1.0])))
+    assert there is not None
+    assert there.score < base.score - 1000
+    assert there.hypothesis.causes[-1].seen is None
+    assert elsewhere is None or there.score < elsewhere.score - 100
+    assert begun_at(lines, base, softer, _between(armed)) is None  # of the wrong sign
 
 
 def test_a_joint_between_two_points_is_found_there(armed: ModalModel, trial_of: TrialOf) -> None:

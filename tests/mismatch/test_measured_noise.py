@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from one_mode_rig import Rig
 
-from estimation import BandRecording, windowed_spectrum
+from estimation import BandRecording, measured_noise, windowed_spectrum
 from millfrf.structure.diagnosis_words import diagnosis_lines
 from mismatch import Hypothesis, LabError, ModelShape, band_of, diagnose
 from mismatch.models import outdoes_noise
@@ -70,6 +70,17 @@ def test_forces_that_hardly_repeat_show_no_noise() -> None:
     assert not outdoes_noise(true, lines)
     louder = replace(lines.noise, responses=2 * lines.noise.responses)
     assert outdoes_noise(true, replace(lines, noise=louder))
+
+
+def test_the_noise_of_a_diagnosis_is_the_measured_noise() -> None:
+    rig = Rig()
+    one = steady(rig, "only", 4.0, 5)
+    lines = with_measured_noise(windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0))
+    assert lines.noise is not None
+    noise = measured_noise([one], (lines.frequencies[0], lines.frequencies[-1])).at(lines.frequencies, rig.rate)
+    assert lines.noise.statement == noise.statement
+    np.testing.assert_array_equal(lines.noise.responses, noise.responses)
+    np.testing.assert_array_equal(lines.noise.forces, noise.forces)
 
 
 def test_random_forces_show_no_noise() -> None:

@@ -1,5 +1,6 @@
 """What is told where a cause stands and something else is left: half of the error gone, and a name that is sure."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -59,7 +60,10 @@ def test_modes_alone_are_no_name() -> None:
 def test_a_law_that_another_outdoes_on_the_motion_seen_is_no_sure_name() -> None:
     seen = {"coulomb_friction": 5e4, "backlash": 900.0, "missing_mode": 1e6}
     assert has_a_sure_name(found_with(("coulomb_friction", 900.0), screened=seen), LAWS)
-    assert not has_a_sure_name(found_with(("coulomb_friction", 900.0), screened=seen | {"backlash": 6e4}), LAWS)
+    other = found_with(("coulomb_friction", 900.0), screened=seen | {"backlash": 6e4})
+    assert not has_a_sure_name(other, LAWS)
+    told_with_it = replace(other.rounds[0], equivalents=("backlash",))
+    assert has_a_sure_name(replace(other, rounds=(told_with_it,)), LAWS)
 
 
 def test_a_tone_in_the_band_must_lower_the_error() -> None:

@@ -55,6 +55,16 @@ def test_a_tone_below_the_noise_is_found_with_frequency_and_size() -> None:
     assert tone.amplitudes == pytest.approx([0.7 * size, 0.28 * size], rel=0.2)
 
 
+def test_a_channel_that_clips_is_not_looked_at() -> None:
+    """A limit makes harmonics of what repeats: what its channel alone shows is no tone from elsewhere."""
+    lines = recordings(5, (10 * float(noise_of(recordings(5))[0]),) * 3)
+    shape = ModelShape(structure(), LabError())
+    true = Hypothesis(shape, np.zeros(shape.size))
+    first, second = lines[0].recording.channels[-2:]
+    assert len(tones_beyond(true, lines, DECAY, 4, clipped=[first])) == 1  # the other one shows it, too
+    assert tones_beyond(true, lines, DECAY, 4, clipped=[first, second]) == []
+
+
 def test_a_line_of_the_cut_is_no_tone() -> None:
     assert found_in(recordings(6, forced=0.02)) == []
 

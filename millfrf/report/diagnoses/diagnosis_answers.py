@@ -192,9 +192,16 @@ def how_sure(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
         for cause in diagnosis.physics
     ]
     said.append(_errors(diagnosis))
+    said += offered_in_words(diagnosis)
     said += [one["sentence"] for one in diagnosis.content.get("noise", ())]
     said.append(f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal.")
     return tuple(said)
+
+
+def offered_in_words(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
+    """What is to be known of the improved model before one predicts with it; empty: nothing."""
+    said = diagnosis.content.get("improved_model", {}).get("sentence")
+    return (said,) if said else ()
 
 
 def _errors(diagnosis: StructureDiagnosis) -> str:

@@ -12,6 +12,7 @@ from stability import StabilityLobes, zero_order
 
 from ...tables import Table
 from ..section import Picture, Section
+from .diagnosis_answers import offered_in_words
 
 ASSUMED = MillingProcess(
     teeth=2,
@@ -71,7 +72,7 @@ def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProce
     table = Table("Depth that is stable at every speed drawn", columns, rows)
     caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
     picture = Picture(as_data_uri(lobes_figure(curves)), caption, "Stability lobes before and after")
-    return Section(title, (sentence,), (table,), (picture,))
+    return Section(title, (sentence, *offered_in_words(diagnosis)), (table,), (picture,))
 
 
 def _frequencies(model: ModalModel) -> NDArray[np.float64]:

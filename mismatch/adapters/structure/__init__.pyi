@@ -1,6 +1,5 @@
 from .diagnosing import diagnose
-from .improved_model import improved_model_of
-from .prediction import Prediction, predict
+from .prediction import Prediction, improved_model_of, predict
 from .receptance_at_level import equivalent_receptance
 
 __all__ = [

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from estimation import WindowedSpectrum
 
 from ...inference import Proposal, Remainder, Round, Search, Settings, equivalents_of
-from ...models import Fit, fit, settled
+from ...models import Fit, fit, gives_one_up, settled
 from ...physics import JointPhysics, Physics, answer_name
 from ...remainder import leftover
 from .acceptance import evidence_needed, impossible, plainest, possible_gains, twins_of, worth_it
-from .rounds import Standing, StructureRound, Weighed, only_modes, weigh
+from .rounds import Standing, StructureRound, Weighed, likeliest_seen, only_modes, weigh
 
 PRUNING = 20
 """Steps at most of a fit without one of its causes."""
@@ -61,7 +61,7 @@ class StructureComparison:
             laws = {name: one for name, one in self.causes.items() if name not in linear}
             weighed = weighed.with_more(weigh(standing, laws))
         chosen = self._chosen(weighed, search)
-        equivalents = () if chosen is None else self._equivalents(weighed, chosen)
+        equivalents = () if chosen is None else self._equivalents(weighed, chosen, current)
         failed = weighed.sighted and not any(
             one.fitted.hypothesis.causes[-1].axis is not None and one.evidence >= self.settings.evidence.least
             for one in weighed.proposals
@@ -94,15 +94,24 @@ class StructureComparison:
             good = [one for one in good if one.name == best.name]
         return None
 
-    def _equivalents(self, weighed: Weighed, chosen: Proposal[Fit]) -> tuple[str, ...]:
-        evidence = self.settings.evidence
+    def _equivalents(self, weighed: Weighed, chosen: Proposal[Fit], current: Fit) -> tuple[str, ...]:
+        """Names that cannot be told from the chosen one.
+
+        Of an effect so strong that a recording was given up, the law that was likeliest on the motion seen is one of
+        them, too, if it was simulated and brings half of the evidence: fits of neither are sure to have ended.
+        """
+        evidence, limits = self.settings.evidence, self.settings.verdict
         possible = [one for one in weighed.proposals if not impossible(one, evidence)]
         near = equivalents_of(possible, chosen, evidence.as_good)
         if chosen.name not in self.laws:
             return near
         laws = [one for one in possible if one.name in self.laws]
         as_forms_go = equivalents_of(laws, chosen, (1 - evidence.as_good_form) * chosen.evidence)
-        return tuple(dict.fromkeys([*near, *as_forms_go]))
+        sighted: tuple[str, ...] = ()
+        if gives_one_up(self.lines, current.hypothesis, limits.most_of_response):
+            half = equivalents_of(laws, chosen, (1 - limits.partly) * chosen.evidence)
+            sighted = tuple(name for name in half if name == likeliest_seen(weighed.candidates, self.laws))
+        return tuple(dict.fromkeys([*near, *as_forms_go, *sighted]))
 
     def _laws_failed_at(self, search: Search[Fit]) -> float:
         """Power that moved with the signal when joint laws last failed; infinite where they did not."""

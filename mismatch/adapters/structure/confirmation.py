@@ -7,8 +7,9 @@ import numpy as np
 from ...faults import residual_lines
 from ...inference import AcceptedCause, Improvement, ProofSettings, Search, Settings, in_processes, released
 from ...models import Fit, Hypothesis, fit, least_misfit, through_structure
+from ...records import Recordings
 from .comparison import StructureComparison
-from .held_out import ITERATIONS, HeldOut, Recordings, chance_of_no_gain, held_out_improvement
+from .held_out import ITERATIONS, HeldOut, chance_of_no_gain, held_out_improvement
 
 
 def confirmed(

@@ -1,7 +1,7 @@
 """The diagnosis of a structure: faults, a linear refit, one cause after the other, and a verdict that binds."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -12,22 +12,11 @@ from foundation import Band, InputError
 from modal_fit import ModalModel
 
 from ...behaviour import behaviour_of
-from ...faults import repair_faults, with_tones_settled
-from ...inference import (
-    AcceptedCause,
-    Candidate,
-    Diagnosis,
-    EvidenceSettings,
-    Progress,
-    Remainder,
-    Search,
-    Settings,
-    released,
-    search,
-)
+from ...faults import repair_faults
+from ...inference import Diagnosis, EvidenceSettings, Progress, Settings, search
 from ...location import SpindleSpeed, StructureDetails, StructureDiagnosis, located, residual_view
-from ...models import Fit, Hypothesis, ModelShape, fit, known_noise, outdoes_noise, through_structure, with_linear_part
-from ...physics import is_fault, library, offered
+from ...models import Fit, Hypothesis, ModelShape, fit, known_noise, outdoes_noise, through_structure
+from ...physics import library, offered
 from ...records import (
     ComparedBand,
     compared_band,
@@ -38,12 +27,11 @@ from ...records import (
     without_force_noise,
 )
 from ...remainder import beyond_model, leftover
+from .answer import Answer, answer_of
 from .comparison import StructureComparison
 from .confirmation import confirmed
-from .form_errors import with_form_spread
-from .held_out import HeldOut, Recordings, held_out_improvement, scored
-from .structure_verdict import has_a_sure_name, shown_faults, small_beside_the_rest, verdict_of_structure
-from .told_causes import modal_deviation, told_causes
+from .held_out import recordings_of
+from .prediction import OfferedModel, offered_model
 
 FIRST_FIT = 30
 """Steps at most of the modal parameters: a nominal model may be far off."""
@@ -126,10 +114,10 @@ def _diagnosed(
     comparison = StructureComparison(mended, causes, settings, before)
     found = search(comparison, base, progress)
     progress("held-out recording")
-    both = Recordings(mended, measured)
+    both = recordings_of(mended, measured, base.hypothesis)
     found, held_out = confirmed(comparison, both, found, faults)
     progress("what is left")
-    answer = _answer(comparison, both, found, held_out, faults, decay)
+    answer = answer_of(comparison, both, found, held_out, faults, decay)
     found = answer.found
     progress("where the mismatch sits")
     band = max(bands, key=lambda band: band.high)
@@ -157,8 +145,15 @@ def _diagnosed(
             "not_asked_for": list(left_out),
             "behaviour": behaviour.content(),
             "noise": _noise_of(answer.final, measured),
+            "improved_model": _offered(answer, measured).content(),
         },
     )
+
+
+def _offered(answer: Answer, measured: list[WindowedSpectrum]) -> OfferedModel:
+    """Which model is offered to predict with."""
+    gain = answer.held_out.improvement
+    return offered_model(answer.verdict, answer.final.hypothesis, measured, answer.causes, gain)
 
 
 def _noise_of(final: Fit, lines: list[WindowedSpectrum]) -> list[dict[str, Any]]:
@@ -210,80 +205,3 @@ def _mostly_kept(lines: WindowedSpectrum, before: WindowedSpectrum) -> bool:
     """Whether most of every force's power is left: else its quietest lines were not those without force."""
     left, had = (np.sum(np.abs(one.force_here) ** 2, axis=0) for one in (lines, before))
     return bool((left > MOSTLY * had).all())
-
-
-@dataclass(frozen=True)
-class _Answer:
-    """What is told: verdict, causes, the fit that holds them, the search, what is left, errors, causes turned down."""
-
-    verdict: str
-    causes: tuple[AcceptedCause, ...]
-    final: Fit
-    found: Search[Fit]
-    left: Remainder
-    held_out: HeldOut
-    rejected: tuple[Candidate, ...] = ()
-
-
-def _answer(
-    comparison: StructureComparison,
-    both: Recordings,
-    found: Search[Fit],
-    held_out: HeldOut,
-    faults: list[AcceptedCause],
-    decay: float,
-) -> _Answer:
-    """The verdict on the causes that a search found; under ``unexplained`` none is told, in part only the large ones.
-
-    What is left may have moved the modes, too: ``modal_parameters`` is no part of a partial answer beside causes.
-    """
-    settings, current = comparison.settings, found.current
-    spread = with_form_spread(current, both.mended)
-    named = [*faults, *told_causes(spread, found.accepted)]
-    causes = with_tones_settled(current, both.measured, named, decay, settings.faults)
-    faults = [cause for cause in causes if is_fault(cause.name)]
-    held_out = scored(both, (held_out.linear, held_out.improved), current.noises, faults, settings.proof)
-    if both.tested and not found.accepted:
-        seen = shown_faults(faults, held_out.improvement, both.mended[-1].frequencies[-1], settings.proof.significance)
-        causes = [cause for cause in causes if cause not in faults or cause in seen]
-        held_out = scored(both, (held_out.linear, held_out.improved), current.noises, seen, settings.proof)
-    deviation = _deviation(both.mended, spread)
-    causes += [] if deviation is None else [deviation]
-    left = leftover(current.hypothesis, both.mended)
-    verdict = verdict_of_structure(
-        current.hypothesis, causes, (comparison.before, left), held_out.improvement, settings.verdict
-    )
-    if verdict == "partly explained" and found.accepted:
-        small = small_beside_the_rest(found, settings.evidence.small_in_part)
-        if small:
-            return _answer(comparison, both, *_without(comparison, both, found, small[-1], faults), faults, decay)
-        causes = [cause for cause in causes if cause is not deviation]
-        if not has_a_sure_name(found, comparison.laws):
-            verdict = "unexplained"
-    if verdict != "unexplained":
-        return _Answer(verdict, tuple(causes), current, found, left, held_out)
-    rejected = tuple(Candidate(one.name, one.evidence, "rejected", one.location) for one in causes)
-    base, measured = found.base, Recordings(both.measured, both.measured)
-    held_out = scored(measured, (held_out.linear, held_out.linear), base.noises, (), settings.proof)
-    return _Answer(verdict, (), base, found, comparison.before, held_out, rejected)
-
-
-def _without(
-    comparison: StructureComparison, both: Recordings, found: Search[Fit], place: int, faults: list[AcceptedCause]
-) -> tuple[Search[Fit], HeldOut]:
-    """The search without one of its causes, and what the others are worth on what was held out."""
-    loss = found.accepted[place].evidence
-    found = released(found, place, comparison.without(found, place), "small beside what is left", loss)
-    last, proof = found.current, comparison.settings.proof
-    return found, held_out_improvement(both, last.hypothesis, last.noises, faults, proof)
-
-
-def _deviation(lines: list[WindowedSpectrum], current: Fit) -> AcceptedCause | None:
-    """Modal parameters that are off by more than a lab's error, and not by the linear part of a joint's law."""
-    found = modal_deviation(current)
-    causes = current.hypothesis.causes
-    if found is None or not current.hypothesis.laws:
-        return found
-    freed = tuple(with_linear_part(cause) if cause.axis is not None else cause for cause in causes)
-    again = fit(lines, replace(current.hypothesis, causes=freed), current.noises, iterations=20)
-    return found if modal_deviation(again) is not None else None

@@ -1,7 +1,7 @@
 """What a hypothesis about a structure is worth on a recording that it was not fitted to."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 
@@ -13,8 +13,9 @@ from estimation import WindowedSpectrum
 
 from ...faults import residual_lines
 from ...inference import AcceptedCause, Improvement, ProofSettings, in_processes, ratio_interval
-from ...models import Hypothesis, fit, known_noise, least_misfit, plain_fit, through_structure
+from ...models import Fit, Hypothesis, fit, known_noise, least_misfit, plain_fit, shares_left, through_structure
 from ...noise import NoiseModel, whitening
+from ...records import Recordings
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -29,10 +30,6 @@ ITERATIONS = 30
 """Steps at most: without the causes the modes may have far to go."""
 
 
-PARTS, PART_LINES = (0.25, 0.75), 24
-"""Share of a recording between which it is held out where there are two or fewer; lines at least of what is left."""
-
-
 @dataclass(frozen=True)
 class HeldOut:
     """What a hypothesis is worth elsewhere.
@@ -43,57 +40,33 @@ class HeldOut:
         Errors on the recording held out.
     linear, improved
         Modal parameters alone, and the whole hypothesis, fitted to what was not held out.
+    everywhere
+        The same errors as root mean squares over all recordings, where a part of each is held out.
+    measured
+        Whether the noise in the recording held out was measured, and not inferred from what a model leaves.
     """
 
     improvement: Improvement
     linear: Hypothesis
     improved: Hypothesis
+    everywhere: Improvement
+    measured: bool
 
 
-@dataclass(frozen=True)
-class Recordings:
-    """The same recordings twice, weakest first.
+def recordings_of(mended: list[WindowedSpectrum], measured: list[WindowedSpectrum], base: Hypothesis) -> Recordings:
+    """The recordings, and which of them modal parameters alone follow worst.
 
     Parameters
     ----------
     mended
-        Recordings without tones and with clipped samples put back, to which causes are fitted.
+        Recordings without tones and with clipped samples put back, weakest first.
     measured
-        Recordings as they were measured, on which errors are counted.
+        The same recordings as they were measured.
+    base
+        Modal parameters alone, fitted to all of them.
     """
-
-    mended: list[WindowedSpectrum]
-    measured: list[WindowedSpectrum]
-
-    @property
-    def held_out_place(self) -> int:
-        """Number of the recording held out: the middle level (the weaker of two), so that the others bracket it."""
-        return (len(self.mended) - 1) // 2
-
-    @property
-    def in_part(self) -> bool:
-        """Whether only the middle half is held out: of two levels one alone says little of a law at the other."""
-        here = self.measured[self.held_out_place]
-        return len(self.mended) < 3 and PARTS[0] * len(here.frequencies) > PART_LINES
-
-    @property
-    def tested(self) -> bool:
-        """Whether anything can be held out: not of a single recording that is too short to be parted."""
-        return len(self.mended) > 1 or self.in_part
-
-    def others(self, which: list[WindowedSpectrum]) -> list[WindowedSpectrum]:
-        """What fits may see: all recordings but the one held out, or the first and last quarter of each.
-
-        Levels keep their weights if all are seen in the same parts.
-        """
-        if self.in_part:
-            return [part for one in which for part in (one.between(0.0, PARTS[0]), one.between(PARTS[1], 1.0))]
-        return [one for k, one in enumerate(which) if k != self.held_out_place] or which
-
-    def held_out(self, which: list[WindowedSpectrum]) -> WindowedSpectrum:
-        """What fits may not see: a recording, or its middle half."""
-        here = which[self.held_out_place]
-        return here.between(*PARTS) if self.in_part else here
+    left = [float(np.mean(shares_left(base, one))) for one in mended]
+    return Recordings(mended, measured, int(np.argmax(left)))
 
 
 def held_out_improvement(
@@ -106,7 +79,8 @@ def held_out_improvement(
 ) -> HeldOut:
     """Fit on all recordings but one, and compare errors on that one as it was measured.
 
-    Two recordings, or one, are fitted in their first and last quarters, and compared in the middle half of the weaker.
+    Two recordings, or one, are fitted in their first and last quarters. They are compared in the middle half of that
+    which modal parameters alone follow worst.
     Of a single short one nothing can be held out: errors are then those of the fit, the p-value is 1.
 
     Modal parameters alone are fitted twice, under inferred noise and by plain least squares: inferred noise makes loud
@@ -129,7 +103,7 @@ def held_out_improvement(
     """
     mended, measured = recordings.others(recordings.mended), recordings.others(recordings.measured)
     caused = bool(final.causes) or any(a is not b for a, b in zip(mended, measured, strict=True))
-    rivals = [] if linear is not None else [fit, plain_fit] if caused else [fit]
+    rivals: list[Callable[..., Fit]] = [] if linear is not None else [fit, plain_fit] if caused else [fit]
     tasks = [partial(one, measured, final.nominal, iterations=ITERATIONS) for one in rivals]
     if caused:
         tasks.append(partial(fit, mended, final, iterations=ITERATIONS))
@@ -201,7 +175,29 @@ def scored(
         against,
         _part_in_words(here) if recordings.in_part else "",
     )
-    return HeldOut(improvement, linear, improved)
+    everywhere = _everywhere(recordings, elsewhere, noises, faults, improvement)
+    return HeldOut(improvement, linear, improved, everywhere, here.noise is not None)
+
+
+def _everywhere(
+    recordings: Recordings,
+    elsewhere: tuple[Hypothesis, Hypothesis],
+    noises: tuple[NoiseModel, ...],
+    faults: Sequence[AcceptedCause],
+    first: Improvement,
+) -> Improvement:
+    """Errors as root mean squares over everything that was held out; those of ``first`` are known."""
+    linear, improved = elsewhere
+    rows = [(first.before, first.refitted, first.after, first.noise_floor)]
+    for place, here in recordings.held_out_elsewhere(recordings.measured).items():
+        rests = [residual_lines(improved.nominal, here), residual_lines(linear, here)]
+        rests.append(residual_lines(improved, here, faults))
+        floor = known_noise(here, through_structure(improved, here), noises[place])
+        powers = [float(np.sum(np.abs(rest) ** 2)) for rest in rests] + [np.trace(floor, axis1=1, axis2=2).real.sum()]
+        shares = np.sqrt(np.array(powers) / np.sum(np.abs(here.measured) ** 2))
+        rows.append(tuple(np.where(np.isfinite(shares), shares, RUNS_AWAY)))
+    before, refitted, after, noise = (float(one) for one in np.sqrt(np.mean(np.square(rows), axis=0)))
+    return replace(first, before=before, refitted=refitted, after=after, noise_floor=noise)
 
 
 def _part_in_words(lines: WindowedSpectrum) -> str:

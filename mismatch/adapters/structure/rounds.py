@@ -1,6 +1,6 @@
 """One round of the search in a structure: every cause is screened, and those that promise most are fitted."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -101,6 +101,20 @@ def only_modes(proposals: Sequence[Proposal[Fit]]) -> bool:
         Fitted causes that count.
     """
     return all(isinstance(one.fitted.hypothesis.causes[-1].physics, ModePhysics) for one in proposals)
+
+
+def likeliest_seen(candidates: Iterable[Candidate], laws: Collection[str]) -> str:
+    """Name of the joint law that was likeliest on the motion seen; empty where none was screened.
+
+    Parameters
+    ----------
+    candidates
+        Candidates of a round.
+    laws
+        Names of the joint laws that were weighed.
+    """
+    seen = [one for one in candidates if one.stage == "screened" and one.name in laws]
+    return max(seen, key=lambda one: one.evidence).name if seen else ""
 
 
 def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:

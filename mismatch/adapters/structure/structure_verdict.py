@@ -16,6 +16,7 @@ from ...inference import (
 from ...models import Fit, Hypothesis
 from ...physics import ModePhysics
 from .acceptance import strained
+from .rounds import likeliest_seen
 
 
 def verdict_of_structure(
@@ -24,8 +25,13 @@ def verdict_of_structure(
     left: tuple[Remainder, Remainder],
     gain: Improvement,
     settings: VerdictSettings,
+    *,
+    everywhere: Improvement | None = None,
+    measured: bool = False,
 ) -> str:
     """Give the verdict: ``none``, ``explained``, ``partly explained`` or ``unexplained``.
+
+    Noise that was measured holds nothing unexplained: an answer that leaves several times as much is not whole.
 
     Parameters
     ----------
@@ -39,13 +45,21 @@ def verdict_of_structure(
         Errors on the recording held out.
     settings
         Thresholds of the verdict.
+    everywhere
+        The same errors over all that was held out; None: nothing else was.
+    measured
+        Whether the noise was measured, and not inferred from what a model leaves.
     """
     before, after = left
     most = settings.most_of_response
     incomplete = leaves_too_much(gain, settings) if causes else min(gain.before, gain.after) > most
+    incomplete |= bool(causes) and measured and gain.after > settings.most_over_measured * gain.noise_floor
     excluded = strained(hypothesis) and not after.noise_like(settings.noise_like)
     # a law that leaves much of the response may stand for another that nobody listed
-    halved = error_halved(gain, settings) and not (hypothesis.laws and gain.after > most)
+    # a linear refit may follow one of two levels, at the other's expense
+    whole = everywhere or gain
+    halved = error_halved(gain, settings) or (gain.after < gain.refitted and error_halved(whole, settings))
+    halved &= not (hypothesis.laws and max(gain.after, whole.after) > most)
     findings = Findings(before, after, bool(causes), excluded=excluded, incomplete=incomplete, halved=halved)
     return verdict_of(findings, settings)
 
@@ -89,7 +103,8 @@ def has_a_sure_name(found: Search[Fit], laws: Collection[str]) -> bool:
     """Whether what leaves something is still known by its name.
 
     Further modes imitate much, also what no library holds: alone they are no name. A law of a joint must also be the
-    likeliest on the motion that was seen; where the free simulation prefers another, neither is sure.
+    likeliest on the motion that was seen, or be told as one that cannot be told from that; where the free simulation
+    alone prefers another, neither is sure.
 
     Parameters
     ----------
@@ -104,8 +119,8 @@ def has_a_sure_name(found: Search[Fit], laws: Collection[str]) -> bool:
     for one in found.accepted:
         if one.name not in laws:
             continue
-        rounds = [each for each in found.rounds if each.chosen is one]
-        seen = [each for each in rounds[0].candidates if each.stage == "screened" and each.name in laws]
-        if seen and max(seen, key=lambda each: each.evidence).name != one.name:
+        own = next(each for each in found.rounds if each.chosen is one)
+        seen = likeliest_seen(own.candidates, laws)
+        if seen and seen != one.name and seen not in own.equivalents:
             return False
     return True

@@ -1,0 +1,145 @@
+"""What a diagnosis tells of a structure: the verdict, the causes under it, and what they are worth on held-out data."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from estimation import WindowedSpectrum
+
+from ...faults import with_tones_settled
+from ...inference import AcceptedCause, Candidate, Remainder, Search, released
+from ...models import Fit, fit, with_linear_part
+from ...physics import is_fault
+from ...records import Recordings
+from ...remainder import leftover
+from .comparison import StructureComparison
+from .form_errors import with_form_spread
+from .held_out import HeldOut, held_out_improvement, scored
+from .structure_verdict import has_a_sure_name, shown_faults, small_beside_the_rest, verdict_of_structure
+from .told_causes import modal_deviation, told_causes
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What is told of a structure.
+
+    Parameters
+    ----------
+    verdict
+        ``none``, ``explained``, ``partly explained`` or ``unexplained``.
+    causes
+        Causes that are told, faults of the recordings first.
+    final
+        The fit that holds them.
+    found
+        The search that found them, without causes that were let go of here.
+    left
+        What that fit leaves beyond noise.
+    held_out
+        What it is worth on the recording held out.
+    rejected
+        Causes that the verdict turns down.
+    """
+
+    verdict: str
+    causes: tuple[AcceptedCause, ...]
+    final: Fit
+    found: Search[Fit]
+    left: Remainder
+    held_out: HeldOut
+    rejected: tuple[Candidate, ...] = ()
+
+
+def answer_of(
+    comparison: StructureComparison,
+    both: Recordings,
+    found: Search[Fit],
+    held_out: HeldOut,
+    faults: list[AcceptedCause],
+    decay: float,
+) -> Answer:
+    """The verdict on the causes that a search found; under ``unexplained`` none is told, in part only the large ones.
+
+    What is left may have moved the modes, too: ``modal_parameters`` is no part of a partial answer beside causes.
+
+    Parameters
+    ----------
+    comparison
+        The comparison that was searched.
+    both
+        The recordings, mended and as measured.
+    found
+        Where the search ended.
+    held_out
+        What its causes are worth on the recording held out.
+    faults
+        Tones and limits that were found before.
+    decay
+        Decay rate of the slowest mode, 1/s.
+    """
+    settings, current = comparison.settings, found.current
+    spread = with_form_spread(current, both.mended)
+    named = [*faults, *told_causes(spread, found.accepted)]
+    causes = with_tones_settled(current, both.measured, named, decay, settings.faults)
+    faults = [cause for cause in causes if is_fault(cause.name)]
+    held_out = scored(both, (held_out.linear, held_out.improved), current.noises, faults, settings.proof)
+    if both.tested and not found.accepted:
+        seen = shown_faults(faults, held_out.improvement, both.mended[-1].frequencies[-1], settings.proof.significance)
+        causes = [cause for cause in causes if cause not in faults or cause in seen]
+        held_out = scored(both, (held_out.linear, held_out.improved), current.noises, seen, settings.proof)
+    deviation = _deviation(both.mended, spread)
+    causes += [] if deviation is None else [deviation]
+    left = leftover(current.hypothesis, both.mended)
+    verdict = verdict_of_structure(
+        current.hypothesis,
+        causes,
+        (comparison.before, left),
+        held_out.improvement,
+        settings.verdict,
+        everywhere=held_out.everywhere,
+        measured=held_out.measured,
+    )
+    if verdict == "partly explained" and found.accepted:
+        small = small_beside_the_rest(found, settings.evidence.small_in_part)
+        if small:
+            return answer_of(comparison, both, *_without(comparison, both, found, small[-1], faults), faults, decay)
+        causes = [cause for cause in causes if cause is not deviation]
+        if not has_a_sure_name(found, comparison.laws):
+            verdict = "unexplained"
+    if verdict == "unexplained":
+        return _unexplained(comparison, both, found, held_out, causes)
+    return Answer(verdict, tuple(causes), current, found, left, held_out)
+
+
+def _unexplained(
+    comparison: StructureComparison,
+    both: Recordings,
+    found: Search[Fit],
+    held_out: HeldOut,
+    causes: Sequence[AcceptedCause],
+) -> Answer:
+    """The answer that tells no cause: the modes refitted to the recordings as they were measured."""
+    rejected = tuple(Candidate(one.name, one.evidence, "rejected", one.location) for one in causes)
+    base, measured = found.base, replace(both, mended=both.measured)
+    held_out = scored(measured, (held_out.linear, held_out.linear), base.noises, (), comparison.settings.proof)
+    return Answer("unexplained", (), base, found, comparison.before, held_out, rejected)
+
+
+def _without(
+    comparison: StructureComparison, both: Recordings, found: Search[Fit], place: int, faults: list[AcceptedCause]
+) -> tuple[Search[Fit], HeldOut]:
+    """The search without one of its causes, and what the others are worth on what was held out."""
+    loss = found.accepted[place].evidence
+    found = released(found, place, comparison.without(found, place), "small beside what is left", loss)
+    last, proof = found.current, comparison.settings.proof
+    return found, held_out_improvement(both, last.hypothesis, last.noises, faults, proof)
+
+
+def _deviation(lines: list[WindowedSpectrum], current: Fit) -> AcceptedCause | None:
+    """Modal parameters that are off by more than a lab's error, and not by the linear part of a joint's law."""
+    found = modal_deviation(current)
+    causes = current.hypothesis.causes
+    if found is None or not current.hypothesis.laws:
+        return found
+    freed = tuple(with_linear_part(cause) if cause.axis is not None else cause for cause in causes)
+    again = fit(lines, replace(current.hypothesis, causes=freed), current.noises, iterations=20)
+    return found if modal_deviation(again) is not None else None

@@ -1,0 +1,79 @@
+"""Where the fit of a joint's law begins: driven by the motion that was seen, and then free, at one place or another."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from estimation import WindowedSpectrum
+
+from ..joints import JointAxis
+from ..models import Fit, fit
+from ..physics import JointPhysics
+from .joint_screening import Screened, screen_joints
+from .whitened_residual import linear_floor
+
+FEW = 1000
+"""Lines of a recording on which shapes of a law are compared."""
+
+FREE_STEPS = 10
+"""Steps at most of a law that is simulated freely; the one that is accepted is fitted to the end."""
+
+
+def driven_by_what_was_seen(lines: list[WindowedSpectrum], current: Fit, screened: Screened) -> Fit:
+    """A law fitted to the motion seen, from the better of its two best shapes.
+
+    Parameters
+    ----------
+    lines
+        Windowed spectra of the recordings that are compared.
+    current
+        The fit without the law.
+    screened
+        The law in its shapes, as they were screened.
+    """
+    rough = [one.thinned(FEW) for one in lines]
+    starts = [
+        fit(rough, current.hypothesis.with_cause(cause), current.noises, iterations=2) for cause in screened.causes[:2]
+    ]
+    best = min(starts, key=lambda start: start.score)
+    if not np.isfinite(best.score):
+        return best
+    return fit(lines, best.hypothesis, best.noises, iterations=4)
+
+
+def freed(lines: list[WindowedSpectrum], driven: Fit) -> Fit:
+    """The last law of a fit, some steps on, free to move as it makes the structure move.
+
+    Parameters
+    ----------
+    lines
+        Windowed spectra of the recordings that are compared.
+    driven
+        A fit whose last law is driven by the motion that was seen.
+    """
+    causes = driven.hypothesis.causes
+    free = replace(driven.hypothesis, causes=(*causes[:-1], replace(causes[-1], seen=None)))
+    return fit(lines, free, driven.noises, iterations=FREE_STEPS, tolerance=10.0)
+
+
+def begun_at(lines: list[WindowedSpectrum], current: Fit, law: JointPhysics, axis: JointAxis) -> Fit | None:
+    """A law begun along another axis, and some steps on; None where nothing there speaks for it.
+
+    A fit turns the axis, but not from one valley into another: where a joint sits is tried by beginning there.
+
+    Parameters
+    ----------
+    lines
+        Windowed spectra of the recordings that are compared.
+    current
+        The fit without the law.
+    law
+        The law, from the library.
+    axis
+        Where the joint is begun.
+    """
+    screened = screen_joints(linear_floor(current, lines), current.hypothesis, axis, [law])
+    if not screened:
+        return None
+    driven = driven_by_what_was_seen(lines, current, screened[0])
+    return freed(lines, driven) if np.isfinite(driven.score) else None

@@ -1,0 +1,81 @@
+"""The model that is offered after a diagnosis: the refit where it is better, else the nominal one, and a word on it."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from one_mode_rig import Rig
+
+from millfrf.report.diagnoses.diagnosis_answers import how_sure
+from millfrf.structure.diagnosis_words import diagnosis_lines
+from mismatch import Settings, StructureDiagnosis, diagnose, improved_model_of, library, predict, write_diagnosis
+
+LEVELS = (20.0, 40.0, 60.0)
+
+
+def diagnosed(share: float, off: float, levels: tuple[float, ...] = LEVELS) -> StructureDiagnosis:
+    """A hardening rig without its law in the library, from a nominal model whose frequency is off by a factor."""
+    rig = Rig().stiffened(share, LEVELS[-1])
+    known = {name: one for name, one in library().items() if name in ("channel_delay", "gain_error")}
+    model = replace(rig.model, poles=off * rig.model.poles, band=(4.0, 22.0))
+    return diagnose(model, rig.recordings(levels, 20.0), Settings(causes=known))
+
+
+def test_a_refit_that_is_better_everywhere_is_kept() -> None:
+    found = diagnosed(0.1, 1.0)
+    assert (found.verdict, found.content["improved_model"]["model"]) == ("unexplained", "final")
+    np.testing.assert_array_equal(improved_model_of(found).poles, found.details.final.hypothesis.model.poles)
+    assert "The improved model holds refitted modes and no law: they leave " in diagnosis_lines(found)[-4]
+    assert all(one["final"] < one["nominal"] for one in found.content["improved_model"]["recordings"])
+
+
+@pytest.mark.parametrize(
+    ("share", "held_out_is_better", "worst"),
+    [(0.3, False, "level_2"), (0.1, True, "level_3")],  # the latter was fitted, and the refit is worse all the same
+)
+def test_the_nominal_model_is_kept_where_the_refit_is_worse(
+    share: float, held_out_is_better: bool, worst: str, tmp_path: Path
+) -> None:
+    """A rig that hardens to the frequency that the lab believes: a refit to all levels ends at the low one's."""
+    found = diagnosed(share, 1.05)
+    assert found.verdict == "unexplained"
+    assert (found.improvement.after < found.improvement.before) is held_out_is_better
+    nominal = found.details.base.hypothesis.shape.nominal
+    np.testing.assert_array_equal(improved_model_of(found).poles, nominal.poles)
+    for lines in found.details.measured:
+        errors = [predict(one, lines.recording).total_error for one in (improved_model_of(found), nominal)]
+        assert errors[0] == errors[1]
+    sentence = found.content["improved_model"]["sentence"]
+    assert sentence.startswith("The improved model is the nominal model: refitted modes leave ")
+    assert f" % of {worst}, the nominal model " in sentence
+    assert sentence in diagnosis_lines(found)
+    assert sentence in how_sure(found)
+    write_diagnosis(tmp_path / "diagnosis.json", found)
+    stored = json.loads((tmp_path / "diagnosis.json").read_text())["improved_model"]
+    assert (stored["model"], stored["sentence"]) == ("nominal", sentence)
+    assert [one["recording"] for one in stored["recordings"]] == ["level_1", "level_2", "level_3"]
+
+
+def test_the_delay_of_the_chain_stays_in_the_nominal_model() -> None:
+    rig, late = Rig(excitation="voltage", response="displacement").stiffened(0.3, LEVELS[-1]), 4
+    model = replace(rig.model, poles=1.05 * rig.model.poles, quantity="transfer", unit="m/V", band=(4.0, 22.0))
+    model = replace(model, delay=late / rig.rate)
+    trials = [replace(one, response=np.roll(one.response, late, axis=0)) for one in rig.recordings(LEVELS, 20.0)]
+    found = diagnose(model, trials, Settings(causes={"gain_error": library()["gain_error"]}))
+    assert found.content["improved_model"]["model"] == "nominal"
+    assert improved_model_of(found) == model
+
+
+def test_an_accepted_cause_that_harms_one_recording_is_kept_and_said_to() -> None:
+    found = diagnosed(0.1, 1.05, (20.0, 60.0))
+    assert [cause.name for cause in found.physics] == ["modal_parameters"]
+    assert improved_model_of(found).poles[0] == found.details.final.hypothesis.model.poles[0]
+    low, high = found.content["improved_model"]["recordings"]
+    assert low["final"] < low["nominal"]
+    assert high["final"] > 1.1 * high["nominal"]
+    numbers = f"{100 * high['final']:.3g} % of level_2, the nominal model {100 * high['nominal']:.3g} %"
+    said = f"The improved model is worse than the nominal one: it leaves {numbers}."
+    assert said in diagnosis_lines(found)
+    assert said in how_sure(found)
