@@ -15,6 +15,7 @@ from .commands import COMMANDS
 from .cut import cut_app
 from .number_lists import options_of_several, with_lists_apart
 from .robot import robot_app
+from .terminal import printable
 from .usage_words import usage_in_words
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -84,7 +85,7 @@ def _unforeseen(error: Exception) -> str:
 
 
 def _fail(message: str, code: int) -> int:
-    print("millfrf: " + " ".join(message.split()), file=sys.stderr)
+    print("millfrf: " + printable(" ".join(message.split())), file=sys.stderr)
     return code
 
 

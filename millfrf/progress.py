@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Protocol
 
+from .terminal import printable, progress_bar
+
 QUIET_FOR = 1.0
 """A bar appears only after this many seconds."""
 
@@ -32,17 +34,11 @@ def _ignore(done: int) -> None:
 @contextmanager
 def bar(description: str, total: int | None = None) -> Iterator[Update]:
     """Show a bar that appears after a second and vanishes when the job is done."""
-    from rich.console import Console
-    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
-    from rich.progress import Progress as RichProgress
-
-    console = Console(stderr=True)
-    if not console.is_terminal:
+    shown_bar = progress_bar()
+    if shown_bar is None:
         yield _ignore
         return
-    columns = (TextColumn("{task.description:<28}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    shown_bar = RichProgress(*columns, console=console, transient=True)
-    task = shown_bar.add_task(description, total=total)
+    task = shown_bar.add_task(printable(description), total=total)
     started, shown = time.monotonic(), total is None
     if shown:
         shown_bar.start()

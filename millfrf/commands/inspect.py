@@ -18,14 +18,15 @@ def inspect(
     from ..inspection import inspect_file
     from ..progress import bar
     from ..tables import show
+    from ..terminal import printable
 
     findings = inspect_file(file, bar)
-    typer.echo(f"{file.name}: {findings.summary}")
+    typer.echo(printable(f"{file.name}: {findings.summary}"))
     for table in findings.tables:
         show(table)
     for note in findings.notes:
-        typer.echo(note)
+        typer.echo(printable(note))
     for concern in findings.concerns:
-        typer.echo(f"warning: {concern}")
+        typer.echo(printable(f"warning: {concern}"))
     if not findings.concerns:
         typer.echo("nothing looks wrong")

@@ -1,11 +1,12 @@
 """Tables of results as plain data, for the terminal and for reports."""
 
-import sys
 from dataclasses import dataclass
 
 import numpy as np
 
 from modal_fit import ModalModel, frequency_and_damping_errors
+
+from ..terminal import print_table
 
 
 @dataclass(frozen=True)
@@ -82,14 +83,4 @@ def error_table(model: ModalModel, title: str = "Standard errors by source") -> 
 
 def show(table: Table) -> None:
     """Print a table to the terminal."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table as RichTable
-
-    drawn = RichTable(title=table.title, box=box.SIMPLE_HEAD, title_justify="left")
-    for number, heading in enumerate(table.columns):
-        drawn.add_column(heading, justify="left" if number == 0 else "right")
-    for row in table.rows:
-        drawn.add_row(*row)
-    console = Console(width=None if sys.stdout.isatty() else 120)
-    console.print(drawn)
+    print_table(table.title, table.columns, table.rows)
