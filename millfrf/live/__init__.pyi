@@ -1,6 +1,6 @@
 from .control import MARKS, LiveControl
 from .monitor import LiveMonitor, LiveSettings
-from .server import LOOPBACK, LiveServer
+from .web import LOOPBACK, LiveServer
 
 __all__ = [
     "LOOPBACK",

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation import Frf, to_receptance
 
@@ -17,15 +18,18 @@ class BandProgress:
     low, high : Hz
         Lower and upper end of the band.
     share
-        Share of its lines that reach the wanted error, 0 ... 1.
+        Share of its known lines that reach the wanted error, 0 ... 1.
     error
-        Median of the error over the wanted one; below 1 is enough.
+        Median over the known lines of the error over the wanted one; below 1 is enough; infinite where none is known.
+    known
+        Share of its lines on which the FRF is known, 0 ... 1.
     """
 
     low: float
     high: float
     share: float
     error: float
+    known: float = 1.0
 
     @property
     def done(self) -> float:
@@ -34,8 +38,8 @@ class BandProgress:
 
     @property
     def enough(self) -> bool:
-        """Whether at least nine tenths of the lines reach the wanted error."""
-        return self.share >= 0.9
+        """Whether at least nine tenths of the lines are known and nine tenths of those reach the wanted error."""
+        return self.share >= 0.9 and self.known >= 0.9
 
 
 def band_progress(
@@ -43,6 +47,7 @@ def band_progress(
     band: tuple[float, float],
     n_bands: int,
     *,
+    known: NDArray[np.bool_] | None = None,
     relative: float,
     absolute: float | None = None,
 ) -> tuple[BandProgress, ...]:
@@ -56,6 +61,8 @@ def band_progress(
         Lowest and highest frequency; the band is cut into parts of equal width.
     n_bands
         Number of parts.
+    known : (n_lines,), bool
+        Lines on which the FRF says something; None: all that are valid.
     relative
         Wanted standard deviation of a column of the FRF over its length (2-norm over the responses).
     absolute
@@ -64,15 +71,17 @@ def band_progress(
     edges = np.linspace(band[0], band[1], n_bands + 1)
     pairs = list(pairwise(edges))
     if frf is None or frf.covariance is None:
-        return tuple(BandProgress(float(low), float(high), 0.0, float("inf")) for low, high in pairs)
+        return tuple(BandProgress(float(low), float(high), 0.0, float("inf"), 0.0) for low, high in pairs)
     reached = _worst(frf, relative, absolute)
+    counted = frf.valid if known is None else known
     found = []
     for low, high in pairs:
         inside = (frf.frequencies >= low) & (frf.frequencies < high) & (frf.frequencies > 0)
-        errors = reached[inside]
+        errors = reached[inside & counted]
         share = float(np.mean(errors <= 1)) if len(errors) else 0.0
         middle = float(np.median(errors)) if len(errors) else float("inf")
-        found.append(BandProgress(float(low), float(high), share, middle))
+        covered = float(np.mean(counted[inside])) if inside.any() else 0.0
+        found.append(BandProgress(float(low), float(high), share, middle, covered))
     return tuple(found)
 
 

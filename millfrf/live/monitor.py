@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Block, Channel, Events, StreamDescription
+from estimation import Frf
 from foundation import InputError
 
 from .enough import BandProgress, band_progress
 from .spectra import GrownSpectra, LiveSpectra
+from .stacked_frf import StackedFrf, stack
 from .traces import TraceBuffer
 
 SPEED_EVENTS = "spindle_speed_rpm"
@@ -68,6 +70,8 @@ class Snapshot:
         Largest magnitude of the last second, in the channel's unit; samples at full scale since the start.
     spectra
         Spectra so far; None until a segment is full.
+    frf, known : FRF and (n_lines,), bool
+        FRF of all tests together, and the lines on which it says something; without FRF `why_no_frf` says why.
     bands
         Progress of each band of frequencies.
     tooth_passing : Hz
@@ -83,6 +87,9 @@ class Snapshot:
     peaks: Real
     overloads: Real
     spectra: GrownSpectra | None
+    frf: Frf | None
+    known: NDArray[np.bool_]
+    why_no_frf: str
     bands: tuple[BandProgress, ...]
     tooth_passing: float
     n_skipped: int
@@ -133,6 +140,7 @@ class LiveMonitor:
         self._n_samples = 0
         self._spectra = self._fresh_spectra()
         self._grown: GrownSpectra | None = None
+        self._stacked: StackedFrf | None = None
         self._bands = self._judged(None)
 
     def _fresh_spectra(self) -> LiveSpectra | None:
@@ -172,9 +180,13 @@ class LiveMonitor:
             with self._lock:
                 self._add(block)
                 if time.monotonic() - estimated > 1.0 and self._spectra is not None:
-                    self._grown = self._spectra.grown()
-                    self._bands = self._judged(self._grown)
+                    self._estimate(self._spectra)
                     estimated = time.monotonic()
+
+    def _estimate(self, spectra: LiveSpectra) -> None:
+        self._grown = spectra.grown()
+        self._stacked = None if self._grown is None else stack([self._grown.cross])
+        self._bands = self._judged(self._stacked)
 
     def _add(self, block: Block) -> None:
         samples = block.samples
@@ -192,10 +204,12 @@ class LiveMonitor:
         if self._spectra is not None:
             self._spectra.add(samples)
 
-    def _judged(self, grown: GrownSpectra | None) -> tuple[BandProgress, ...]:
+    def _judged(self, stacked: StackedFrf | None) -> tuple[BandProgress, ...]:
         s = self.settings
-        frf = None if grown is None else grown.frf
-        return band_progress(frf, self.band, s.n_bands, relative=s.relative_error, absolute=s.absolute_error)
+        frf, known = (None, None) if stacked is None else (stacked.frf, stacked.known)
+        return band_progress(
+            frf, self.band, s.n_bands, known=known, relative=s.relative_error, absolute=s.absolute_error
+        )
 
     def snapshot(self) -> Snapshot:
         """Give the state that a page draws now."""
@@ -210,10 +224,19 @@ class LiveMonitor:
                 peaks,
                 self._overloads.copy(),
                 self._grown,
+                None if self._stacked is None else self._stacked.frf,
+                np.zeros(0, dtype=bool) if self._stacked is None else self._stacked.known,
+                self._why_no_frf(),
                 self._bands,
                 self.settings.teeth * self._speed_rpm / 60,
                 self.n_skipped,
             )
+
+    def _why_no_frf(self) -> str:
+        if self._stacked is None:
+            return "no spectra yet"
+        n = len(self.stream.channels) if self._grown is None else len(self._grown.cross.excitations)
+        return "" if self._stacked.frf is not None else f"the {n} forces are not independent yet"
 
     def close(self) -> None:
         """End the thread."""

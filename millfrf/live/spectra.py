@@ -1,13 +1,13 @@
 """Spectra, coherence and FRF as they grow, of the band that matters: samples are reduced to its rate first."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Channel
-from estimation import EXCITING, RESPONDING, Frf, Resampler, SpectralAccumulator, h1, settings_for, whole_ratio
+from estimation import EXCITING, RESPONDING, CrossSpectra, Resampler, SpectralAccumulator, settings_for, whole_ratio
 from foundation import InputError
 
 Real = NDArray[np.float64]
@@ -15,7 +15,7 @@ Real = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class GrownSpectra:
-    """Spectra and FRF estimated so far.
+    """Spectra of one test so far.
 
     Parameters
     ----------
@@ -23,18 +23,15 @@ class GrownSpectra:
         Frequencies of the lines.
     power : (n, n_channels), unit^2/Hz
         Power spectral density of the excitations, then of the responses.
-    channels
-        Names of the channels, in that order.
-    frf
-        FRF so far; None until there are more segments than excitations.
+    cross
+        The spectra themselves, for stacking with those of other tests.
     averages
         Number of independent averages.
     """
 
     frequencies: Real
     power: Real
-    channels: tuple[str, ...]
-    frf: Frf | None
+    cross: CrossSpectra
     averages: float
 
 
@@ -70,7 +67,6 @@ class LiveSpectra:
         self._highest = highest_frequency
         settings = settings_for(rate, max(segment, 16 / rate), window="hann")
         exciting, responding = ([channels[k] for k in chosen] for chosen in (self._exciting, self._responding))
-        self._names = tuple(channel.name for channel in (*exciting, *responding))
         self._accumulator = SpectralAccumulator(exciting, responding, rate, settings)
 
     def add(self, samples: Real) -> None:
@@ -86,9 +82,19 @@ class LiveSpectra:
             spectra = self._accumulator.result()
         except InputError:
             return None
-        shown = (spectra.frequencies <= self._highest) & (spectra.frequencies > 0)
-        inputs = np.real(np.einsum("kii->ki", spectra.input_spectra))
-        outputs = np.real(np.einsum("kii->ki", spectra.output_spectra))
-        frf = h1(spectra) if spectra.effective_averages > len(self._exciting) + 0.5 else None
-        power = np.concatenate([inputs, outputs], axis=1)[shown]
-        return GrownSpectra(spectra.frequencies[shown], power, self._names, frf, spectra.effective_averages)
+        cross = _lines(spectra, (spectra.frequencies <= self._highest) & (spectra.frequencies > 0))
+        inputs = np.real(np.einsum("kii->ki", cross.input_spectra))
+        outputs = np.real(np.einsum("kii->ki", cross.output_spectra))
+        power = np.concatenate([inputs, outputs], axis=1)
+        return GrownSpectra(cross.frequencies, power, cross, cross.effective_averages)
+
+
+def _lines(spectra: CrossSpectra, chosen: NDArray[np.bool_]) -> CrossSpectra:
+    """Chosen lines of spectra."""
+    return replace(
+        spectra,
+        frequencies=spectra.frequencies[chosen],
+        input_spectra=spectra.input_spectra[chosen],
+        cross_spectra=spectra.cross_spectra[chosen],
+        output_spectra=spectra.output_spectra[chosen],
+    )

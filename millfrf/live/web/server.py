@@ -1,19 +1,20 @@
-"""The page's server: on this machine only, unless an address is given; then its path holds a token nobody can guess."""
+"""The page's server: on this machine only, unless an address is given; its path always holds a token."""
 
 import asyncio
 import ipaddress
-import secrets
+import json
 import threading
 from typing import Any
 
 from acquisition import DriverMissing
 from foundation import InputError
 
-from .control import LiveControl
-from .monitor import LiveMonitor
-from .page import build_page
+from ..control import LiveControl
+from ..monitor import LiveMonitor
+from .guard import Guard, Limits, hosts_of
 
 LOOPBACK = "127.0.0.1"
+PERIOD_MS = 500
 
 
 class LiveServer:
@@ -24,11 +25,11 @@ class LiveServer:
     monitor, control
         What is drawn; what the buttons say.
     address
-        IP address to listen on. Other than loopback, everybody who knows the whole address can see and stop.
+        IP address to listen on. Everybody who knows the whole address of the page can see and stop.
     port
         0: any free one.
-    token
-        Whether the path holds a token; None: only where the address is not loopback.
+    limits
+        What all visitors together can have.
 
     Raises
     ------
@@ -44,7 +45,7 @@ class LiveServer:
         control: LiveControl,
         address: str = LOOPBACK,
         port: int = 0,
-        token: bool | None = None,
+        limits: Limits | None = None,
     ) -> None:
         try:
             parsed = ipaddress.ip_address(address)
@@ -55,9 +56,10 @@ class LiveServer:
         if parsed.is_unspecified:
             raise InputError(f"{address} means every network; give the one of this computer's addresses to listen on")
         self._monitor, self._control = monitor, control
-        self._address, self._wanted_port = address, port
-        guarded = not parsed.is_loopback if token is None else token
-        self._path = f"/{secrets.token_urlsafe(24)}" if guarded else "/"
+        self._address, self._wanted_port, self._loopback = address, port, parsed.is_loopback
+        self._limits = limits or Limits()
+        self._guard: Guard | None = None
+        self._port = 0
         self._loop: asyncio.AbstractEventLoop | None = None
         self._server: Any = None
         self._ready = threading.Event()
@@ -66,9 +68,10 @@ class LiveServer:
 
     @property
     def url(self) -> str:
-        """Address for a browser."""
+        """Address for a browser; whoever has it can press the buttons."""
+        assert self._guard is not None
         host = f"[{self._address}]" if ":" in self._address else self._address
-        return f"http://{host}:{self._server.port}{self._path}"
+        return f"http://{host}:{self._port}/{self._guard.token}/"
 
     def __enter__(self) -> "LiveServer":
         self._thread.start()
@@ -90,17 +93,52 @@ class LiveServer:
         self._ready.set()
         self._loop.run_forever()
         self._server.stop()
+        self._loop.run_until_complete(self._server.close_all_connections())
         self._loop.run_until_complete(self._loop.shutdown_asyncgens())
         self._loop.close()
 
     def _started(self) -> Any:
         try:
-            from bokeh.application import Application
-            from bokeh.application.handlers.function import FunctionHandler
-            from bokeh.server.server import Server
+            from bokeh.embed import json_item
+            from tornado.ioloop import PeriodicCallback
+            from tornado.web import Application
         except ImportError as error:
             raise DriverMissing("the live page needs bokeh; pip install millfrf[live]") from error
-        from tornado.ioloop import IOLoop
+        from ..drawings import all_drawings, first_choice, names_of
+        from .connections import CountedServer
+        from .feeder import Feeder
+        from .handlers import LiveSocket, Missing, PageFile, page_content
+
+        socket = self._bound()
+        self._port = socket.getsockname()[1]
+        self._guard = Guard(hosts_of(self._address, self._port, self._loopback))
+        drawings, first = all_drawings(self._monitor), first_choice(self._monitor)
+        items = {"figures": {one.name: json_item(one.figure) for one in drawings}}
+        chosen = {"response": first.response, "excitation": first.excitation, "spectra": first.spectra}
+        content = json.dumps(items | {"names": names_of(self._monitor), "first": chosen})
+        feeder = Feeder(self._monitor, self._control, drawings, first, self._limits.patience)
+        application = Application(
+            [
+                (r"/(?P<token>[^/]*)/live", LiveSocket),
+                (r"/(?P<token>[^/]*)/(?P<name>[^/]*)", PageFile),
+            ],
+            default_handler_class=Missing,
+            log_function=_say_nothing,
+            websocket_max_message_size=self._limits.message_bytes,
+            websocket_ping_interval=self._limits.patience,
+            guard=self._guard,
+            limits=self._limits,
+            feeder=feeder,
+            content=page_content(content.encode()),
+        )
+        server = CountedServer.with_limits(application, self._limits)
+        application.settings["server"] = server
+        server.add_sockets([socket])
+        PeriodicCallback(feeder.feed, PERIOD_MS).start()
+        return server
+
+    def _bound(self) -> Any:
+        """The socket that is listened on."""
         from tornado.netutil import bind_sockets
 
         try:
@@ -112,25 +150,13 @@ class LiveServer:
             ) from error
         for other in others:
             other.close()
-        port = socket.getsockname()[1]
-        socket.close()
-        host = f"[{self._address}]" if ":" in self._address else self._address
-        page = Application(FunctionHandler(lambda document: build_page(document, self._monitor, self._control)))
-        server = Server(
-            {self._path: page},
-            io_loop=IOLoop.current(),
-            port=port,
-            address=self._address,
-            allow_websocket_origin=[f"{host}:{port}", *([f"localhost:{port}"] if self._path == "/" else [])],
-            use_index=False,
-            redirect_root=False,
-            check_unused_sessions_milliseconds=2000,
-            unused_session_lifetime_milliseconds=5000,
-        )
-        server.start()
-        return server
+        return socket
 
     def __exit__(self, *exception: object) -> None:
         if self._loop is not None and self._loop.is_running():
             self._loop.call_soon_threadsafe(self._loop.stop)
         self._thread.join(5.0)
+
+
+def _say_nothing(_: object) -> None:
+    """Log no request: its path holds the token."""

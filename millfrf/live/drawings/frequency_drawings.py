@@ -1,0 +1,162 @@
+"""Figures over frequency: spectra with the tooth-passing lines, FRF, coherence, and whether there is enough data."""
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import Channel
+from estimation import Frf
+from figures import COLOURS
+
+from ..control import Mark
+from ..enough import BandProgress
+from ..monitor import Snapshot
+from .drawing import GREEN, RED, Choice, Content, Drawing, framed, number, plain, thinned
+
+FREQUENCY = "Frequency (Hz)"
+_HARMONICS = 3
+_TINY = 1e-30
+_COLOUR = COLOURS[1]
+
+Kind = Literal["magnitude", "phase", "coherence"]
+
+
+def spectrum(channels: Sequence[Channel]) -> Drawing:
+    """Roots of the power spectral densities of chosen channels, with the tooth-passing frequency and its harmonics."""
+    from bokeh.models import ColumnDataSource
+
+    plot = framed("spectra", "Spectra", FREQUENCY, "Amplitude density (unit/√Hz)", y_axis_type="log")
+    data = ColumnDataSource({"xs": [], "ys": [], "colour": [], "name": []}, name="spectra.data")
+    plot.multi_line("xs", "ys", color="colour", legend_field="name", source=data)
+    plot.add_layout(plot.legend[0], "right")
+    teeth = ColumnDataSource({"x": []}, name="teeth")
+    plot.vspan(x="x", source=teeth, line_dash="dashed", line_color="#999999")
+    labels = [f"{plain(channel.name)} ({plain(channel.unit)})" for channel in channels]
+
+    def content(shown: Snapshot, choice: Choice, _: Sequence[Mark]) -> Content:
+        passing, spectra = shown.tooth_passing, shown.spectra
+        told = (
+            f"Spectra of this test; dashed: tooth passing {number(passing)} Hz" if passing else "Spectra of this test"
+        )
+        xs: list[Any] = []
+        ys: list[Any] = []
+        if spectra is not None:
+            kept = thinned(len(spectra.power))
+            density = np.maximum(np.sqrt(spectra.power[kept]), _TINY)
+            xs, ys = [spectra.frequencies[kept]] * len(choice.spectra), [density[:, k] for k in choice.spectra]
+        wanted = choice.spectra if xs else ()
+        lines = {
+            "xs": xs,
+            "ys": ys,
+            "colour": [COLOURS[k % len(COLOURS)] for k in range(len(wanted))],
+            "name": [labels[k] for k in wanted],
+        }
+        harmonics = {"x": [order * passing for order in range(1, _HARMONICS + 1)] if passing else []}
+        return {"sources": {"spectra": lines, "teeth": harmonics}, "title": told}
+
+    return Drawing("spectra", plot, content)
+
+
+def transfer(kind: Kind, responses: Sequence[Channel], excitations: Sequence[Channel]) -> Drawing:
+    """An entry of the FRF (magnitude with two standard deviations, or phase), or its response's multiple coherence."""
+    from bokeh.models import ColumnDataSource, FixedTicker
+
+    label = {"magnitude": "Magnitude", "phase": "Phase (°)", "coherence": "Multiple coherence"}[kind]
+    plot = framed(kind, label, FREQUENCY, label, y_axis_type="log" if kind == "magnitude" else "linear")
+    data = ColumnDataSource({"x": [], "y": [], "low": [], "high": []}, name=f"{kind}.data")
+    if kind == "magnitude":
+        plot.varea("x", "low", "high", source=data, fill_alpha=0.25, fill_color=_COLOUR)
+    line = plot.line("x", "y", source=data, color=_COLOUR)
+    if kind == "magnitude":
+        plot.y_range.renderers = [line]  # where little is known yet, the band would squeeze the curve flat
+    elif kind == "phase":
+        plot.y_range.start, plot.y_range.end = -190.0, 190.0
+        plot.yaxis.ticker = FixedTicker(ticks=[-180, -90, 0, 90, 180])
+    else:
+        plot.y_range.start, plot.y_range.end = 0.0, 1.05
+
+    def content(shown: Snapshot, choice: Choice, _: Sequence[Mark]) -> Content:
+        response, excitation = plain(responses[choice.response].name), plain(excitations[choice.excitation].name)
+        title = {
+            "magnitude": f"FRF {response} / {excitation}; band: two standard deviations",
+            "phase": f"Phase of the FRF {response} / {excitation}",
+            "coherence": f"Multiple coherence of {response}",
+        }[kind]
+        frf = shown.frf
+        if frf is None:
+            empty: dict[str, Any] = {"x": [], "y": [], "low": [], "high": []}
+            return {"sources": {kind: empty}, "title": f"{title}: {shown.why_no_frf}"}
+        axis = {"y_label": f"Magnitude ({plain(frf.unit)})"} if kind == "magnitude" else {}
+        curve = _curve(frf, shown.known, kind, choice.response, choice.excitation)
+        return {"sources": {kind: curve}, "title": title, **axis}
+
+    return Drawing(kind, plot, content)
+
+
+def _curve(frf: Frf, known: NDArray[np.bool_], kind: Kind, response: int, excitation: int) -> dict[str, Any]:
+    """Lines of an entry, with a gap (NaN) wherever nothing is known: no stroke bridges what was not measured."""
+    drawn = known if kind == "coherence" else known & _sure(frf, response, excitation)
+    inside = np.flatnonzero(drawn)
+    inside = inside[thinned(len(inside))]
+    frequencies, entry = frf.frequencies[inside], frf.values[inside, response, excitation]
+    step = np.diff(inside, prepend=inside[:1])
+    low = high = value = np.zeros(len(inside))
+    if kind == "magnitude":
+        value = np.abs(entry)
+        error = 2 * _deviation(frf, response, excitation)[inside]
+        low, high = np.maximum(value - error, 1e-3 * value), value + error
+    elif kind == "phase":
+        value = np.degrees(np.angle(entry))
+    elif frf.multiple_coherence is not None:
+        value = frf.multiple_coherence[inside, response]
+    gaps = np.flatnonzero(step > 1.5 * max(1, int(np.median(step)) if len(step) else 1))
+    columns = {"x": frequencies, "y": value, "low": low, "high": high}
+    return {name: np.insert(column, gaps, np.nan) for name, column in columns.items()}
+
+
+def _deviation(frf: Frf, response: int, excitation: int) -> NDArray[np.float64]:
+    if frf.covariance is None:
+        return np.zeros(len(frf.frequencies))
+    return np.asarray(np.sqrt(frf.covariance.variance()[:, response, excitation]))
+
+
+def _sure(frf: Frf, response: int, excitation: int) -> NDArray[np.bool_]:
+    """Lines on which an entry is more than its error: elsewhere a curve would be noise."""
+    return np.asarray(np.abs(frf.values[:, response, excitation]) > _deviation(frf, response, excitation))
+
+
+def enough() -> Drawing:
+    """Share of the data that each band needs for the planned error of its FRF; nothing where no FRF is known."""
+    from bokeh.models import ColumnDataSource
+
+    title = "Enough data? Green: yes"
+    plot = framed("enough", title, "Share of the averages that the planned error needs", FREQUENCY)
+    plot.x_range.start, plot.x_range.end = 0.0, 1.02
+    columns: dict[str, Any] = {"low": [], "high": [], "middle": [], "share": [], "colour": [], "said": []}
+    data = ColumnDataSource(columns, name="enough.data")
+    plot.quad(*(0, "share"), "high", "low", color="colour", line_color="white", alpha=0.75, source=data)
+    plot.text(0, "middle", text="said", source=data, text_font_size="12px", text_baseline="middle", x_offset=6)
+
+    def content(shown: Snapshot, _: Choice, __: Sequence[Mark]) -> Content:
+        bands = shown.bands
+        columns = {
+            "low": [band.low for band in bands],
+            "high": [band.high for band in bands],
+            "middle": [0.5 * (band.low + band.high) for band in bands],
+            "share": [band.done for band in bands],
+            "colour": [GREEN if band.enough else RED for band in bands],
+            "said": [_progress(band) for band in bands],
+        }
+        return {"sources": {"enough": columns}}
+
+    return Drawing("enough", plot, content)
+
+
+def _progress(band: BandProgress) -> str:
+    """How much of the band is known, and its error in terms of the wanted one."""
+    if not np.isfinite(band.error):
+        return "no FRF"
+    covered = "" if band.known >= 0.9 else f"{100 * band.known:.0f} % of lines known, "
+    return f"{covered}error {number(band.error)} × planned"

@@ -1,0 +1,30 @@
+"""What the page says in words: state, time, samples, marks, and what was left out of the drawing."""
+
+from typing import Any
+
+from ..control import LiveControl
+from ..monitor import Snapshot
+
+
+def status_of(now: Snapshot, control: LiveControl) -> dict[str, Any]:
+    """State of the recording as plain text, for the page to set as text; never as HTML."""
+    return {
+        "state": control.state,
+        "line": status_line(now, control),
+        "start": control.state == "waiting",
+        "mark": control.state == "recording",
+        "stop": control.state in ("waiting", "recording"),
+    }
+
+
+def status_line(now: Snapshot, control: LiveControl) -> str:
+    """Time, samples, averages, marks, what was left out of the drawing, and how it ended."""
+    n = len(control.marks)
+    parts = [f"{now.seconds:.1f} s", f"{now.n_samples} samples a channel"]
+    if now.spectra is not None:
+        parts.append(f"{now.spectra.averages:.0f} averages")
+    if n:
+        parts.append(f"{n} mark{'' if n == 1 else 's'} (last: {control.marks[-1].label})")
+    if now.n_skipped:
+        parts.append(f"{now.n_skipped} blocks recorded but not drawn")
+    return f"{', '.join(parts)}. {control.message}".strip()
