@@ -27,9 +27,11 @@ from .recordings import (
 )
 from .session import Session, SimulatedDevice, build_source, session_from_text, session_text
 from .sources import (
+    DEVICES,
     HOST_AXIS,
     SAMPLES_AXIS,
     Block,
+    DeviceStory,
     EventAxis,
     EventFeed,
     Events,
@@ -38,9 +40,11 @@ from .sources import (
     StreamDescription,
     WithFeeds,
     announced_events,
+    device_story,
 )
 
 __all__ = [
+    "DEVICES",
     "HOST_AXIS",
     "SAMPLES_AXIS",
     "SUFFIXES",
@@ -50,6 +54,7 @@ __all__ = [
     "Channel",
     "CsvOptions",
     "DeviceError",
+    "DeviceStory",
     "DeviceTimeout",
     "Disconnected",
     "DiskFull",
@@ -77,6 +82,7 @@ __all__ = [
     "announced_events",
     "build_source",
     "convert",
+    "device_story",
     "open_arrays",
     "read_uff_lines",
     "read_uff_sets",

@@ -28,7 +28,19 @@ class Disconnected(DeviceError):
 
 
 class DeviceTimeout(DeviceError):
-    """The device is there but gave nothing in time."""
+    """The device is there but gave nothing in time.
+
+    Parameters
+    ----------
+    message
+        One line with device and remedy.
+    since : s
+        Host's monotonic time at which the device was last heard; None: not known.
+    """
+
+    def __init__(self, message: str, since: float | None = None) -> None:
+        super().__init__(message)
+        self.since = since
 
 
 class DriverMissing(DeviceError):

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Recording
+from acquisition import DEVICES, DeviceStory, Recording, device_story
 from estimation import Frf, Geometry, read_frf, read_geometry
 from modal_fit import read_modal_model
 from stability import STATUSES, read_lobes
@@ -110,7 +110,16 @@ def _recording(path: str | os.PathLike[str], progress: Progress) -> Findings:
                 for name, series in recording.events.items()
                 if series.axis.texts and len(series.read_raw()[0])
             ]
+            story = _device_story(recording)
+            concerns += story.losses
+            notes += story.notices
     return Findings(RECORDING, summary, tuple(tables), tuple(concerns), tuple(notes))
+
+
+def _device_story(recording: Recording) -> DeviceStory:
+    """What the recording tells of auxiliary devices."""
+    log = recording.events.get(DEVICES)
+    return DeviceStory() if log is None else device_story(*log.read(), log.read_texts())
 
 
 def _text_table(name: str, values: tuple[np.ndarray, np.ndarray], texts: tuple[str, ...]) -> Table:

@@ -130,7 +130,9 @@ def read_can_log(log: Path, decoder: DbcDecoder) -> dict[str, tuple[NDArray[np.f
 
 
 def _take(message: Any, first: float, decoder: DbcDecoder, found: dict[str, tuple[list[float], list[float]]]) -> None:
-    for name, value in decoder.decode(message.arbitration_id, bytes(message.data)):
+    for name, value in decoder.decode(
+        message.arbitration_id, bytes(message.data), extended=bool(message.is_extended_id)
+    ):
         times, values = found.setdefault(name, ([], []))
         times.append(message.timestamp - first)
         values.append(value)

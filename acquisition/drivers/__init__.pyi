@@ -1,6 +1,7 @@
 from .amplifier import Amplifier, Command
 from .can_bus import CanFeed, CanSignal, DbcDecoder
 from .modbus_drive import ModbusFeed, Register
+from .modbus_link import SerialLink, TcpLink
 from .ni import NiSource
 from .ni_channels import NiInput
 from .replay import ReplaySource
@@ -17,5 +18,7 @@ __all__ = [
     "NiSource",
     "Register",
     "ReplaySource",
+    "SerialLink",
     "TachometerFeed",
+    "TcpLink",
 ]

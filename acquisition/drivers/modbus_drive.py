@@ -1,4 +1,4 @@
-"""A spindle drive that is asked for its registers through Modbus-RTU."""
+"""A spindle drive that is asked for its registers through Modbus, on a serial line or a network."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import DeviceTimeout, Disconnected, DriverMissing
+from ..errors import DeviceTimeout
 from ..sources import HOST_AXIS, Events, Put, ThreadedFeed
-from .serial_line import BITS_A_BYTE, LINE_FAILURES
+from .modbus_link import Link, ask, connected
 
-_REPLY_BYTES = 7  # address, function, length, two data bytes, two of the checksum
 _PATIENCE = 5
 
 
@@ -39,16 +38,20 @@ class Register:
     signed: bool = False
     input_register: bool = False
 
+    def value(self, integer: int) -> float:
+        """The integer as a value."""
+        return self.factor * (integer - 0x10000 if self.signed and integer >= 0x8000 else integer)
+
 
 class ModbusFeed(ThreadedFeed):
-    """Registers of one slave, asked in turn.
+    """Registers of one drive, asked in turn; every one is asked once before the recording begins.
 
     Parameters
     ----------
-    port, baud
-        Name and speed (bits/s) of the serial line.
+    link
+        Serial line or network on which the drive is.
     slave
-        Address of the drive, 1 ... 247.
+        Address of the drive, 1 ... 247; behind a gateway, that of the drive there.
     registers
         Registers to read.
     interval : s
@@ -59,63 +62,59 @@ class ModbusFeed(ThreadedFeed):
 
     def __init__(
         self,
-        port: str,
-        baud: int,
+        link: Link,
         slave: int,
         registers: Sequence[Register],
         *,
         interval: float = 0.1,
         timeout: float = 0.2,
     ) -> None:
-        super().__init__(f"Modbus {port}", {register.series: HOST_AXIS for register in registers})
-        self._port, self._baud, self._slave = port, baud, slave
+        super().__init__(link.where, {register.series: HOST_AXIS for register in registers})
+        self._link, self._slave = link, slave
         self._registers = tuple(registers)
         self._interval, self._timeout = interval, timeout
-        self._drive: Any = None
+        self._client: Any = None
 
     def _connect(self) -> None:
+        self._client = connected(self._link, self._timeout)
         try:
-            import minimalmodbus
-        except ImportError as error:
-            raise DriverMissing(f"Modbus on {self._port}: needs minimalmodbus; pip install millfrf[devices]") from error
-        try:
-            self._drive = minimalmodbus.Instrument(self._port, self._slave)
-        except OSError as error:
-            raise Disconnected(f"serial line {self._port} cannot be opened: {error}; check its name") from error
-        self._drive.serial.baudrate = self._baud
-        self._drive.serial.timeout = self._timeout
+            for register in self._registers:
+                if all(self._ask(register) is None for _ in range(_PATIENCE)):
+                    raise self._silent(register)
+        except BaseException:
+            self._release()
+            raise
 
     def _receive(self, put: Put, stopped: Callable[[], bool]) -> None:
         failures, due = 0, time.monotonic()
+        heard = due
         while not stopped():
             for register in self._registers:
                 value = self._ask(register)
                 failures = failures + 1 if value is None else 0
                 if failures >= _PATIENCE:
-                    raise DeviceTimeout(
-                        f"drive {self._slave} on {self._port} does not answer; check address, baud rate and register "
-                        f"{register.address}"
-                    )
+                    raise self._silent(register, heard)
                 if value is not None:
-                    sampled = time.monotonic() - _REPLY_BYTES * BITS_A_BYTE / self._baud
-                    put(Events(register.series, np.array([sampled]), np.array([value * register.factor])))
+                    heard = time.monotonic()
+                    put(Events(register.series, np.array([heard - self._link.reply_duration]), np.array([value])))
             due = max(due + self._interval, time.monotonic())
             while not stopped() and (wait := due - time.monotonic()) > 0:
                 time.sleep(min(wait, 0.1))
 
-    def _ask(self, register: Register) -> float | None:
-        """The register's integer, or None where no proper answer came."""
-        import minimalmodbus
+    def _silent(self, register: Register, heard: float | None = None) -> DeviceTimeout:
+        """The error of a drive that gives no answer."""
+        return DeviceTimeout(
+            f"{self.where}: drive {self._slave} does not answer; check its address, {self._link.settings} and register "
+            f"{register.address}",
+            heard,
+        )
 
-        try:
-            function = 4 if register.input_register else 3
-            return float(self._drive.read_register(register.address, functioncode=function, signed=register.signed))
-        except minimalmodbus.ModbusException:
-            return None
-        except LINE_FAILURES as error:
-            raise Disconnected(f"serial line {self._port} is gone ({error}); check its plug") from error
+    def _ask(self, register: Register) -> float | None:
+        """The register's value, or None where no proper answer came."""
+        found = ask(self._client, self._link, self._slave, register.address, input_register=register.input_register)
+        return None if found is None else register.value(found)
 
     def _release(self) -> None:
-        if self._drive is not None:
-            self._drive.serial.close()
-            self._drive = None
+        if self._client is not None:
+            self._client.close()
+            self._client = None

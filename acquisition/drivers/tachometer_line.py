@@ -2,7 +2,7 @@
 
 import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from foundation import InputError
 
 from ..errors import DeviceTimeout
-from ..sources import HOST_AXIS, EventAxis, Events, Put, ThreadedFeed
+from ..sources import HOST_AXIS, EventAxis, Events, Put, Stamped, SteadyStamps, ThreadedFeed
 from .serial_line import BITS_A_BYTE, on_line, open_line
 
 _NUMBER = r"([-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)"
@@ -60,27 +60,36 @@ class TachometerFeed(ThreadedFeed):
         if not self._pattern.groups:
             raise InputError(f"serial line {port}: pattern {pattern!r} needs a group ( ) around the number")
         axis = HOST_AXIS if period is None else EventAxis("device", f"line:{port}")
-        super().__init__(f"line {port}", {series: axis})
+        super().__init__(f"serial line {port}", {series: axis})
         self._port, self._baud, self._series = port, baud, series
         self._factor, self._period, self._silence = factor, period, silence
         self._line: Any = None
+        self._stamps = SteadyStamps()
 
     def _connect(self) -> None:
+        self._stamps = SteadyStamps()
+        self._reconnect()
+
+    def _reconnect(self) -> None:
         self._line = open_line(self._port, self._baud, 0.1)
 
     def _receive(self, put: Put, stopped: Callable[[], bool]) -> None:
         pending, n_lines, heard = b"", 0, time.monotonic()
-        while not stopped():
-            with on_line(self._port):
-                came = self._line.read(max(1, self._line.in_waiting))
-            arrival = time.monotonic()
-            *lines, pending = (pending + came).replace(b"\r", b"\n").split(b"\n")
-            pending = pending[-_LONGEST_LINE:]
-            for line in filter(None, lines):
-                n_lines, heard = n_lines + 1, arrival
-                self._take(line, n_lines, arrival, put)
-            if arrival - heard > self._silence:
-                raise DeviceTimeout(f"serial line {self._port}: nothing came for {self._silence:g} s; check instrument")
+        try:
+            while not stopped():
+                with on_line(self._port):
+                    came = self._line.read(max(1, self._line.in_waiting))
+                arrival = time.monotonic()
+                *lines, pending = (pending + came).replace(b"\r", b"\n").split(b"\n")
+                pending = pending[-_LONGEST_LINE:]
+                for line in filter(None, lines):
+                    n_lines, heard = n_lines + 1, arrival
+                    self._take(line, n_lines, arrival, put)
+                if arrival - heard > self._silence:
+                    what = f"nothing came for {self._silence:g} s; check instrument"
+                    raise DeviceTimeout(f"serial line {self._port}: {what}", heard)
+        finally:
+            self._put(self._stamps.flush(), put)
 
     def _take(self, line: bytes, count: int, arrival: float, put: Put) -> None:
         found = self._pattern.search(line.decode("ascii", "replace"))
@@ -91,9 +100,17 @@ class TachometerFeed(ThreadedFeed):
         except (TypeError, ValueError):
             return
         begun = arrival - (len(line) + 1) * BITS_A_BYTE / self._baud
-        stamp = begun if self._period is None else count * self._period
-        arrivals = None if self._period is None else np.array([begun])
-        put(Events(self._series, np.array([stamp]), np.array([value]), arrivals))
+        if self._period is None:
+            put(Events(self._series, np.array([begun]), np.array([value])))
+        else:
+            self._put(self._stamps.add(Stamped(self._series, value, count * self._period, begun)), put)
+
+    def _put(self, clear: Sequence[Stamped], put: Put) -> None:
+        """Hand over; a step of the count of lines is that of lines which got lost, or of a line opened anew."""
+        for at, step in self._stamps.steps():
+            self.note(f"{-step:.3f} s of lines are missing, the times go on", at)
+        for one in clear:
+            put(Events(one.series, np.array([one.stamp]), np.array([one.value]), np.array([one.arrival])))
 
     def _release(self) -> None:
         if self._line is not None:

@@ -6,6 +6,7 @@ from foundation import InputError
 
 from ..drivers import NiSource, ReplaySource
 from ..sources import Source, WithFeeds
+from .feed_tables import AmplifierTable
 from .tables import NiDevice, ReplayDevice, Session
 
 
@@ -29,7 +30,10 @@ def build_source(session: Session, setup: str, folder: Path, sampled: Source | N
     """
     if sampled is None:
         sampled = _sampled(session, setup, folder)
-    feeds = [table.feed(folder) for table in session.feeds]
+    feeds = [
+        table.feed(folder, session.ranges_of(table)) if isinstance(table, AmplifierTable) else table.feed(folder)
+        for table in session.feeds
+    ]
     return WithFeeds(sampled, feeds) if feeds else sampled
 
 

@@ -1,6 +1,6 @@
 """`[[channels]]` of a session: what is wired to a terminal, in the lab's own units."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -28,7 +28,16 @@ class ChannelTable(BaseModel):
     mv_per_unit : mV per ``unit``
         Sensitivity of the sensor.
     units_per_volt : ``unit`` per V
-        Setting of a charge amplifier, given instead of a sensitivity.
+        Scale of a device with a voltage output, given instead of a sensitivity.
+    amplifier_range : ``unit``, or pC where ``pc_per_unit`` is given
+        Range of a charge amplifier, given instead of a sensitivity: at it the output is ``amplifier_volts``. It scales
+        the samples and is told to the amplifier, so that the two cannot differ.
+    amplifier_volts : V
+        Output of the amplifier at its range.
+    pc_per_unit : pC per ``unit``
+        Sensitivity of a piezoelectric sensor, where the amplifier's range is a charge.
+    amplifier
+        Name of the `[[amplifier]]` that is told the range; empty: it is set by hand.
     range_v : V
         Largest magnitude of the input.
     iepe_ma : mA
@@ -44,6 +53,10 @@ class ChannelTable(BaseModel):
     terminal: Name
     mv_per_unit: float | None = None
     units_per_volt: float | None = None
+    amplifier_range: Positive | None = None
+    amplifier_volts: Positive = 10.0
+    pc_per_unit: float | None = None
+    amplifier: str = ""
     range_v: Positive = 5.0
     iepe_ma: Annotated[float, Field(ge=0, le=20)] = 0.0
     delay_us: Annotated[float, Field(ge=0, le=1e6)] = 0.0
@@ -54,12 +67,16 @@ class ChannelTable(BaseModel):
 
     @model_validator(mode="after")
     def _understood(self) -> "ChannelTable":
-        if (self.mv_per_unit is None) == (self.units_per_volt is None):
+        given = (self.mv_per_unit, self.units_per_volt, self.amplifier_range)
+        if sum(one is not None for one in given) != 1:
             raise ValueError(
-                f"channel {self.name}: give either mv_per_unit (a sensor's sheet) or units_per_volt (an amplifier)"
+                f"channel {self.name}: give either mv_per_unit (a sensor's sheet) or units_per_volt (a voltage output) "
+                "or amplifier_range (a charge amplifier)"
             )
-        if 0 in (self.mv_per_unit, self.units_per_volt):
+        if 0 in (*given, self.pc_per_unit):
             raise ValueError(f"channel {self.name}: a sensitivity of 0; take it from the calibration sheet")
+        if self.amplifier_range is None and (self.amplifier or self.pc_per_unit is not None):
+            raise ValueError(f"channel {self.name}: amplifier and pc_per_unit go with amplifier_range; give it")
         try:
             self.wired()
         except InputError as error:
@@ -72,7 +89,16 @@ class ChannelTable(BaseModel):
         factor = si_factor(self.quantity, self.unit)
         if self.mv_per_unit is not None:
             return self.mv_per_unit * 1e-3 / factor
+        if self.amplifier_range is not None:
+            return self.amplifier_volts * (self.pc_per_unit or 1.0) / (self.amplifier_range * factor)
         return 1.0 / ((self.units_per_volt or 1.0) * factor)
+
+    def _extra(self) -> dict[str, Any]:
+        """Settings that the recording keeps with the channel."""
+        if self.amplifier_range is None:
+            return {}
+        names = ("amplifier", "amplifier_range", "amplifier_volts", "pc_per_unit")
+        return {name: getattr(self, name) for name in names if getattr(self, name) not in ("", None)}
 
     def wired(self) -> NiInput:
         """The input in SI units.
@@ -93,5 +119,6 @@ class ChannelTable(BaseModel):
             self.high_pass_hz,
             self.sensor,
             self.delay_us * 1e-6 or None,
+            self._extra(),
         )
         return NiInput(channel, self.terminal, self.volts_per_si_unit, self.range_v, self.iepe_ma * 1e-3)

@@ -1,11 +1,12 @@
 """`[[can]]`, `[[tachometer]]`, `[[modbus]]` and `[[amplifier]]` of a session."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, model_validator
 
-from ..drivers import Amplifier, CanFeed, CanSignal, Command, ModbusFeed, Register, TachometerFeed
+from ..drivers import Amplifier, CanFeed, CanSignal, Command, ModbusFeed, Register, SerialLink, TachometerFeed, TcpLink
 from .channel_table import STRICT, Name, Positive
 
 Baud = Annotated[int, Field(ge=50, le=10_000_000)]
@@ -77,21 +78,36 @@ class RegisterTable(BaseModel):
 
 
 class ModbusTable(BaseModel):
-    """A drive; see `ModbusFeed`."""
+    """A drive; see `ModbusFeed`. On a serial line it has ``port`` and ``baud``, on a network ``host``."""
 
     model_config = STRICT
-    port: Name
-    baud: Baud
+    port: str = ""
+    baud: Baud | None = None
+    parity: Literal["none", "even", "odd"] = "none"
+    stop_bits: Literal[1, 2] = 1
+    host: str = ""
+    tcp_port: Annotated[int, Field(ge=1, le=65535)] = 502
     slave: Annotated[int, Field(ge=1, le=247)]
     registers: Annotated[tuple[RegisterTable, ...], Field(min_length=1)]
     interval_s: Positive = 0.1
     timeout_s: Positive = 0.2
 
+    @model_validator(mode="after")
+    def _one_link(self) -> "ModbusTable":
+        if bool(self.port) == bool(self.host):
+            raise ValueError("modbus: give either port and baud (a serial line) or host (Modbus TCP)")
+        if self.port and self.baud is None:
+            raise ValueError(f"modbus on {self.port}: baud is missing; take it from the drive's settings")
+        return self
+
     def feed(self, folder: Path) -> ModbusFeed:
         """The drive as a feed."""
         del folder
+        link: SerialLink | TcpLink = TcpLink(self.host, self.tcp_port)
+        if self.baud is not None:
+            link = SerialLink(self.port, self.baud, self.parity, self.stop_bits)
         registers = [Register(**each.model_dump()) for each in self.registers]
-        return ModbusFeed(self.port, self.baud, self.slave, registers, interval=self.interval_s, timeout=self.timeout_s)
+        return ModbusFeed(link, self.slave, registers, interval=self.interval_s, timeout=self.timeout_s)
 
 
 class CommandTable(BaseModel):
@@ -108,17 +124,41 @@ class CommandTable(BaseModel):
 
 
 class AmplifierTable(BaseModel):
-    """A charge amplifier; see `Amplifier`."""
+    """A charge amplifier; see `Amplifier`. Channels name it by ``name``, or by its port where it has none."""
 
     model_config = STRICT
+    name: str = ""
     port: Name
     baud: Baud
     ending: str = "\r\n"
     on_open: tuple[CommandTable, ...] = ()
     on_close: tuple[CommandTable, ...] = ()
+    check: tuple[CommandTable, ...] = ()
+    check_every_s: Positive = 5.0
 
-    def feed(self, folder: Path) -> Amplifier:
-        """The amplifier as a feed without events."""
+    @property
+    def called(self) -> str:
+        """Its name, or its port."""
+        return self.name or self.port
+
+    def ranges_told(self) -> frozenset[str]:
+        """Channels whose range its commands send or expect."""
+        commands = [each.command() for each in (*self.on_open, *self.check)]
+        return frozenset(name for command in commands for name in command.ranges if not name.isdigit())
+
+    def feed(self, folder: Path, ranges: Mapping[str, float] | None = None) -> Amplifier:
+        """The amplifier as a feed without events; ``ranges`` by channel name."""
         del folder
-        opening, closing = [each.command() for each in self.on_open], [each.command() for each in self.on_close]
-        return Amplifier(self.port, self.baud, opening, closing, self.ending)
+        opening, closing, check = (
+            [each.command() for each in commands] for commands in (self.on_open, self.on_close, self.check)
+        )
+        return Amplifier(
+            self.port,
+            self.baud,
+            opening,
+            closing,
+            self.ending,
+            check=check,
+            check_every=self.check_every_s,
+            ranges=ranges,
+        )

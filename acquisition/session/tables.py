@@ -126,8 +126,39 @@ class Session(BaseModel):
             twice = sorted({value for value in values if values.count(value) > 1})
             if twice:
                 yield f"{what} {', '.join(twice)} appears twice; each must be unique"
+        if driver == "ni":
+            yield from self._amplifier_complaints()
         if self.band_hz is not None:
             yield from self._band_complaints(self.band_hz)
+
+    def _amplifier_complaints(self) -> Iterator[str]:
+        """A range must stand in one place: with its channel, from where the amplifier is told it."""
+        called = [table.called for table in self.amplifier]
+        for channel in self.channels:
+            if channel.amplifier and channel.amplifier not in called:
+                yield f"channel {channel.name}: no [[amplifier]] {channel.amplifier!r}; there are {', '.join(called)}"
+        for table in self.amplifier:
+            own, told = self.ranges_of(table), table.ranges_told()
+            for name in sorted(told - set(own)):
+                yield (
+                    f"amplifier {table.called}: {{{name}}} is the range of no channel; give the channel {name} "
+                    f"amplifier = {table.called!r} and amplifier_range"
+                )
+            for name in sorted(set(own) - told):
+                yield (
+                    f"amplifier {table.called} is not told the range of channel {name}; write {{{name}}} for it in a "
+                    "command of on_open or check"
+                )
+            if not own:
+                yield (
+                    f"amplifier {table.called} belongs to no channel, so that its range could differ from the scale; "
+                    f"give channels amplifier = {table.called!r} and amplifier_range"
+                )
+
+    def ranges_of(self, table: AmplifierTable) -> dict[str, float]:
+        """Range by name of the channels that an amplifier serves."""
+        served = [channel for channel in self.channels if channel.amplifier == table.called]
+        return {channel.name: channel.amplifier_range or 0.0 for channel in served}
 
     def _band_complaints(self, band: tuple[float, float]) -> Iterator[str]:
         if band[0] >= band[1]:

@@ -41,7 +41,7 @@ class EventAxis:
             raise InputError("a device's time axis needs the name of its clock, such as can0")
 
 
-TEXT_BYTES = 120
+TEXT_BYTES = 240
 """Room for the text of a value; a longer one is cut."""
 
 SAMPLES_AXIS = EventAxis()
@@ -90,7 +90,7 @@ def stored_texts(texts: Sequence[str]) -> NDArray[np.bytes_]:
 
     Examples
     --------
-    >>> stored_texts(["Fräser " + 60 * "ü"])[0].decode()[-3:]
+    >>> stored_texts(["Fräser " + 120 * "ü"])[0].decode()[-3:]
     'üüü'
     """
     cut = [" ".join(text.split()).encode("utf-8", "replace")[:TEXT_BYTES].decode("utf-8", "ignore") for text in texts]

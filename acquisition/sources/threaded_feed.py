@@ -1,10 +1,14 @@
 """The common part of feeds with a receiving thread: connect, receive, hand over, release."""
 
+import time
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Mapping
 
 from .events import EventAxis, Events
 from .receiver import Put, Receiver
+
+Note = tuple[float, str]
 
 
 class ThreadedFeed(ABC):
@@ -19,9 +23,10 @@ class ThreadedFeed(ABC):
     """
 
     def __init__(self, where: str, event_series: Mapping[str, EventAxis]) -> None:
-        self._where = where
+        self.where = where
         self.event_series: dict[str, EventAxis] = dict(event_series)
         self._receiver = Receiver(where)
+        self._notes: deque[Note] = deque()
 
     @abstractmethod
     def _connect(self) -> None:
@@ -35,16 +40,41 @@ class ThreadedFeed(ABC):
     def _release(self) -> None:
         """Close the device; harmless when not open."""
 
+    def _reconnect(self) -> None:
+        """Open the device again while a recording runs."""
+        self._connect()
+
+    def _let_go(self) -> None:
+        """Release the device while a recording runs."""
+        self._release()
+
     def open(self) -> None:
         """Open the device and start to receive.
 
         Raises
         ------
-        DriverMissing, Disconnected
+        DriverMissing, Disconnected, DeviceTimeout
         """
         self.close()
         self._connect()
         self._receiver.start(self._receive)
+
+    def reopen(self) -> None:
+        """Open a device that was lost, while the recording goes on.
+
+        Raises
+        ------
+        DeviceError
+            It is still not there.
+        """
+        self.drop()
+        self._reconnect()
+        self._receiver.start(self._receive)
+
+    def drop(self) -> None:
+        """Let go of a device that was lost, without a word to it."""
+        self._receiver.stop()
+        self._let_go()
 
     def poll(self) -> list[Events]:
         """Give the events since the last call.
@@ -55,6 +85,20 @@ class ThreadedFeed(ABC):
             The device is gone or silent.
         """
         return self._receiver.drain()
+
+    def note(self, text: str, time_of_it: float | None = None) -> None:
+        """Note something that the recording shall tell, at a host's monotonic time (s; None: now)."""
+        self._notes.append((time.monotonic() if time_of_it is None else time_of_it, f"{self.where}: {text}"))
+
+    def notes(self) -> list[Note]:
+        """Give what was noted since the last call: host's time (s) and text."""
+        taken = []
+        while self._notes:
+            taken.append(self._notes.popleft())
+        return taken
+
+    def conclude(self) -> None:  # noqa: B027  # most devices have nothing to tell
+        """Note what is worth telling at the end of a recording; called before `close`."""
 
     def close(self) -> None:
         """Stop to receive and release the device."""

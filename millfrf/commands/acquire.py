@@ -90,4 +90,7 @@ def _report(tally: object, out: Path) -> None:
         typer.echo("stopped before Start; nothing was recorded")
         return
     typer.echo(tally.summary())
+    story = tally.device_story()
+    for line in (*story.losses, *story.notices):
+        typer.echo(f"device: {line}")
     typer.echo(f"wrote {out}")

@@ -28,7 +28,8 @@ unit = "kN"
 node = "TCP"
 direction = "+X"
 terminal = "cDAQ1Mod1/ai0"
-units_per_volt = 0.1
+amplifier = "COM7"
+amplifier_range = 1
 range_v = 10
 [[channels]]
 name = "ax"
@@ -54,19 +55,33 @@ registers = [{address = 7, series = "load"}]
 [[amplifier]]
 port = "COM7"
 baud = 9600
-on_open = [{send = "RANGE 1", expect = "OK"}]
+on_open = [{send = "RANGE {fx}", expect = "OK"}]
 """
 
 
 def test_units_become_si_at_this_edge() -> None:
     session = session_from_text(GOOD)
     force, acceleration = (channel.wired() for channel in session.channels)
-    assert force.sensitivity == pytest.approx(10 / 1000)  # 0.1 kN/V
+    assert force.sensitivity == pytest.approx(10 / 1000)  # 1 kN at 10 V
     assert force.full_scale == pytest.approx(1000.0)
     assert (force.channel.unit, force.channel.degree_of_freedom) == ("N", "TCP:+X")
     assert acceleration.sensitivity == pytest.approx(0.1 / 9.80665)
     assert acceleration.iepe_current == 0.002
     assert len(session.feeds) == 4
+
+
+def test_a_charge_range_in_picocoulombs_scales_by_the_sensors_sheet() -> None:
+    text = GOOD.replace("amplifier_range = 1\n", "amplifier_range = 5000\namplifier_volts = 5\npc_per_unit = -7500\n")
+    session = session_from_text(text)
+    force = session.channels[0].wired()
+    assert force.sensitivity == pytest.approx(5 * -7.5 / 5000)  # 5 V at 5000 pC, -7.5 pC/N
+    assert force.channel.extra == {
+        "amplifier": "COM7",
+        "amplifier_range": 5000.0,
+        "amplifier_volts": 5.0,
+        "pc_per_unit": -7500.0,
+    }
+    assert session.ranges_of(session.amplifier[0]) == {"fx": 5000.0}
 
 
 def test_the_example_is_a_session() -> None:
@@ -90,7 +105,15 @@ def test_the_example_is_a_session() -> None:
         ('quantity = "force"', 'quantity = "forc"', "unknown quantity 'forc'; use one of force"),
         ("duration_s = 2.0", 'duration_s = "x"', "duration_s must be a number, not 'x'"),
         ("mv_per_unit = 100", "mv_per_unit = 0", "channel ax: a sensitivity of 0; take it from the calibration sheet"),
-        ("mv_per_unit = 100", "", "give either mv_per_unit .* or units_per_volt"),
+        ("mv_per_unit = 100", "", "give either mv_per_unit .* or units_per_volt .* or amplifier_range"),
+        ("amplifier_range = 1", "units_per_volt = 0.1", "amplifier and pc_per_unit go with amplifier_range"),
+        ("RANGE {fx}", "RANGE 1", "amplifier COM7 is not told the range of channel fx; write {fx} for it"),
+        ("RANGE {fx}", "RANGE {fy}", "{fy} is the range of no channel; give the channel fy amplifier = 'COM7'"),
+        ('amplifier = "COM7"', "", "{fx} is the range of no channel"),
+        ('amplifier = "COM7"', 'amplifier = "COM6"', r"channel fx: no \[\[amplifier\]\] 'COM6'; there are COM7"),
+        ("baud = 19200", "", "modbus on COM8: baud is missing"),
+        ("baud = 19200", 'host = "10.0.0.2"', "give either port and baud .* or host"),
+        ("slave = 3", 'slave = 3\nparity = "mark"', "parity"),
         ("iepe_ma = 2", "iepe_ma = 2000", "iepe_ma must be 20 or less, not 2000"),
         ('"+X"', '"X"', "TCP:X is not understood"),
         ("[10.0, 400.0]", "[400.0, 10.0]", "is empty; give the lower frequency first"),

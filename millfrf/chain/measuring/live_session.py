@@ -83,7 +83,7 @@ def acquire_live(
                 source = WithFeeds(opened.source, [control])
                 stop = _stopping(control)
                 tally = acquire(replace(opened, source=source), out, watchers=[monitor], stop=stop)
-                control.ended(f"Wrote {os.fspath(out)}: {tally.summary()}")
+                control.ended("; ".join([f"Wrote {os.fspath(out)}: {tally.summary()}", *tally.device_story().losses]))
             except MillfrfError as error:
                 control.ended(f"Ended by an error: {error}")
                 raise

@@ -9,16 +9,22 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+
 from acquisition import (
+    DEVICES,
     Block,
     DeviceError,
+    DeviceStory,
     DiskFull,
     Events,
     Paced,
     Session,
     SimulatedDevice,
     Source,
+    WithFeeds,
     build_source,
+    device_story,
     record,
     session_from_text,
     session_text,
@@ -61,14 +67,20 @@ class Tally:
     samples: dict[str, int] = field(default_factory=dict)
     events: dict[str, int] = field(default_factory=dict)
     longest_gap: float = 0.0
+    _log: list[Events] = field(default_factory=list)
+    _began: float | None = None
     _last: dict[str, float] = field(default_factory=dict)
 
     def __call__(self, taken: Block | Events) -> None:
         """Count one block or event."""
         if isinstance(taken, Events):
             self.events[taken.series] = self.events.get(taken.series, 0) + len(taken.times)
+            if taken.series == DEVICES:
+                self._log.append(taken)
             return
         now = time.monotonic()
+        if self._began is None:
+            self._began = now - len(taken.samples) / self.rates[taken.stream]
         if taken.stream in self._last:
             beyond = now - self._last[taken.stream] - len(taken.samples) / self.rates[taken.stream]
             self.longest_gap = max(self.longest_gap, beyond)
@@ -79,10 +91,20 @@ class Tally:
         """Duration of the longest stream, s."""
         return max((n / self.rates[name] for name, n in self.samples.items()), default=0.0)
 
+    def device_story(self) -> DeviceStory:
+        """What happened to auxiliary devices; times since the first sample, as well as this computer was prompt."""
+        lines = [
+            (at - (self._began or at), value, text)
+            for one in self._log
+            for at, value, text in zip(one.times, one.values, one.texts or (), strict=True)
+        ]
+        times, values, texts = zip(*lines, strict=True) if lines else ((), (), ())
+        return device_story(np.array(times), np.array(values), texts)
+
     def summary(self) -> str:
         """Sum the recording up in one line."""
         streams = ", ".join(f"{name}: {n} samples" for name, n in self.samples.items()) or "no samples"
-        events = ", ".join(f"{name}: {n} events" for name, n in self.events.items())
+        events = ", ".join(f"{name}: {n} events" for name, n in self.events.items() if name != DEVICES)
         said = f"{streams}{'; ' if events else ''}{events}; {self.seconds():.2f} s"
         return f"{said}, longest delay {1e3 * self.longest_gap:.0f} ms"
 
@@ -162,6 +184,13 @@ def acquire(
         for watcher in watchers:
             watcher(taken)
 
+    def ended(asked: bool) -> bool:
+        """Whether to end at once; a source with feeds is asked to end, so that they can say their last words."""
+        if asked and isinstance(opened.source, WithFeeds):
+            opened.source.finish()
+            return False
+        return asked
+
     try:
         with interrupts() as interrupted:
             record(
@@ -169,7 +198,7 @@ def acquire(
                 out,
                 observer=observe,
                 progress=progress,
-                stop=lambda: interrupted() or stop() or tally.seconds() >= duration,
+                stop=lambda: ended(interrupted() or stop() or tally.seconds() >= duration),
             )
     except (DeviceError, DiskFull) as error:
         error.args = (f"{error}; {_kept(tally, out)}",)

@@ -1,6 +1,8 @@
 """Instruments at the other end of a serial line: pseudo terminals whose far end runs in a thread."""
 
+import contextlib
 import os
+import socket
 import struct
 import threading
 import time
@@ -18,6 +20,7 @@ class FarEnd:
         self._slave = slave
         self.unplugged = threading.Event()
         self.heard: list[bytes] = []
+        self.settings: dict[str, float] = {}
         self._thread = threading.Thread(target=self._run, args=(serve,), daemon=True)
         self._thread.start()
 
@@ -66,6 +69,27 @@ def amplifier(answers: dict[bytes, bytes]) -> Callable[[FarEnd], None]:
     return serve
 
 
+def ranged_amplifier(ranges: dict[str, float]) -> Callable[[FarEnd], None]:
+    """Keeps a range for each input: ``RANGE 1,500`` sets it, ``RANGE? 1`` asks for it."""
+
+    def serve(end: FarEnd) -> None:
+        end.settings.update(ranges)
+        pending = b""
+        while True:
+            pending += end.read()
+            *commands, pending = pending.split(b"\r\n")
+            for command in commands:
+                name, _, value = command.decode().partition(" ")
+                if name == "RANGE":
+                    number, _, wanted = value.partition(",")
+                    end.settings[number] = float(wanted)
+                    end.write(b"OK\r\n")
+                else:
+                    end.write(f"RANGE {end.settings[value]:.3e}\r\n".encode())
+
+    return serve
+
+
 def tachometer(line: Callable[[float], bytes], period: float) -> Callable[[FarEnd], None]:
     """Sends a line every ``period`` s; its argument is the host's monotonic time."""
 
@@ -100,6 +124,42 @@ def modbus_slave(address: int, registers: dict[int, int]) -> Callable[[FarEnd], 
             end.write(body + checksum(body))
 
     return serve
+
+
+class TcpDrive:
+    """A Modbus TCP drive on this machine, after MODBUS Messaging on TCP/IP V1.0b; `unplug` closes every socket."""
+
+    def __init__(self, unit: int, registers: dict[int, int], port: int = 0) -> None:
+        self._unit, self._registers = unit, registers
+        self._server = socket.create_server(("127.0.0.1", port))
+        self.port = int(self._server.getsockname()[1])
+        self._sockets = [self._server]
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        try:
+            while True:
+                line, _ = self._server.accept()
+                self._sockets.append(line)
+                while request := line.recv(12):
+                    transaction, _, _, unit, function, register, count = struct.unpack(">HHHBBHH", request)
+                    if unit != self._unit:
+                        continue
+                    if register in self._registers and count == 1:
+                        body = struct.pack(">BBBH", unit, function, 2, self._registers[register])
+                    else:
+                        body = struct.pack(">BBB", unit, function | 0x80, 2)
+                    line.sendall(struct.pack(">HHH", transaction, 0, len(body)) + body)
+        except OSError:
+            pass
+
+    def unplug(self) -> None:
+        for each in reversed(self._sockets):
+            with contextlib.suppress(OSError):
+                each.shutdown(socket.SHUT_RDWR)
+            each.close()
+        self._thread.join()
 
 
 def checksum(data: bytes) -> bytes:

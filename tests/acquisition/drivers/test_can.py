@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import Block, Channel, DeviceTimeout, Disconnected, Recording, StreamDescription, record
+from acquisition import Block, Channel, Disconnected, Recording, StreamDescription, record
 from acquisition.drivers.can_bus import CanFeed, CanSignal, DbcDecoder
 from acquisition.sources.feeds import WithFeeds
 from foundation import FileFormatError, InputError
@@ -126,35 +126,140 @@ def test_wanted_signals_are_recorded_at_the_time_of_the_message(kind: str, dbc: 
     assert max(early.max(), late.max()) < 1e-3
 
 
-def test_a_silent_bus_ends_the_recording(dbc: Path, tmp_path: Path) -> None:
-    feed = CanFeed("virtual", "silent", dbc, SIGNALS, silence=0.3)
-    with pytest.raises(DeviceTimeout, match=r"no wanted message for 0.3 s; check bus, bitrate and DBC"):
-        record(WithFeeds(Clockwork(), [feed]), tmp_path / "a.h5")
+def _log(recording: Recording) -> list[tuple[float, float, str]]:
+    series = recording.events["devices"]
+    return list(zip(*series.read(), series.read_texts(), strict=True))
+
+
+def test_a_silent_bus_does_not_end_the_cut_and_its_silence_is_in_the_file(dbc: Path, tmp_path: Path) -> None:
+    talker = can.Bus(interface="virtual", channel="pauses")
+    feed = CanFeed("virtual", "pauses", dbc, SIGNALS, silence=0.3)
+
+    def play(item: object) -> None:
+        if isinstance(item, Block) and not 500 <= item.first_sample < 1400:
+            for frame in _frames(item.first_sample // 100):
+                talker.send(frame)
+
+    try:
+        record(WithFeeds(Clockwork(22), [feed], retry=0.1), tmp_path / "a.h5", observer=play)
+    finally:
+        talker.shutdown()
     with Recording(tmp_path / "a.h5") as recording:
-        assert recording.complete is False
-        assert 300 <= recording.stream().n_samples <= 600
+        assert (recording.complete, recording.stream().n_samples) == (True, 2200)
+        [(lost, code, text), (back, code_back, text_back)] = _log(recording)
+        assert (code, text) == (0.0, "CAN bus virtual pauses: lost (no wanted message for 0.3 s)")
+        assert (code_back, text_back) == (1.0, "CAN bus virtual pauses: back")
+        times, speeds = recording.events["spindle_speed_rpm"].read()
+        assert lost == pytest.approx(0.5, abs=0.05)  # the last message, not when it was missed
+        assert back == pytest.approx(1.5, abs=0.05)
+        assert speeds.tolist() == [6000.0 + k for k in (*range(5), *range(14, 22))][: len(speeds)]
+        assert len(speeds) >= 12
+        assert np.abs(times - (0.1 + (speeds - 6000) / 10)).max() < 0.02
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pseudo terminals need a Unix")
-def test_an_slcan_adapter_is_read_and_its_unplugging_noticed(dbc: Path, tmp_path: Path) -> None:
+def test_an_slcan_adapter_is_unplugged_and_plugged_again(dbc: Path, tmp_path: Path) -> None:
     pytest.importorskip("serial")
-    master, slave = os.openpty()
-    tty.setraw(slave)
-    feed = CanFeed("slcan", os.ttyname(slave), dbc, SIGNALS, options={"sleep_after_open": 0, "bitrate": 500000})
+    port, ends = tmp_path / "ttyCAN", []
+
+    def plug() -> None:
+        master, slave = os.openpty()
+        tty.setraw(slave)
+        port.unlink(missing_ok=True)
+        port.symlink_to(os.ttyname(slave))
+        ends.append((master, slave))
 
     def play(item: object) -> None:
-        if isinstance(item, Block) and item.first_sample < 500:
-            os.write(master, b"t1008" + (2 * 7000).to_bytes(2, "little").hex().encode() + bytes(6).hex().encode())
-            os.write(master, b"\r")
-        elif isinstance(item, Block) and item.first_sample == 500:
-            os.close(slave)
-            os.close(master)
+        if not isinstance(item, Block):
+            return
+        if item.first_sample == 500:
+            port.unlink()
+            for end in ends.pop():
+                os.close(end)
+        elif item.first_sample == 1200:
+            plug()
+        elif ends:
+            frame = b"t1008" + (2 * 7000).to_bytes(2, "little").hex().encode() + bytes(6).hex().encode()
+            os.write(ends[0][0], frame + b"\r")
 
-    with pytest.raises(Disconnected, match=r"CAN bus slcan .* is gone .*check its plug"):
-        record(WithFeeds(Clockwork(20), [feed]), tmp_path / "a.h5", observer=play)
+    plug()
+    feed = CanFeed("slcan", str(port), dbc, SIGNALS, options={"sleep_after_open": 0, "bitrate": 500000})
+    record(WithFeeds(Clockwork(20), [feed], retry=0.1), tmp_path / "a.h5", observer=play)
+    for end in ends[0]:
+        os.close(end)
     with Recording(tmp_path / "a.h5") as recording:
-        assert recording.events["spindle_speed_rpm"].read()[1].tolist() == [7000.0] * 5
-        assert recording.ending.startswith("Disconnected: CAN bus slcan")
+        assert (recording.complete, recording.stream().n_samples) == (True, 2000)
+        [(lost, code, text), (back, code_back, _)] = _log(recording)
+        assert (code, code_back) == (0.0, 1.0)
+        assert text.startswith(f"CAN bus slcan {port}: lost (is gone"[:60])
+        assert 0.6 <= lost < 0.8
+        assert 1.3 <= back < 1.6
+        times, speeds = recording.events["spindle_speed_rpm"].read()
+        assert set(speeds) == {7000.0}
+        assert sum(times < lost) == 5
+        assert sum(times >= back - 1e-3) >= 3
+
+
+@pytest.mark.parametrize("step", [5.0, -5.0, 0.3])
+def test_events_stay_right_when_the_wall_clock_is_set(
+    dbc: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: float
+) -> None:
+    real, set_by = time.time, [0.0]
+    monkeypatch.setattr(time, "time", lambda: real() + set_by[0])
+    talker = can.Bus(interface="virtual", channel="clock")
+    source, sent = Clockwork(25), []
+
+    def play(item: object) -> None:
+        if isinstance(item, Block):
+            if item.first_sample == 1200:
+                set_by[0] = step
+            sent.append(time.monotonic() - source.started)
+            talker.send(_frames(len(sent))[0])
+
+    try:
+        record(WithFeeds(source, [CanFeed("virtual", "clock", dbc, SIGNALS)]), tmp_path / "a.h5", observer=play)
+    finally:
+        talker.shutdown()
+    with Recording(tmp_path / "a.h5") as recording:
+        log = _log(recording)
+        times, speeds = recording.events["spindle_speed_rpm"].read()
+    true = np.array(sent)[speeds.astype(int) - 6001]
+    assert len(times) >= 23
+    assert np.abs(times - true).max() < 0.02
+    texts = sorted(text for _, _, text in log)
+    assert len(texts) == 2
+    assert texts[0].startswith("CAN bus virtual clock: clock of its stamps stepped by ")
+    assert texts[1].startswith("computer: wall clock set by ")
+    for text in texts:
+        assert float(text.split(" by ")[1].split(" s")[0]) == pytest.approx(step, abs=2e-3)
+    assert all(code == 2.0 and 1.25 < at < 1.6 for at, code, _ in log)
+
+
+TWINS = """VERSION ""
+BU_: PLC
+BO_ 256 Spindle: 2 PLC
+ SG_ Speed : 0|16@1+ (1,0) [0|32000] "rpm" PLC
+BO_ 512 Table: 2 PLC
+ SG_ Speed : 0|16@1+ (10,0) [0|32000] "mm/min" PLC
+BO_ 2147483904 Coolant: 2 PLC
+ SG_ Flow : 0|16@1+ (1,0) [0|32000] "l" PLC
+"""
+
+
+def test_signals_of_one_name_and_identifiers_of_one_number_are_told_apart(tmp_path: Path) -> None:
+    path = tmp_path / "twins.dbc"
+    path.write_text(TWINS)
+    wanted = (CanSignal("Spindle.Speed"), CanSignal("Table.Speed", "feed"), CanSignal("Flow"))
+    decoder = DbcDecoder(path, wanted)
+    data = (7).to_bytes(2, "little")
+    assert decoder.decode(256, data) == [("Spindle.Speed", 7.0)]
+    assert decoder.decode(512, data) == [("feed", 70.0)]
+    assert decoder.decode(256, data, extended=True) == [("Flow", 7.0)]
+    assert decoder.decode(512, data, extended=True) == []
+    with pytest.raises(InputError, match=r"'Speed' in 2 messages; name one of Spindle\.Speed, Table\.Speed"):
+        DbcDecoder(path, [CanSignal("Speed")])
+    with pytest.raises(InputError, match="series v is given to two signals"):
+        DbcDecoder(path, [CanSignal("Spindle.Speed", "v"), CanSignal("Table.Speed", "v")])
 
 
 def test_wrong_files_signals_and_buses_are_named(dbc: Path, tmp_path: Path) -> None:
