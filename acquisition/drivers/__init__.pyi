@@ -2,8 +2,7 @@ from .amplifier import Amplifier, Command
 from .can_bus import CanFeed, CanSignal, DbcDecoder
 from .modbus_drive import ModbusFeed, Register
 from .modbus_link import SerialLink, TcpLink
-from .ni import NiSource
-from .ni_channels import NiInput
+from .ni import NiClocks, NiCounter, NiInput, NiSource
 from .replay import ReplaySource
 from .tachometer_line import TachometerFeed
 
@@ -14,6 +13,8 @@ __all__ = [
     "Command",
     "DbcDecoder",
     "ModbusFeed",
+    "NiClocks",
+    "NiCounter",
     "NiInput",
     "NiSource",
     "Register",

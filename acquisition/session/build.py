@@ -43,6 +43,8 @@ def _sampled(session: Session, setup: str, folder: Path) -> Source:
         return NiSource(
             [channel.wired() for channel in session.channels],
             device.sample_rate_hz,
+            counters=[counter.wired() for counter in session.counters],
+            clocks=device.clocks(),
             block_duration=device.block_s,
             buffer_duration=device.buffer_s,
             timeout=device.timeout_s,

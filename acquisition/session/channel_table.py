@@ -1,13 +1,13 @@
 """`[[channels]]` of a session: what is wired to a terminal, in the lab's own units."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from foundation import SI_UNITS, InputError, si_factor
 
 from ..channel import Channel
-from ..drivers import NiInput
+from ..drivers import NiCounter, NiInput
 
 STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
 Positive = Annotated[float, Field(gt=0)]
@@ -42,6 +42,13 @@ class ChannelTable(BaseModel):
         Largest magnitude of the input.
     iepe_ma : mA
         Excitation current of an IEPE sensor; 0: none.
+    coupling
+        ``ac`` or ``dc``; empty: as the module chooses.
+    terminal_configuration
+        ``rse``, ``nrse``, ``differential`` or ``pseudodifferential``; empty: as the module chooses.
+    teds
+        Whether the IEPE sensor's electronic data sheet is read; it scales where no sensitivity is given, and is held
+        against ``mv_per_unit`` where one is.
     delay_us : microseconds
         Time by which an amplifier before the input delays the signal; the module's own delay is added.
     """
@@ -59,6 +66,9 @@ class ChannelTable(BaseModel):
     amplifier: str = ""
     range_v: Positive = 5.0
     iepe_ma: Annotated[float, Field(ge=0, le=20)] = 0.0
+    coupling: Literal["", "ac", "dc"] = ""
+    terminal_configuration: Literal["", "rse", "nrse", "differential", "pseudodifferential"] = ""
+    teds: bool = False
     delay_us: Annotated[float, Field(ge=0, le=1e6)] = 0.0
     node: str = ""
     direction: str = ""
@@ -68,7 +78,8 @@ class ChannelTable(BaseModel):
     @model_validator(mode="after")
     def _understood(self) -> "ChannelTable":
         given = (self.mv_per_unit, self.units_per_volt, self.amplifier_range)
-        if sum(one is not None for one in given) != 1:
+        n_given = sum(one is not None for one in given)
+        if n_given > 1 or (n_given == 0 and not self.teds):
             raise ValueError(
                 f"channel {self.name}: give either mv_per_unit (a sensor's sheet) or units_per_volt (a voltage output) "
                 "or amplifier_range (a charge amplifier)"
@@ -84,14 +95,14 @@ class ChannelTable(BaseModel):
         return self
 
     @property
-    def volts_per_si_unit(self) -> float:
-        """V per SI unit of the quantity."""
+    def volts_per_si_unit(self) -> float | None:
+        """V per SI unit of the quantity; None: the sensor's TEDS states it."""
         factor = si_factor(self.quantity, self.unit)
         if self.mv_per_unit is not None:
             return self.mv_per_unit * 1e-3 / factor
         if self.amplifier_range is not None:
             return self.amplifier_volts * (self.pc_per_unit or 1.0) / (self.amplifier_range * factor)
-        return 1.0 / ((self.units_per_volt or 1.0) * factor)
+        return None if self.units_per_volt is None else 1.0 / (self.units_per_volt * factor)
 
     def _extra(self) -> dict[str, Any]:
         """Settings that the recording keeps with the channel."""
@@ -121,4 +132,52 @@ class ChannelTable(BaseModel):
             self.delay_us * 1e-6 or None,
             self._extra(),
         )
-        return NiInput(channel, self.terminal, self.volts_per_si_unit, self.range_v, self.iepe_ma * 1e-3)
+        return NiInput(
+            channel,
+            self.terminal,
+            self.volts_per_si_unit,
+            self.range_v,
+            self.iepe_ma * 1e-3,
+            self.coupling,
+            self.terminal_configuration,
+            self.teds,
+        )
+
+
+class CounterTable(BaseModel):
+    """One counter of a session file: an angular encoder, or edges.
+
+    Parameters
+    ----------
+    name, node, direction, sensor
+        Fields of the same names in a recording's `Channel`.
+    counter
+        Name of the counter, such as ``cDAQ1/_ctr0``.
+    kind
+        ``encoder`` (an angle in rad) or ``edges`` (a number).
+    pulses_per_revolution, decoding, index
+        Settings of an encoder; see `NiCounter`.
+    """
+
+    model_config = STRICT
+    name: Name
+    counter: Name
+    kind: Literal["encoder", "edges"] = "encoder"
+    pulses_per_revolution: Annotated[int, Field(ge=1, le=10_000_000)] = 1024
+    decoding: Literal["x1", "x2", "x4"] = "x4"
+    index: bool = False
+    node: str = ""
+    direction: str = ""
+    sensor: str = ""
+
+    def wired(self) -> NiCounter:
+        """The counter as the driver takes it.
+
+        Raises
+        ------
+        InputError
+            A direction that is not known.
+        """
+        quantity = "angle" if self.kind == "encoder" else "dimensionless"
+        channel = Channel(self.name, quantity, SI_UNITS[quantity], self.node, self.direction, sensor=self.sensor)
+        return NiCounter(channel, self.counter, self.kind, self.pulses_per_revolution, self.decoding, self.index)

@@ -5,7 +5,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, model_validator
 
-from .channel_table import STRICT, ChannelTable, Name, Positive
+from ..drivers import NiClocks
+from .channel_table import STRICT, ChannelTable, CounterTable, Name, Positive
 from .feed_tables import AmplifierTable, CanTable, ModbusTable, TachometerTable
 
 FREQUENCIES_A_SAMPLE_RATE = 2.56
@@ -13,7 +14,7 @@ FREQUENCIES_A_SAMPLE_RATE = 2.56
 
 
 class NiDevice(BaseModel):
-    """`[device]` with ``driver = "ni"``."""
+    """`[device]` with ``driver = "ni"``; clocks and trigger as in `NiClocks`, empty: as DAQmx chooses."""
 
     model_config = STRICT
     driver: Literal["ni"]
@@ -21,6 +22,25 @@ class NiDevice(BaseModel):
     block_s: Annotated[float, Field(gt=0.001, le=10)] = 0.1
     buffer_s: Annotated[float, Field(ge=0.2, le=600)] = 10.0
     timeout_s: Positive = 5.0
+    sample_clock: str = ""
+    reference_clock: str = ""
+    reference_clock_hz: Positive | None = None
+    sync_pulse: str = ""
+    start_trigger: str = ""
+    start_edge: Literal["rising", "falling"] = "rising"
+    trigger_timeout_s: Positive = 600.0
+
+    def clocks(self) -> NiClocks:
+        """Clocks and trigger as the driver takes them."""
+        return NiClocks(
+            self.sample_clock,
+            self.reference_clock,
+            self.reference_clock_hz,
+            self.sync_pulse,
+            self.start_trigger,
+            self.start_edge,
+            self.trigger_timeout_s,
+        )
 
 
 class ReplayDevice(BaseModel):
@@ -86,6 +106,8 @@ class Session(BaseModel):
         The device that samples.
     channels
         Inputs of that device; needed for ``ni``, refused for the others, which bring their own.
+    counters
+        Counters of that device, read at each sample of the inputs.
     can, tachometer, modbus, amplifier
         Tables of further devices.
     """
@@ -102,6 +124,7 @@ class Session(BaseModel):
     live: LiveTable = LiveTable()
     device: Device
     channels: tuple[ChannelTable, ...] = ()
+    counters: tuple[CounterTable, ...] = ()
     can: tuple[CanTable, ...] = ()
     tachometer: tuple[TachometerTable, ...] = ()
     modbus: tuple[ModbusTable, ...] = ()
@@ -117,11 +140,11 @@ class Session(BaseModel):
         driver = self.device.driver
         if driver == "ni" and not self.channels:
             yield "no [[channels]]; describe what is wired to the device"
-        if driver != "ni" and self.channels:
+        if driver != "ni" and (self.channels or self.counters):
             yield f"[[channels]] do not go with driver {driver!r}, which brings its own; remove them"
         for what, values in (
-            ("channel name", [channel.name for channel in self.channels]),
-            ("terminal", [channel.terminal for channel in self.channels]),
+            ("channel name", [*(each.name for each in self.channels), *(each.name for each in self.counters)]),
+            ("terminal", [*(each.terminal for each in self.channels), *(each.counter for each in self.counters)]),
         ):
             twice = sorted({value for value in values if values.count(value) > 1})
             if twice:

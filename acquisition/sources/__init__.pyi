@@ -1,4 +1,4 @@
-from .device_log import BACK, DEVICES, LOST, NOTE, DeviceStory, device_event, device_story
+from .device_log import BACK, CLEARED, DEVICES, DEVICES_AXIS, FAULT, LOST, NOTE, DeviceStory, device_event, device_story
 from .event_feed import EventFeed
 from .events import HOST_AXIS, SAMPLES_AXIS, TEXT_BYTES, EventAxis, Events, announced_events, stored_texts
 from .feeds import WithFeeds
@@ -11,7 +11,10 @@ from .wall_clock import WallClock
 
 __all__ = [
     "BACK",
+    "CLEARED",
     "DEVICES",
+    "DEVICES_AXIS",
+    "FAULT",
     "HOST_AXIS",
     "LOST",
     "NOTE",

@@ -34,3 +34,8 @@ class AroundSource:
     def n_samples(self) -> int | None:
         """The source's number of samples."""
         return self._source.n_samples
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What the source says of its settings before it runs, one sentence each."""
+        return tuple(getattr(self._source, "notices", ()))

@@ -14,8 +14,9 @@ DEVICES = "devices"
 DEVICES_AXIS = EventAxis("host", texts=True)
 """Its times are those of the host's monotonic clock."""
 
-LOST, BACK, NOTE = 0.0, 1.0, 2.0
-"""Values of the series: a device was lost, it is back, something else was noticed."""
+LOST, BACK, NOTE, FAULT, CLEARED = 0.0, 1.0, 2.0, 3.0, 4.0
+"""Values of the series: a device was lost, it is back; something was noticed; an input is at fault (an overload, an
+open loop), it is well again."""
 
 
 def device_event(time: float, value: float, text: str, series: str = DEVICES) -> Events:
@@ -30,7 +31,7 @@ class DeviceStory:
     Parameters
     ----------
     losses
-        Devices that were lost, with the time of it, its reason and when they were back.
+        Devices that were lost and inputs that were at fault, with time and reason, and when it was over.
     notices
         Whatever else was noticed: a clock that was set, packets that were lost.
     """
@@ -47,7 +48,7 @@ def device_story(times: NDArray[np.float64], values: NDArray[np.float64], texts:
     times : (n,), s
         Times of the log's lines, on any one axis.
     values : (n,)
-        `LOST`, `BACK` or `NOTE`.
+        `LOST`, `BACK`, `NOTE`, `FAULT` or `CLEARED`.
     texts
         Text of each line, which begins with the device and a colon.
 
@@ -57,19 +58,20 @@ def device_story(times: NDArray[np.float64], values: NDArray[np.float64], texts:
     >>> device_story(np.array([2.0, 5.5]), np.array([LOST, BACK]), log).losses
     ('CAN bus can0: lost (silent) at 2.00 s, back after 3.50 s',)
     """
-    lost: dict[str, tuple[float, int]] = {}
+    standing: dict[str, tuple[float, int]] = {}
     losses: list[str] = []
     notices: list[str] = []
     for time, value, text in zip(times, values, texts, strict=True):
-        if value == LOST:
-            lost[text.split(": lost")[0]] = (float(time), len(losses))
+        subject = text.split(": lost")[0].split(": back")[0]
+        if value in (LOST, FAULT):
+            standing[subject] = (float(time), len(losses))
             losses.append(f"{text} at {time:.2f} s")
-        elif value == BACK:
-            begun, line = lost.pop(text.split(": back")[0], (float(time), -1))
+        elif value in (BACK, CLEARED):
+            begun, line = standing.pop(subject, (float(time), -1))
             if line >= 0:
-                losses[line] += f", back after {time - begun:.2f} s"
+                losses[line] += f", {'back' if value == BACK else 'over'} after {time - begun:.2f} s"
         else:
             notices.append(f"{text} ({time:.2f} s)")
-    for _, line in lost.values():
-        losses[line] += ", not back until the end"
+    for _, line in standing.values():
+        losses[line] += ", until the end" if ": lost" not in losses[line] else ", not back until the end"
     return DeviceStory(tuple(losses), tuple(notices))

@@ -37,6 +37,8 @@ def acquire(
     opened = open_session(session)
     for stream in opened.source.streams:
         typer.echo(f"stream {stream.name}: {len(stream.channels)} channels at {stream.sample_rate:.9g} Hz")
+    for notice in getattr(opened.source, "notices", ()):
+        typer.echo(f"note: {notice}")
     if out is None:
         _check(opened.source, seconds)
     elif live:

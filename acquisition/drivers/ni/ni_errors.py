@@ -5,12 +5,19 @@ from contextlib import contextmanager
 
 from foundation import InputError, MillfrfError
 
-from ..errors import DeviceError, DeviceTimeout, Disconnected, DriverMissing, Overrun
+from ...errors import DeviceError, DeviceTimeout, Disconnected, DriverMissing, Overrun
 
-OVERRUN = -200279
+OVERRUNS = {
+    -200279: "the computer did not keep up; close other programs",  # samples no longer available in the buffer
+    -200361: "the device's own memory overflowed; lower the rate, or use a faster bus or fewer devices on it",
+    -200714: "the driver could not fetch them fast enough; lower the rate, or use a faster bus or computer",
+}
 TIMEOUT = -200284
-_GONE = {-201003, -200324, -200045, -88709, -88710, -200220, -201401}
+_GONE = {-201003, -200324, -200045, -88705, -88709, -88710, -50405, -200220, -201401}
 _NO_SUCH_TERMINAL = -200170
+_BAD_VALUE = -200077
+_NO_SYNC = -201426
+_NO_TEDS = {-200709, -200741, -200742, -200743, -200753, -200826}
 _INSTALL = "install NI-DAQmx from ni.com and the package with pip install millfrf[devices]"
 
 
@@ -35,14 +42,26 @@ def speaking_to(devices: str) -> Iterator[None]:
 
 
 def _translated(code: int, text: str, devices: str) -> MillfrfError:
-    if code == OVERRUN:
-        return Overrun(f"{devices}: samples were lost, the computer did not keep up; close other programs")
+    if code in OVERRUNS:
+        return Overrun(f"{devices}: samples were lost, {OVERRUNS[code]}")
     if code == TIMEOUT:
         return DeviceTimeout(f"{devices}: no samples came in time; check the sample clock and the chassis")
     if code in _GONE:
         return Disconnected(f"{devices}: the device is gone; check its plug and its power, then start anew")
     if code == _NO_SUCH_TERMINAL:
         return InputError(f"{devices}: a terminal does not exist ({_first_line(text)}); look it up in NI MAX")
+    if code == _BAD_VALUE:
+        return InputError(
+            f"{devices}: the module cannot be set so ({_first_line(text)}); check range_v, iepe_ma, coupling and "
+            "terminal_configuration against its data sheet"
+        )
+    if code == _NO_SYNC:
+        return InputError(
+            f"{devices}: these devices share no clock; put the modules into one chassis, or use devices that DAQmx "
+            "synchronizes (PXI, or chassis on a time-sensitive network)"
+        )
+    if code in _NO_TEDS:
+        return InputError(f"{devices}: no readable TEDS ({_first_line(text)}); leave teds out or check the sensor")
     return DeviceError(f"{devices}: DAQmx error {code}: {_first_line(text)}; look the code up in NI MAX")
 
 
