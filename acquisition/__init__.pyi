@@ -1,4 +1,5 @@
 from .channel import Channel
+from .clock_check import ClockFindings, check_clock
 from .conversion import (
     SUFFIXES,
     ArrayFile,
@@ -14,6 +15,8 @@ from .drivers import ReplaySource
 from .errors import DeviceError, DeviceTimeout, Disconnected, DiskFull, DriverMissing, Overrun
 from .recordings import (
     Aligner,
+    DamagedRows,
+    DamagedSamplesError,
     EventSeries,
     Recording,
     RecordingWriter,
@@ -52,7 +55,10 @@ __all__ = [
     "ArrayFile",
     "Block",
     "Channel",
+    "ClockFindings",
     "CsvOptions",
+    "DamagedRows",
+    "DamagedSamplesError",
     "DeviceError",
     "DeviceStory",
     "DeviceTimeout",
@@ -81,6 +87,7 @@ __all__ = [
     "aligned_samples",
     "announced_events",
     "build_source",
+    "check_clock",
     "convert",
     "device_story",
     "open_arrays",

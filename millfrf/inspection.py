@@ -20,9 +20,11 @@ from .gate import (
     check_model,
     check_model_reciprocity,
     check_reciprocity,
+    clock_concerns,
     doubts_of,
     level_table,
     look,
+    missing_concerns,
     read_checked_cutting,
     stored_doubts,
 )
@@ -99,6 +101,7 @@ def _recording(path: str | os.PathLike[str], progress: Progress) -> Findings:
             seen = look(stream, progress=progress)
             tables.append(level_table(stream, seen.levels))
             concerns += [*seen.concerns(stream.sample_rate), *tap_concerns(stream, seen.levels)]
+            concerns += [*clock_concerns(recording, stream.name), *missing_concerns(recording, stream.name)]
             notes += repeats_in_words(stream)
         title = recording.title or "untitled"
         summary = f"recording, {title}, {recording.recorded_at or 'no date'}"

@@ -38,7 +38,10 @@ def whole_rows(samples: h5py.Dataset, file_size: int) -> int:
     if samples.chunks is None:
         return n_rows
     for start in range(0, n_rows, samples.chunks[0]):
-        stored = samples.id.get_chunk_info_by_coord((start, 0))
+        try:
+            stored = samples.id.get_chunk_info_by_coord((start, 0))
+        except RuntimeError:  # what tells where the chunk lies was not written any more
+            return start
         if stored.byte_offset is None or stored.byte_offset + stored.size > file_size:
             return start
     return n_rows

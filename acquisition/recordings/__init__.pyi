@@ -1,4 +1,5 @@
 from .aligner import Aligner, aligned_blocks, aligned_samples, rows_left_out
+from .checked_samples import DamagedRows, DamagedSamplesError
 from .event_series import EventSeries
 from .record_source import record
 from .recording import Recording
@@ -11,6 +12,8 @@ __all__ = [
     "FORMAT",
     "FORMAT_VERSION",
     "Aligner",
+    "DamagedRows",
+    "DamagedSamplesError",
     "EventSeries",
     "Recording",
     "RecordingWriter",

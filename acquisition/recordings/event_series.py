@@ -10,6 +10,7 @@ from foundation import FileFormatError, InputError
 
 from ..sources import EventAxis
 from .recording_format import text_attribute
+from .tables import event_columns, summed_rows
 
 Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
 Columns = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]
@@ -24,11 +25,16 @@ class EventSeries:
         The HDF5 group ``/events/<name>``.
     aligned
         Function that gives the times on the samples' axis and the values; None: the stored times are taken as they are.
+    sound_only
+        Leave out values that do not match their checksums instead of refusing the series.
     """
 
-    def __init__(self, group: h5py.Group, aligned: Callable[[], Pair] | None = None) -> None:
+    def __init__(
+        self, group: h5py.Group, aligned: Callable[[], Pair] | None = None, *, sound_only: bool = False
+    ) -> None:
         self._group = group
         self._aligned = aligned
+        self._sound_only = sound_only
 
     @property
     def axis(self) -> EventAxis:
@@ -58,16 +64,27 @@ class EventSeries:
         FileFormatError
             The series is damaged.
         """
-        axis = self.axis
-        names = ("time", "value", *(("arrival",) if axis.kind == "device" else ()))
-        try:
-            columns = [np.asarray(self._group[name][:], dtype=float) for name in names]
-            n_texts = [self._group["text"].shape[0]] if axis.texts else []
-        except (OSError, RuntimeError, KeyError, AttributeError, TypeError, ValueError) as error:
-            raise FileFormatError(f"events {self._group.name} lack readable 'time' and 'value'; record anew") from error
-        n_whole = min(*map(len, columns), *n_texts)  # a writer killed between two leaves some longer
-        times, values, *arrivals = (column[:n_whole] for column in columns)
-        return times, values, arrivals[0] if arrivals else None
+        times, values, *others = (np.asarray(one, dtype=float) for one in self._sound()[: 3 if self._arrives else 2])
+        return times, values, others[0] if others else None
+
+    @property
+    def damaged(self) -> int:
+        """Number of values that do not match their checksums."""
+        return summed_rows(self._group, event_columns(self.axis), "sum")[1]
+
+    @property
+    def _arrives(self) -> bool:
+        return self.axis.kind == "device"
+
+    def _sound(self) -> list[NDArray[np.generic]]:
+        """Columns of the rows that match their checksums."""
+        columns, damaged = summed_rows(self._group, event_columns(self.axis), "sum")
+        if damaged and not self._sound_only:
+            raise FileFormatError(
+                f"{self._group.file.filename}: {damaged} values of {self._group.name} are damaged; save the sound ones "
+                "with millfrf recover"
+            )
+        return columns
 
     def read_texts(self) -> tuple[str, ...]:
         """The text of each value; empty texts where the series has none.
@@ -77,13 +94,12 @@ class EventSeries:
         FileFormatError
             The series is damaged.
         """
-        n_whole = len(self.read_raw()[0])
+        columns = self._sound()
         if not self.axis.texts:
-            return ("",) * n_whole
+            return ("",) * len(columns[0])
         try:
-            stored = np.asarray(self._group["text"][:n_whole])
-            return tuple(bytes(text).decode("utf-8", "replace") for text in stored)
-        except (OSError, TypeError, ValueError) as error:
+            return tuple(bytes(text).decode("utf-8", "replace") for text in columns[-1])
+        except (TypeError, ValueError) as error:
             raise FileFormatError(f"events {self._group.name} have no readable 'text'; record anew") from error
 
     def read(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -80,7 +80,7 @@ def _write(writer: RecordingWriter, taken: Block | Events) -> int:
     if isinstance(taken, Events):
         writer.append_events(taken)
         return 0
-    writer.append(taken.stream, taken.samples)
+    writer.append(taken.stream, taken.samples, taken.first_sample)
     if math.isfinite(taken.host_time):
         last = taken.first_sample + len(taken.samples)
         pair = last if taken.host_sample is None else taken.host_sample

@@ -13,11 +13,13 @@ from numpy.typing import NDArray
 
 from foundation import FileFormatError, InputError, Summary, counted
 
-from ..file_safety import is_being_written, open_for_reading, reporting_damage, require_stored
+from ..file_safety import BlockTable, is_being_written, open_for_reading, reporting_damage, require_stored
 from .alignment import Alignment
+from .checked_samples import CheckedSamples, DamagedRows, block_table
 from .event_series import EventSeries
 from .recording_format import check_format, stream_from_attributes, text_attribute
 from .stream import Stream
+from .tables import summed_rows
 
 if TYPE_CHECKING:
     import pandas
@@ -31,9 +33,9 @@ class Recording:
     Parameters
     ----------
     path
-        An HDF5 file of format ``millfrf.recording``, version 1.
+        An HDF5 file of format ``millfrf.recording``, version 1 or 2.
     accept_cut
-        Open a file that ends before its samples do; their missing part must then not be read. For recovery.
+        Open a file that is damaged or ends before its samples do; what is not sound is left out. For recovery.
 
     Raises
     ------
@@ -62,14 +64,30 @@ class Recording:
             raise FileFormatError(f"{self.path} holds no /signals; record or convert anew")
         streams = {}
         for name, clock in group.items():
+            # the blocks before the samples: a living writer announces a block when its samples are there
+            table = self._table_of(name, clock)
             samples = clock.get("samples") if isinstance(clock, h5py.Group) else None
             if not isinstance(samples, h5py.Dataset) or samples.ndim != 2 or samples.dtype.kind != "f":
                 raise FileFormatError(f"{self.path}: /signals/{name} has no table 'samples' of floats; convert anew")
             if not self._accept_cut:
                 require_stored(samples, name, self.path)
             described = stream_from_attributes(name, clock.attrs, samples.shape[1], self.path)
-            streams[name] = Stream(described, samples, self.path)
+            checked = CheckedSamples(samples, table, name, self.path)
+            if not self._accept_cut:
+                checked.require_whole_end()
+            streams[name] = Stream(described, checked, self.path)
         return streams
+
+    def _table_of(self, name: str, clock: object) -> BlockTable | None:
+        """Checksums of a stream's samples; None in a file of version 1."""
+        if self.format_version < 2 or not isinstance(clock, h5py.Group):
+            return None
+        return block_table(clock.get("blocks"), name, self.path)
+
+    @property
+    def format_version(self) -> int:
+        """Version of the file's format: 2 has checksums, 1 has none."""
+        return int(self._file.attrs.get("format_version", 1))
 
     @property
     def title(self) -> str:
@@ -122,15 +140,52 @@ class Recording:
         described = self.stream(stream).description
         with reporting_damage(self.path):
             group = self._file.get("events")
-            plain = {} if group is None else {name: EventSeries(entry) for name, entry in group.items()}
+            sound_only = self._accept_cut
+            plain = (
+                {} if group is None else {name: EventSeries(one, sound_only=sound_only) for name, one in group.items()}
+            )
             alignment = Alignment(described, self.clock_pairs(stream), plain)
-            return {name: EventSeries(group[name], partial(alignment.read, name)) for name in plain}
+            return {
+                name: EventSeries(group[name], partial(alignment.read, name), sound_only=sound_only) for name in plain
+            }
 
     def clock_pairs(self, stream: str) -> NDArray[np.float64]:
-        """Pairs (sample index, host monotonic time in s) of a stream, shape (n_pairs, 2)."""
+        """Pairs (sample index, host monotonic time in s) of a stream, shape (n_pairs, 2).
+
+        Raises
+        ------
+        FileFormatError
+            Some do not match their checksums.
+        """
+        pairs, damaged = self._clock(stream)
+        if damaged and not self._accept_cut:
+            raise FileFormatError(
+                f"{self.path}: {damaged} clock pairs of {stream} are damaged; save the sound ones with millfrf recover"
+            )
+        return pairs
+
+    def damaged_clock_pairs(self, stream: str) -> int:
+        """Number of clock pairs that do not match their checksums."""
+        return self._clock(stream)[1]
+
+    def _clock(self, stream: str) -> tuple[NDArray[np.float64], int]:
+        """Sound clock pairs, and how many are damaged."""
         with reporting_damage(self.path):
-            pairs = self._file["signals"][stream].get("clock")
-            return np.empty((0, 2)) if pairs is None else np.asarray(pairs[:], dtype=float).reshape(-1, 2)
+            group = self._file["signals"][stream]
+            if "clock" not in group:
+                return np.empty((0, 2)), 0
+            (pairs,), damaged = summed_rows(group, ["clock"], "clock_sum")
+            return np.asarray(pairs, dtype=float).reshape(-1, 2), damaged
+
+    def missing(self, stream: str) -> tuple[DamagedRows, ...]:
+        """Rows of a stream that are missing (NaN), with the reason, as far as the file lists them."""
+        with reporting_damage(self.path):
+            listed = self._file["signals"][stream].get("missing")
+            rows = [] if listed is None else list(listed[:])
+            return tuple(
+                DamagedRows(int(one[0]), int(one[0]) + int(one[1]), bytes(one[2]).decode("utf-8", "replace"))
+                for one in rows
+            )
 
     def stream(self, name: str | None = None) -> Stream:
         """The stream of that name; None asks for the only one.

@@ -11,7 +11,9 @@ from ..channel import Channel
 from ..sources import StreamDescription
 
 FORMAT = "millfrf.recording"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+READ_VERSIONS = (1, 2)
+"""Versions that are read; the first has no checksums."""
 ENDING_BYTES = 240
 """Room for the line that says how the recording ended; attributes cannot grow while a file is written."""
 
@@ -37,9 +39,10 @@ def check_format(attributes: Any, path: object) -> None:
             f"{path} is not a recording: its format is {found or 'not given'!r}, expected {FORMAT!r}; convert it first"
         )
     version = attributes.get("format_version")
-    if not isinstance(version, (int, np.integer)) or version != FORMAT_VERSION:
+    if not isinstance(version, (int, np.integer)) or int(version) not in READ_VERSIONS:
         raise FileFormatError(
-            f"{path} has format_version {version}, this program reads {FORMAT_VERSION}; use the program that wrote it"
+            f"{path} has format_version {version}, this program reads {' and '.join(map(str, READ_VERSIONS))}; "
+            "use the program that wrote it"
         )
 
 

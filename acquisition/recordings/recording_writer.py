@@ -1,7 +1,6 @@
 """`RecordingWriter`: a recording written block by block, readable after a crash."""
 
 import datetime
-import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,13 +13,14 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..errors import DiskFull
+from ..errors import DiskFull, Overrun
 from ..file_safety import SpareSpace, Syncer, is_being_written, is_disk_full
-from ..sources import SAMPLES_AXIS, TEXT_BYTES, EventAxis, Events, StreamDescription, stored_texts
-from .appending import append_rows
+from ..sources import SAMPLES_AXIS, EventAxis, Events, StreamDescription, stored_texts
 from .recording_format import ENDING_BYTES, FORMAT, FORMAT_VERSION
+from .tables import append_missing, append_samples, append_summed, make_events, make_stream
 
-_CLOCK_CHUNK = 1024
+PAGE_BYTES = 4096
+"""Bytes that systems write back to a disk together."""
 
 
 class RecordingWriter:
@@ -92,9 +92,9 @@ class RecordingWriter:
         stamp = recorded_at or datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         self._write_texts({"title": title, "recorded_at": stamp, "setup": setup})
         for stream in streams:
-            self._make_stream(stream, dtype, block_length)
+            make_stream(self._file, stream, dtype, block_length)
         for name, axis in self._event_axes.items():
-            self._make_events(name, axis)
+            make_events(self._file, name, axis)
         self._file.swmr_mode = True
         self._file.flush()
         self._syncer = Syncer(self.path)
@@ -105,7 +105,9 @@ class RecordingWriter:
         if overwrite and self.path.is_file() and is_being_written(self.path):
             raise InputError(f"{self.path} is being written by another program; choose another name or wait for it")
         try:
-            return h5py.File(self.path, "w" if overwrite else "x", libver="latest")
+            # pages: what HDF5 knows of a small table lies in one page, which a failing disk writes whole or not at all
+            paged = {"fs_strategy": "page", "fs_page_size": PAGE_BYTES}
+            return h5py.File(self.path, "w" if overwrite else "x", libver="latest", **paged)
         except FileExistsError as error:
             raise InputError(f"{self.path} exists; choose another name or remove it first") from error
         except OSError as error:
@@ -116,46 +118,82 @@ class RecordingWriter:
         self._file.attrs["complete"] = np.bool_(False)
         self._file.attrs["ending"] = np.array(b"", f"S{ENDING_BYTES}")
 
-    def _make_stream(self, stream: StreamDescription, dtype: str, block_length: int) -> None:
-        group = self._file.create_group(f"signals/{stream.name}")
-        group.attrs["sample_rate"] = float(stream.sample_rate)
-        group.attrs["start_time"] = float(stream.start_time)
-        group.attrs["channels"] = json.dumps([channel.to_json() for channel in stream.channels])
-        width = len(stream.channels)
-        group.create_dataset("samples", (0, width), dtype, maxshape=(None, width), chunks=(block_length, width))
-        group.create_dataset("clock", (0, 2), "f8", maxshape=(None, 2), chunks=(_CLOCK_CHUNK, 2))
-
-    def _make_events(self, name: str, axis: EventAxis) -> None:
-        group = self._file.create_group(f"events/{name}")
-        group.attrs["time_axis"] = axis.kind
-        group.attrs["clock"] = axis.clock
-        for column in ("time", "value", *(("arrival",) if axis.kind == "device" else ())):
-            group.create_dataset(column, (0,), "f8", maxshape=(None,), chunks=(_CLOCK_CHUNK,))
-        if axis.texts:
-            group.create_dataset("text", (0,), f"S{TEXT_BYTES}", maxshape=(None,), chunks=(_CLOCK_CHUNK,))
-
-    def append(self, stream: str, samples: NDArray[np.floating]) -> None:
+    def append(self, stream: str, samples: NDArray[np.floating], first_sample: int | None = None) -> None:
         """Append rows (n_samples, n_channels) in SI units to a stream.
+
+        Parameters
+        ----------
+        stream
+            Name of the stream.
+        samples : (n_samples, n_channels)
+            Rows in SI units.
+        first_sample
+            Number of the first row since the recording began, as the device counts; None: it does not count.
 
         Raises
         ------
         InputError
             Unknown stream, wrong number of columns, or samples that are not finite.
+        Overrun
+            The rows do not follow on those before: samples are missing, or come twice.
         DiskFull
             No room is left.
         """
-        described = self._described(stream)
-        if samples.ndim != 2 or samples.shape[1] != len(described.channels):
-            raise InputError(
-                f"block of shape {samples.shape} for stream {stream}, expected {len(described.channels)} columns; "
-                "give one a channel"
-            )
+        described, group = self._described(stream), self._file["signals"][stream]
+        self._check_columns(described, samples)
+        if first_sample is not None:
+            self._check_order(stream, first_sample, group["samples"].shape[0])
         if not np.isfinite(samples).all():
             column = int(np.argmax(~np.isfinite(samples).all(axis=0)))
             raise InputError(
                 f"channel {described.channels[column].name} holds NaN or infinity; mend the data or its conversion"
             )
-        append_rows([(self._file["signals"][stream]["samples"], samples)], self._spare, self.path)
+        append_samples(group, samples, self._spare, self.path)
+
+    def append_with_missing(self, stream: str, samples: NDArray[np.floating], reason: str) -> None:
+        """Append rows of which some are missing: NaN, listed in the file with the reason.
+
+        Parameters
+        ----------
+        stream
+            Name of the stream.
+        samples : (n_samples, n_channels)
+            Rows in SI units; a row that holds NaN or infinity is missing.
+        reason
+            Why rows are missing, in a few words.
+
+        Raises
+        ------
+        InputError
+            Unknown stream, or wrong number of columns.
+        DiskFull
+            No room is left.
+        """
+        self._check_columns(self._described(stream), samples)
+        append_missing(self._file["signals"][stream], samples, reason, self._spare, self.path)
+
+    def _check_columns(self, described: StreamDescription, samples: NDArray[np.floating]) -> None:
+        if samples.ndim != 2 or samples.shape[1] != len(described.channels):
+            raise InputError(
+                f"block of shape {samples.shape} for stream {described.name}, expected {len(described.channels)} "
+                "columns; give one a channel"
+            )
+
+    def _check_order(self, stream: str, first_sample: int, written: int) -> None:
+        """Refuse a block that does not follow on the one before."""
+        if first_sample > written:
+            missing = first_sample - written
+            raise Overrun(
+                f"stream {stream}: {missing} samples are missing after sample {written}; the recording ends there; "
+                "use a larger buffer or fewer channels",
+                missing,
+            )
+        if first_sample < written:
+            raise Overrun(
+                f"stream {stream}: a block begins at sample {first_sample} though {written} are written; the driver "
+                "gives samples twice, the recording ends there",
+                0,
+            )
 
     def append_event(self, name: str, time: float | NDArray[np.floating], value: float | NDArray[np.floating]) -> None:
         """Append a slow value at ``time`` (s), or several of each (n,), to the series ``name``.
@@ -194,7 +232,7 @@ class RecordingWriter:
                 f"event {name}: {events.times.size} times but {events.values.size} values (or texts); give one a time"
             )
         group = self._file[f"events/{name}"]
-        append_rows([(group[key], column) for key, column in columns.items()], self._spare, self.path)
+        append_summed(group, list(columns), "sum", list(columns.values()), self._spare)
 
     def append_clock_pair(self, stream: str, sample_index: int, host_time: float) -> None:
         """Append (sample index, host monotonic time in s) to a stream's clock."""
@@ -203,7 +241,7 @@ class RecordingWriter:
     def append_clock_pairs(self, stream: str, pairs: NDArray[np.float64]) -> None:
         """Append several such pairs (n_pairs, 2)."""
         self._described(stream)
-        append_rows([(self._file["signals"][stream]["clock"], pairs)], self._spare, self.path)
+        append_summed(self._file["signals"][stream], ["clock"], "clock_sum", [pairs], self._spare)
 
     def _described(self, stream: str) -> StreamDescription:
         if stream not in self.streams:

@@ -4,15 +4,15 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import FileFormatError, InputError, Summary, counted, drawing, listed, optional_library
+from foundation import InputError, Summary, counted, drawing, listed, optional_library
 
 from ..channel import Channel
-from ..file_safety import reporting_damage, whole_rows
+from ..file_safety import reporting_damage
 from ..sources import StreamDescription
+from .checked_samples import CheckedSamples, DamagedRows
 
 if TYPE_CHECKING:
     import pandas
@@ -28,12 +28,12 @@ class Stream:
     description
         Name, rate and channels.
     samples
-        The dataset ``(n_samples, n_channels)``; rows are read when asked for.
+        The dataset ``(n_samples, n_channels)`` with its checksums; rows are read when asked for.
     path
         Path of the file, for messages.
     """
 
-    def __init__(self, description: StreamDescription, samples: h5py.Dataset, path: Path) -> None:
+    def __init__(self, description: StreamDescription, samples: CheckedSamples, path: Path) -> None:
         self.description = description
         self.path = path
         self._samples = samples
@@ -61,12 +61,12 @@ class Stream:
     @property
     def n_samples(self) -> int:
         """Number of samples that are stored."""
-        return int(self._samples.shape[0])
+        return self._samples.n_rows
 
     @property
     def dtype(self) -> "np.dtype[np.floating]":
         """How samples are stored: float32 or float64."""
-        stored: np.dtype[np.floating] = self._samples.dtype
+        stored: np.dtype[np.floating] = self._samples.dataset.dtype
         return stored
 
     @property
@@ -74,10 +74,15 @@ class Stream:
         """n_samples / sample_rate, s."""
         return self.n_samples / self.sample_rate
 
-    def whole_rows(self, file_size: int) -> int:
-        """Leading rows whose bytes lie within a file of ``file_size`` bytes; fewer than n_samples in a cut file."""
+    @property
+    def has_checksums(self) -> bool:
+        """Whether samples were stored with checksums, so that damaged ones are refused."""
+        return self._samples.has_checksums
+
+    def salvaged(self, file_size: int) -> Iterator[NDArray[np.floating] | DamagedRows]:
+        """All rows in order, part by part; damaged ones are named instead (:meth:`CheckedSamples.salvaged`)."""
         with reporting_damage(self.path):
-            return whole_rows(self._samples, file_size)
+            yield from self._samples.salvaged(file_size)
 
     def channels_of(self, quantity: str) -> tuple[Channel, ...]:
         """The channels of one quantity, in column order."""
@@ -109,14 +114,10 @@ class Stream:
         InputError
             An unknown channel.
         FileFormatError
-            The file's bytes cannot be read there.
+            Samples there are damaged.
         """
-        try:
-            rows = np.asarray(self._samples[start:stop], dtype=float)
-        except OSError as error:
-            raise FileFormatError(
-                f"{self.path}: samples {start} to {stop} of {self.name} cannot be read; the file is damaged"
-            ) from error
+        first, end, _ = slice(start, stop).indices(self.n_samples)
+        rows = np.asarray(self._samples.read(first, end), dtype=float)
         return rows if channels is None else rows[:, self.columns(channels)]
 
     def blocks(

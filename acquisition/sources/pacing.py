@@ -35,13 +35,17 @@ class Pace:
         self._started = time.monotonic()
 
     def wait_until(self, seconds: float) -> float:
-        """Sleep until the clock shows ``seconds``; returns the host's monotonic time, s (NaN where nothing waits)."""
+        """Sleep until the clock shows ``seconds``; returns what it shows, counted from the host's time at its start.
+
+        The times of a faster clock are stretched as its samples are: they tell the rate that the samples have. NaN
+        where nothing waits.
+        """
         if math.isinf(self._speed):
             return math.nan
         wait = self._started + seconds / self._speed - time.monotonic()
         if wait > 0:
             time.sleep(wait)
-        return time.monotonic()
+        return self._started + self._speed * (time.monotonic() - self._started)
 
 
 class Paced(AroundSource):

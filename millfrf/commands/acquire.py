@@ -87,6 +87,7 @@ def _say(line: str) -> None:
 
 def _report(tally: object, out: Path) -> None:
     from ..chain import Tally
+    from ..gate import doubts_of_rate
 
     if not isinstance(tally, Tally):
         typer.echo("stopped before Start; nothing was recorded")
@@ -96,3 +97,5 @@ def _report(tally: object, out: Path) -> None:
     for line in (*story.losses, *story.notices):
         typer.echo(f"device: {line}")
     typer.echo(f"wrote {out}")
+    for doubt in doubts_of_rate(out):
+        typer.echo(f"warning: {doubt}")

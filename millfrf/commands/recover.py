@@ -1,18 +1,24 @@
-"""`millfrf recover`: rescue a recording whose writer was killed."""
+"""`millfrf recover`: rescue a recording that was left open or damaged."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+if TYPE_CHECKING:
+    from acquisition import Recovered
+
 
 def recover(
-    recording: Annotated[Path, typer.Argument(metavar="REC.h5", help="Recording whose writer was killed.")],
+    recording: Annotated[Path, typer.Argument(metavar="REC.h5", help="Recording that was left open or damaged.")],
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="File to write; else REC.recovered.h5 beside it.")
     ] = None,
 ) -> None:
-    """Copy everything a killed writer had written into a new recording; the old file is left as it is."""
+    """Copy what is sound of a recording into a new one: after a kill, a power failure, or damage on the disk.
+
+    Damaged samples are listed, and never copied; the old file is left as it is.
+    """
     from acquisition import recover as recover_file
 
     from ..options import check_output
@@ -22,9 +28,27 @@ def recover(
         check_output(out, (".h5", ".hdf5"), [recording])
     with bar(f"recovering {recording.name}") as update:
         back = recover_file(recording, out, progress=update)
-    for name, n_samples in back.samples.items():
-        lost = f", {back.lost[name]} cut off" if back.lost[name] else ""
-        typer.echo(f"stream {name}: {n_samples} samples{lost}")
-    for name, n_events in back.events.items():
-        typer.echo(f"events {name}: {n_events}")
+    for line in recovered_lines(back):
+        typer.echo(line)
     typer.echo(f"wrote {back.path}")
+
+
+def recovered_lines(back: "Recovered") -> list[str]:
+    """What came back and what did not, line by line.
+
+    Parameters
+    ----------
+    back
+        Result of the recovery.
+    """
+    lines = []
+    for name, n_samples in back.samples.items():
+        lines.append(f"stream {name}: {n_samples} samples")
+        for one in back.damaged[name]:
+            where = "left out at the end" if one.first >= n_samples else "missing (NaN) in the new file"
+            lines.append(f"  samples {one.first} to {one.end - 1}: {one.reason}; {where}")
+    lines += [f"events {name}: {count}" for name, count in back.events.items()]
+    lines += [f"{name}: {count} damaged values left out" for name, count in back.damaged_values.items()]
+    if not back.has_checksums:
+        lines.append("the file has no checksums (format version 1): damaged samples cannot be told from sound ones")
+    return lines

@@ -1,5 +1,6 @@
 from .belonging import Given, check_belonging
 from .calibrations import check_tip_and_sensor
+from .clocks import clock_concerns, missing_concerns
 from .cut_statements import check_one_speed, stated_cut
 from .cutting_data import check_cutting, read_checked_cutting
 from .frfs import check_frf, check_frf_for_fit
@@ -53,6 +54,7 @@ __all__ = [
     "check_taps_used",
     "check_tip_and_sensor",
     "check_window_damping",
+    "clock_concerns",
     "doubts_of",
     "doubts_of_rate",
     "doubts_of_taps",
@@ -62,6 +64,7 @@ __all__ = [
     "level_table",
     "look",
     "lowest_frequency",
+    "missing_concerns",
     "plainly_different",
     "read_checked_cutting",
     "rigid_directions",

@@ -9,6 +9,7 @@ from estimation import choose_channels
 from foundation import InputError
 
 from ..progress import Progress, silent
+from .clocks import check_clock_of, clock_concerns
 from .several import check_several
 from .signals import ChannelLevel, Look, look, rate_concerns
 from .taps_in_segments import Segmentation, refuse_taps
@@ -73,7 +74,8 @@ def check_recordings(
     ------
     InputError
         A dead channel (an excitation: dead in every file), samples that are not finite or beyond what a sensor gives,
-        or a channel that copies another; taps of a hammer where segments would spoil them.
+        a channel that copies another, or a sample rate that the host's clock contradicts; taps of a hammer where
+        segments would spoil them.
     """
 
     def chosen(source: Stream) -> tuple[Sequence[str], Sequence[str]]:
@@ -110,6 +112,7 @@ def check_channels(
             silent_in.update({name: Path(path).name for name in idle})
             alive |= set(exciting) - set(idle)
             found = _check_stream(source, seen, set(idle), excluding, remedy)
+            found += check_clock_of(recording, source.name)
             if segments is not None:
                 refuse_taps(source, seen.levels[: len(exciting)], segments)
             if recording.complete is False:
@@ -129,8 +132,8 @@ def doubts_of_rate(path: str | os.PathLike[str]) -> list[str]:
     with Recording(path) as recording:
         return [
             f"{Path(path).name}: {text}"
-            for one in recording.streams.values()
-            for text in rate_concerns(one.sample_rate)
+            for name, one in recording.streams.items()
+            for text in (*rate_concerns(one.sample_rate), *clock_concerns(recording, name))
         ]
 
 

@@ -25,6 +25,7 @@ def changed(source: Path, target: Path, change: Callable[[Samples], Samples]) ->
         samples = change(np.asarray(group["samples"][:], dtype=float))
         del group["samples"]
         group["samples"] = samples
+        file.attrs["format_version"] = 1  # as another program writes it: without checksums
         channels = json.loads(group.attrs["channels"])
         group.attrs["channels"] = json.dumps([{k: v for k, v in c.items() if k != "full_scale"} for c in channels])
     return target

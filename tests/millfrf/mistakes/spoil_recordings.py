@@ -23,6 +23,7 @@ def column(folder: Path, file: str, channel: str, change: str) -> None:
             other = change.removeprefix("=")
             samples[:, i] = samples[:, names.index(other)] if other != change else CHANGES[change](samples[:, i])
         opened[SAMPLES][...] = samples
+        opened.attrs["format_version"] = 1  # as another program writes it: without checksums
 
 
 def swapped(folder: Path, file: str, first: str, second: str) -> None:
@@ -33,6 +34,7 @@ def swapped(folder: Path, file: str, first: str, second: str) -> None:
         samples = opened[SAMPLES][:]
         samples[:, [a, b]] = samples[:, [b, a]]
         opened[SAMPLES][...] = samples
+        opened.attrs["format_version"] = 1  # as another program writes it: without checksums
 
 
 CHANGES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -83,6 +85,7 @@ def full_scale(folder: Path, file: str, name: str) -> None:
         top = float(np.quantile(np.abs(samples[:, i]), 0.97))
         samples[:, i] = np.clip(samples[:, i], -top, top)
         opened[SAMPLES][...] = samples
+        opened.attrs["format_version"] = 1  # as another program writes it: without checksums
     channel(folder, file, name, full_scale=top)
 
 
@@ -114,6 +117,7 @@ def held(folder: Path, file: str, n_samples: int) -> None:
         middle = len(samples) // 2
         samples[middle : middle + n_samples] = samples[middle]
         opened[SAMPLES][...] = samples
+        opened.attrs["format_version"] = 1  # as another program writes it: without checksums
 
 
 def without(folder: Path, file: str, *names: str) -> None:

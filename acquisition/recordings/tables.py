@@ -1,0 +1,196 @@
+"""The tables of a recording file: made empty, grown row by row, each row or block with its checksum."""
+
+import json
+from collections.abc import Sequence
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import FileFormatError
+
+from ..file_safety import ENTRY, SpareSpace, entries_of, row_sums
+from ..sources import TEXT_BYTES, EventAxis, StreamDescription
+from .appending import append_rows
+
+SLOW_ROWS = 1024
+"""Rows in a chunk of clock pairs and events."""
+
+ENTRIES = 512
+"""Entries of blocks in a chunk: it is written anew with each block, and many small chunks have a large index."""
+
+MISSING = np.dtype([("first_row", "<u8"), ("rows", "<u8"), ("reason", "S120")])
+"""Rows of a stream that are missing; their samples are NaN."""
+
+Real = NDArray[np.floating]
+
+
+def make_stream(file: h5py.File, stream: StreamDescription, dtype: str, block_length: int) -> None:
+    """Make the group of a stream, with empty tables.
+
+    Parameters
+    ----------
+    file
+        File open for writing.
+    stream
+        Name, rate and channels.
+    dtype
+        ``float32`` or ``float64``.
+    block_length
+        Rows in a chunk of samples.
+    """
+    group = file.create_group(f"signals/{stream.name}")
+    group.attrs["sample_rate"] = float(stream.sample_rate)
+    group.attrs["start_time"] = float(stream.start_time)
+    group.attrs["channels"] = json.dumps([channel.to_json() for channel in stream.channels])
+    width = len(stream.channels)
+    group.create_dataset("samples", (0, width), dtype, maxshape=(None, width), chunks=(block_length, width))
+    group.create_dataset("blocks", (0,), ENTRY, maxshape=(None,), chunks=(ENTRIES,))
+    group.create_dataset("missing", (0,), MISSING, maxshape=(None,), chunks=(ENTRIES,))
+    group.create_dataset("clock", (0, 2), "f8", maxshape=(None, 2), chunks=(SLOW_ROWS, 2))
+    group.create_dataset("clock_sum", (0,), "<u4", maxshape=(None,), chunks=(SLOW_ROWS,))
+
+
+def make_events(file: h5py.File, name: str, axis: EventAxis) -> None:
+    """Make the group of a series of events, with empty columns.
+
+    Parameters
+    ----------
+    file
+        File open for writing.
+    name
+        Name of the series.
+    axis
+        Clock that tells the times, and whether there are texts.
+    """
+    group = file.create_group(f"events/{name}")
+    group.attrs["time_axis"] = axis.kind
+    group.attrs["clock"] = axis.clock
+    for column in event_columns(axis):
+        dtype = f"S{TEXT_BYTES}" if column == "text" else "f8"
+        group.create_dataset(column, (0,), dtype, maxshape=(None,), chunks=(SLOW_ROWS,))
+    group.create_dataset("sum", (0,), "<u4", maxshape=(None,), chunks=(SLOW_ROWS,))
+
+
+def event_columns(axis: EventAxis) -> tuple[str, ...]:
+    """Names of the columns of a series, in the order in which their checksum takes them."""
+    arrival = ("arrival",) if axis.kind == "device" else ()
+    return ("time", "value", *arrival, *(("text",) if axis.texts else ()))
+
+
+def append_samples(group: h5py.Group, samples: Real, spare: SpareSpace | None, path: object) -> None:
+    """Append rows to a stream, and then the checksums of their blocks.
+
+    Parameters
+    ----------
+    group
+        Group of the stream.
+    samples : (n_samples, n_channels)
+        Rows in SI units.
+    spare
+        Disk space to give back when the disk is full.
+    path
+        Path of the file, for messages.
+
+    Raises
+    ------
+    DiskFull
+        No room is left.
+    """
+    table, blocks = group["samples"], group["blocks"]
+    stored = np.asarray(samples, table.dtype)
+    entries = entries_of(stored, table.shape[0], blocks.shape[0])
+    append_rows([(table, stored), (blocks, entries)], spare, path)
+
+
+def append_missing(group: h5py.Group, samples: Real, reason: str, spare: SpareSpace | None, path: object) -> None:
+    """Append rows to a stream of which some are missing, NaN, and say which and why.
+
+    Parameters
+    ----------
+    group
+        Group of the stream.
+    samples : (n_samples, n_channels)
+        Rows in SI units; a row that holds NaN is missing.
+    reason
+        Why rows are missing, in a few words.
+    spare
+        Disk space to give back when the disk is full.
+    path
+        Path of the file, for messages.
+
+    Raises
+    ------
+    DiskFull
+        No room is left.
+    """
+    first, table = group["samples"].shape[0], group["missing"]
+    gone = np.concatenate([[False], ~np.isfinite(samples).all(axis=1), [False]])
+    edges = np.flatnonzero(np.diff(gone.astype(np.int8)))
+    append_samples(group, samples, spare, path)
+    text = " ".join(reason.split()).encode()[: MISSING["reason"].itemsize]
+    rows = [(first + a, b - a, text) for a, b in edges.reshape(-1, 2)]
+    append_rows([(table, np.array(rows, MISSING))], spare, path)
+
+
+def append_summed(
+    group: h5py.Group, columns: Sequence[str], sums: str, rows: Sequence[NDArray[np.generic]], spare: SpareSpace | None
+) -> None:
+    """Append rows of slow values, and then their checksums.
+
+    Parameters
+    ----------
+    group
+        Group that holds the columns.
+    columns
+        Names of the columns.
+    sums
+        Name of the column of checksums.
+    rows
+        New rows of each column.
+    spare
+        Disk space to give back when the disk is full.
+
+    Raises
+    ------
+    DiskFull
+        No room is left.
+    """
+    stored = [np.asarray(new, group[name].dtype) for name, new in zip(columns, rows, strict=True)]
+    checks = row_sums(stored, group[sums].shape[0])
+    tables = [group[name] for name in (*columns, sums)]
+    append_rows(list(zip(tables, (*stored, checks), strict=True)), spare, group.file.filename)
+
+
+def summed_rows(group: h5py.Group, columns: Sequence[str], sums: str) -> tuple[list[NDArray[np.generic]], int]:
+    """Rows of slow values that match their checksums, and how many do not.
+
+    Rows that are in some columns only were never acknowledged. A file of version 1 has no checksums: all are taken.
+
+    Parameters
+    ----------
+    group
+        Group that holds the columns.
+    columns
+        Names of the columns.
+    sums
+        Name of the column of checksums.
+
+    Raises
+    ------
+    FileFormatError
+        A column is not there or cannot be read.
+    """
+    try:
+        stored = [np.asarray(group[name][:]) for name in columns]
+        checks = np.asarray(group[sums][:]) if sums in group else None
+    except (OSError, RuntimeError, KeyError, AttributeError, TypeError, ValueError) as error:
+        raise FileFormatError(
+            f"{group.file.filename}: {group.name} lacks readable {' and '.join(map(repr, columns[:2]))}; record anew"
+        ) from error
+    count = min([*map(len, stored), *([] if checks is None else [len(checks)])])
+    stored = [column[:count] for column in stored]
+    if checks is None:
+        return stored, 0
+    good = row_sums(stored) == checks[:count]
+    return [column[good] for column in stored], int(count - good.sum())
