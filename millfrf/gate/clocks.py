@@ -10,7 +10,7 @@ def clock_concerns(recording: Recording, stream: str) -> list[str]:
     Parameters
     ----------
     recording
-        Open recording.
+        Recording, open for reading, whose pairs are looked at.
     stream
         Name of the stream.
     """
@@ -24,7 +24,7 @@ def check_clock_of(recording: Recording, stream: str) -> list[str]:
     Parameters
     ----------
     recording
-        Open recording.
+        Recording, open for reading, whose pairs are looked at.
     stream
         Name of the stream.
 
@@ -45,7 +45,7 @@ def missing_concerns(recording: Recording, stream: str) -> list[str]:
     Parameters
     ----------
     recording
-        Open recording.
+        Recording, open for reading, whose pairs are looked at.
     stream
         Name of the stream.
     """
