@@ -225,6 +225,10 @@ class VerdictSettings(Thresholds, shares=("explained", "partly", "halves")):
         Error held out over noise that was measured above which something is missing, whatever the nominal model leaves.
     most_left
         Share of the nominal model's power above the noise that an answer may then leave.
+    most_over_alone
+        Error in any recording over that of modes that are refitted to it alone, above which what is left is no noise.
+    most_not_noise
+        Share of the response that must so be known to be no noise.
     """
 
     noise_like: float = 0.05
@@ -235,6 +239,8 @@ class VerdictSettings(Thresholds, shares=("explained", "partly", "halves")):
     most_over_noise: float = 1.5
     most_over_measured: float = 5.0
     most_left: float = 0.1
+    most_over_alone: float = 1.5
+    most_not_noise: float = 0.1
 
 
 @dataclass(frozen=True)

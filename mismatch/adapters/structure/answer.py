@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 from estimation import WindowedSpectrum
 
+from ...behaviour import FollowedAlone, followed_alone
 from ...faults import with_tones_settled
 from ...inference import AcceptedCause, Candidate, Remainder, Search, released
 from ...models import Fit, fit, with_linear_part
@@ -38,6 +40,8 @@ class Answer:
         What it is worth on the recording held out.
     rejected
         Causes that the verdict turns down.
+    no_noise
+        Recordings of which the causes leave much that is no noise, and that keep the answer from being whole.
     """
 
     verdict: str
@@ -47,6 +51,7 @@ class Answer:
     left: Remainder
     held_out: HeldOut
     rejected: tuple[Candidate, ...] = ()
+    no_noise: tuple[FollowedAlone, ...] = ()
 
 
 def answer_of(
@@ -89,7 +94,8 @@ def answer_of(
     deviation = _deviation(both.mended, spread)
     causes += [] if deviation is None else [deviation]
     left = leftover(current.hypothesis, both.mended)
-    verdict = verdict_of_structure(
+    judged = partial(
+        verdict_of_structure,
         current.hypothesis,
         causes,
         (comparison.before, left),
@@ -98,6 +104,11 @@ def answer_of(
         everywhere=held_out.everywhere,
         measured=held_out.measured,
     )
+    verdict = judged()
+    no_noise: tuple[FollowedAlone, ...] = ()
+    if verdict in ("none", "explained"):
+        no_noise = followed_alone(current.hypothesis, found.base.hypothesis, both.mended, settings.verdict)
+        verdict = judged(followed_alone=bool(no_noise))
     if verdict == "partly explained" and found.accepted:
         small = small_beside_the_rest(found, settings.evidence.small_in_part)
         if small:
@@ -106,8 +117,8 @@ def answer_of(
         if not has_a_sure_name(found, comparison.laws):
             verdict = "unexplained"
     if verdict == "unexplained":
-        return _unexplained(comparison, both, found, held_out, causes)
-    return Answer(verdict, tuple(causes), current, found, left, held_out)
+        return replace(_unexplained(comparison, both, found, held_out, causes), no_noise=no_noise)
+    return Answer(verdict, tuple(causes), current, found, left, held_out, no_noise=no_noise)
 
 
 def _unexplained(

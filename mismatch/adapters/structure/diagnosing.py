@@ -139,7 +139,7 @@ def _diagnosed(
         answer.left,
         located(view, speeds),
         replace(details, view=view, behaviour=behaviour),
-        doubts=beyond_model(base.hypothesis, mended),
+        doubts=(*beyond_model(base.hypothesis, mended), *(one.sentence for one in answer.no_noise)),
         content={
             "compared_band": asdict(band),
             "not_asked_for": list(left_out),
