@@ -11,7 +11,7 @@ from .conversion import (
     read_uff_lines,
     read_uff_sets,
 )
-from .drivers import ReplaySource
+from .drivers import RSI_COUNTS, ReplaySource
 from .errors import DeviceError, DeviceTimeout, Disconnected, DiskFull, DriverMissing, Overrun
 from .recordings import (
     Aligner,
@@ -31,7 +31,9 @@ from .recordings import (
 from .session import Session, SimulatedDevice, build_source, session_from_text, session_text
 from .sources import (
     DEVICES,
+    FAULT,
     HOST_AXIS,
+    LOST,
     SAMPLES_AXIS,
     Block,
     DeviceStory,
@@ -48,7 +50,10 @@ from .sources import (
 
 __all__ = [
     "DEVICES",
+    "FAULT",
     "HOST_AXIS",
+    "LOST",
+    "RSI_COUNTS",
     "SAMPLES_AXIS",
     "SUFFIXES",
     "Aligner",

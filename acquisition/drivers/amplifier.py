@@ -179,7 +179,7 @@ class Amplifier(ThreadedFeed):
 
     def conclude(self) -> None:
         """Ask a last time whether all is still as it was set."""
-        self._receiver.stop()
+        super().conclude()
         if self._line is None:
             return
         try:

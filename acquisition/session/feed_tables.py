@@ -1,4 +1,4 @@
-"""`[[can]]`, `[[tachometer]]`, `[[modbus]]` and `[[amplifier]]` of a session."""
+"""`[[can]]`, `[[tachometer]]`, `[[modbus]]`, `[[rsi]]` and `[[amplifier]]` of a session."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -6,7 +6,20 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, model_validator
 
-from ..drivers import Amplifier, CanFeed, CanSignal, Command, ModbusFeed, Register, SerialLink, TachometerFeed, TcpLink
+from ..drivers import (
+    STANDARD_SIGNALS,
+    Amplifier,
+    CanFeed,
+    CanSignal,
+    Command,
+    ModbusFeed,
+    Register,
+    RsiFeed,
+    RsiSignal,
+    SerialLink,
+    TachometerFeed,
+    TcpLink,
+)
 from .channel_table import STRICT, Name, Positive
 
 Baud = Annotated[int, Field(ge=50, le=10_000_000)]
@@ -18,6 +31,15 @@ class SignalTable(BaseModel):
     model_config = STRICT
     signal: Name
     series: str = ""
+    factor: float = 1.0
+
+
+class RsiSignalTable(BaseModel):
+    """One value of a KUKA controller's packets; see `RsiSignal`."""
+
+    model_config = STRICT
+    signal: Annotated[str, Field(pattern=r"^\w+\.\w+$")]
+    series: Name
     factor: float = 1.0
 
 
@@ -108,6 +130,33 @@ class ModbusTable(BaseModel):
             link = SerialLink(self.port, self.baud, self.parity, self.stop_bits)
         registers = [Register(**each.model_dump()) for each in self.registers]
         return ModbusFeed(link, self.slave, registers, interval=self.interval_s, timeout=self.timeout_s)
+
+
+class RsiTable(BaseModel):
+    """A KUKA robot; see `RsiFeed`. Without ``signals``: joint angles, position and motor currents."""
+
+    model_config = STRICT
+    address: Name
+    port: Annotated[int, Field(ge=1, le=65535)] = 59152
+    robot: str = ""
+    signals: tuple[RsiSignalTable, ...] = ()
+    cycle_ms: Literal[4, 12] | None = None
+    silence_s: Positive = 1.0
+    sentype: Annotated[str, Field(pattern=r"^\w+$")] = "ImFree"
+
+    def feed(self, folder: Path) -> RsiFeed:
+        """The robot as a feed."""
+        del folder
+        signals = [RsiSignal(each.signal, each.series, each.factor) for each in self.signals] or STANDARD_SIGNALS
+        return RsiFeed(
+            self.address,
+            self.port,
+            self.robot,
+            signals,
+            cycle=self.cycle_ms,
+            silence=self.silence_s,
+            sentype=self.sentype,
+        )
 
 
 class CommandTable(BaseModel):

@@ -7,7 +7,7 @@ from pydantic import BaseModel, Field, model_validator
 
 from ..drivers import NiClocks
 from .channel_table import STRICT, ChannelTable, CounterTable, Name, Positive
-from .feed_tables import AmplifierTable, CanTable, ModbusTable, TachometerTable
+from .feed_tables import AmplifierTable, CanTable, ModbusTable, RsiTable, TachometerTable
 
 FREQUENCIES_A_SAMPLE_RATE = 2.56
 """A sample rate must be at least this many times the band's upper end, so that the anti-alias filter fits between."""
@@ -84,7 +84,7 @@ class LiveTable(BaseModel):
 
 
 Device = Annotated[NiDevice | ReplayDevice | SimulatedDevice, Field(discriminator="driver")]
-FeedTable = CanTable | TachometerTable | ModbusTable | AmplifierTable
+FeedTable = CanTable | TachometerTable | ModbusTable | RsiTable | AmplifierTable
 
 
 class Session(BaseModel):
@@ -108,7 +108,7 @@ class Session(BaseModel):
         Inputs of that device; needed for ``ni``, refused for the others, which bring their own.
     counters
         Counters of that device, read at each sample of the inputs.
-    can, tachometer, modbus, amplifier
+    can, tachometer, modbus, rsi, amplifier
         Tables of further devices.
     """
 
@@ -128,6 +128,7 @@ class Session(BaseModel):
     can: tuple[CanTable, ...] = ()
     tachometer: tuple[TachometerTable, ...] = ()
     modbus: tuple[ModbusTable, ...] = ()
+    rsi: tuple[RsiTable, ...] = ()
     amplifier: tuple[AmplifierTable, ...] = ()
 
     @model_validator(mode="after")
@@ -197,4 +198,4 @@ class Session(BaseModel):
     @property
     def feeds(self) -> tuple[FeedTable, ...]:
         """All tables of further devices; amplifiers first, so that they are set before anything runs."""
-        return (*self.amplifier, *self.can, *self.tachometer, *self.modbus)
+        return (*self.amplifier, *self.can, *self.tachometer, *self.modbus, *self.rsi)

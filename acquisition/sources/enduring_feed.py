@@ -36,6 +36,7 @@ class EnduringFeed:
         self._stop = threading.Event()
         self._returning: threading.Thread | None = None
         self._lost_at: float | None = None
+        self._is_open = False
 
     def open(self) -> None:
         """Open the device.
@@ -48,13 +49,12 @@ class EnduringFeed:
         self._stop.clear()
         self._lost_at = None
         self._feed.open()
+        self._is_open = True
 
     def poll(self) -> list[Events]:
         """Give the events since the last call and what there is to log; never waits and never fails."""
-        if self._returning is not None:
-            if self._returning.is_alive():
-                return self._logged([])
-            self._returning = None
+        if not self._is_open:
+            return self._logged([])
         taken: list[Events] = []
         try:
             taken = self._feed.poll()
@@ -66,6 +66,7 @@ class EnduringFeed:
 
     def conclude(self) -> list[Events]:
         """Give the last events, and what the device has to tell of the whole recording."""
+        self._end_attempts()
         if isinstance(self._feed, TellsNotes):
             self._feed.conclude()
         return self.poll()
@@ -78,6 +79,9 @@ class EnduringFeed:
 
     def _lose(self, error: Exception) -> list[Events]:
         """Start to bring the device back; the log's line, where it was not lost before."""
+        self._is_open = False
+        self._end_attempts()
+        self._stop.clear()
         self._returning = threading.Thread(target=self._bring_back, name=f"{self.where} again", daemon=True)
         self._returning.start()
         if self._lost_at is not None:
@@ -101,6 +105,7 @@ class EnduringFeed:
                 drop()
             with suppress(Exception):
                 reopen()
+                self._is_open = True
                 return
             self._stop.wait(self._retry)
 
@@ -111,9 +116,12 @@ class EnduringFeed:
 
     def close(self) -> None:
         """End the attempts and release the device."""
+        self._end_attempts()
+        with suppress(Exception):
+            self._feed.close()
+
+    def _end_attempts(self) -> None:
         self._stop.set()
         if self._returning is not None:
             self._returning.join()
             self._returning = None
-        with suppress(Exception):
-            self._feed.close()

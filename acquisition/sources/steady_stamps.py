@@ -96,9 +96,10 @@ class SteadyStamps:
             return []
         lateness = sorted(one.arrival - one.stamp - self._shift for one in self._held)
         level, middle = lateness[0], lateness[len(lateness) // 2]
-        if middle - level > TOLERANCE and not last and span < _MOST_WAIT:
+        alike = middle - level <= TOLERANCE or abs(level - usual) > _MOST_WAIT
+        if not alike and not last and span < _MOST_WAIT:
             return []  # it still changes: a busy host
-        if abs(level - usual) >= LEAST_STEP and middle - level <= TOLERANCE:
+        if abs(level - usual) >= LEAST_STEP and alike:
             self._take_out(usual - level, self._held[0].arrival)
         else:
             self._least.clear()

@@ -97,8 +97,9 @@ class ThreadedFeed(ABC):
             taken.append(self._notes.popleft())
         return taken
 
-    def conclude(self) -> None:  # noqa: B027  # most devices have nothing to tell
-        """Note what is worth telling at the end of a recording; called before `close`."""
+    def conclude(self) -> None:
+        """Receive no more, so that what was held back is given, and note what is worth telling of the recording."""
+        self._receiver.stop()
 
     def close(self) -> None:
         """Stop to receive and release the device."""

@@ -58,7 +58,8 @@ def _check(source: object, seconds: float) -> None:
     from ..tables import show
 
     assert isinstance(source, Source)
-    found = preflight(listen(source, seconds))
+    heard = listen(source, seconds)
+    found = preflight(heard.streams, heard.doubts)
     show(found.table())
     for tap in found.taps:
         typer.echo(f"tap: {tap.acceleration.name} {1e6 * tap.delay:+.0f} us after {tap.force.name}")

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Block, Channel, Source, StreamDescription
+from acquisition import DEVICES, FAULT, LOST, RSI_COUNTS, Channel, Events, Source, StreamDescription, announced_events
 from estimation import find_taps
 from foundation import InputError
 
@@ -113,15 +113,18 @@ class Preflight:
     ----------
     checks, taps
         Checks of each channel, and of each pair of channels where there were taps.
+    doubts
+        Auxiliary devices that were lost or silent, one sentence each.
     """
 
     checks: tuple[ChannelCheck, ...]
     taps: tuple[TapCheck, ...]
+    doubts: tuple[str, ...] = ()
 
     def concerns(self) -> list[str]:
         """What is wrong; empty where nothing is."""
         found = [check.concerns() for check in self.checks] + [tap.concerns() for tap in self.taps]
-        return [line for lines in found for line in lines]
+        return [*(line for lines in found for line in lines), *self.doubts]
 
     def table(self) -> Table:
         """One row a channel."""
@@ -141,8 +144,24 @@ class Preflight:
         return Table("Pre-flight", columns, rows)
 
 
-def listen(source: Source, seconds: float) -> list[tuple[StreamDescription, Real]]:
-    """Samples of every stream for a while, in memory.
+@dataclass(frozen=True)
+class Heard:
+    """What came from a source while it was listened to.
+
+    Parameters
+    ----------
+    streams
+        Each stream with its samples (n, n_channels).
+    doubts
+        Auxiliary devices that were lost or silent, one sentence each.
+    """
+
+    streams: tuple[tuple[StreamDescription, Real], ...]
+    doubts: tuple[str, ...]
+
+
+def listen(source: Source, seconds: float) -> Heard:
+    """Samples of every stream for a while, in memory, and what auxiliary devices did meanwhile.
 
     Raises
     ------
@@ -152,6 +171,7 @@ def listen(source: Source, seconds: float) -> list[tuple[StreamDescription, Real
         The device failed.
     """
     taken: dict[str, list[Real]] = {stream.name: [] for stream in source.streams}
+    events: list[Events] = []
     latest = time.monotonic() + 10 * seconds + 30
     try:
         source.open()
@@ -159,25 +179,48 @@ def listen(source: Source, seconds: float) -> list[tuple[StreamDescription, Real
             block = source.read()
             if block is None:
                 break
-            if isinstance(block, Block):
-                taken[block.stream].append(block.samples)
-                if all(sum(map(len, taken[s.name])) >= seconds * s.sample_rate for s in source.streams):
-                    break
+            if isinstance(block, Events):
+                events.append(block)
+                continue
+            taken[block.stream].append(block.samples)
+            if all(sum(map(len, taken[s.name])) >= seconds * s.sample_rate for s in source.streams):
+                break
     finally:
         source.close()
     if not all(taken.values()):
         raise InputError("the device gave no samples; nothing can be checked")
-    return [(stream, np.concatenate(taken[stream.name])) for stream in source.streams]
+    streams = tuple((stream, np.concatenate(taken[stream.name])) for stream in source.streams)
+    return Heard(streams, tuple(_device_doubts(source, events, seconds)))
 
 
-def preflight(streams: Sequence[tuple[StreamDescription, Real]]) -> Preflight:
-    """Judge what was listened to."""
+def _device_doubts(source: Source, events: Sequence[Events], seconds: float) -> list[str]:
+    """What the log of the devices says, and series that nothing came of."""
+    lines = [
+        text
+        for one in events
+        if one.series == DEVICES
+        for value, text in zip(one.values, one.texts or (), strict=True)
+        if value in (LOST, FAULT)
+    ]
+    heard = {one.series for one in events if len(one.values)}
+    mute = [
+        name
+        for name, axis in announced_events(source).items()
+        if name not in heard and not axis.texts and axis.kind != "samples" and name not in RSI_COUNTS
+    ]
+    if mute:
+        lines.append(f"no value came of {', '.join(mute)} in {seconds:g} s; check the device, its names and its wire")
+    return lines
+
+
+def preflight(streams: Sequence[tuple[StreamDescription, Real]], doubts: Sequence[str] = ()) -> Preflight:
+    """Judge what was listened to; ``doubts`` about auxiliary devices are passed on."""
     checks, taps = [], []
     for stream, samples in streams:
         for column, channel in enumerate(stream.channels):
             checks.append(_channel_check(channel, samples[:, column], stream.sample_rate))
         taps += _tap_checks(stream, samples)
-    return Preflight(tuple(checks), tuple(taps))
+    return Preflight(tuple(checks), tuple(taps), tuple(doubts))
 
 
 def _channel_check(channel: Channel, samples: Real, rate: float) -> ChannelCheck:

@@ -1,0 +1,163 @@
+"""The KUKA driver against a simulated controller, a process of its own: echo, lost and late packets, and its end."""
+
+import json
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquisition import Block, Channel, Disconnected, Recording, StreamDescription, WithFeeds, record
+from acquisition.drivers.rsi import RsiFeed, RsiSignal
+from acquisition.drivers.rsi.rsi_answering import answer
+from acquisition.drivers.rsi.rsi_packet import PacketCount, RsiPacket, understood
+
+CONTROLLER = Path(__file__).with_name("rsi_controller.py")
+STREAM = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))
+
+
+class Clockwork:
+    """Blocks of 0.1 s in real time on the host's own clock."""
+
+    title, setup, streams, n_samples = "", "", (STREAM,), None
+
+    def __init__(self, n_blocks: int) -> None:
+        self.n_blocks, self.done, self.started = n_blocks, 0, 0.0
+
+    def open(self) -> None:
+        self.started, self.done = time.monotonic(), 0
+
+    def read(self) -> Block | None:
+        if self.done == self.n_blocks:
+            return None
+        self.done += 1
+        due = self.started + self.done * 0.1
+        time.sleep(max(0.0, due - time.monotonic()))
+        return Block("main", (self.done - 1) * 100, np.zeros((100, 1)), due)
+
+    def close(self) -> None:
+        pass
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as line:
+        line.bind(("127.0.0.1", 0))
+        return int(line.getsockname()[1])
+
+
+def controller(port: int, *arguments: object) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, str(CONTROLLER), str(port), *map(str, arguments)], stdout=subprocess.PIPE, text=True
+    )
+
+
+@pytest.mark.parametrize("cycle", [4, 12])
+def test_a_robot_is_recorded_answered_and_its_lost_packets_counted(tmp_path: Path, cycle: int) -> None:
+    port, told = free_port(), {}
+    n_packets = 1200 // cycle
+    running = []
+
+    def play(item: object) -> None:
+        if isinstance(item, Block) and item.first_sample == 200:
+            running.append(controller(port, cycle, n_packets, "lose=20,21,60", "late=40"))
+
+    source = Clockwork(32)
+    feed = RsiFeed("127.0.0.1", port, "127.0.0.1", silence=0.5)
+    record(WithFeeds(source, [feed]), tmp_path / "a.h5", observer=play)
+    said, _ = running[0].communicate(timeout=10)
+    told = json.loads(said)
+    assert told["sent"] == n_packets - 3
+    assert told["answered"] >= 0.98 * told["sent"]
+    assert told["wrong"] == 0
+    assert told["median_delay_ms"] < cycle
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.complete
+        series = recording.events
+        _, angles = series["joint_1_rad"].read()
+        packets = np.sort(np.round(np.degrees(angles) / 10).astype(int))
+        assert packets.tolist() == [k for k in range(n_packets) if k not in (20, 21, 60)]
+        due, positions = series["tcp_x_m"].read()
+        error = due - (positions - source.started)
+        assert np.abs(error).max() < 5e-3
+        _, lost = series["rsi_lost"].read()
+        assert lost.tolist() == [2.0, 1.0, 1.0]  # the late one counts as lost until it comes
+        _, late = series["rsi_late"].read()
+        assert len(late) >= 1
+        assert late.max() > 2.5e-3 * cycle
+        assert series["motor_current_2"].read()[1][0] == 0.5
+        assert series["tcp_b_rad"].read()[1][0] == pytest.approx(np.pi / 2)
+        texts = series["devices"].read_texts()
+    assert texts[-1].startswith(f"RSI 127.0.0.1:{port}: 3 of {n_packets} packets lost, ")
+    assert texts[-2].endswith("lost (no packet for 0.5 s)")  # the robot's program had ended
+
+
+def test_a_controller_that_ends_and_starts_anew_is_lost_and_back(tmp_path: Path) -> None:
+    port, running = free_port(), []
+
+    def play(item: object) -> None:
+        if isinstance(item, Block) and item.first_sample in (0, 1800):
+            running.append(controller(port, 4, 150, f"first={1000 if item.first_sample else 900_000}"))
+
+    source = Clockwork(32)
+    record(WithFeeds(source, [RsiFeed("127.0.0.1", port, silence=0.4)]), tmp_path / "a.h5", observer=play)
+    for each in running:
+        assert json.loads(each.communicate(timeout=10)[0])["answered"] >= 140
+    with Recording(tmp_path / "a.h5") as recording:
+        assert recording.complete
+        log = recording.events["devices"]
+        lines = list(zip(log.read_texts(), log.read()[0], strict=True))
+        times, positions = recording.events["tcp_x_m"].read()
+        _, lost = recording.events["rsi_lost"].read()
+    where = f"RSI 127.0.0.1:{port}"
+    assert lost.sum() == 0
+    assert len(times) == 300
+    assert np.abs(times - (positions - source.started)).max() < 10e-3
+    told = [(text, at) for text, at in lines if text.endswith(("lost (no packet for 0.4 s)", "back"))]
+    (_, gone), (_, back) = told[0], next((text, at) for text, at in told if text == f"{where}: back")
+    assert 0.6 < gone < 1.2 < 1.8 < back < 2.5
+    assert any("controller's clock began anew" in text for text, _ in lines)
+
+
+def test_a_port_in_use_and_foreign_senders(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        feed = RsiFeed("127.0.0.1", taken.getsockname()[1])
+        with pytest.raises(Disconnected, match=r"cannot be opened: .*in use; check address and port"):
+            feed.open()
+    port = free_port()
+    feed = RsiFeed("127.0.0.1", port, "10.9.8.7", (RsiSignal("AIPos.A1", "a"),))
+    feed.open()
+    try:
+        told = json.loads(controller(port, 4, 20).communicate(timeout=10)[0])
+        assert (told["answered"], feed.poll()) == (0, [])
+    finally:
+        feed.close()
+
+
+def test_packets_that_are_none_are_not_answered() -> None:
+    good = b'<Rob Type="KUKA"><AIPos A1="1.5" A2="x"/><IPOC>7</IPOC></Rob>'
+    assert understood(good) == RsiPacket(7, {"AIPos.A1": 1.5})
+    assert answer(good, "ImFree") == b'<Sen Type="ImFree"><IPOC>7</IPOC></Sen>'
+    for bad in (b"", b"<Rob>", b"<Rob></Rob>", b"\xff\x00", b"<Rob><IPOC>x</IPOC></Rob>"):
+        assert understood(bad) is None
+        assert answer(bad, "ImFree") is None
+    bomb = b'<!DOCTYPE a [<!ENTITY b "bbbb">]><Rob><IPOC>1</IPOC></Rob>'
+    assert understood(bomb) is None
+
+
+def test_lost_late_overtaken_and_repeated_packets_are_told_apart() -> None:
+    count = PacketCount()
+    order = [0, 1, 2, 3, 4, 5, 6, 9, 8, 10, 10, 11, 15]
+    came = [
+        count.take(RsiPacket(5000 + 12 * k, {}), 5.0 + 0.012 * max(k, 9 if n == 8 else k)) for n, k in enumerate(order)
+    ]
+    assert [one.n_lost for one in came] == [0, 0, 0, 0, 0, 0, 0, 2, -1, 0, 0, 0, 3]
+    assert came[10].repeated
+    assert (count.cycle, count.n_came, count.n_lost, count.n_late) == (12, 12, 4, 1)
+    assert count.take(RsiPacket(5000 + 12 * 16, {}), 5.0 + 0.012 * 16 + 0.05).lateness == pytest.approx(0.05, abs=1e-3)
+    paused = count.take(RsiPacket(9000, {}), 9.0)
+    assert (paused.n_lost, paused.restarted) == (0, False)
+    assert count.take(RsiPacket(3, {}), 9.1).restarted
