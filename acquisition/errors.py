@@ -1,6 +1,8 @@
 """Errors of a device or a disk while recording; each message names the device and the remedy."""
 
-from foundation import MillfrfError
+from foundation import DiskFull, MillfrfError
+
+__all__ = ["DeviceError", "DeviceTimeout", "Disconnected", "DiskFull", "DriverMissing", "Overrun"]
 
 
 class DeviceError(MillfrfError):
@@ -45,7 +47,3 @@ class DeviceTimeout(DeviceError):
 
 class DriverMissing(DeviceError):
     """The Python package or the vendor's library that speaks to the device is not installed."""
-
-
-class DiskFull(MillfrfError):
-    """The recording's disk or quota is full; what was acknowledged before is kept."""

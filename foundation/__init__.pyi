@@ -1,12 +1,12 @@
-from .atomic_files import writing_whole_file
 from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom
-from .errors import FileFormatError, InputError, MillfrfError, MillfrfWarning
+from .errors import DiskFull, FileFormatError, InputError, MillfrfError, MillfrfWarning
 from .noted_table import WARNING, apart, warning_lines
 from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library, same_values
 from .table_mistakes import mistake_in_words, shown
 from .toml_tables import checked_toml
 from .units import SI_UNITS, si_factor, unit_factor
 from .valid_band import Band, checked_band, shared_band
+from .whole_files import LeftoverRemoved, is_disk_full, writing_whole_file, writing_whole_folder
 
 __all__ = [
     "HOUSING",
@@ -15,8 +15,10 @@ __all__ = [
     "WARNING",
     "Band",
     "DegreeOfFreedom",
+    "DiskFull",
     "FileFormatError",
     "InputError",
+    "LeftoverRemoved",
     "MillfrfError",
     "MillfrfWarning",
     "Result",
@@ -27,6 +29,7 @@ __all__ = [
     "counted",
     "doubts_line",
     "drawing",
+    "is_disk_full",
     "listed",
     "mistake_in_words",
     "optional_library",
@@ -37,4 +40,5 @@ __all__ = [
     "unit_factor",
     "warning_lines",
     "writing_whole_file",
+    "writing_whole_folder",
 ]

@@ -13,5 +13,9 @@ class FileFormatError(InputError):
     """A file is not what it should be: wrong kind, wrong version, damaged, or lacking a field."""
 
 
+class DiskFull(MillfrfError):
+    """The disk or quota is full; of a recording, what was acknowledged before is kept; of other files, the old ones."""
+
+
 class MillfrfWarning(UserWarning):
     """A doubt about what was given or found: the result stands, and its user should know of it."""

@@ -1,15 +1,18 @@
 """The command line `millfrf`: one verb a job; exit code 0 done, 1 the run failed, 2 bad input."""
 
 import os
+import signal
 import sys
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import typer
 
-from foundation import InputError, MillfrfError, MillfrfWarning
+from foundation import InputError, LeftoverRemoved, MillfrfError, MillfrfWarning, is_disk_full
 
 from .commands import COMMANDS
 from .cut import cut_app
@@ -45,6 +48,8 @@ def run(arguments: Sequence[str]) -> int:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MillfrfWarning)  # each command prints the doubts of its result
+            warnings.simplefilter("always", LeftoverRemoved)
+            warnings.showwarning = partial(_say_in_one_line, warnings.showwarning)
             words = with_lists_apart(arguments, options_of_several(command, arguments))
             result = command.main(args=words, prog_name="millfrf", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
@@ -54,6 +59,14 @@ def run(arguments: Sequence[str]) -> int:
     if result == INTERRUPTED:
         return _fail(STOPPED, FAILED)
     return result if isinstance(result, int) else DONE
+
+
+def _say_in_one_line(usual: Callable[..., None], message: object, category: type[Warning], *where: Any) -> None:
+    """Print what was removed as a note; other warnings go their usual way."""
+    if issubclass(category, LeftoverRemoved):
+        print(f"note: {message}", file=sys.stderr)
+    else:
+        usual(message, category, *where)
 
 
 def _explain(error: Exception, arguments: Sequence[str]) -> int:
@@ -67,6 +80,8 @@ def _explain(error: Exception, arguments: Sequence[str]) -> int:
         return _fail(usage_in_words(str(usage()), arguments), BAD_INPUT)
     if os.environ.get("MILLFRF_TRACEBACK"):
         raise error
+    if is_disk_full(error):
+        return _fail(f"no room for {getattr(error, 'filename', None) or 'temporary files'}; free space first", FAILED)
     if isinstance(error, OSError):
         return _fail(f"{error.filename or 'a file'}: {error.strerror or error}", FAILED)
     return _fail(_unforeseen(error), FAILED)
@@ -89,8 +104,17 @@ def _fail(message: str, code: int) -> int:
     return code
 
 
+def _stop_in_order(owner: int, number: int, frame: object) -> None:
+    """End as by Ctrl-C, so that unfinished files are removed; a helper process of the program ends at once."""
+    del frame
+    if os.getpid() != owner:
+        os._exit(128 + number)
+    raise KeyboardInterrupt
+
+
 def main() -> None:
     """Entry point of the program ``millfrf``."""
+    signal.signal(signal.SIGTERM, partial(_stop_in_order, os.getpid()))
     sys.exit(run(sys.argv[1:]))
 
 

@@ -19,6 +19,9 @@ from .flat_fields import to_fields
 
 Progress = Callable[[int], None]
 
+SPARE_BYTES = 1_000_000
+"""Disk space kept aside so that the HDF5 library can close its file in order on a full disk."""
+
 _LARGEST_MAT_ARRAY = 2**31 - 1
 
 
@@ -57,6 +60,7 @@ def _write_h5(content: Content, path: Path, progress: Progress) -> None:
         event_axes={name: EventAxis(texts=name in content.event_texts) for name in content.events},
         recorded_at=content.recorded_at or None,
         overwrite=True,
+        spare_bytes=SPARE_BYTES,
     ) as writer:
         written = 0
         for samples in content.streams:

@@ -1,6 +1,6 @@
 from .checked_blocks import ENTRY, BlockTable, entries_of, row_sums, samples_sum
 from .damage import open_for_reading, reporting_damage, require_stored, whole_rows
-from .durability import SpareSpace, Syncer, is_being_written, is_disk_full
+from .durability import SpareSpace, Syncer, is_being_written
 from .guarded_reading import read_guarded
 
 __all__ = [
@@ -10,7 +10,6 @@ __all__ = [
     "Syncer",
     "entries_of",
     "is_being_written",
-    "is_disk_full",
     "open_for_reading",
     "read_guarded",
     "reporting_damage",

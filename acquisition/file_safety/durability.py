@@ -2,21 +2,18 @@
 
 import contextlib
 import os
-import re
 import tempfile
 import threading
 from pathlib import Path
 from types import ModuleType
 
-from foundation import InputError
+from foundation import InputError, is_disk_full
 
 _fcntl: ModuleType | None
 try:
     import fcntl as _fcntl
 except ImportError:  # Windows: HDF5's own locks must do
     _fcntl = None
-
-_FULL = {28, 122, 27}  # ENOSPC, EDQUOT, EFBIG
 
 
 class SpareSpace:
@@ -121,17 +118,3 @@ def is_being_written(path: Path) -> bool:
     finally:
         os.close(descriptor)
     return False
-
-
-def is_disk_full(error: BaseException) -> bool:
-    """Whether the HDF5 library or the system says that there is no more room.
-
-    Examples
-    --------
-    >>> is_disk_full(RuntimeError("Unable to flush (file write failed: errno = 28, error message = 'No space left')"))
-    True
-    >>> is_disk_full(ValueError("errno = 5"))
-    False
-    """
-    found = re.search(r"errno = (\d+)", str(error))
-    return getattr(error, "errno", None) in _FULL or (found is not None and int(found.group(1)) in _FULL)

@@ -7,8 +7,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import DiskFull
-from ..file_safety import SpareSpace, is_disk_full
+from foundation import DiskFull, is_disk_full
+
+from ..file_safety import SpareSpace
 
 Rows = Sequence[tuple[h5py.Dataset, NDArray[np.generic]]]
 

@@ -18,6 +18,8 @@ from .recording import Recording
 from .recording_writer import RecordingWriter
 from .stream import Stream
 
+_SPARE_BYTES = 1_000_000
+
 
 @dataclass(frozen=True)
 class Recovered:
@@ -107,6 +109,7 @@ def _copy(source: Path, temporary: Path, target: Path, progress: Callable[[int],
             event_axes={name: one.axis for name, one in series.items()},
             recorded_at=recording.recorded_at,
             overwrite=True,
+            spare_bytes=_SPARE_BYTES,
         ) as writer:
             copied = _Copied(writer, size, progress)
             for name, stream in recording.streams.items():

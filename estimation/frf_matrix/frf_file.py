@@ -1,7 +1,9 @@
 """FRF files: HDF5, format ``millfrf.frf`` version 1, readable with any HDF5 tool."""
 
+import io
 import json
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +30,24 @@ def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", proven
     ------
     InputError
         The folder cannot be written to.
+    DiskFull
+        No room was left.
     """
-    with writing_whole_file(path) as temporary, h5py.File(temporary, "w") as file:
-        file.attrs.update({"format": FORMAT, "format_version": FORMAT_VERSION, "title": title})
-        file.attrs.update({"provenance": provenance, "quantity": frf.quantity, "unit": frf.unit})
+    described = {"title": title, "provenance": provenance}
+    with writing_whole_file(path) as temporary:
+        temporary.write_bytes(_image(frf, described))
+
+
+def _image(frf: Frf, described: Mapping[str, str]) -> bytes:
+    """The file's bytes, made in memory.
+
+    On a full disk the HDF5 library loses a table that is flushed when it is let go, says nothing, and crashes the
+    program when it ends; what writes plain bytes is told.
+    """
+    memory = io.BytesIO()
+    with h5py.File(memory, "w") as file:
+        file.attrs.update({"format": FORMAT, "format_version": FORMAT_VERSION, **described})
+        file.attrs.update({"quantity": frf.quantity, "unit": frf.unit})
         file.attrs["responses"] = json.dumps(list(frf.responses))
         file.attrs["excitations"] = json.dumps(list(frf.excitations))
         for name in ("frequencies", "values", "valid"):
@@ -46,6 +62,7 @@ def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", proven
         if frf.covariance is not None:
             file["covariance/response"] = frf.covariance.response
             file["covariance/excitation"] = frf.covariance.excitation
+    return memory.getvalue()
 
 
 def read_frf(path: str | os.PathLike[str]) -> Frf:

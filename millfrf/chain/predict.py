@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Recording, RecordingWriter, StreamDescription
-from foundation import Result, Summary, doubts_line, listed
+from foundation import Result, Summary, doubts_line, listed, writing_whole_file
 from mismatch import Prediction, predict, read_recording
 from modal_fit import ModalModel
 
@@ -118,7 +118,11 @@ def write_prediction(
     """
     title = f"responses predicted for {Path(recording_path).name} by {Path(model_path).name}"
     setup = with_warnings(predicted.setup, predicted.warnings)
-    with RecordingWriter(out, (predicted.description,), title=title, setup=setup) as writer:
+    described = (predicted.description,)
+    with (
+        writing_whole_file(out) as temporary,
+        RecordingWriter(temporary, described, title=title, setup=setup, spare_bytes=1_000_000) as writer,
+    ):
         writer.append(predicted.description.name, predicted.prediction.response)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from acquisition import Recording
 from cutting import MillingProcess
-from foundation import InputError
+from foundation import InputError, writing_whole_folder
 from mismatch import diagnose_cut, read_cut_recording, write_diagnosis, write_improved_cut
 from modal_fit import read_modal_model
 
@@ -55,12 +55,12 @@ def diagnose_cut_files(cutting: Path, paths: Sequence[Path], out: Path, asking: 
             coefficient_error=asking.coefficient_error,
             force_error=asking.force_error,
         )
-    out.mkdir(parents=True, exist_ok=True)
-    write_diagnosis(out / "diagnosis.json", found)
-    write_improved_cut(out / "improved_cut.toml", found)
     lines = [*summary(found), *(f"warning: {doubt}" for doubt in doubts)]
-    with bar("writing the report"):
-        write_cut_report(out / "report.html", found, cutting.name, lines)
+    with writing_whole_folder(out) as folder:
+        write_diagnosis(folder / "diagnosis.json", found)
+        write_improved_cut(folder / "improved_cut.toml", found)
+        with bar("writing the report"):
+            write_cut_report(folder / "report.html", found, cutting.name, lines)
     written = ", ".join(str(out / name) for name in ("diagnosis.json", "improved_cut.toml", "report.html"))
     return [*lines, f"wrote {written}"]
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from acquisition import record
-from foundation import InputError, MillfrfError
+from foundation import InputError, MillfrfError, writing_whole_file
 from modal_fit import ModalModel
 from replay_data import (
     FINE_RATE,
@@ -166,9 +166,8 @@ def _draw(
 
 
 def _record(source: HammerCell | ConcealedCell, path: Path, progress: Progress) -> Path:
-    path.unlink(missing_ok=True)  # of an earlier demonstration in the same folder
-    with progress(f"recording {path.stem}", source.n_samples) as update:
-        record(source, path, progress=update)
+    with progress(f"recording {path.stem}", source.n_samples) as update, writing_whole_file(path) as unfinished:
+        record(source, unfinished, progress=update)
     return path
 
 

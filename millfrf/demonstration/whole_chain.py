@@ -12,7 +12,7 @@ from acquisition import Source, record
 from cutting import MillingProcess
 from estimation import Frf
 from figures import lobes_figure
-from foundation import InputError, writing_whole_file
+from foundation import writing_whole_file, writing_whole_folder
 from modal_fit import ModalModel, write_modal_model
 from replay_data import (
     HammerCell,
@@ -76,6 +76,7 @@ AXIS_RPM = {"identified": (600, 2400, 91), "hammer": (600, 2400, 19), "true": (6
 """Fewer speeds where lines of an FRF have to do: they take longer."""
 
 MAX_DEPTH = 10e-3
+REPORT = "report.html"
 
 
 @dataclass(frozen=True)
@@ -137,7 +138,15 @@ def run_demo(options: DemoOptions, progress: Progress = silent, say: Callable[[s
         A step failed.
     """
     started = time.perf_counter()
-    folder = _folder(options.out)
+    with writing_whole_folder(options.out) as folder:
+        identified, true, limits, trap = _run(folder, options, progress, say)
+    return DemoResult(identified, true, limits, trap, options.out / REPORT, time.perf_counter() - started)
+
+
+def _run(
+    folder: Path, options: DemoOptions, progress: Progress, say: Callable[[str], object]
+) -> tuple[ModalModel, ModalModel, dict[str, StabilityLobes], Trap]:
+    """Make every file of the demonstration in a folder; both models of the tip, the limits and the trap."""
     say(f"milling three {options.seconds:g} s speed sweeps, {SWEEP_RPM[0]:g} to {SWEEP_RPM[1]:g} rpm, and tapping ...")
     sweeps, hammer = _record_all(folder, options, progress)
     say("estimating frequency response functions ...")
@@ -159,11 +168,11 @@ def run_demo(options: DemoOptions, progress: Progress = silent, say: Callable[[s
     compared = np.array(COMPARED_RPM) * RPM
     limits = {name: certified_lobes(structure, CUTTER, compared, MAX_DEPTH) for name, structure in structures.items()}
     _draw_lobes(folder)
-    report = _report(folder, sweeps, progress)
+    _report(folder, sweeps, progress)
     say("trying a cut that averaged coefficients call stable ...")
     trap = spring_trap(identified, true, CUTTER)
     report_trap(folder, identified, CUTTER, progress)
-    return DemoResult(identified, true, limits, trap, report, time.perf_counter() - started)
+    return identified, true, limits, trap
 
 
 def comparison_tables(result: DemoResult) -> tuple[Table, Table, Table]:
@@ -220,15 +229,8 @@ def nearest_modes(result: DemoResult) -> tuple[tuple[int, int], ...]:
     return tuple((r, int(np.argmin(np.abs(result.identified.poles - result.true.poles[r])))) for r in inside)
 
 
-def _folder(out: Path) -> Path:
-    try:
-        (out / "recordings").mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot make the folder {out}: {error.strerror}; choose another --out") from error
-    return out
-
-
 def _record_all(folder: Path, options: DemoOptions, progress: Progress) -> tuple[list[Path], list[Path]]:
+    (folder / "recordings").mkdir()
     structure, noise = default_structure(), options.noise
     sweep = LinearSweep(SWEEP_RPM[0] * RPM, SWEEP_RPM[1] * RPM, options.seconds)
     sweeps = []
@@ -249,7 +251,6 @@ def _record_all(folder: Path, options: DemoOptions, progress: Progress) -> tuple
 
 
 def _record(source: Source, path: Path, progress: Progress) -> Path:
-    path.unlink(missing_ok=True)  # of an earlier demonstration in the same folder
     with progress(f"recording {path.stem}", source.n_samples) as update:
         record(source, path, progress=update)
     return path
@@ -286,7 +287,7 @@ def _draw_lobes(folder: Path) -> None:
         figure.savefig(temporary, dpi=130, format="png")
 
 
-def _report(folder: Path, sweeps: list[Path], progress: Progress) -> Path:
+def _report(folder: Path, sweeps: list[Path], progress: Progress) -> None:
     with writing_whole_file(folder / "cut.toml") as temporary:
         temporary.write_text(cutting_text(CUTTER), encoding="utf-8")
     names = (
@@ -297,12 +298,10 @@ def _report(folder: Path, sweeps: list[Path], progress: Progress) -> Path:
         "model_tip.json",
     )
     tables = ("lobes_identified.csv", "lobes_hammer.csv", "lobes_true.csv", "cut.toml")
-    report = folder / "report.html"
     options = ReportOptions(
         "Simulated robot cell: in-process FRF and modal fit", reference=folder / "true_model_tip.json"
     )
-    write_report(report, [*sweeps, *(folder / name for name in (*names, *tables))], options, progress)
-    return report
+    write_report(folder / REPORT, [*sweeps, *(folder / name for name in (*names, *tables))], options, progress)
 
 
 def cutting_text(process: MillingProcess) -> str:

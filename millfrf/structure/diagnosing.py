@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cutting import MillingProcess
-from foundation import Band
+from foundation import Band, writing_whole_folder
 from mismatch import (
     Settings,
     SpindleSpeed,
@@ -61,16 +61,17 @@ def diagnose_files(
     diagnosis = diagnose_recordings(
         whole, recordings, settings, model_file=model_path, stream=stream, band=band, progress=progress
     )
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = (folder / "diagnosis.json", folder / "improved_model.json", folder / "report.html")
-    write_diagnosis(paths[0], diagnosis)
-    write_modal_model(paths[1], improved_model_of(diagnosis))
-    with progress("writing the report"):
-        write_diagnosis_report(paths[2], diagnosis, Path(model_path).name, process)
+    names = ("diagnosis.json", "improved_model.json", "report.html")
+    with writing_whole_folder(folder) as unfinished:
+        paths = [unfinished / name for name in names]
+        write_diagnosis(paths[0], diagnosis)
+        write_modal_model(paths[1], improved_model_of(diagnosis))
+        with progress("writing the report"):
+            write_diagnosis_report(paths[2], diagnosis, Path(model_path).name, process)
     measured = measured_part(whole, recordings, stream=stream).responses
     missing = [label for label in whole.responses if label not in measured]
     note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []
-    return DiagnosisFiles(diagnosis, paths, (*note, *diagnosis_lines(diagnosis)))
+    return DiagnosisFiles(diagnosis, tuple(folder / name for name in names), (*note, *diagnosis_lines(diagnosis)))
 
 
 def diagnose_recordings(

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
+from foundation import InputError, writing_whole_folder
 from mismatch import LabError, PosedRecording, diagnose_robot, posed_channels, read_posed, write_diagnosis
 from modal_fit import write_modal_model
 from robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot, tool_down
@@ -63,17 +63,17 @@ def diagnose_robot_files(robot: str, paths: Sequence[Path], out: Path, asking: A
             error=asking.error,
         )
     found = replace(found, doubts=tuple(doubts))
-    out.mkdir(parents=True, exist_ok=True)
-    write_diagnosis(out / "robot_diagnosis.json", found)
-    improved, offset = found.details.improved_robot()
-    for recording in recordings:
-        modes = modes_at(improved, recording.q + offset)
-        top = 3 * float(recording.spectrum.frequencies[-1])
-        model = model_of_modes(modes, improved, axes=recording.axes, highest_frequency=top)
-        write_modal_model(out / f"model_{recording.name}.json", model)
     lines = summary(found)
-    with bar("writing the report"):
-        write_robot_report(out / "report.html", found, case.name, lines)
+    improved, offset = found.details.improved_robot()
+    with writing_whole_folder(out) as folder:
+        write_diagnosis(folder / "robot_diagnosis.json", found)
+        for recording in recordings:
+            modes = modes_at(improved, recording.q + offset)
+            top = 3 * float(recording.spectrum.frequencies[-1])
+            model = model_of_modes(modes, improved, axes=recording.axes, highest_frequency=top)
+            write_modal_model(folder / f"model_{recording.name}.json", model)
+        with bar("writing the report"):
+            write_robot_report(folder / "report.html", found, case.name, lines)
     lines += [f"warning: {doubt}" for doubt in doubts]
     return [*lines, f"wrote {out / 'robot_diagnosis.json'}, {out / 'report.html'} and a model for each recording"]
 

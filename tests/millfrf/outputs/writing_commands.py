@@ -1,0 +1,125 @@
+"""Every command that writes files, with small inputs: one table for the trials of kills, full disks and provenance."""
+
+import importlib.util
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from acquisition import Channel, RecordingWriter, StreamDescription
+
+_SPEC = importlib.util.spec_from_file_location(
+    "good_files_of_outputs", Path(__file__).parents[1] / "mistakes" / "good_files.py"
+)
+assert _SPEC is not None
+assert _SPEC.loader is not None
+good_files = importlib.util.module_from_spec(_SPEC)
+_SPEC.loader.exec_module(good_files)
+
+
+@dataclass(frozen=True)
+class Writing:
+    """A command line, run in a folder with the inputs, and what it writes there."""
+
+    name: str
+    arguments: str
+    outputs: tuple[str, ...]
+
+    @property
+    def words(self) -> list[str]:
+        """The command line in words."""
+        return self.arguments.split()
+
+
+ROBOT = "staubli_rx170 --pose ready"
+LOBES = "--cutting cut.toml --speeds 600 1200 4 --max-depth 0.01 --method zero-order"
+COMMANDS = (
+    Writing("recover", "recover killed.h5 --out out.h5", ("out.h5",)),
+    Writing("convert npz", "convert up.h5 out.npz", ("out.npz",)),
+    Writing("convert mat", "convert up.h5 out.mat", ("out.mat",)),
+    Writing("convert csv", "convert up.h5 out.csv", ("out.csv",)),
+    Writing("convert h5", "convert table.csv out.h5 --map map.toml", ("out.h5",)),
+    Writing("convert can", "convert log.asc out.h5 --map log.toml", ("out.h5",)),
+    Writing("convert uff", "convert frf_tip.h5 out.uff", ("out.uff",)),
+    Writing("convert frf", "convert given.uff out.h5", ("out.h5",)),
+    Writing("convert modes", "convert model_tip.json out.unv", ("out.unv",)),
+    Writing("convert model", "convert given.unv out.json", ("out.json",)),
+    Writing("convert geometry", "convert points.csv out.toml", ("out.toml",)),
+    Writing("estimate", "estimate up.h5 down.h5 central.h5 --segment 4 --out out.h5", ("out.h5",)),
+    Writing("tap", "tap tap_x.h5 tap_y.h5 tap_z.h5 --out out.h5", ("out.h5",)),
+    Writing("fit", "fit frf_tip.h5 --band 12 60 --out out.json --candidates poles.json", ("out.json", "poles.json")),
+    Writing("fit records", "fit up.h5 down.h5 central.h5 --band 13 30 --out out.json", ("out.json",)),
+    Writing(
+        "calibrate",
+        "calibrate model_process.json --tip frf_tip.h5 --sensor frf_housing.h5 --out out.json",
+        ("out.json",),
+    ),
+    Writing("lobes", f"lobes model_tip.json {LOBES} --out out.csv", ("out.csv",)),
+    Writing("chatter", "chatter steady.h5 --cutting cut.toml --speed 800 --out out.json", ("out.json",)),
+    Writing("predict", "predict model_tip.json steady.h5 --out out.h5", ("out.h5",)),
+    Writing(
+        "diagnose",
+        "diagnose model_tip.json steady.h5 --out out",
+        ("out/diagnosis.json", "out/improved_model.json", "out/report.html"),
+    ),
+    Writing(
+        "cut diagnose",
+        "cut diagnose cut.toml steady.h5 --depth 0.001 --out out",
+        ("out/diagnosis.json", "out/improved_cut.toml", "out/report.html"),
+    ),
+    Writing("report", "report frf_tip.h5 model_tip.json --out out.html", ("out.html",)),
+    Writing("robot modes", f"robot modes {ROBOT} --picture out.html", ("out.html",)),
+    Writing("robot frf", f"robot frf {ROBOT} --lines 50 --out out.h5", ("out.h5",)),
+    Writing("robot model", f"robot frf {ROBOT} --out out.json", ("out.json",)),
+    Writing("robot stiffness", f"robot stiffness {ROBOT} --out out.json", ("out.json",)),
+    Writing(
+        "robot deviation",
+        "robot deviation staubli_rx170 --x 1 1.1 2 --y 0 0.1 2 --out out.csv --picture out.png",
+        ("out.csv", "out.png"),
+    ),
+    Writing("robot lobes", f"robot lobes {ROBOT} {LOBES} --out out.csv", ("out.csv",)),
+    Writing("robot map", "robot map staubli_rx170 --picture out.png --x 1 1.1 2 --y 0 0.1 2", ("out.png",)),
+    Writing("robot compensate", "robot compensate staubli_rx170 path.csv --out out.csv", ("out.csv",)),
+)
+
+
+def make_inputs(folder: Path) -> None:
+    """Write the files that the commands read."""
+    from millfrf.__main__ import run
+
+    good_files.make(folder)
+    _killed(folder / "killed.h5")
+    _can_log(folder)
+    (folder / "points.csv").write_text("point,x [m],y [m],z [m]\n1,0,0,0\n2,0.1,0,0\n", encoding="utf-8")
+    for source, target in (("frf_tip.h5", "given.uff"), ("model_tip.json", "given.unv")):
+        assert run(["convert", str(folder / source), str(folder / target)]) == 0
+
+
+def _killed(path: Path) -> None:
+    """A recording as a killed writer leaves it."""
+    channels = (Channel("fx", "force", "N", "TCP", "+X"), Channel("ax", "acceleration", "m/s^2", "TCP", "+X"))
+    whole = path.with_name("whole.h5")
+    with RecordingWriter(whole, [StreamDescription("main", 100.0, 0.0, channels)], block_length=64) as writer:
+        writer.append("main", np.random.default_rng(0).standard_normal((20_000, 2)))
+        path.write_bytes(whole.read_bytes())
+    whole.unlink()
+
+
+def _can_log(folder: Path) -> None:
+    import can
+
+    (folder / "cell.dbc").write_text(
+        'VERSION ""\nBU_: PLC\nBO_ 256 Spindle: 8 PLC\n SG_ Speed : 0|16@1+ (1,0) [0|1] "" PLC\n', encoding="utf-8"
+    )
+    (folder / "log.toml").write_text(
+        'recording = "up.h5"\ndbc = "cell.dbc"\nsignals = [{signal = "Speed"}]\n', encoding="utf-8"
+    )
+    with can.Logger(folder / "log.asc") as writer:
+        for k in range(30):
+            writer(can.Message(1.7e9 + 0.1 * k, 256, is_extended_id=False, data=bytes([k] * 8), channel=0))
+
+
+def table_as_json() -> str:
+    """The table for a program in another process."""
+    return json.dumps([[one.name, one.words] for one in COMMANDS])
