@@ -1,5 +1,5 @@
 from .compilation import compiled
-from .cutting_file import read_cutting_process
+from .cutting_file import process_from_table, read_cutting_process
 from .cutting_writer import write_cutting_process
 from .directional import (
     average_directional_matrix,
@@ -39,6 +39,7 @@ __all__ = [
     "force_direction",
     "force_harmonics",
     "immersion_angles",
+    "process_from_table",
     "read_cutting_process",
     "refuse_varied",
     "specific_forces",

@@ -3,8 +3,9 @@
 import math
 import os
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Strict, ValidationError
 
@@ -67,11 +68,31 @@ def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
     table = content.get("cutting")
     if not isinstance(table, dict):
         raise FileFormatError(f"{path} has no table [cutting]; add one with teeth, diameter_m, ktc_pa, krc, ...")
+    return process_from_table(table, os.fspath(path))
+
+
+def process_from_table(table: Mapping[str, Any], name: str) -> MillingProcess:
+    """Give the process of a table ``[cutting]`` that was read already.
+
+    Parameters
+    ----------
+    table
+        Keys and values of the table.
+    name
+        Name of the file, for messages.
+
+    Raises
+    ------
+    InputError
+        A value out of its range.
+    FileFormatError
+        A key unknown, missing or of the wrong type.
+    """
     try:
         cutting = _Cutting.model_validate(table)
     except ValidationError as error:
-        raise FileFormatError(f"{path}: cutting.{mistake_in_words(error, _Cutting)}") from error
-    return _process(cutting, path)
+        raise FileFormatError(f"{name}: cutting.{mistake_in_words(error, _Cutting)}") from error
+    return _process(cutting, name)
 
 
 def _process(cutting: _Cutting, path: object) -> MillingProcess:

@@ -11,11 +11,19 @@ from .concealment import (
     posture_robot,
 )
 from .hammer_cell import HammerCell
-from .laboratory import Sensor, dynamometer, hammer_sensors, housing_accelerometers, milling_sensors, tip_accelerometers
+from .laboratory import (
+    Sensor,
+    cutting_table,
+    dynamometer,
+    hammer_sensors,
+    housing_accelerometers,
+    milling_sensors,
+    tip_accelerometers,
+)
 from .milling_cell import MillingCell
 from .robot_structure import default_structure, select, table_one_model, tip_model
 from .simulation import Material, Settling, settle, tip_motion
-from .speed_profiles import ConstantSpeed, DriftingSpeed, LinearSweep, SpeedProfile
+from .speed_profiles import ConstantSpeed, DriftingSpeed, LinearSweep, RepeatedSweep, SpeedProfile
 
 __all__ = [
     "FINE_RATE",
@@ -29,9 +37,11 @@ __all__ = [
     "LinearSweep",
     "Material",
     "MillingCell",
+    "RepeatedSweep",
     "Sensor",
     "Settling",
     "SpeedProfile",
+    "cutting_table",
     "default_structure",
     "draw_effect",
     "draw_name",

@@ -146,6 +146,64 @@ class LinearSweep:
 
 
 @dataclass(frozen=True)
+class RepeatedSweep:
+    """A linear sweep, then the same speeds back, and so on.
+
+    Parameters
+    ----------
+    first, last : rad/s
+        Speed at the beginning and after ``duration``, above zero.
+    duration : s
+        Duration of one sweep.
+
+    Raises
+    ------
+    InputError
+        A value is not above zero.
+
+    Examples
+    --------
+    >>> RepeatedSweep(10.0, 20.0, 2.0).angle(np.array([2.0, 4.0, 6.0])).tolist()
+    [30.0, 60.0, 90.0]
+    """
+
+    first: float
+    last: float
+    duration: float
+
+    def __post_init__(self) -> None:
+        LinearSweep(self.first, self.last, self.duration)  # refuses what is no sweep
+
+    @property
+    def slowest(self) -> float:
+        """Lowest speed of the course, rad/s."""
+        return min(self.first, self.last)
+
+    @property
+    def fastest(self) -> float:
+        """Highest speed of the course, rad/s."""
+        return max(self.first, self.last)
+
+    def angle(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Angle turned, rad."""
+        whole = np.floor(time / self.duration)  # sweeps that are over
+        rest = time - whole * self.duration
+        begin = np.where(whole % 2 == 0, self.first, self.last)
+        rate = np.where(whole % 2 == 0, 1.0, -1.0) * (self.last - self.first) / self.duration
+        before = 0.5 * (self.first + self.last) * self.duration * whole
+        return np.asarray(before + begin * rest + 0.5 * rate * rest**2)
+
+    def rehearsed(self, share: float) -> "RepeatedSweep":
+        """The same speeds, swept faster."""
+        return RepeatedSweep(self.first, self.last, self.duration * share)
+
+    def description(self) -> dict[str, str | float]:
+        """Kind, both speeds and the duration of one sweep."""
+        swept = LinearSweep(self.first, self.last, self.duration).description()
+        return {**swept, "speed_profile": "linear sweep, back and forth"}
+
+
+@dataclass(frozen=True)
 class DriftingSpeed:
     """A nominally constant speed that wanders: ``mean (1 + share sin(2 pi t / period))``.
 

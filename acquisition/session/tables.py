@@ -53,12 +53,29 @@ class ReplayDevice(BaseModel):
 
 
 class SimulatedDevice(BaseModel):
-    """`[device]` with ``driver = "simulated"``: the simulated cell, milling, ``speed`` times as fast as real."""
+    """`[device]` with ``driver = "simulated"``: the simulated cell, milling, ``speed`` times as fast as real.
+
+    Parameters
+    ----------
+    sample_rate_hz : Hz
+        Samples a second of every channel.
+    sweep_rpm, sweep_s : rpm and s
+        First and last spindle speed of a sweep and its duration, back and forth as long as it is recorded; None: those
+        of the plan, else of the demonstration.
+    spindle_speed_rpm : rpm
+        A steady speed instead of a sweep.
+    noise, seed
+        Noise of every sensor as a share of its signal, and the seed of it.
+    speed
+        Factor over real time.
+    """
 
     model_config = STRICT
     driver: Literal["simulated"]
     sample_rate_hz: Positive = 2048.0
-    spindle_speed_rpm: Positive = 6000.0
+    sweep_rpm: tuple[Positive, Positive] | None = None
+    sweep_s: Positive | None = None
+    spindle_speed_rpm: Positive | None = None
     noise: Annotated[float, Field(ge=0, le=10)] = 0.01
     seed: Annotated[int, Field(ge=0)] = 0
     speed: Positive = 1.0
@@ -69,8 +86,10 @@ class LiveTable(BaseModel):
 
     Parameters
     ----------
-    segment_s
-        Length of a segment of the spectra, s.
+    segment_s : s
+        Length of a segment of the spectra; None: two periods of the resolution of `[plan]`, else 1 s.
+    tests
+        Recordings beside the one to write that are stacked with it, a pattern of names; "" for none.
     frf_error
         Wanted standard deviation of the FRF over its magnitude; lines below it count as having enough data.
     bands
@@ -78,7 +97,8 @@ class LiveTable(BaseModel):
     """
 
     model_config = STRICT
-    segment_s: Annotated[float, Field(gt=0, le=60)] = 1.0
+    segment_s: Annotated[float, Field(gt=0, le=60)] | None = None
+    tests: Annotated[str, Field(pattern=r"^[^/\\]*$")] = "*.h5"
     frf_error: Positive = 0.1
     bands: Annotated[int, Field(ge=1, le=40)] = 8
 
@@ -152,6 +172,8 @@ class Session(BaseModel):
                 yield f"{what} {', '.join(twice)} appears twice; each must be unique"
         if driver == "ni":
             yield from self._amplifier_complaints()
+        if isinstance(self.device, SimulatedDevice) and self.device.sweep_rpm and self.device.spindle_speed_rpm:
+            yield "device has sweep_rpm and spindle_speed_rpm; a spindle sweeps or runs steadily: remove one"
         if self.band_hz is not None:
             yield from self._band_complaints(self.band_hz)
 

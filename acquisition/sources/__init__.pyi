@@ -1,3 +1,4 @@
+from .around_source import AroundSource
 from .device_log import BACK, CLEARED, DEVICES, DEVICES_AXIS, FAULT, LOST, NOTE, DeviceStory, device_event, device_story
 from .event_feed import EventFeed
 from .events import HOST_AXIS, SAMPLES_AXIS, TEXT_BYTES, EventAxis, Events, announced_events, stored_texts
@@ -20,6 +21,7 @@ __all__ = [
     "NOTE",
     "SAMPLES_AXIS",
     "TEXT_BYTES",
+    "AroundSource",
     "Block",
     "DeviceStory",
     "EventAxis",

@@ -1,9 +1,22 @@
 from .concealment import ConcealOptions, run_concealed
 from .concealment_result import concealment_table
-from .whole_chain import CUTTER, DemoOptions, comparison_tables, run_demo
+from .whole_chain import (
+    CUTTER,
+    IMMERSIONS,
+    SWEEP_DEPTH,
+    SWEEP_RPM,
+    SWEEP_SECONDS,
+    DemoOptions,
+    comparison_tables,
+    run_demo,
+)
 
 __all__ = [
     "CUTTER",
+    "IMMERSIONS",
+    "SWEEP_DEPTH",
+    "SWEEP_RPM",
+    "SWEEP_SECONDS",
     "ConcealOptions",
     "DemoOptions",
     "comparison_tables",

@@ -1,5 +1,6 @@
 from .control import MARKS, LiveControl
 from .monitor import LiveMonitor, LiveSettings
+from .session import SessionPlan, SessionTests, session_plan
 from .web import LOOPBACK, LiveServer
 
 __all__ = [
@@ -9,4 +10,7 @@ __all__ = [
     "LiveMonitor",
     "LiveServer",
     "LiveSettings",
+    "SessionPlan",
+    "SessionTests",
+    "session_plan",
 ]

@@ -14,13 +14,14 @@ from estimation import Frf
 from foundation import InputError
 
 from .enough import BandProgress, band_progress
+from .session import SPEED_EVENTS, MilledSpeeds, SessionTests, SetUp, Standing
 from .spectra import GrownSpectra, LiveSpectra
 from .stacked_frf import StackedFrf, stack
 from .traces import TraceBuffer
 
-SPEED_EVENTS = "spindle_speed_rpm"
 _WAITING = 64
 _OVERLOAD = 0.999
+_FINISHING = 2.0  # s
 
 Real = NDArray[np.float64]
 
@@ -33,6 +34,8 @@ class LiveSettings:
     ----------
     band : Hz
         Lowest and highest frequency; None: up to 2 kHz or what the sample rate allows.
+    judged_band : Hz
+        Band in which progress is told; None: the same.
     segment : s
         Duration of a segment.
     relative_error, absolute_error
@@ -52,6 +55,7 @@ class LiveSettings:
     n_bands: int = 8
     teeth: int = 0
     spindle_speed_rpm: float = 0.0
+    judged_band: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,8 @@ class Snapshot:
         Progress of each band of frequencies.
     tooth_passing : Hz
         Tooth-passing frequency; 0: unknown.
+    standing, notes
+        How far the session is, and what else is to be said of it; None and nothing without a session.
     n_skipped
         Number of blocks that were recorded but not drawn, because the page did not keep up.
     """
@@ -92,6 +98,8 @@ class Snapshot:
     why_no_frf: str
     bands: tuple[BandProgress, ...]
     tooth_passing: float
+    standing: Standing | None
+    notes: tuple[str, ...]
     n_skipped: int
 
 
@@ -104,20 +112,28 @@ class LiveMonitor:
         Streams of the source; the one with most channels is shown.
     settings
         Settings of what is estimated.
+    session
+        Tests of the session, which are stacked with the running one; None: it stands alone.
     """
 
-    def __init__(self, streams: Sequence[StreamDescription], settings: LiveSettings) -> None:
+    def __init__(
+        self, streams: Sequence[StreamDescription], settings: LiveSettings, session: SessionTests | None = None
+    ) -> None:
         self.stream = max(streams, key=lambda stream: len(stream.channels))
-        self.settings = settings
+        self.settings, self.session = settings, session
         rate = self.stream.sample_rate
         low, high = settings.band or (0.0, 2000.0)
         self.band = (low, min(high, 0.4 * rate))
+        self.judged_band = settings.judged_band or self.band
+        if session is not None:
+            session.read(SetUp(self.stream, session.setup, self.band[1], settings.segment))
         self._queue: queue.Queue[Block] = queue.Queue(_WAITING)
         self._lock = threading.Lock()
         self._stop = threading.Event()
         self._gap = False
         self._speed_rpm = settings.spindle_speed_rpm
         self.n_skipped = 0
+        self._recording = self._ended = False
         self._begin()
         self._thread = threading.Thread(target=self._run, name="live monitor", daemon=True)
         self._thread.start()
@@ -142,6 +158,8 @@ class LiveMonitor:
         self._grown: GrownSpectra | None = None
         self._stacked: StackedFrf | None = None
         self._bands = self._judged(None)
+        self._standing: Standing | None = None
+        self._speeds = MilledSpeeds()
 
     def _fresh_spectra(self) -> LiveSpectra | None:
         try:
@@ -155,12 +173,14 @@ class LiveMonitor:
             while not self._queue.empty():
                 self._queue.get_nowait()
             self._begin()
+            self._recording = True
 
     def __call__(self, taken: Block | Events) -> None:
         """Take a block or event; never waits."""
         if isinstance(taken, Events):
             if taken.series == SPEED_EVENTS and len(taken.values):
                 self._speed_rpm = float(taken.values[-1])
+                self._speeds.add(taken.values)
             return
         if taken.stream != self.stream.name:
             return
@@ -184,9 +204,27 @@ class LiveMonitor:
                     estimated = time.monotonic()
 
     def _estimate(self, spectra: LiveSpectra) -> None:
+        """Stack what came so far with the tests before; while nothing is recorded yet, those tests alone."""
         self._grown = spectra.grown()
-        self._stacked = None if self._grown is None else stack([self._grown.cross])
+        mine = None if self._grown is None else self._grown.cross
+        before = [] if self.session is None else [one.spectra for one in self.session.earlier if one.spectra]
+        stacked = [*before, *([mine] if mine and (self._recording or not before) else [])]
+        self._stacked = stack(stacked) if stacked else None
         self._bands = self._judged(self._stacked)
+        if self.session is not None:
+            now = self.session.running(mine, self.seconds, self._speeds) if self._recording else None
+            known = self._stacked is not None and self._stacked.frf is not None
+            self._standing = self.session.standing(now, self._ended, self._bands, known)
+
+    def finish(self) -> None:
+        """Work off what waits, and judge all of it: the recording has ended."""
+        latest = time.monotonic() + _FINISHING
+        while not self._queue.empty() and time.monotonic() < latest:
+            time.sleep(0.02)
+        with self._lock:
+            self._ended = True
+            if self._spectra is not None:
+                self._estimate(self._spectra)
 
     def _add(self, block: Block) -> None:
         samples = block.samples
@@ -208,7 +246,7 @@ class LiveMonitor:
         s = self.settings
         frf, known = (None, None) if stacked is None else (stacked.frf, stacked.known)
         return band_progress(
-            frf, self.band, s.n_bands, known=known, relative=s.relative_error, absolute=s.absolute_error
+            frf, self.judged_band, s.n_bands, known=known, relative=s.relative_error, absolute=s.absolute_error
         )
 
     def snapshot(self) -> Snapshot:
@@ -229,16 +267,19 @@ class LiveMonitor:
                 self._why_no_frf(),
                 self._bands,
                 self.settings.teeth * self._speed_rpm / 60,
+                self._standing,
+                () if self.session is None else self.session.notes,
                 self.n_skipped,
             )
 
     def _why_no_frf(self) -> str:
         if self._stacked is None:
             return "no spectra yet"
-        n = len(self.stream.channels) if self._grown is None else len(self._grown.cross.excitations)
-        return "" if self._stacked.frf is not None else f"the {n} forces are not independent yet"
+        return "" if self._stacked.frf is not None else "the forces are not independent yet"
 
     def close(self) -> None:
         """End the thread."""
         self._stop.set()
+        if self.session is not None:
+            self.session.close()
         self._thread.join()

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimation import CrossSpectra, Frf, h1, sum_tests
+from estimation import CrossSpectra, Frf, h1, input_independence, sum_tests
 from foundation import InputError
 
 from ..gate import driven_lines
 
 _COHERENT = 0.5
+_POOR = 1e3  # condition of the scaled forces from which noise on the weakest direction rules
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ def stack(tests: Sequence[CrossSpectra]) -> StackedFrf:
         frf = h1(total)
     except InputError:
         return none
-    known = driven & frf.valid
+    known = driven & frf.valid & (input_independence(total).condition < _POOR)
     if frf.multiple_coherence is not None:
         known &= frf.multiple_coherence.max(axis=1) >= _COHERENT
     return StackedFrf(frf, driven, known) if known.any() else none

@@ -5,29 +5,54 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from acquisition import Session, Source, WithFeeds, announced_events
 from foundation import MillfrfError
 
-from ...live import LOOPBACK, MARKS, LiveControl, LiveMonitor, LiveServer, LiveSettings
+from ...live import (
+    LOOPBACK,
+    MARKS,
+    LiveControl,
+    LiveMonitor,
+    LiveServer,
+    LiveSettings,
+    SessionPlan,
+    SessionTests,
+    session_plan,
+)
+from .plan import plan_from_file
 from .record_session import OpenedSession, Tally, acquire, interrupts
 
 _LINGER = 3.0  # s in which open pages learn how it ended
 
 
-def live_settings(session: Session) -> LiveSettings:
+def live_settings(session: Session, plan: SessionPlan | None = None) -> LiveSettings:
     """Give the settings of the page from the session's tables ``live``, ``plan``, ``cutting``, ``tool`` and ``cut``."""
     teeth = _number(session.cutting, "teeth") or _number(session.tool, "teeth")
+    resolution = _number(session.plan, "resolution_hz")
     return LiveSettings(
         session.band_hz,
-        session.live.segment_s,
+        session.live.segment_s or (2 / resolution if plan is not None and resolution > 0 else 1.0),
         session.live.frf_error,
         _number(session.plan, "frf_error_m_per_n") or None,
         session.live.bands,
         int(teeth),
         _number(session.cut, "spindle_speed_rpm"),
+        None if plan is None else plan.band,
     )
+
+
+def session_tests(opened: OpenedSession, out: str | os.PathLike[str]) -> SessionTests:
+    """Tests of the session that a recording belongs to: those beside it, and the plan where there is one."""
+    plan, note = None, ""
+    if opened.session.plan:
+        try:
+            plan = session_plan(plan_from_file(opened.path)[0])
+        except MillfrfError as error:
+            note = f"no plan: {error}"
+    return SessionTests(Path(out), opened.session.live.tests, opened.source.setup, plan, note)
 
 
 def _number(table: dict[str, Any], key: str) -> float:
@@ -71,7 +96,8 @@ def acquire_live(
     """
     replayed = announced_events(opened.source)
     control = LiveControl(MARKS if MARKS not in replayed else f"{MARKS}_while_replaying")
-    monitor = LiveMonitor(opened.source.streams, live_settings(opened.session))
+    tests = session_tests(opened, out)
+    monitor = LiveMonitor(opened.source.streams, live_settings(opened.session, tests.plan), tests)
     try:
         with LiveServer(monitor, control, address, port) as server:
             say(f"live page: {server.url}")
@@ -83,6 +109,7 @@ def acquire_live(
                 source = WithFeeds(opened.source, [control])
                 stop = _stopping(control)
                 tally = acquire(replace(opened, source=source), out, watchers=[monitor], stop=stop)
+                monitor.finish()
                 control.ended("; ".join([f"Wrote {os.fspath(out)}: {tally.summary()}", *tally.device_story().losses]))
             except MillfrfError as error:
                 control.ended(f"Ended by an error: {error}")

@@ -18,7 +18,6 @@ from acquisition import (
     DeviceStory,
     DiskFull,
     Events,
-    Paced,
     Session,
     SimulatedDevice,
     Source,
@@ -31,6 +30,8 @@ from acquisition import (
 )
 from foundation import MillfrfError
 
+from .simulated_device import simulated_device
+
 Watcher = Callable[[Block | Events], None]
 
 
@@ -40,12 +41,13 @@ class OpenedSession:
 
     Parameters
     ----------
-    session, source
-        What was read and what it describes.
+    session, source, path
+        What was read, what it describes, and the file that it was read from.
     """
 
     session: Session
     source: Source
+    path: Path
 
 
 @dataclass
@@ -121,31 +123,8 @@ def open_session(path: str | os.PathLike[str]) -> OpenedSession:
     """
     text = session_text(path)
     session = session_from_text(text, os.fspath(path))
-    sampled = _simulated(session) if isinstance(session.device, SimulatedDevice) else None
-    return OpenedSession(session, build_source(session, text, Path(path).parent, sampled))
-
-
-def _simulated(session: Session) -> Source:
-    """The simulated cell, milling in real time."""
-    from replay_data import MillingCell, default_structure, milling_sensors
-
-    from ...demonstration import CUTTER
-
-    device = session.device
-    assert isinstance(device, SimulatedDevice)
-    cell = MillingCell(
-        default_structure(),
-        CUTTER,
-        1e-3,
-        device.spindle_speed_rpm * math.pi / 30,
-        session.duration_s or 3600.0,
-        sample_rate=device.sample_rate_hz,
-        sensors=milling_sensors(device.noise, device.noise),
-        seed=device.seed,
-        block_length=max(64, round(0.1 * device.sample_rate_hz)),
-        oversampling=max(2, math.ceil(8192 / device.sample_rate_hz)),
-    )
-    return Paced(cell, device.speed)
+    sampled = simulated_device(session, path) if isinstance(session.device, SimulatedDevice) else None
+    return OpenedSession(session, build_source(session, text, Path(path).parent, sampled), Path(path))
 
 
 def acquire(

@@ -23,11 +23,13 @@ _COLOUR = COLOURS[1]
 Kind = Literal["magnitude", "phase", "coherence"]
 
 
-def spectrum(channels: Sequence[Channel]) -> Drawing:
+def spectrum(channels: Sequence[Channel], band: tuple[float, float]) -> Drawing:
     """Roots of the power spectral densities of chosen channels, with the tooth-passing frequency and its harmonics."""
     from bokeh.models import ColumnDataSource
 
-    plot = framed("spectra", "Spectra", FREQUENCY, "Amplitude density (unit/√Hz)", y_axis_type="log")
+    plot = framed(
+        "spectra", "Spectra", FREQUENCY, "Amplitude density (unit/√Hz)", y_axis_type="log", x_range=(0, band[1])
+    )
     data = ColumnDataSource({"xs": [], "ys": [], "colour": [], "name": []}, name="spectra.data")
     plot.multi_line("xs", "ys", color="colour", legend_field="name", source=data)
     plot.add_layout(plot.legend[0], "right")
@@ -54,20 +56,24 @@ def spectrum(channels: Sequence[Channel]) -> Drawing:
             "name": [labels[k] for k in wanted],
         }
         harmonics = {"x": [order * passing for order in range(1, _HARMONICS + 1)] if passing else []}
-        return {"sources": {"spectra": lines, "teeth": harmonics}, "title": told}
+        return {"sources": {"spectra.data": lines, "teeth": harmonics}, "title": told}
 
     return Drawing("spectra", plot, content)
 
 
-def transfer(kind: Kind, responses: Sequence[Channel], excitations: Sequence[Channel]) -> Drawing:
+def transfer(
+    kind: Kind, responses: Sequence[Channel], excitations: Sequence[Channel], band: tuple[float, float]
+) -> Drawing:
     """An entry of the FRF (magnitude with two standard deviations, or phase), or its response's multiple coherence."""
     from bokeh.models import ColumnDataSource, FixedTicker
 
     label = {"magnitude": "Magnitude", "phase": "Phase (°)", "coherence": "Multiple coherence"}[kind]
-    plot = framed(kind, label, FREQUENCY, label, y_axis_type="log" if kind == "magnitude" else "linear")
-    data = ColumnDataSource({"x": [], "y": [], "low": [], "high": []}, name=f"{kind}.data")
+    scale = "log" if kind == "magnitude" else "linear"
+    plot = framed(kind, label, FREQUENCY, label, y_axis_type=scale, x_range=(0, band[1]))
+    data = ColumnDataSource({"x": [], "y": []}, name=f"{kind}.data")
     if kind == "magnitude":
-        plot.varea("x", "low", "high", source=data, fill_alpha=0.25, fill_color=_COLOUR)
+        errors = ColumnDataSource({"xs": [], "ys": []}, name="errors")
+        plot.patches("xs", "ys", source=errors, fill_alpha=0.25, fill_color=_COLOUR, line_color=None)
     line = plot.line("x", "y", source=data, color=_COLOUR)
     if kind == "magnitude":
         plot.y_range.renderers = [line]  # where little is known yet, the band would squeeze the curve flat
@@ -86,34 +92,44 @@ def transfer(kind: Kind, responses: Sequence[Channel], excitations: Sequence[Cha
         }[kind]
         frf = shown.frf
         if frf is None:
-            empty: dict[str, Any] = {"x": [], "y": [], "low": [], "high": []}
-            return {"sources": {kind: empty}, "title": f"{title}: {shown.why_no_frf}"}
-        axis = {"y_label": f"Magnitude ({plain(frf.unit)})"} if kind == "magnitude" else {}
-        curve = _curve(frf, shown.known, kind, choice.response, choice.excitation)
-        return {"sources": {kind: curve}, "title": title, **axis}
+            told = f"{title}: {shown.why_no_frf}"
+            empty: dict[str, Any] = {f"{kind}.data": {"x": [], "y": []}}
+            return {"sources": empty | ({"errors": {"xs": [], "ys": []}} if kind == "magnitude" else {}), "title": told}
+        sources, axis = _curve(frf, shown.known, kind, choice.response, choice.excitation), {}
+        if not len(sources[f"{kind}.data"]["x"]):
+            title += ": no line is sure yet"
+        if kind == "magnitude":
+            axis = {"y_label": f"Magnitude ({plain(frf.unit)})"}
+        return {"sources": sources, "title": title, **axis}
 
     return Drawing(kind, plot, content)
 
 
 def _curve(frf: Frf, known: NDArray[np.bool_], kind: Kind, response: int, excitation: int) -> dict[str, Any]:
     """Lines of an entry, with a gap (NaN) wherever nothing is known: no stroke bridges what was not measured."""
-    drawn = known if kind == "coherence" else known & _sure(frf, response, excitation)
-    inside = np.flatnonzero(drawn)
-    inside = inside[thinned(len(inside))]
-    frequencies, entry = frf.frequencies[inside], frf.values[inside, response, excitation]
-    step = np.diff(inside, prepend=inside[:1])
-    low = high = value = np.zeros(len(inside))
-    if kind == "magnitude":
-        value = np.abs(entry)
-        error = 2 * _deviation(frf, response, excitation)[inside]
-        low, high = np.maximum(value - error, 1e-3 * value), value + error
-    elif kind == "phase":
+    deviation = _deviation(frf, response, excitation)
+    sure = np.abs(frf.values[:, response, excitation]) > 2 * deviation  # elsewhere a curve would be noise
+    inside = np.flatnonzero(known if kind == "coherence" else known & sure)
+    step = thinned(len(inside)).step
+    inside = inside[::step]
+    f, entry = frf.frequencies[inside], frf.values[inside, response, excitation]
+    apart = np.diff(inside) > 1.5 * step
+    if kind == "phase":
         value = np.degrees(np.angle(entry))
-    elif frf.multiple_coherence is not None:
-        value = frf.multiple_coherence[inside, response]
-    gaps = np.flatnonzero(step > 1.5 * max(1, int(np.median(step)) if len(step) else 1))
-    columns = {"x": frequencies, "y": value, "low": low, "high": high}
-    return {name: np.insert(column, gaps, np.nan) for name, column in columns.items()}
+        apart = apart | (np.abs(np.diff(value)) > 180)  # no stroke from -180 to 180
+    elif kind == "coherence":
+        value = np.zeros(len(f)) if frf.multiple_coherence is None else frf.multiple_coherence[inside, response]
+    else:
+        value = np.abs(entry)
+    gaps = np.flatnonzero(apart) + 1
+    sources: dict[str, Any] = {f"{kind}.data": {"x": np.insert(f, gaps, np.nan), "y": np.insert(value, gaps, np.nan)}}
+    if kind == "magnitude":
+        error = 2 * deviation[inside]
+        runs = [run for run in np.split(np.arange(len(f)), gaps) if len(run) > 1]
+        low, high = np.maximum(value - error, 1e-3 * value), value + error
+        xs = [np.concatenate([f[run], f[run][::-1]]) for run in runs]
+        sources["errors"] = {"xs": xs, "ys": [np.concatenate([low[run], high[run][::-1]]) for run in runs]}
+    return sources
 
 
 def _deviation(frf: Frf, response: int, excitation: int) -> NDArray[np.float64]:
@@ -122,17 +138,13 @@ def _deviation(frf: Frf, response: int, excitation: int) -> NDArray[np.float64]:
     return np.asarray(np.sqrt(frf.covariance.variance()[:, response, excitation]))
 
 
-def _sure(frf: Frf, response: int, excitation: int) -> NDArray[np.bool_]:
-    """Lines on which an entry is more than its error: elsewhere a curve would be noise."""
-    return np.asarray(np.abs(frf.values[:, response, excitation]) > _deviation(frf, response, excitation))
-
-
-def enough() -> Drawing:
+def enough(band: tuple[float, float]) -> Drawing:
     """Share of the data that each band needs for the planned error of its FRF; nothing where no FRF is known."""
     from bokeh.models import ColumnDataSource
 
     title = "Enough data? Green: yes"
-    plot = framed("enough", title, "Share of the averages that the planned error needs", FREQUENCY)
+    needed = "Share of the averages that the planned error needs"
+    plot = framed("enough", title, needed, FREQUENCY, y_range=band)
     plot.x_range.start, plot.x_range.end = 0.0, 1.02
     columns: dict[str, Any] = {"low": [], "high": [], "middle": [], "share": [], "colour": [], "said": []}
     data = ColumnDataSource(columns, name="enough.data")
@@ -149,7 +161,7 @@ def enough() -> Drawing:
             "colour": [GREEN if band.enough else RED for band in bands],
             "said": [_progress(band) for band in bands],
         }
-        return {"sources": {"enough": columns}}
+        return {"sources": {"enough.data": columns}}
 
     return Drawing("enough", plot, content)
 

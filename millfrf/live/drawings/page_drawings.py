@@ -41,7 +41,7 @@ def all_drawings(monitor: LiveMonitor) -> list[Drawing]:
         return drawings
     return [
         *drawings,
-        spectrum([*excitations, *responses]),
-        *(transfer(kind, responses, excitations) for kind in ("magnitude", "phase", "coherence")),
-        enough(),
+        spectrum([*excitations, *responses], monitor.band),
+        *(transfer(kind, responses, excitations, monitor.band) for kind in ("magnitude", "phase", "coherence")),
+        enough(monitor.judged_band),
     ]

@@ -52,7 +52,7 @@ def traces(channels: Sequence[Channel]) -> Drawing:
             "label": [plain(mark.label) for mark in inside],
         }
         ticks = {n - 1 - k: f"{name}  {number(low[k])} … {number(high[k])} {units[k]}" for k, name in enumerate(names)}
-        return {"sources": {"traces": lines, "marks": labels}, "ticks": ticks}
+        return {"sources": {"traces.data": lines, "marks": labels}, "ticks": ticks}
 
     return Drawing("traces", plot, content)
 
@@ -85,7 +85,7 @@ def levels(channels: Sequence[Channel]) -> Drawing:
             "colour": np.where(over, RED, np.where(np.isnan(scales), GREY, GREEN)).tolist(),
             "said": [_said(c, shown.peaks[k], int(shown.overloads[k])) for k, c in enumerate(channels)],
         }
-        return {"sources": {"levels": columns}}
+        return {"sources": {"levels.data": columns}}
 
     return Drawing("levels", plot, content)
 

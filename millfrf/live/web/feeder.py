@@ -9,7 +9,7 @@ from typing import Any
 from ..control import LiveControl
 from ..drawings import Choice, Drawing, as_json
 from ..monitor import LiveMonitor, Snapshot
-from .status import status_of
+from .status import status_of, tests_of
 
 NOTE_LENGTH = 120
 _MOST_TICKED = 500  # channels of a rig, with room to spare
@@ -151,5 +151,5 @@ class Feeder:
     def _message(self, now: Snapshot, choice: Choice) -> bytes:
         marks = self._control.marks
         figures = {drawing.name: drawing.content(now, choice, marks) for drawing in self._drawings}
-        told = {"status": status_of(now, self._control), "figures": figures}
+        told = {"status": status_of(now, self._control), "tests": tests_of(now), "figures": figures}
         return json.dumps(told, default=as_json, allow_nan=False, separators=(",", ":")).encode("ascii")

@@ -1,5 +1,6 @@
 """What the server answers: the page's files behind the token, and the websocket of each open page."""
 
+import asyncio
 import json
 import time
 from collections import deque
@@ -114,7 +115,7 @@ class LiveSocket(Guarded, WebSocketHandler):
 
     def _send(self, message: bytes) -> None:
         if self.ws_connection is not None and not self.ws_connection.is_closing():
-            self.write_message(message.decode("ascii"))
+            asyncio.ensure_future(self.write_message(message.decode("ascii"))).add_done_callback(_let_go)
 
     def on_message(self, message: str | bytes) -> None:
         """Do what was pressed; end a page that sends anything else, or too much of it."""
@@ -134,6 +135,12 @@ class LiveSocket(Guarded, WebSocketHandler):
             self._counted = False
             self._feeder.remove(self._page)
             self.application.settings["server"].page_left()
+
+
+def _let_go(sent: "asyncio.Future[None]") -> None:
+    """A page that has left needs no message, and nobody needs to hear of it."""
+    if not sent.cancelled():
+        sent.exception()
 
 
 def page_content(figures: bytes) -> dict[str, bytes | Path]:

@@ -27,7 +27,7 @@ function columnsOf(packed) {
 
 function drawFigure(doc, name, content) {
   for (const [source, packed] of Object.entries(content.sources)) {
-    doc.get_model_by_name(source === name ? `${name}.data` : source).data = columnsOf(packed);
+    doc.get_model_by_name(source).data = columnsOf(packed);
   }
   const figure = doc.get_model_by_name(name);
   if ("title" in content) figure.title.text = content.title;
@@ -66,6 +66,12 @@ function drawTests(tests) {
     return row;
   });
   byId("tests").querySelector("tbody").replaceChildren(...rows);
+  const notes = tests.notes.map((note) => {
+    const item = document.createElement("li");
+    item.textContent = note;
+    return item;
+  });
+  byId("notes").replaceChildren(...notes);
 }
 
 function draw() {

@@ -1,9 +1,10 @@
-"""What the page says in words: state, time, samples, marks, and what was left out of the drawing."""
+"""What the page says in words: state, time, samples, marks, what was not drawn, and how far the session is."""
 
 from typing import Any
 
 from ..control import LiveControl
 from ..monitor import Snapshot
+from ..session import COLUMNS
 
 
 def status_of(now: Snapshot, control: LiveControl) -> dict[str, Any]:
@@ -15,6 +16,15 @@ def status_of(now: Snapshot, control: LiveControl) -> dict[str, Any]:
         "mark": control.state == "recording",
         "stop": control.state in ("waiting", "recording"),
     }
+
+
+def tests_of(now: Snapshot) -> dict[str, Any] | None:
+    """How far the session is, as plain text; None without a session."""
+    standing = now.standing
+    if standing is None or not (standing.rows or standing.advice or now.notes):
+        return None
+    rows = [{"state": row.state, "cells": row.cells} for row in standing.rows]
+    return {"advice": standing.advice, "columns": COLUMNS, "rows": rows, "notes": now.notes}
 
 
 def status_line(now: Snapshot, control: LiveControl) -> str:

@@ -1,0 +1,150 @@
+"""Tests that were recorded before: which recordings of a folder belong to the running one, and their spectra."""
+
+import math
+import time
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from acquisition import Recording, StreamDescription
+from cutting import immersion_angles
+from estimation import CrossSpectra
+from foundation import InputError, MillfrfError
+
+from ..spectra import LiveSpectra
+from .milled_speeds import MilledSpeeds
+from .planned_sweeps import Immersion
+
+SPEED_EVENTS = "spindle_speed_rpm"
+"""Event series of the spindle's speed, rpm."""
+
+_SAME = ("tool", "pose")
+_BLOCK = 1 << 15
+
+
+@dataclass(frozen=True)
+class SetUp:
+    """What recordings must share to be stacked.
+
+    Parameters
+    ----------
+    stream
+        Channels and sample rate.
+    setup
+        Set-up, TOML text: tool and pose must be equal, the immersion may differ.
+    highest_frequency, segment : Hz and s
+        Settings of the spectra.
+    """
+
+    stream: StreamDescription
+    setup: str
+    highest_frequency: float
+    segment: float
+
+
+@dataclass(frozen=True)
+class SessionTest:
+    """One test of a session.
+
+    Parameters
+    ----------
+    name
+        Name of the recording.
+    spectra
+        Its spectra; None: too short for any.
+    immersion : degrees
+        Start and exit angle; None where it does not say.
+    seconds : s
+        Duration of its samples.
+    speeds
+        Spindle speeds that a device told; None: no device did.
+    """
+
+    name: str
+    spectra: CrossSpectra | None
+    immersion: Immersion | None
+    seconds: float
+    speeds: MilledSpeeds | None = None
+
+
+def tests_beside(out: Path, pattern: str) -> list[Path]:
+    """Recordings beside the one that is written, in the order of their names."""
+    if not pattern or not out.parent.is_dir():
+        return []
+    return sorted(path for path in out.parent.glob(pattern) if path.is_file() and path.resolve() != out.resolve())
+
+
+def read_test(path: Path, wanted: SetUp, stopped: Callable[[], bool] = lambda: False) -> SessionTest:
+    """Read a recording's spectra, with pauses, so that the recording that runs is not held up.
+
+    Raises
+    ------
+    InputError
+        It is of another set-up, not complete, or no recording.
+    """
+    with Recording(path) as recording:
+        if recording.complete is not True:
+            raise InputError("not closed in order")
+        stream = next((one for one in recording.streams.values() if _alike(one.description, wanted.stream)), None)
+        if stream is None:
+            raise InputError("other channels or another sample rate")
+        for key in _SAME:
+            if _table(recording.setup, key) != _table(wanted.setup, key):
+                raise InputError(f"another {key}")
+        spectra = LiveSpectra(stream.channels, stream.sample_rate, wanted.highest_frequency, wanted.segment)
+        for start in range(0, stream.n_samples, _BLOCK):
+            if stopped():
+                raise InputError("not read to its end")
+            spectra.add(stream.read(start, min(start + _BLOCK, stream.n_samples)))
+            time.sleep(0.002)
+        grown = spectra.grown()
+        seconds = stream.n_samples / stream.sample_rate
+        cross = None if grown is None else grown.cross
+        return SessionTest(path.name, cross, immersion_of(recording.setup), seconds, _speeds(recording))
+
+
+def _speeds(recording: Recording) -> MilledSpeeds | None:
+    if SPEED_EVENTS not in recording.events:
+        return None
+    speeds = MilledSpeeds()
+    speeds.add(recording.events[SPEED_EVENTS].read()[1])
+    return speeds if speeds.known else None
+
+
+def _alike(one: StreamDescription, other: StreamDescription) -> bool:
+    """Equal channels at an equal rate; rates that a device makes differ in the last digits."""
+    kinds = [[(c.name, c.quantity, c.unit, c.degree_of_freedom) for c in each.channels] for each in (one, other)]
+    return kinds[0] == kinds[1] and one.sample_rate == other.sample_rate
+
+
+def _table(setup: str, name: str) -> dict[str, Any]:
+    try:
+        found = tomllib.loads(setup).get(name, {})
+    except (tomllib.TOMLDecodeError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def immersion_of(setup: str) -> Immersion | None:
+    """Start and exit angle that a set-up states, degrees, in its table ``cut`` or ``cutting``.
+
+    Examples
+    --------
+    >>> immersion_of("[cutting]\\nimmersion = 'slot'\\n")
+    (0.0, 180.0)
+    """
+    for name in ("cut", "cutting"):
+        table = _table(setup, name)
+        start, leave, kind = (table.get(key) for key in ("start_angle_deg", "exit_angle_deg", "immersion"))
+        if isinstance(start, int | float) and isinstance(leave, int | float):
+            return float(start), float(leave)
+        if isinstance(kind, str):
+            depth, diameter = table.get("radial_depth_m", 0.0), _table(setup, "cutting").get("diameter_m", 0.0)
+            try:
+                first, last = immersion_angles(kind, float(depth), float(diameter))
+            except (MillfrfError, TypeError, ValueError):
+                return None
+            return math.degrees(first), math.degrees(last)
+    return None
