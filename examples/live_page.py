@@ -3,9 +3,10 @@
     python examples/live_page.py [FOLDER]
 
 The simulated cell is milled in the three immersions of a plan. The three recordings are then replayed one after the
-other, eight times as fast as they were, with the page open. Needs playwright and Chromium.
+other, four times as fast as they were, with the page open. Needs playwright and Chromium.
 """
 
+import math
 import shutil
 import subprocess
 import sys
@@ -19,10 +20,10 @@ from millfrf.chain import plan_from_file
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
 
-SPEED = 8.0
+SPEED = 4.0
 SESSION = """
 title = "{title}"
-duration_s = {duration}
+{duration}
 band_hz = [5.0, 60.0]
 
 [cutting]
@@ -48,19 +49,20 @@ immersion_widths_deg = [45]
 """
 
 
-def write_session(path: Path, immersion: tuple[float, float], duration: float, device: str) -> None:
-    """A session with a plan, an immersion and a device."""
+def write_session(path: Path, immersion: tuple[float, float], device: str, seconds: float | None = None) -> None:
+    """A session with a plan, an immersion, a device and a duration; a replay is over when its file is."""
     title = f"posture A, immersion {immersion[0]:.4g} to {immersion[1]:.4g} degrees"
     start, leave = immersion
+    duration = "" if seconds is None else f"duration_s = {seconds}"
     path.write_text(SESSION.format(title=title, start=start, leave=leave, duration=duration, device=device))
 
 
 def planned(folder: Path) -> tuple[list[tuple[float, float]], float]:
     """Immersions (degrees) and duration (s) of the plan."""
-    write_session(folder / "plan.toml", (0.0, 180.0), 60.0, 'driver = "simulated"')
+    write_session(folder / "plan.toml", (0.0, 180.0), 'driver = "simulated"')
     plan = plan_from_file(folder / "plan.toml")[0]
-    degree = 57.29577951308232
-    return [(one.start_angle * degree, one.exit_angle * degree) for one in plan.processes], plan.duration
+    immersions = [(math.degrees(one.start_angle), math.degrees(one.exit_angle)) for one in plan.processes]
+    return immersions, plan.duration
 
 
 def record(folder: Path, immersions: list[tuple[float, float]], duration: float) -> list[Path]:
@@ -68,7 +70,7 @@ def record(folder: Path, immersions: list[tuple[float, float]], duration: float)
     found = []
     for number, immersion in enumerate(immersions, 1):
         session, out = folder / f"mill{number}.toml", folder / f"milled{number}.h5"
-        write_session(session, immersion, duration, f'driver = "simulated"\nspeed = 1000.0\nseed = {number}')
+        write_session(session, immersion, f'driver = "simulated"\nspeed = 1000.0\nseed = {number}', duration)
         out.unlink(missing_ok=True)
         subprocess.run([sys.executable, "-m", "millfrf", "acquire", str(session), "--out", str(out)], check=True)
         found.append(out)
@@ -88,7 +90,7 @@ def replay(browser: "Browser", session: Path, out: Path, pictures: dict[str, flo
     page.get_by_role("button", name="Start").click()
     spent = 0.0
     for name, share in pictures.items():
-        page.wait_for_timeout(max(1000 * (share * duration / SPEED - spent), 0))
+        page.wait_for_timeout(1000 * (share * duration / SPEED - spent))
         spent = share * duration / SPEED
         if share == 1.0:
             page.get_by_text("ended", exact=True).wait_for()
@@ -115,7 +117,7 @@ def main() -> None:
         browser = driver.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
         for number, (immersion, path, pictures) in enumerate(zip(immersions, milled, wanted, strict=True), 1):
             file = folder / f"replay{number}.toml"
-            write_session(file, immersion, duration, f'driver = "replay"\nfile = "{path.name}"\nspeed = {SPEED}')
+            write_session(file, immersion, f'driver = "replay"\nfile = "{path.name}"\nspeed = {SPEED}')
             replay(browser, file, session / f"sweep{number}.h5", pictures, duration)
         browser.close()
     print(f"pictures in {session}")

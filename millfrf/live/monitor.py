@@ -167,13 +167,17 @@ class LiveMonitor:
         except InputError:
             return None
 
-    def restart(self) -> None:
-        """Forget everything drawn so far: the recording proper begins."""
+    def forget(self) -> None:
+        """Forget everything drawn so far."""
         with self._lock:
             while not self._queue.empty():
                 self._queue.get_nowait()
             self._begin()
-            self._recording = True
+
+    def restart(self) -> None:
+        """Forget everything drawn so far: the recording proper begins."""
+        self.forget()
+        self._recording = True
 
     def __call__(self, taken: Block | Events) -> None:
         """Take a block or event; never waits."""

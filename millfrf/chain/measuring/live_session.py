@@ -25,6 +25,7 @@ from ...live import (
 from .plan import plan_from_file
 from .record_session import OpenedSession, Tally, acquire, interrupts
 
+_PAUSE = 0.2  # s between two previews of a source that ends
 _LINGER = 3.0  # s in which open pages learn how it ended
 
 
@@ -129,9 +130,13 @@ def _preview(source: Source, monitor: LiveMonitor, control: LiveControl) -> bool
             source.open()
             while control.state == "waiting" and not interrupted():
                 taken = source.read()
-                if taken is None:
-                    break
-                monitor(taken)
+                if taken is None:  # a file or a simulation is over before anybody has pressed Start: show it again
+                    source.close()
+                    time.sleep(_PAUSE)
+                    monitor.forget()
+                    source.open()
+                else:
+                    monitor(taken)
         finally:
             source.close()
         return not interrupted() and control.state != "stopping"

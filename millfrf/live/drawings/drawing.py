@@ -96,6 +96,17 @@ def plain(text: str) -> str:
     return seen if len(seen) <= _LONGEST else seen[: _LONGEST - 1] + "…"
 
 
+def unit_text(unit: str) -> str:
+    """A unit as it is printed.
+
+    Examples
+    --------
+    >>> unit_text("m/s^2")
+    'm/s²'
+    """
+    return plain(unit).replace("^2", "²")
+
+
 def thinned(n: int) -> slice:
     """Every how-manyeth of ``n`` lines is drawn."""
     return slice(None, None, max(1, n // _MOST_LINES))

@@ -13,7 +13,7 @@ from figures import COLOURS
 from ..control import Mark
 from ..enough import BandProgress
 from ..monitor import Snapshot
-from .drawing import GREEN, RED, Choice, Content, Drawing, framed, number, plain, thinned
+from .drawing import GREEN, RED, Choice, Content, Drawing, framed, number, plain, thinned, unit_text
 
 FREQUENCY = "Frequency (Hz)"
 _HARMONICS = 3
@@ -35,7 +35,7 @@ def spectrum(channels: Sequence[Channel], band: tuple[float, float]) -> Drawing:
     plot.add_layout(plot.legend[0], "right")
     teeth = ColumnDataSource({"x": []}, name="teeth")
     plot.vspan(x="x", source=teeth, line_dash="dashed", line_color="#999999")
-    labels = [f"{plain(channel.name)} ({plain(channel.unit)})" for channel in channels]
+    labels = [f"{plain(channel.name)} ({unit_text(channel.unit)})" for channel in channels]
 
     def content(shown: Snapshot, choice: Choice, _: Sequence[Mark]) -> Content:
         passing, spectra = shown.tooth_passing, shown.spectra
@@ -86,7 +86,7 @@ def transfer(
     def content(shown: Snapshot, choice: Choice, _: Sequence[Mark]) -> Content:
         response, excitation = plain(responses[choice.response].name), plain(excitations[choice.excitation].name)
         title = {
-            "magnitude": f"FRF {response} / {excitation}; band: two standard deviations",
+            "magnitude": f"FRF {response} / {excitation}",
             "phase": f"Phase of the FRF {response} / {excitation}",
             "coherence": f"Multiple coherence of {response}",
         }[kind]
@@ -98,8 +98,10 @@ def transfer(
         sources, axis = _curve(frf, shown.known, kind, choice.response, choice.excitation), {}
         if not len(sources[f"{kind}.data"]["x"]):
             title += ": no line is sure yet"
+        elif kind == "magnitude":
+            title += "; band: two standard deviations"
         if kind == "magnitude":
-            axis = {"y_label": f"Magnitude ({plain(frf.unit)})"}
+            axis = {"y_label": f"Magnitude ({unit_text(frf.unit)})"}
         return {"sources": sources, "title": title, **axis}
 
     return Drawing(kind, plot, content)
@@ -157,7 +159,7 @@ def enough(band: tuple[float, float]) -> Drawing:
             "low": [band.low for band in bands],
             "high": [band.high for band in bands],
             "middle": [0.5 * (band.low + band.high) for band in bands],
-            "share": [band.done for band in bands],
+            "share": [band.done * band.known for band in bands],
             "colour": [GREEN if band.enough else RED for band in bands],
             "said": [_progress(band) for band in bands],
         }
@@ -171,4 +173,5 @@ def _progress(band: BandProgress) -> str:
     if not np.isfinite(band.error):
         return "no FRF"
     covered = "" if band.known >= 0.9 else f"{100 * band.known:.0f} % of lines known, "
-    return f"{covered}error {number(band.error)} × planned"
+    reached = "" if band.error > 1 or band.share >= 0.9 else f", reached on {100 * band.share:.0f} % of them"
+    return f"{covered}error {number(band.error)} × planned{reached}"

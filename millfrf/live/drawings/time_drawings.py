@@ -10,7 +10,7 @@ from figures import COLOURS
 
 from ..control import Mark
 from ..monitor import Snapshot
-from .drawing import GREEN, GREY, RED, Choice, Content, Drawing, framed, number, plain
+from .drawing import GREEN, GREY, RED, Choice, Content, Drawing, framed, number, plain, unit_text
 
 FLOOR_DB = -80.0
 _TOP_DB = 3.0
@@ -32,7 +32,7 @@ def traces(channels: Sequence[Channel]) -> Drawing:
     plot.y_range.start, plot.y_range.end = -0.7, n - 0.5 + max(0.3, 0.055 * n)  # room for the marks' notes
     plot.ygrid.visible = False
     names = [plain(channel.name) for channel in channels]
-    units = [plain(channel.unit) for channel in channels]
+    units = [unit_text(channel.unit) for channel in channels]
 
     def content(shown: Snapshot, _: Choice, marks: Sequence[Mark]) -> Content:
         if not len(shown.traces):
@@ -94,4 +94,4 @@ def _said(channel: Channel, peak: float, overloads: int) -> str:
     """Peak in its unit, full scale, and how many samples were over."""
     whole = f" of {number(channel.full_scale)}" if channel.full_scale else ""
     over = f", {overloads} samples overloaded" if overloads else ""
-    return f"{number(peak)}{whole} {plain(channel.unit)}{over}"
+    return f"{number(peak)}{whole} {unit_text(channel.unit)}{over}"

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+from foundation import counted
+
 from ..control import LiveControl
 from ..monitor import Snapshot
 from ..session import COLUMNS
@@ -32,9 +34,9 @@ def status_line(now: Snapshot, control: LiveControl) -> str:
     n = len(control.marks)
     parts = [f"{now.seconds:.1f} s", f"{now.n_samples} samples a channel"]
     if now.spectra is not None:
-        parts.append(f"{now.spectra.averages:.0f} averages")
+        parts.append(counted(round(now.spectra.averages), "average"))
     if n:
-        parts.append(f"{n} mark{'' if n == 1 else 's'} (last: {control.marks[-1].label})")
+        parts.append(f"{counted(n, 'mark')} (last: {control.marks[-1].label})")
     if now.n_skipped:
         parts.append(f"{now.n_skipped} blocks recorded but not drawn")
     return f"{', '.join(parts)}. {control.message}".strip()

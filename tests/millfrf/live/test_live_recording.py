@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,9 @@ import pytest
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from millfrf.__main__ import run
+from millfrf.chain import open_session
+from millfrf.chain.measuring.live_session import _preview
+from millfrf.live import LiveControl, LiveMonitor, LiveSettings
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -45,6 +49,21 @@ def test_without_any_browser_a_live_recording_ends_by_its_duration(
         assert recording.stream().n_samples == 2048
         assert recording.events["mark"].read()[0].size == 0
     assert run(["acquire", str(tmp_path / "s.toml"), "--out", str(out), "--live", "--live-address", "me"]) == 2
+
+
+def test_a_replay_that_ends_is_shown_again_until_start(tmp_path: Path) -> None:
+    streams = [StreamDescription("main", 2048.0, 0.0, (Channel("f", "force", "N", "T", "+X"),))]
+    with RecordingWriter(tmp_path / "short.h5", streams) as writer:
+        writer.append("main", np.ones((1024, 1)))
+    (tmp_path / "s.toml").write_text('[device]\ndriver = "replay"\nfile = "short.h5"\n')
+    opened = open_session(tmp_path / "s.toml")
+    control, monitor = LiveControl(), LiveMonitor(opened.source.streams, LiveSettings())
+    starter = threading.Timer(2.0, control.start)
+    starter.start()
+    began = time.monotonic()
+    assert _preview(opened.source, monitor, control)
+    assert time.monotonic() - began > 1.9
+    monitor.close()
 
 
 def _browser() -> str:
