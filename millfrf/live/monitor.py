@@ -172,6 +172,7 @@ class LiveMonitor:
         with self._lock:
             while not self._queue.empty():
                 self._queue.get_nowait()
+                self._queue.task_done()
             self._begin()
 
     def restart(self) -> None:
@@ -203,6 +204,7 @@ class LiveMonitor:
                 continue
             with self._lock:
                 self._add(block)
+                self._queue.task_done()
                 if time.monotonic() - estimated > 1.0 and self._spectra is not None:
                     self._estimate(self._spectra)
                     estimated = time.monotonic()
@@ -223,7 +225,7 @@ class LiveMonitor:
     def finish(self) -> None:
         """Work off what waits, and judge all of it: the recording has ended."""
         latest = time.monotonic() + _FINISHING
-        while not self._queue.empty() and time.monotonic() < latest:
+        while self._queue.unfinished_tasks and time.monotonic() < latest:
             time.sleep(0.02)
         with self._lock:
             self._ended = True
