@@ -238,7 +238,7 @@ class LiveMonitor:
         self._traces.add(samples)
         now = time.monotonic()
         self._recent = [entry for entry in self._recent if now - entry[0] < 1.0]
-        size = np.abs(samples).max(axis=0)
+        size = np.nan_to_num(np.abs(samples).max(axis=0))
         self._recent.append((now, size))
         limits = np.array([channel.full_scale or np.inf for channel in self.channels]) * _OVERLOAD
         if (size >= limits).any():
@@ -246,7 +246,10 @@ class LiveMonitor:
         if self._gap:  # segments must not reach over samples that were not seen
             self._gap, self._spectra = False, self._fresh_spectra()
         if self._spectra is not None:
-            self._spectra.add(samples)
+            try:
+                self._spectra.add(samples)
+            except InputError:  # a sample that is no number: the segments begin anew behind it
+                self._gap = True
 
     def _judged(self, stacked: StackedFrf | None) -> tuple[BandProgress, ...]:
         s = self.settings

@@ -78,6 +78,18 @@ def test_a_monitor_shows_what_came_and_never_waits(monitor: LiveMonitor) -> None
     assert monitor.snapshot().overloads.tolist() == [0, 0]
 
 
+def test_samples_that_are_no_numbers_end_no_drawing(monitor: LiveMonitor) -> None:
+    samples = _samples(4096)
+    samples[5, 0] = np.nan
+    monitor(Block("main", 0, samples))
+    monitor(Block("main", 4096, _samples(8192, 1)))
+    monitor.finish()
+    shown = monitor.snapshot()
+    assert shown.n_samples == 12288
+    assert shown.frf is not None
+    assert np.isfinite(shown.peaks).all()
+
+
 def test_a_flood_is_recorded_but_not_all_drawn(monitor: LiveMonitor) -> None:
     samples = _samples(200_000)
     began = time.monotonic()
