@@ -1,5 +1,8 @@
 """The two ways to a Modbus drive: a serial line (RTU) and a network (TCP), through pymodbus."""
 
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -91,6 +94,7 @@ class TcpLink:
 
 
 Link = SerialLink | TcpLink
+_LOG = logging.getLogger("pymodbus.logging")
 
 
 def connected(link: Link, timeout: float) -> Any:
@@ -101,9 +105,25 @@ def connected(link: Link, timeout: float) -> Any:
     DriverMissing, Disconnected
     """
     client = link.client(timeout)
-    if not client.connect():
-        raise Disconnected(f"{link.where} cannot be opened; check its name, plug and power")
+    with _complaints() as said:
+        there = client.connect()
+    if not there:
+        reason = f": {said[0]}" if said and not said[0].startswith("Repeating") else ""
+        raise Disconnected(f"{link.where} cannot be opened{reason}; check its name, plug, power and settings")
     return client
+
+
+@contextmanager
+def _complaints() -> Iterator[list[str]]:
+    """What pymodbus logs meanwhile: it tells the reason of a failure nowhere else."""
+    said: list[str] = []
+    handler = logging.Handler(logging.ERROR)
+    handler.emit = lambda record: said.append(" ".join(record.getMessage().split()))  # type: ignore[method-assign]
+    _LOG.addHandler(handler)
+    try:
+        yield said
+    finally:
+        _LOG.removeHandler(handler)
 
 
 def ask(client: Any, link: Link, device: int, address: int, *, input_register: bool) -> int | None:
@@ -142,4 +162,6 @@ def _pymodbus(where: str) -> Any:
         import serial  # noqa: F401  # pymodbus takes it only where it is loaded
     except ImportError as error:
         raise DriverMissing(f"{where}: needs pymodbus and pyserial; pip install millfrf[devices]") from error
+    if not _LOG.handlers:
+        _LOG.addHandler(logging.NullHandler())  # else its complaints come to the terminal beside this program's own
     return pymodbus.client

@@ -185,7 +185,7 @@ def test_a_drive_on_the_network_is_read_and_comes_back(tmp_path: Path) -> None:
         assert set(values[times < lost]) == {5968.5}
         assert set(values[times >= back]) == {6000.0}
         assert recording.events["load"].read()[1][0] == -2.0
-    with pytest.raises(Disconnected, match=r"Modbus 127.0.0.1:\d+ cannot be opened; check its name, plug and power"):
+    with pytest.raises(Disconnected, match=r"cannot be opened.*; check its name, plug, power"):
         ModbusFeed(TcpLink("127.0.0.1", drive.port), 3, registers, timeout=0.1).open()
 
 
