@@ -1,5 +1,6 @@
 from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom
 from .errors import DiskFull, FileFormatError, InputError, MillfrfError, MillfrfWarning
+from .memory import allowed_bytes, require_memory
 from .noted_table import WARNING, apart, warning_lines
 from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library, same_values
 from .table_mistakes import mistake_in_words, shown
@@ -23,6 +24,7 @@ __all__ = [
     "MillfrfWarning",
     "Result",
     "Summary",
+    "allowed_bytes",
     "apart",
     "checked_band",
     "checked_toml",
@@ -33,6 +35,7 @@ __all__ = [
     "listed",
     "mistake_in_words",
     "optional_library",
+    "require_memory",
     "same_values",
     "shared_band",
     "shown",

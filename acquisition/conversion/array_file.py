@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import loadmat
 
-from foundation import FileFormatError, InputError
+from foundation import FileFormatError, InputError, require_memory
 
 from ..file_safety import read_guarded
 from .csv_file import read_csv
@@ -20,6 +20,10 @@ from .mat_check import is_plain_mat
 from .sampled_files import read_uff_times, read_wav
 
 SUFFIXES = (".npy", ".npz", ".mat", ".h5", ".hdf5", ".tdms", ".csv", ".txt", ".wav", ".uff", ".unv")
+
+
+_COPIES = 2.5
+"""Times the arrays of a file that a conversion holds in memory."""
 
 
 class ArrayFile:
@@ -121,6 +125,10 @@ def _npz(path: Path) -> dict[str, Any]:
     with np.load(path, allow_pickle=False) as archive:
         if not isinstance(archive, np.lib.npyio.NpzFile):
             raise FileFormatError(f"{path} is not an NPZ archive; rename it to .npy")
+        announced = sum(entry.file_size for entry in archive.zip.infolist()) if archive.zip is not None else 0
+        require_memory(
+            _COPIES * announced, f"{path} ({path.stat().st_size} bytes) unpacks to {announced} bytes", "split it"
+        )
         return {name: archive[name] for name in archive.files}
 
 

@@ -14,6 +14,7 @@ from .content import Content, recording_content
 from .csv_file import describes_itself, read_own_csv
 from .flat_fields import from_fields
 from .mapping import load_mapping
+from .span import part_of
 from .writers import require_writable, write_content
 
 
@@ -22,6 +23,8 @@ def convert(
     output_path: str | os.PathLike[str],
     mapping_path: str | os.PathLike[str] | None = None,
     progress: Callable[[int], None] | None = None,
+    *,
+    span: tuple[float, float] | None = None,
 ) -> list[Path]:
     """Convert by suffix: ``.h5 .npz .npy .mat .csv`` into ``.h5 .npz .mat .csv``.
 
@@ -35,6 +38,8 @@ def convert(
         TOML file that says which array or column is which channel, see :class:`Mapping`.
     progress
         Called with the number of samples written so far in the file at hand.
+    span : s
+        First and last time to keep, counted from the first sample; None: all.
 
     Returns
     -------
@@ -56,7 +61,8 @@ def convert(
             path = target.with_name(f"{target.stem}-{number}{target.suffix}") if several else target
             if path.exists() and path.samefile(source):
                 raise InputError(f"{path} is the input itself; choose another output name")
-            write_content(content, stack.enter_context(writing_whole_file(path)), progress)
+            kept = content if span is None else part_of(content, span)
+            write_content(kept, stack.enter_context(writing_whole_file(path)), progress)
             written.append(path)
     return written
 

@@ -20,6 +20,17 @@ def to_fields(content: Content) -> FlatFields:
 
     Every name is a valid MATLAB variable.
     """
+    samples = {name: one.read().astype(one.dtype) for name, one in tables_of(content).items()}
+    return described_fields(content) | samples
+
+
+def tables_of(content: Content) -> dict[str, Samples]:
+    """Samples of each stream by the name of their field; they are not read yet."""
+    return {f"samples{_ending(number)}": samples for number, samples in enumerate(content.streams)}
+
+
+def described_fields(content: Content) -> FlatFields:
+    """Everything that :func:`to_fields` gives, but the samples."""
     fields: FlatFields = {
         "format": FORMAT,
         "format_version": 1,
@@ -36,7 +47,6 @@ def to_fields(content: Content) -> FlatFields:
         fields[f"sample_rate{end}"] = described.sample_rate
         fields[f"start_time{end}"] = described.start_time
         fields[f"channels{end}"] = json.dumps([channel.to_json() for channel in described.channels])
-        fields[f"samples{end}"] = samples.read().astype(samples.dtype)
         fields[f"clock{end}"] = content.clock_pairs.get(described.name, np.empty((0, 2)))
     for number, series in enumerate(content.events.values()):
         fields[f"event_time{_ending(number)}"], fields[f"event_value{_ending(number)}"] = series

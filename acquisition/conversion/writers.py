@@ -2,26 +2,28 @@
 
 import csv
 import json
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.io import savemat
 
-from foundation import InputError
+from foundation import InputError, require_memory
 
 from ..recordings import FORMAT, FORMAT_VERSION, RecordingWriter
 from ..sources import EventAxis, Events
 from .content import Content, row_blocks
-from .flat_fields import to_fields
+from .flat_fields import described_fields, tables_of, to_fields
 
 Progress = Callable[[int], None]
 
 SPARE_BYTES = 1_000_000
 """Disk space kept aside so that the HDF5 library can close its file in order on a full disk."""
 
+_BYTES_A_MAT_VALUE = 16.0  # seen at the peak
 _LARGEST_MAT_ARRAY = 2**31 - 1
 
 
@@ -76,10 +78,21 @@ def _write_h5(content: Content, path: Path, progress: Progress) -> None:
 
 
 def _write_npz(content: Content, path: Path, progress: Progress) -> None:
-    arrays: dict[str, Any] = {name: np.asarray(value) for name, value in to_fields(content).items()}
-    with path.open("wb") as handle:
-        np.savez(handle, **arrays)
-    progress(_total(content))
+    """As `numpy.savez` writes it, with the samples block by block."""
+    written = 0
+    with zipfile.ZipFile(path, "w", allowZip64=True) as archive:
+        for name, value in described_fields(content).items():
+            with archive.open(f"{name}.npy", "w") as entry:
+                np.lib.format.write_array(entry, np.asarray(value), allow_pickle=False)
+        for name, samples in tables_of(content).items():
+            shape = (samples.n_samples, len(samples.description.channels))
+            header = {"descr": samples.dtype.str, "fortran_order": False, "shape": shape}
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as entry:
+                np.lib.format.write_array_header_1_0(entry, header)
+                for block in row_blocks(samples):
+                    entry.write(block.astype(samples.dtype).tobytes())
+                    written += len(block)
+                    progress(written)
 
 
 def _write_mat(content: Content, path: Path, progress: Progress) -> None:
@@ -87,6 +100,11 @@ def _write_mat(content: Content, path: Path, progress: Progress) -> None:
         size = samples.n_samples * len(samples.description.channels) * samples.dtype.itemsize
         if size > _LARGEST_MAT_ARRAY:
             raise InputError(f"stream {samples.description.name} has {size} bytes, more than a MAT file holds; use .h5")
+        require_memory(
+            _BYTES_A_MAT_VALUE * size / samples.dtype.itemsize,
+            f"{path.name}, a MAT file of {size / 1e6:.0f} MB, which is written at once",
+            "write .h5, which MATLAB reads with h5read, or a part with --span",
+        )
     with path.open("wb") as handle:
         savemat(handle, to_fields(content), oned_as="column")
     progress(_total(content))

@@ -17,6 +17,7 @@ from .motion_quantities import (
 from .reading import band_of_channels, read_band_recording
 from .reduced_recording import BandRecording, band_recording, before_force_high_pass
 from .resampling import Resampler, needed_ratio, resampled, whole_ratio, widest_band
+from .room import require_room
 from .spectrum_lines import WindowedSpectrum, padded_force, windowed_spectrum
 
 __all__ = [
@@ -41,6 +42,7 @@ __all__ = [
     "padded_force",
     "read_band_recording",
     "refuse_shared",
+    "require_room",
     "resampled",
     "whole_ratio",
     "widest_band",

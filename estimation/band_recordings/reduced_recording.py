@@ -16,8 +16,12 @@ from .channel_matching import MatchedChannel
 from .motion_quantities import derivative_orders, high_pass_corners, kinematic_factor
 from .resampling import Resampler, resampled, widest_band
 from .rest import starts_at_rest
+from .room import require_room
 
 Real = NDArray[np.float64]
+
+BYTES_A_VALUE = 100.0
+"""Memory for each value of a band recording in the jobs that use one: simulations and transforms of all of it."""
 
 
 @dataclass(frozen=True)
@@ -117,9 +121,11 @@ def band_recording(
     Raises
     ------
     InputError
-        The recording is shorter than the filter, or a channel holds values that are not finite.
+        The recording is shorter than the filter, longer than memory allows, or a channel holds values that are not
+        finite.
     """
     matched = (*excitations, *responses)
+    require_room(stream, len(matched), BYTES_A_VALUE, float(ratio))
     names = [one.channel.name for one in matched]
     resampler, pieces, done = Resampler(stream.sample_rate, ratio), [np.empty((0, len(names)))], 0
     signs = np.array([one.sign for one in matched])

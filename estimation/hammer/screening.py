@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition import Channel, Recording
 
+from ..band_recordings import require_room
 from ..spectra import OVERLOAD
 from .taps import SETTLE, Tap, at_rest, find_taps, noise_of
 
@@ -19,6 +20,7 @@ CANDIDATE = 0.05
 WEAK = 0.2
 """Share of the middle peak of a recording's taps below which a tap is left out as weak."""
 
+_BYTES_A_VALUE = 140.0  # of the force, seen at the peak
 _FLAT = 3  # samples in a row at the extreme value
 _STEEP = 2.5  # times the smallest step: beside a smooth maximum the samples are one step away
 
@@ -120,6 +122,7 @@ def found_taps(test: TapTest) -> FoundTaps:
     """
     with Recording(test.path) as recording:
         stream = recording.stream(test.stream)
+        require_room(stream, len(test.excitations), _BYTES_A_VALUE)
         force = stream.read(channels=[channel.name for channel in test.excitations])
         rate, start = stream.sample_rate, stream.start_time
     quiet = at_rest(force, rate)

@@ -16,6 +16,9 @@ def convert(
     mapping: Annotated[
         Path | None, typer.Option("--map", metavar="MAP.toml", help="Which array or column is which channel or FRF.")
     ] = None,
+    span: Annotated[
+        tuple[float, float] | None, typer.Option("--span", metavar="LO HI", help="Part of a recording to keep, s.")
+    ] = None,
 ) -> None:
     """Convert by suffix: recordings .h5 .npz .npy .mat .tdms .csv .wav .uff into .h5 .npz .mat .csv; FRFs .uff .unv
     .mat .npz .csv .txt .gz (several files make one matrix) into .h5 .uff; modal models .json into .uff and back;
@@ -42,7 +45,7 @@ def convert(
     elif mapping is None and is_uff_conversion(sources[0], target):
         check_output(target, (*FRF_SUFFIXES, ".json", ".toml"), sources)
     with bar(f"converting {sources[0].name}") as update:
-        written, told = convert_files(sources, target, mapping, update)
+        written, told = convert_files(sources, target, mapping, update, span)
     for text in told.inferred:
         typer.echo(f"note: {text}")
     for text in told.doubts:

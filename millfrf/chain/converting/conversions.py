@@ -15,7 +15,11 @@ FRF_SUFFIXES = (".h5", ".hdf5", *UFF_SUFFIXES)
 
 
 def convert_files(
-    sources: Sequence[Path], target: Path, mapping: Path | None, progress: Callable[[int], None] | None = None
+    sources: Sequence[Path],
+    target: Path,
+    mapping: Path | None,
+    progress: Callable[[int], None] | None = None,
+    span: tuple[float, float] | None = None,
 ) -> tuple[list[Path], Told]:
     """Convert one file, or several that make one FRF matrix.
 
@@ -29,6 +33,8 @@ def convert_files(
         TOML with ``channels`` (a recording) or ``[frf]`` (FRFs); None: the files say it themselves.
     progress
         Called with the number of samples written so far, for recordings.
+    span : s
+        First and last time of a recording to keep, counted from its first sample; None: all of it.
 
     Returns
     -------
@@ -40,6 +46,8 @@ def convert_files(
     InputError
         Files that cannot be used together or at all; nothing is written.
     """
+    if span is not None and (is_frf_conversion(sources, mapping) or is_uff_conversion(sources[0], target)):
+        raise InputError("--span cuts a part out of a recording; leave it out for other files")
     if is_frf_conversion(sources, mapping):
         found = import_frf(sources, None if mapping is None else load_frf_mapping(mapping))
         return [target], write_imported(target, found, sources)
@@ -50,7 +58,7 @@ def convert_files(
         )
     if mapping is None and is_uff_conversion(sources[0], target):
         return [target], convert_uff(sources[0], target)
-    written = convert_recording(sources[0], target, mapping, progress=progress)
+    written = convert_recording(sources[0], target, mapping, progress=progress, span=span)
     doubts = tuple(doubt for path in written for doubt in doubts_of_rate(path))
     return written, Told((), doubts)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from acquisition import Channel, Recording
 from cutting import MillingProcess
-from estimation import choose_channels, derivative_orders
+from estimation import choose_channels, derivative_orders, require_room
 from foundation import DegreeOfFreedom, InputError
 from modal_fit import ModalModel
 from stability import ChatterVerdict, ModelledCut, classify_cut
@@ -65,6 +65,8 @@ class CutOptions:
 
 MOTION = ("displacement", "velocity", "acceleration")
 """Quantities whose size tells by how much the chip changes."""
+BYTES_A_VALUE = 110.0
+"""Memory for each sample of a cut that is judged, seen at the peak."""
 TIP_NODE = "TCP"
 """Node of the tool's tip."""
 
@@ -219,6 +221,7 @@ def doubts_of_cuts(
         with Recording(path) as recording:
             stream = recording.stream(options.stream)
             _, responses = choose_channels(stream, None, options.responses or None)
+            require_room(stream, len(responses), BYTES_A_VALUE)
             doubts += check_one_speed(recording.path.name, recording.setup, process, options.speed_rpm)
         names = [channel.name for channel in responses]
         doubts += check_recordings([path], stream=options.stream, responses=names, progress=progress, remedy=OTHERS)

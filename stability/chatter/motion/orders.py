@@ -70,8 +70,7 @@ def to_revolutions(data: Real, sample_rate: float, track: SpindleTrack, teeth: i
 
     The samples are doubled in number by a band-limited filter before cubic splines are laid through them.
     """
-    fine = np.asarray(resample_poly(data, 2, 1, axis=0))
-    times = np.arange(len(fine)) / (2 * sample_rate)
+    times = np.arange(2 * len(data)) / (2 * sample_rate)
     turns = track.revolutions(times)
     count = int(turns[len(data) * 2 - 2])
     places = max(_FEWEST_PLACES, int(np.ceil(sample_rate / track.mean_frequency)))
@@ -81,5 +80,7 @@ def to_revolutions(data: Real, sample_rate: float, track: SpindleTrack, teeth: i
     for _ in range(2):
         speed = np.gradient(turns, times, edge_order=2)
         when = when - (track.revolutions(when) - angles) / np.interp(when, times, speed)
-    samples = CubicSpline(times, fine)(when)
-    return Revolutions(np.asarray(samples).reshape(count, places, -1), track.mean_frequency, teeth)
+    samples = np.empty((len(when), data.shape[1]))
+    for number, column in enumerate(data.T):  # a spline takes many times the memory of its samples
+        samples[:, number] = CubicSpline(times, resample_poly(column, 2, 1))(when)
+    return Revolutions(samples.reshape(count, places, -1), track.mean_frequency, teeth)

@@ -90,12 +90,20 @@ def _thinned(data: Real, sample_rate: float, stated: float) -> tuple[Real, float
 
 def _floors(data: Real, sample_rate: float, stated: float) -> Real:
     """Median power of the windowed recording about each order, (n_orders,)."""
-    window = np.hanning(len(data) + 2)[1:-1, None]
-    power = np.sum(np.abs(np.fft.rfft(data * window, axis=0)) ** 2, axis=1)
+    window = np.hanning(len(data) + 2)[1:-1]
+    power = _power(data, window, len(data))
     bins = len(data) / sample_rate * stated
     orders = range(1, highest_order(sample_rate, stated) + 1)
     medians = [np.median(power[int((k - 0.5) * bins) : int((k + 0.5) * bins)]) for k in orders]
     return np.asarray(np.array(medians) + _SINGLE**2 * power.max() + 1e-300)
+
+
+def _power(data: Real, window: Real, length: int) -> Real:
+    """Power of all channels together, (n_lines,); one channel after the other, as long cuts fill the memory."""
+    power = np.zeros(length // 2 + 1)
+    for column in data.T:
+        power += np.abs(np.fft.rfft(column * window, length)) ** 2
+    return power
 
 
 def _starts(data: Real, sample_rate: float, stated: float) -> list[SpindleTrack]:
@@ -154,9 +162,9 @@ def _coarse(data: Real, sample_rate: float, stated: float, n_blocks: int) -> lis
 
 def _score(block: Real, sample_rate: float, trials: Real, orders: NDArray[np.int64], stated: float) -> Real:
     """Sum over orders of the logarithm of power over floor at each trial frequency."""
-    window = np.hanning(len(block) + 2)[1:-1, None]
+    window = np.hanning(len(block) + 2)[1:-1]
     room = 4 * 2 ** math.ceil(math.log2(len(block)))
-    power = np.sum(np.abs(np.fft.rfft(block * window, room, axis=0)) ** 2, axis=1)
+    power = _power(block, window, room)
     bins = room / sample_rate
     least = _SINGLE**2 * power.max() + 1e-300
     total = np.zeros(len(trials))
