@@ -43,6 +43,30 @@ def versions() -> dict[str, str]:
     }
 
 
+def origin(
+    step: str, inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Origin of a result: the step, files with hashes, options, versions.
+
+    Parameters
+    ----------
+    step
+        Name of the command.
+    inputs
+        Files that the result was made from; a name of something that is no file (a robot that ships) is left out.
+    options
+        What was asked for; paths and other objects are told as text.
+    """
+    files = [path for path in inputs if Path(path).is_file()]
+    asked = json.loads(json.dumps(dict(options or {}), default=str))
+    return {"step": step, "sources": sources(files), "options": asked, "versions": versions()}
+
+
+def made(step: str, inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any] | None = None) -> str:
+    """The same as one line of JSON, see :func:`origin`."""
+    return json.dumps(origin(step, inputs, options))
+
+
 def add_to_json(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> None:
     """Put a field ``provenance`` into a JSON file; readers that do not know it pass over it."""
     content = json.loads(Path(path).read_text(encoding="utf-8"))
@@ -51,10 +75,17 @@ def add_to_json(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> 
         temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
 
 
+def add_comment(path: str | os.PathLike[str], provenance: Mapping[str, Any]) -> None:
+    """Put the origin above a TOML file, as a comment of one line."""
+    text = f"# provenance: {json.dumps(dict(provenance))}\n" + Path(path).read_text(encoding="utf-8")
+    with writing_whole_file(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
 def read_provenance(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Read the origin that an FRF, a model, lobes or verdicts state; empty where they state none that can be read."""
     try:
-        if Path(path).suffix.lower() == ".csv":
+        if Path(path).suffix.lower() in (".csv", ".toml"):
             stored = _of_lobes(Path(path))
         elif Path(path).suffix.lower() == ".json":
             stored = json.loads(Path(path).read_text(encoding="utf-8")).get("provenance", {})
@@ -85,7 +116,7 @@ def of_chatter(
 
 
 def _of_lobes(path: Path) -> Any:
-    """Read the origin from the line that `write_lobes` puts above the headings."""
+    """Read the origin from the comments above a table of lobes, a recording as CSV, or a TOML file."""
     mark = "# provenance: "
     with path.open(encoding="utf-8", errors="replace") as file:
         for line in file:

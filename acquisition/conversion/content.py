@@ -93,6 +93,8 @@ class Content:
         The text of each value by name, for series that have texts.
     clock_pairs
         (sample index, host time) by stream, (n_pairs, 2).
+    provenance
+        Where it comes from, as JSON text.
     """
 
     streams: tuple[Samples, ...]
@@ -102,6 +104,7 @@ class Content:
     events: Mapping[str, Pairs] = field(default_factory=dict)
     clock_pairs: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     event_texts: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    provenance: str = ""
 
 
 def recording_content(recording: Recording) -> Content:

@@ -3,6 +3,7 @@
 import os
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from foundation import FileFormatError, InputError, writing_whole_file
@@ -25,6 +26,7 @@ def convert(
     progress: Callable[[int], None] | None = None,
     *,
     span: tuple[float, float] | None = None,
+    provenance: str = "",
 ) -> list[Path]:
     """Convert by suffix: ``.h5 .npz .npy .mat .csv`` into ``.h5 .npz .mat .csv``.
 
@@ -40,6 +42,8 @@ def convert(
         Called with the number of samples written so far in the file at hand.
     span : s
         First and last time to keep, counted from the first sample; None: all.
+    provenance
+        Where the output comes from, as JSON text; every kind of file keeps it.
 
     Returns
     -------
@@ -62,7 +66,8 @@ def convert(
             if path.exists() and path.samefile(source):
                 raise InputError(f"{path} is the input itself; choose another output name")
             kept = content if span is None else part_of(content, span)
-            write_content(kept, stack.enter_context(writing_whole_file(path)), progress)
+            told = replace(kept, provenance=provenance)
+            write_content(told, stack.enter_context(writing_whole_file(path)), progress)
             written.append(path)
     return written
 

@@ -37,6 +37,7 @@ def described_fields(content: Content) -> FlatFields:
         "title": content.title,
         "recorded_at": content.recorded_at,
         "setup": content.setup,
+        "provenance": content.provenance,
         "event_names": json.dumps(list(content.events)),
         "event_texts": json.dumps({name: list(texts) for name, texts in content.event_texts.items()}),
     }

@@ -61,6 +61,7 @@ def _write_h5(content: Content, path: Path, progress: Progress) -> None:
         dtype=dtype,
         event_axes={name: EventAxis(texts=name in content.event_texts) for name in content.events},
         recorded_at=content.recorded_at or None,
+        provenance=content.provenance,
         overwrite=True,
         spare_bytes=SPARE_BYTES,
     ) as writer:
@@ -148,6 +149,7 @@ def _csv_metadata(content: Content) -> dict[str, object]:
         "title": content.title,
         "recorded_at": content.recorded_at,
         "setup": content.setup,
+        "provenance": content.provenance,
         "stream": described.name,
         "sample_rate": described.sample_rate,
         "start_time": described.start_time,

@@ -21,6 +21,7 @@ def record(
     stop: Callable[[], bool] | None = None,
     observer: Callable[[Block | Events], None] | None = None,
     spare_bytes: int = SPARE_BYTES,
+    provenance: str = "",
 ) -> None:
     """Write ``source`` to a new recording until it ends or ``stop`` says so.
 
@@ -43,6 +44,8 @@ def record(
         Shown every block and event after it was written; it must return quickly.
     spare_bytes
         Disk space kept aside, in bytes.
+    provenance
+        Where the recording comes from, as JSON text.
 
     Raises
     ------
@@ -61,6 +64,7 @@ def record(
         dtype=dtype,
         event_axes=announced_events(source),
         spare_bytes=spare_bytes,
+        provenance=provenance,
     ) as writer:
         try:
             source.open()

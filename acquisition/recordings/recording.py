@@ -104,6 +104,11 @@ class Recording:
         """Tool, cut and pose as TOML text."""
         return self._text("setup")
 
+    @property
+    def provenance(self) -> str:
+        """Where the recording comes from, as JSON text; empty where the file does not say."""
+        return self._text("provenance")
+
     def _text(self, name: str) -> str:
         with reporting_damage(self.path):
             return text_attribute(self._file.attrs, name)

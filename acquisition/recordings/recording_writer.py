@@ -48,6 +48,8 @@ class RecordingWriter:
         The same for series whose times are told by another clock.
     recorded_at
         ISO 8601 UTC; None: now.
+    provenance
+        Where the recording comes from, as JSON text: files with hashes, options, versions.
     overwrite
         Replace an existing file, unless it is being written.
     spare_bytes
@@ -71,6 +73,7 @@ class RecordingWriter:
         event_names: Sequence[str] = (),
         event_axes: Mapping[str, EventAxis] | None = None,
         recorded_at: str | None = None,
+        provenance: str = "",
         overwrite: bool = False,
         spare_bytes: int = 0,
     ) -> None:
@@ -90,7 +93,7 @@ class RecordingWriter:
             raise
         self._event_axes = dict.fromkeys(event_names, SAMPLES_AXIS) | dict(event_axes or {})
         stamp = recorded_at or datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
-        self._write_texts({"title": title, "recorded_at": stamp, "setup": setup})
+        self._write_texts({"title": title, "recorded_at": stamp, "setup": setup, "provenance": provenance})
         for stream in streams:
             make_stream(self._file, stream, dtype, block_length)
         for name, axis in self._event_axes.items():

@@ -60,6 +60,7 @@ def recover(
     path: str | os.PathLike[str],
     out: str | os.PathLike[str] | None = None,
     progress: Callable[[int], None] | None = None,
+    provenance: str = "",
 ) -> Recovered:
     """Copy what is sound of a recording into a new file that opens anywhere; the old one is left as it is.
 
@@ -74,6 +75,8 @@ def recover(
         New file; None: ``REC.recovered.h5`` beside it.
     progress
         Called with the number of samples copied, over all streams.
+    provenance
+        Where the new file comes from, as JSON text; empty: what the source says.
 
     Raises
     ------
@@ -91,10 +94,12 @@ def recover(
     if is_being_written(source):
         raise InputError(f"{source} is still being written; stop its writer first")
     with writing_whole_file(target) as temporary:
-        return _copy(source, temporary, target, progress)
+        return _copy(source, temporary, target, progress, provenance)
 
 
-def _copy(source: Path, temporary: Path, target: Path, progress: Callable[[int], None] | None) -> Recovered:
+def _copy(
+    source: Path, temporary: Path, target: Path, progress: Callable[[int], None] | None, provenance: str
+) -> Recovered:
     with Recording(source, accept_cut=True) as recording:
         if recording.complete and recording.format_version < 2:
             raise InputError(f"{source} was closed in order; there is nothing to recover")
@@ -108,6 +113,7 @@ def _copy(source: Path, temporary: Path, target: Path, progress: Callable[[int],
             dtype=_widest(recording),
             event_axes={name: one.axis for name, one in series.items()},
             recorded_at=recording.recorded_at,
+            provenance=provenance or recording.provenance,
             overwrite=True,
             spare_bytes=_SPARE_BYTES,
         ) as writer:

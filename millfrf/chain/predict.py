@@ -13,7 +13,7 @@ from mismatch import Prediction, predict, read_recording
 from modal_fit import ModalModel
 
 from ..gate import check_model_and_recordings, check_scales
-from ..provenance import with_warnings
+from ..provenance import made, with_warnings
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -118,10 +118,12 @@ def write_prediction(
     """
     title = f"responses predicted for {Path(recording_path).name} by {Path(model_path).name}"
     setup = with_warnings(predicted.setup, predicted.warnings)
-    described = (predicted.description,)
+    origin = made("predict", [model_path, recording_path])
     with (
         writing_whole_file(out) as temporary,
-        RecordingWriter(temporary, described, title=title, setup=setup, spare_bytes=1_000_000) as writer,
+        RecordingWriter(
+            temporary, (predicted.description,), title=title, setup=setup, provenance=origin, spare_bytes=1_000_000
+        ) as writer,
     ):
         writer.append(predicted.description.name, predicted.prediction.response)
 

@@ -23,11 +23,13 @@ def recover(
 
     from ..options import check_output
     from ..progress import bar
+    from ..provenance import made
 
     if out is not None:
         check_output(out, (".h5", ".hdf5"), [recording])
     with bar(f"recovering {recording.name}") as update:
-        back = recover_file(recording, out, progress=update)
+        origin = made("recover", [recording])
+        back = recover_file(recording, out, progress=update, provenance=origin)
     for line in recovered_lines(back):
         typer.echo(line)
     typer.echo(f"wrote {back.path}")

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from acquisition import Recording
@@ -13,6 +13,7 @@ from modal_fit import read_modal_model
 
 from ..gate import RECORD_AGAIN, check_depth, check_one_speed, check_recordings, read_checked_cutting
 from ..progress import bar
+from ..provenance import add_comment, add_to_json, origin
 from ..report import write_cut_report
 from ..result_folder import refuse_file
 from .diagnosis_words import summary
@@ -59,6 +60,9 @@ def diagnose_cut_files(cutting: Path, paths: Sequence[Path], out: Path, asking: 
     with writing_whole_folder(out) as folder:
         write_diagnosis(folder / "diagnosis.json", found)
         write_improved_cut(folder / "improved_cut.toml", found)
+        made_of = origin("cut diagnose", [cutting, *paths, *([asking.model] if asking.model else [])], asdict(asking))
+        add_to_json(folder / "diagnosis.json", made_of)
+        add_comment(folder / "improved_cut.toml", made_of)
         with bar("writing the report"):
             write_cut_report(folder / "report.html", found, cutting.name, lines)
     written = ", ".join(str(out / name) for name in ("diagnosis.json", "improved_cut.toml", "report.html"))

@@ -34,6 +34,7 @@ from replay_data import (
 
 from ..chain import EstimateOptions, FitOptions, estimate_recordings, fit_model, write_estimate, write_fit
 from ..progress import Progress, silent
+from ..provenance import made
 from .seal import open_seal, seal
 
 SECONDS = 48.0
@@ -167,7 +168,7 @@ def _draw(
 
 def _record(source: HammerCell | ConcealedCell, path: Path, progress: Progress) -> Path:
     with progress(f"recording {path.stem}", source.n_samples) as update, writing_whole_file(path) as unfinished:
-        record(source, unfinished, progress=update)
+        record(source, unfinished, progress=update, provenance=made("demo", []))
     return path
 
 

@@ -12,6 +12,7 @@ from replay_data import Settling, settle
 from stability import StabilityLobes, certified_lobes, write_lobes, zero_order
 
 from ..progress import Progress, silent
+from ..provenance import made
 from ..report import ReportOptions, write_report
 from ..tables import Table
 
@@ -71,7 +72,8 @@ def report_trap(folder: Path, identified: ModalModel, cutter: MillingProcess, pr
     cut, report = low_immersion(cutter), folder / "report_low_immersion.html"
     write_cutting_process(folder / "cut_low_immersion.toml", cut)
     lobes = folder / "lobes_low_immersion_zero_order.csv"
-    write_lobes(lobes, zero_order(identified, cut, AXIS_RPM * RPM, MAX_DEPTH))
+    made_of = made("lobes", [folder / "model_tip.json", folder / "cut_low_immersion.toml"], {"method": "zero-order"})
+    write_lobes(lobes, zero_order(identified, cut, AXIS_RPM * RPM, MAX_DEPTH), provenance=made_of)
     files = [folder / "model_tip.json", folder / "cut_low_immersion.toml", lobes]
     write_report(report, files, ReportOptions("A cut for which averaged coefficients are unsafe"), progress)
     return report

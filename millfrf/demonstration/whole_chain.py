@@ -40,6 +40,7 @@ from ..chain import (
     write_fit,
 )
 from ..progress import Progress, silent
+from ..provenance import made
 from ..report import ReportOptions, write_report
 from ..tables import Table
 from .demo_trap import Trap, report_trap, spring_trap, trap_table
@@ -72,6 +73,8 @@ SUBSPACE_BAND = (13.0, 60.0)
 """Records need no force on every line."""
 
 COMPARED_RPM = (800, 900, 1200, 1600, 2000)
+STRUCTURES = {"identified": "model_tip.json", "hammer": "frf_hammer_tip.h5", "true": "true_model_tip.json"}
+"""Files that hold the structures whose lobes are drawn."""
 AXIS_RPM = {"identified": (600, 2400, 91), "hammer": (600, 2400, 19), "true": (600, 2400, 91)}
 """Fewer speeds where lines of an FRF have to do: they take longer."""
 
@@ -164,7 +167,7 @@ def _run(
     structures: dict[str, Frf | ModalModel] = {"identified": identified, "hammer": tip, "true": true}
     for name, structure in structures.items():
         lobes = compute_lobes(structure, CUTTER, speed_axis(*AXIS_RPM[name]), MAX_DEPTH, progress=progress, name=name)
-        write_lobes(folder / f"lobes_{name}.csv", lobes)
+        write_lobes(folder / f"lobes_{name}.csv", lobes, provenance=made("lobes", [folder / STRUCTURES[name]]))
     compared = np.array(COMPARED_RPM) * RPM
     limits = {name: certified_lobes(structure, CUTTER, compared, MAX_DEPTH) for name, structure in structures.items()}
     _draw_lobes(folder)
@@ -252,7 +255,7 @@ def _record_all(folder: Path, options: DemoOptions, progress: Progress) -> tuple
 
 def _record(source: Source, path: Path, progress: Progress) -> Path:
     with progress(f"recording {path.stem}", source.n_samples) as update:
-        record(source, path, progress=update)
+        record(source, path, progress=update, provenance=made("demo", []))
     return path
 
 

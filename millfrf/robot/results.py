@@ -27,7 +27,7 @@ from robot_model import (
 from ..gate import check_depth, check_speed, read_checked_cutting
 from ..options import check_band, check_output
 from ..progress import bar
-from ..provenance import add_to_json, versions
+from ..provenance import add_to_json, origin
 from ..tables import Table, show
 from .asked_loads import Loads, check_axis, check_degrees, check_near, check_places, check_positive
 from .depth_maps import depth_over_places
@@ -88,7 +88,7 @@ def write_receptance(
         "robot": robot,
         "posture": shown_values(mechanism_of(case), driven),
         "warnings": list(result.warnings),
-        "versions": versions(),
+        **origin("robot frf", [robot]),
     }
     if out.suffix == ".json":
         with writing_whole_file(out) as temporary:

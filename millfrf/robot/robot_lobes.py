@@ -16,6 +16,7 @@ from ..chain import compute_lobes, lobes_summary, speed_axis
 from ..gate import check_depth, check_speed, check_speeds, lowest_frequency, read_checked_cutting
 from ..options import check_output
 from ..progress import bar
+from ..provenance import made
 from .depth_maps import depth_over_redundancy, write_posture_map
 from .postures import Asked, cut_place, posture_of, spatial
 from .results import RPM, say_doubts
@@ -61,7 +62,8 @@ def write_lobes_in_posture(
     doubts += check_speeds(speeds, process, lowest_frequency(result.known_model().natural_frequencies))
     found = compute_lobes(at_the_tip(result.known_model()), process, speed_axis(*speeds), max_depth, method, bar)
     found = replace(found, warnings=(*doubts, *result.warnings, *found.warnings))
-    write_lobes(out, found)
+    asked_for = {"speeds_rpm": speeds, "depth_max_m": max_depth, "method": method}
+    write_lobes(out, found, provenance=made("robot lobes", [robot, cutting], asked_for))
     for warning in found.warnings:
         typer.echo(f"warning: {warning}", err=True)
     typer.echo(f"wrote {out}: {lobes_summary(found, max_depth)}")

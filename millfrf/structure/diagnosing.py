@@ -23,6 +23,7 @@ from modal_fit import ModalModel, read_modal_model, write_modal_model
 from ..chain import SUBSPACE, FitOptions, fit_recordings
 from ..gate import check_model_and_recordings
 from ..progress import Progress, silent
+from ..provenance import add_to_json, origin
 from ..report import write_diagnosis_report
 from ..result_folder import refuse_file
 from .diagnosis_words import diagnosis_lines
@@ -66,6 +67,9 @@ def diagnose_files(
         paths = [unfinished / name for name in names]
         write_diagnosis(paths[0], diagnosis)
         write_modal_model(paths[1], improved_model_of(diagnosis))
+        asked = {"stream": stream, "band_hz": band, "settings": settings}
+        for path in paths[:2]:
+            add_to_json(path, origin("diagnose", [model_path, *recordings], asked))
         with progress("writing the report"):
             write_diagnosis_report(paths[2], diagnosis, Path(model_path).name, process)
     measured = measured_part(whole, recordings, stream=stream).responses

@@ -9,6 +9,7 @@ from estimation import import_frf, is_frf_mapping, load_frf_mapping, looks_like_
 from foundation import InputError
 
 from ...gate import doubts_of_rate
+from ...provenance import made
 from .convert_uff import UFF_SUFFIXES, Told, convert_uff, is_uff_conversion, write_imported
 
 FRF_SUFFIXES = (".h5", ".hdf5", *UFF_SUFFIXES)
@@ -58,7 +59,8 @@ def convert_files(
         )
     if mapping is None and is_uff_conversion(sources[0], target):
         return [target], convert_uff(sources[0], target)
-    written = convert_recording(sources[0], target, mapping, progress=progress, span=span)
+    origin = made("convert", [sources[0], *([] if mapping is None else [mapping])], {"span_s": span})
+    written = convert_recording(sources[0], target, mapping, progress=progress, span=span, provenance=origin)
     doubts = tuple(doubt for path in written for doubt in doubts_of_rate(path))
     return written, Told((), doubts)
 

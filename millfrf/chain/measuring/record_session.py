@@ -30,6 +30,7 @@ from acquisition import (
 )
 from foundation import MillfrfError
 
+from ...provenance import made
 from .simulated_device import simulated_device
 
 Watcher = Callable[[Block | Events], None]
@@ -177,6 +178,7 @@ def acquire(
                 out,
                 observer=observe,
                 progress=progress,
+                provenance=made("acquire", [opened.path]),
                 stop=lambda: ended(interrupted() or stop() or tally.seconds() >= duration),
             )
     except (DeviceError, DiskFull) as error:

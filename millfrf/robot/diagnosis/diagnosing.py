@@ -1,7 +1,7 @@
 """The step from a robot's file and recordings in several postures to a diagnosis, models and a report."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read
 from ...gate import RECORD_AGAIN, check_channels
 from ...options import check_band
 from ...progress import bar
+from ...provenance import add_to_json, origin
 from ...report import write_robot_report
 from ...result_folder import refuse_file
 from ..postures import Asked, posture_of, spatial
@@ -72,6 +73,8 @@ def diagnose_robot_files(robot: str, paths: Sequence[Path], out: Path, asking: A
             top = 3 * float(recording.spectrum.frequencies[-1])
             model = model_of_modes(modes, improved, axes=recording.axes, highest_frequency=top)
             write_modal_model(folder / f"model_{recording.name}.json", model)
+        for path in folder.glob("*.json"):
+            add_to_json(path, origin("robot diagnose", [robot, *paths], asdict(asking)))
         with bar("writing the report"):
             write_robot_report(folder / "report.html", found, case.name, lines)
     lines += [f"warning: {doubt}" for doubt in doubts]

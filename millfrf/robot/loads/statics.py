@@ -11,7 +11,7 @@ from foundation import writing_whole_file
 from robot_model import PlanarCase, PostureResult, SpatialCase, in_posture, read_robot, shown_values
 
 from ...options import check_output
-from ...provenance import versions
+from ...provenance import origin
 from ...tables import Table, show
 from ..asked_loads import Loads, check_positive
 from ..postures import Asked, mechanism_of, posture_of
@@ -90,7 +90,7 @@ def _write(out: Path, robot: str, posture: str, result: PostureResult, force: fl
         "force_n": force,
         **found,
         "warnings": list(result.warnings),
-        "versions": versions(),
+        "provenance": origin("robot stiffness", [robot]),
     }
     with writing_whole_file(out) as temporary:
         temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
