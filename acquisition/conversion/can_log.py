@@ -59,6 +59,7 @@ def add_can_log(
     target: str | os.PathLike[str],
     mapping: str | os.PathLike[str],
     progress: Callable[[int], None] | None = None,
+    provenance: str = "",
 ) -> Path:
     """Write the recording that the mapping names with the log's signals among its events.
 
@@ -72,6 +73,8 @@ def add_can_log(
         TOML file with the keys of `LogMapping`.
     progress
         Called with the number of samples written.
+    provenance
+        Where the output comes from, as JSON text.
 
     Raises
     ------
@@ -90,7 +93,8 @@ def add_can_log(
         if twice:
             raise InputError(f"{recording.path.name} has events {', '.join(twice)} already; name another series")
         with writing_whole_file(out) as temporary:
-            write_content(replace(content, events={**content.events, **shifted}), temporary, progress)
+            whole = replace(content, events={**content.events, **shifted}, provenance=provenance)
+            write_content(whole, temporary, progress)
     return out
 
 

@@ -149,7 +149,7 @@ def _csv_metadata(content: Content) -> dict[str, object]:
         "title": content.title,
         "recorded_at": content.recorded_at,
         "setup": content.setup,
-        "provenance": content.provenance,
+        "provenance": json.loads(content.provenance or "{}"),
         "stream": described.name,
         "sample_rate": described.sample_rate,
         "start_time": described.start_time,

@@ -30,6 +30,7 @@ def convert(
 
     from ..chain import FRF_SUFFIXES, convert_files, is_frf_conversion, is_uff_conversion
     from ..progress import bar
+    from ..provenance import made
 
     if len(files) < 2:
         raise InputError(f"{files[0]} alone: give files to read and a file to write: millfrf convert IN... OUT")
@@ -38,7 +39,8 @@ def convert(
         if mapping is None:
             raise InputError(f"{sources[0]} needs --map MAP.toml with recording, dbc and signals")
         with bar(f"adding {sources[0].name}") as update:
-            typer.echo(f"wrote {add_can_log(sources[0], target, mapping, update)}")
+            origin = made("convert", [sources[0], mapping])
+            typer.echo(f"wrote {add_can_log(sources[0], target, mapping, update, origin)}")
         return
     if is_frf_conversion(sources, mapping):
         check_output(target, FRF_SUFFIXES, sources)

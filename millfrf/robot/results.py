@@ -27,7 +27,7 @@ from robot_model import (
 from ..gate import check_depth, check_speed, read_checked_cutting
 from ..options import check_band, check_output
 from ..progress import bar
-from ..provenance import add_to_json, origin
+from ..provenance import add_comment, add_to_json, origin
 from ..tables import Table, show
 from .asked_loads import Loads, check_axis, check_degrees, check_near, check_places, check_positive
 from .depth_maps import depth_over_places
@@ -145,7 +145,9 @@ def write_compensation(robot: str, path: Path, asked: Asked, out: Path, loads: L
     close_loops(case.robot.mechanism, start)
     with bar("compensating"):
         result = compensate_path(case.robot, read_tool_path(path), start, payload=loads.payload, weight=loads.weight)
-    write_compensated_path(out, result)
+    with writing_whole_file(out) as unfinished:
+        write_compensated_path(unfinished, result)
+        add_comment(unfinished, origin("robot compensate", [robot, path], {"payload_and_weight": loads}))
     before, after, sag = (
         1e3 * np.linalg.norm(moved[:, :3], axis=1) for moved in (result.deviations, result.left, result.weight)
     )

@@ -16,7 +16,7 @@ from ..chain import compute_lobes, lobes_summary, speed_axis
 from ..gate import check_depth, check_speed, check_speeds, lowest_frequency, read_checked_cutting
 from ..options import check_output
 from ..progress import bar
-from ..provenance import made
+from ..provenance import add_comment, made, origin
 from .depth_maps import depth_over_redundancy, write_posture_map
 from .postures import Asked, cut_place, posture_of, spatial
 from .results import RPM, say_doubts
@@ -103,7 +103,9 @@ def write_map_over_redundancy(
             case.robot, cut_place(asked), axis, process, speed * RPM, max_depth, asked.redundancy
         )
     best = found.best()
-    write_posture_map(out, found, doubts)
+    with writing_whole_file(out) as unfinished:
+        write_posture_map(unfinished, found, doubts)
+        add_comment(unfinished, origin("robot lobes", [robot, cutting], {"speed_rpm": speed, "depth_max_m": max_depth}))
     typer.echo(
         f"wrote {out}: {found.reached.sum()} of {len(axis)} angles reached; best {1e3 * found.values[best]:.3g} mm at "
         f"{np.degrees(axis[best]):.1f} deg, worst {1e3 * np.nanmin(found.values):.3g} mm"

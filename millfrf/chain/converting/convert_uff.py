@@ -20,7 +20,7 @@ from foundation import writing_whole_file
 from modal_fit import ModalModel, import_modes_uff, read_modal_model, write_modal_model, write_modes_uff
 
 from ...gate import check_frf
-from ...provenance import add_to_json, sources, versions
+from ...provenance import add_comment, add_to_json, origin, sources, versions
 
 UFF_SUFFIXES = (".uff", ".unv")
 
@@ -79,7 +79,9 @@ def convert_geometry(source: str | os.PathLike[str], target: str | os.PathLike[s
         A file that cannot be used; nothing is written.
     """
     geometry, doubts = import_geometry(source)
-    write_geometry(target, geometry)
+    with writing_whole_file(target) as temporary:
+        write_geometry(temporary, geometry)
+        add_comment(temporary, origin("convert", [source]))
     return Told((), doubts)
 
 

@@ -32,6 +32,7 @@ from robot_model import (
 )
 
 from ...options import check_output
+from ...provenance import add_comment, origin
 from ...tables import Table, show
 from ..asked_loads import Loads, check_axis, check_places, check_positive
 from ..postures import spatial
@@ -167,7 +168,9 @@ def show_deviation(
     for warning in warnings:
         typer.echo(f"warning: {warning}", err=True)
     if out is not None:
-        _write_deviations(out, found, needed, warnings)
+        with writing_whole_file(out) as unfinished:
+            _write_deviations(unfinished, found, needed, warnings)
+            add_comment(unfinished, origin("robot deviation", [robot], {"area": area, "accuracy": accuracy}))
         typer.echo(f"wrote {out}")
     if picture is not None:
         from ..picture import draw_deviation
@@ -254,7 +257,7 @@ def _show_budget(holes: _Holes, worst: int, budget: UncertaintyBudget) -> None:
 
 
 def _write_deviations(out: Path, found: DeviationMap, needed: Real, warnings: Sequence[str]) -> None:
-    with writing_whole_file(out) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+    with out.open("w", newline="", encoding="utf-8") as stream:
         stream.writelines(warning_lines(warnings))
         writer = csv.writer(stream)
         names = [f"{what}{axis}_m" for what in ("", "deviation_", "weight_") for axis in "xyz"]
