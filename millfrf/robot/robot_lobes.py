@@ -7,7 +7,7 @@ import numpy as np
 import typer
 
 from figures import lobes_figure, save_figure
-from foundation import TIP, InputError
+from foundation import TIP, InputError, writing_whole_file
 from modal_fit import ModalModel, Residuals
 from robot_model import in_posture, read_robot
 from stability import with_residual_flexibility, write_lobes
