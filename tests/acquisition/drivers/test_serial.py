@@ -181,7 +181,7 @@ def test_a_drive_on_the_network_is_read_and_comes_back(tmp_path: Path) -> None:
         (lost, back), codes = recording.events["devices"].read()
         times, values = recording.events["rpm"].read()
         assert codes.tolist() == [0.0, 1.0]
-        assert 0.5 < lost < 1.2 < back < 1.6
+        assert 0.5 < lost < 1.2 < back < 2.3
         assert set(values[times < lost]) == {5968.5}
         assert set(values[times >= back]) == {6000.0}
         assert recording.events["load"].read()[1][0] == -2.0
@@ -219,21 +219,22 @@ def test_a_plug_that_is_pulled_and_put_in_again_does_not_end_the_cut(
             ends.append(far_end(SERVERS[kind]))
             port.symlink_to(ends[1].port)
 
-    record(WithFeeds(Clockwork(60), [feed], retry=0.1), tmp_path / "a.h5", observer=pull)
+    n_blocks = 60 if kind == "strict" else 38  # a clock that steps is held for a second
+    record(WithFeeds(Clockwork(n_blocks), [feed], retry=0.1), tmp_path / "a.h5", observer=pull)
     with Recording(tmp_path / "a.h5") as recording:
-        assert (recording.complete, recording.stream().n_samples) == (True, 3000)
+        assert (recording.complete, recording.stream().n_samples) == (True, 50 * n_blocks)
         log = recording.events["devices"]
         times, codes = log.read()
         texts = log.read_texts()
         assert codes[:2].tolist() == [0.0, 1.0], texts
         assert texts[0].startswith(f"{feed.where}: lost (")
         assert texts[1] == f"{feed.where}: back"
-        assert 0.5 < times[0] < 0.8
-        assert 1.2 < times[1] < 1.6
+        assert 0.5 < times[0] < 1.1
+        assert 1.2 < times[1] < 1.85
         if kind != "amplifier":
             at, values = recording.events["speed"].read()
             assert set(values) == {5.0}
-            assert at.max() > 2.5
+            assert at.max() > 0.05 * n_blocks - 0.3
             assert not ((at > times[0] + 0.05) & (at < times[1] - 0.05)).any()
         if kind == "strict":
             assert "lines are missing, the times go on" in texts[2]
