@@ -18,6 +18,8 @@ SPEED = "spindle_speed_rpm"
 MOST_ORDERS = 24
 NEAR = 1.5
 """Distance from an order within which lines belong to it, in spacings of a block's lines."""
+LONGEST_GAP, USUAL_GAPS = 2.0, 20.0
+"""A gap between two statements of the speed longer than this, in s and in median gaps, is a device that was lost."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +38,20 @@ class SpindleSpeed:
     rpm: Real
 
     def hertz(self, start: float, stop: float) -> tuple[float, float]:
-        """Return the mean speed between two times, and its range there, revolutions a second."""
+        """Return the mean speed between two times, and its range there, revolutions a second.
+
+        Both are NaN where nobody stated the speed for so long that its device must have been lost.
+        """
+        steps = np.diff(self.time)
+        if len(steps) and self._lost(steps, start, stop):
+            return float("nan"), float("nan")
         at = np.interp(np.linspace(start, stop, 9), self.time, self.rpm) / 60
         return float(at.mean()), float(np.ptp(at))
+
+    def _lost(self, steps: Real, start: float, stop: float) -> bool:
+        """Whether a gap between two statements, longer than all usual ones, reaches into the stretch of time."""
+        gaps = steps > max(LONGEST_GAP, USUAL_GAPS * float(np.median(steps)))
+        return bool((gaps & (self.time[:-1] < stop) & (self.time[1:] > start)).any())
 
 
 def spindle_speed(path: str | os.PathLike[str]) -> SpindleSpeed | None:
@@ -71,7 +84,7 @@ def order_powers(blocks: BlockResidual, speed: SpindleSpeed) -> tuple[Real, Real
     sums = np.zeros((3, MOST_ORDERS))
     for row, start, stop in zip(blocks.power, blocks.times[:-1], blocks.times[1:], strict=True):
         rotation, change = speed.hertz(float(start), float(stop))
-        if rotation < 4 * NEAR * step:
+        if not rotation >= 4 * NEAR * step:  # too slow, or unknown (NaN)
             continue
         for k in range(MOST_ORDERS):
             order = k + 1

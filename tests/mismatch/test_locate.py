@@ -139,3 +139,13 @@ def test_noise_is_not_believed_where_something_stayed_unexplained(
     assert locate(fooled)["frequency_bands"] == []
     first = locate(replace(fooled, verdict="unexplained"))["frequency_bands"][0]
     assert first["low_hz"] < 10 < first["high_hz"]
+
+
+def test_a_speed_whose_device_was_lost_is_unknown_there() -> None:
+    time = np.r_[np.arange(0.0, 10.0, 0.1), np.arange(14.0, 20.0, 0.1)]
+    speed = SpindleSpeed(time, np.where(time < 10, 6000.0, 9000.0))
+    assert speed.hertz(2.0, 4.0) == (100.0, 0.0)
+    assert speed.hertz(15.0, 16.0) == (150.0, 0.0)
+    for start, stop in ((9.5, 10.5), (11.0, 12.0), (13.0, 15.0)):
+        assert np.isnan(speed.hertz(start, stop)).all()
+    assert SpindleSpeed(np.array([0.0, 5.0]), np.array([6000.0, 6000.0])).hertz(1.0, 2.0) == (100.0, 0.0)
