@@ -17,7 +17,7 @@ from ..errors import Overrun
 from ..file_safety import SpareSpace, Syncer, is_being_written
 from ..sources import SAMPLES_AXIS, EventAxis, Events, StreamDescription, stored_texts
 from .recording_format import ENDING_BYTES, FORMAT, FORMAT_VERSION
-from .tables import append_missing, append_samples, append_summed, make_events, make_stream
+from .tables import Tables, append_missing, append_samples, append_summed, make_events, make_stream
 
 PAGE_BYTES = 4096
 """Bytes that systems write back to a disk together."""
@@ -91,13 +91,14 @@ class RecordingWriter:
             self._file.close()
             self.path.unlink()
             raise
+        self._tables: dict[str, Tables] = {}
         self._event_axes = dict.fromkeys(event_names, SAMPLES_AXIS) | dict(event_axes or {})
         stamp = recorded_at or datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         self._write_texts({"title": title, "recorded_at": stamp, "setup": setup, "provenance": provenance})
         for stream in streams:
-            make_stream(self._file, stream, dtype, block_length)
+            self._tables[f"signals/{stream.name}"] = make_stream(self._file, stream, dtype, block_length)
         for name, axis in self._event_axes.items():
-            make_events(self._file, name, axis)
+            self._tables[f"events/{name}"] = make_events(self._file, name, axis)
         self._file.swmr_mode = True
         self._file.flush()
         self._syncer = Syncer(self.path)
@@ -142,7 +143,7 @@ class RecordingWriter:
         DiskFull
             No room is left.
         """
-        described, group = self._described(stream), self._file["signals"][stream]
+        described, group = self._described(stream), self._tables[f"signals/{stream}"]
         self._check_columns(described, samples)
         if first_sample is not None:
             self._check_order(stream, first_sample, group["samples"].shape[0])
@@ -173,7 +174,7 @@ class RecordingWriter:
             No room is left.
         """
         self._check_columns(self._described(stream), samples)
-        append_missing(self._file["signals"][stream], samples, reason, self._spare, self.path)
+        append_missing(self._tables[f"signals/{stream}"], samples, reason, self._spare, self.path)
 
     def _check_columns(self, described: StreamDescription, samples: NDArray[np.floating]) -> None:
         if samples.ndim != 2 or samples.shape[1] != len(described.channels):
@@ -234,8 +235,8 @@ class RecordingWriter:
             raise InputError(
                 f"event {name}: {events.times.size} times but {events.values.size} values (or texts); give one a time"
             )
-        group = self._file[f"events/{name}"]
-        append_summed(group, list(columns), "sum", list(columns.values()), self._spare)
+        group = self._tables[f"events/{name}"]
+        append_summed(group, list(columns), "sum", list(columns.values()), self._spare, self.path)
 
     def append_clock_pair(self, stream: str, sample_index: int, host_time: float) -> None:
         """Append (sample index, host monotonic time in s) to a stream's clock."""
@@ -244,7 +245,7 @@ class RecordingWriter:
     def append_clock_pairs(self, stream: str, pairs: NDArray[np.float64]) -> None:
         """Append several such pairs (n_pairs, 2)."""
         self._described(stream)
-        append_summed(self._file["signals"][stream], ["clock"], "clock_sum", [pairs], self._spare)
+        append_summed(self._tables[f"signals/{stream}"], ["clock"], "clock_sum", [pairs], self._spare, self.path)
 
     def _described(self, stream: str) -> StreamDescription:
         if stream not in self.streams:

@@ -1,7 +1,7 @@
 """The tables of a recording file: made empty, grown row by row, each row or block with its checksum."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import h5py
 import numpy as np
@@ -23,9 +23,11 @@ MISSING = np.dtype([("first_row", "<u8"), ("rows", "<u8"), ("reason", "S120")])
 """Rows of a stream that are missing; their samples are NaN."""
 
 Real = NDArray[np.floating]
+Tables = Mapping[str, h5py.Dataset]
+"""Tables of one group by name, held open: looking them up takes longer than a block's checksum."""
 
 
-def make_stream(file: h5py.File, stream: StreamDescription, dtype: str, block_length: int) -> None:
+def make_stream(file: h5py.File, stream: StreamDescription, dtype: str, block_length: int) -> Tables:
     """Make the group of a stream, with empty tables.
 
     Parameters
@@ -49,9 +51,10 @@ def make_stream(file: h5py.File, stream: StreamDescription, dtype: str, block_le
     group.create_dataset("missing", (0,), MISSING, maxshape=(None,), chunks=(ENTRIES,))
     group.create_dataset("clock", (0, 2), "f8", maxshape=(None, 2), chunks=(SLOW_ROWS, 2))
     group.create_dataset("clock_sum", (0,), "<u4", maxshape=(None,), chunks=(SLOW_ROWS,))
+    return dict(group.items())
 
 
-def make_events(file: h5py.File, name: str, axis: EventAxis) -> None:
+def make_events(file: h5py.File, name: str, axis: EventAxis) -> Tables:
     """Make the group of a series of events, with empty columns.
 
     Parameters
@@ -70,6 +73,7 @@ def make_events(file: h5py.File, name: str, axis: EventAxis) -> None:
         dtype = f"S{TEXT_BYTES}" if column == "text" else "f8"
         group.create_dataset(column, (0,), dtype, maxshape=(None,), chunks=(SLOW_ROWS,))
     group.create_dataset("sum", (0,), "<u4", maxshape=(None,), chunks=(SLOW_ROWS,))
+    return dict(group.items())
 
 
 def event_columns(axis: EventAxis) -> tuple[str, ...]:
@@ -78,13 +82,13 @@ def event_columns(axis: EventAxis) -> tuple[str, ...]:
     return ("time", "value", *arrival, *(("text",) if axis.texts else ()))
 
 
-def append_samples(group: h5py.Group, samples: Real, spare: SpareSpace | None, path: object) -> None:
+def append_samples(tables: Tables, samples: Real, spare: SpareSpace | None, path: object) -> None:
     """Append rows to a stream, and then the checksums of their blocks.
 
     Parameters
     ----------
-    group
-        Group of the stream.
+    tables
+        Tables of the stream.
     samples : (n_samples, n_channels)
         Rows in SI units.
     spare
@@ -97,19 +101,19 @@ def append_samples(group: h5py.Group, samples: Real, spare: SpareSpace | None, p
     DiskFull
         No room is left.
     """
-    table, blocks = group["samples"], group["blocks"]
+    table, blocks = tables["samples"], tables["blocks"]
     stored = np.asarray(samples, table.dtype)
     entries = entries_of(stored, table.shape[0], blocks.shape[0])
     append_rows([(table, stored), (blocks, entries)], spare, path)
 
 
-def append_missing(group: h5py.Group, samples: Real, reason: str, spare: SpareSpace | None, path: object) -> None:
+def append_missing(tables: Tables, samples: Real, reason: str, spare: SpareSpace | None, path: object) -> None:
     """Append rows to a stream of which some are missing, NaN, and say which and why.
 
     Parameters
     ----------
-    group
-        Group of the stream.
+    tables
+        Tables of the stream.
     samples : (n_samples, n_channels)
         Rows in SI units; a row that holds NaN is missing.
     reason
@@ -124,24 +128,29 @@ def append_missing(group: h5py.Group, samples: Real, reason: str, spare: SpareSp
     DiskFull
         No room is left.
     """
-    first, table = group["samples"].shape[0], group["missing"]
+    first, table = tables["samples"].shape[0], tables["missing"]
     gone = np.concatenate([[False], ~np.isfinite(samples).all(axis=1), [False]])
     edges = np.flatnonzero(np.diff(gone.astype(np.int8)))
-    append_samples(group, samples, spare, path)
+    append_samples(tables, samples, spare, path)
     text = " ".join(reason.split()).encode()[: MISSING["reason"].itemsize]
     rows = [(first + a, b - a, text) for a, b in edges.reshape(-1, 2)]
     append_rows([(table, np.array(rows, MISSING))], spare, path)
 
 
 def append_summed(
-    group: h5py.Group, columns: Sequence[str], sums: str, rows: Sequence[NDArray[np.generic]], spare: SpareSpace | None
+    tables: Tables,
+    columns: Sequence[str],
+    sums: str,
+    rows: Sequence[NDArray[np.generic]],
+    spare: SpareSpace | None,
+    path: object,
 ) -> None:
     """Append rows of slow values, and then their checksums.
 
     Parameters
     ----------
-    group
-        Group that holds the columns.
+    tables
+        Tables that hold the columns.
     columns
         Names of the columns.
     sums
@@ -150,16 +159,18 @@ def append_summed(
         New rows of each column.
     spare
         Disk space to give back when the disk is full.
+    path
+        Path of the file, for messages.
 
     Raises
     ------
     DiskFull
         No room is left.
     """
-    stored = [np.asarray(new, group[name].dtype) for name, new in zip(columns, rows, strict=True)]
-    checks = row_sums(stored, group[sums].shape[0])
-    tables = [group[name] for name in (*columns, sums)]
-    append_rows(list(zip(tables, (*stored, checks), strict=True)), spare, group.file.filename)
+    stored = [np.asarray(new, tables[name].dtype) for name, new in zip(columns, rows, strict=True)]
+    checks = row_sums(stored, tables[sums].shape[0])
+    grown = [tables[name] for name in (*columns, sums)]
+    append_rows(list(zip(grown, (*stored, checks), strict=True)), spare, path)
 
 
 def summed_rows(group: h5py.Group, columns: Sequence[str], sums: str) -> tuple[list[NDArray[np.generic]], int]:

@@ -93,8 +93,8 @@ def test_ten_kills_lose_nothing_acknowledged(killer: Killer, tmp_path: Path) -> 
 
 @posix
 @pytest.mark.slow
-def test_two_hundred_kills_lose_nothing_acknowledged(killer: Killer, tmp_path: Path) -> None:
-    for seed in range(100, 300):
+def test_three_hundred_kills_lose_nothing_acknowledged(killer: Killer, tmp_path: Path) -> None:
+    for seed in range(100, 400):
         _kill_and_recover(killer, tmp_path, seed)
 
 
