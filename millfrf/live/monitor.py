@@ -213,7 +213,7 @@ class LiveMonitor:
         """Stack what came so far with the tests before; while nothing is recorded yet, those tests alone."""
         self._grown = spectra.grown()
         mine = None if self._grown is None else self._grown.cross
-        before = [] if self.session is None else [one.spectra for one in self.session.earlier if one.spectra]
+        before = [] if self.session is None or self.session.total is None else [self.session.total]
         stacked = [*before, *([mine] if mine and (self._recording or not before) else [])]
         self._stacked = stack(stacked) if stacked else None
         self._bands = self._judged(self._stacked)

@@ -1,4 +1,4 @@
-from .earlier_tests import SPEED_EVENTS, SessionTest, SetUp, read_test, tests_beside
+from .earlier_tests import SPEED_EVENTS, SessionTest, SetUp, force_power, read_test, tests_beside
 from .milled_speeds import MilledSpeeds
 from .planned_sweeps import SessionPlan, session_plan
 from .session_tests import SessionTests
@@ -14,6 +14,7 @@ __all__ = [
     "SetUp",
     "Standing",
     "TestRow",
+    "force_power",
     "read_test",
     "session_plan",
     "standing_of",

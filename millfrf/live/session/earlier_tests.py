@@ -8,6 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from acquisition import Recording, StreamDescription
 from cutting import immersion_angles
 from estimation import CrossSpectra
@@ -45,6 +48,29 @@ class SetUp:
 
 
 @dataclass(frozen=True)
+class ForcePower:
+    """Power of the forces over frequency; of a test that is stacked nothing else is kept.
+
+    Parameters
+    ----------
+    frequencies : (n_lines,), Hz
+        Frequencies of the lines.
+    power : (n_lines, n_forces), N^2/Hz
+        Power spectral density of each force.
+    """
+
+    frequencies: NDArray[np.float64]
+    power: NDArray[np.float64]
+
+
+def force_power(spectra: CrossSpectra | None) -> ForcePower | None:
+    """Give the power of the forces of spectra; None where there are none."""
+    if spectra is None:
+        return None
+    return ForcePower(spectra.frequencies, np.real(np.einsum("kii->ki", spectra.input_spectra)).copy())
+
+
+@dataclass(frozen=True)
 class SessionTest:
     """One test of a session.
 
@@ -52,8 +78,8 @@ class SessionTest:
     ----------
     name
         Name of the recording.
-    spectra
-        Its spectra; None: too short for any.
+    forces
+        Power of its forces; None: it is too short for spectra.
     immersion : degrees
         Start and exit angle; None where it does not say.
     seconds : s
@@ -63,7 +89,7 @@ class SessionTest:
     """
 
     name: str
-    spectra: CrossSpectra | None
+    forces: ForcePower | None
     immersion: Immersion | None
     seconds: float
     speeds: MilledSpeeds | None = None
@@ -76,8 +102,10 @@ def tests_beside(out: Path, pattern: str) -> list[Path]:
     return sorted(path for path in out.parent.glob(pattern) if path.is_file() and path.resolve() != out.resolve())
 
 
-def read_test(path: Path, wanted: SetUp, stopped: Callable[[], bool] = lambda: False) -> SessionTest:
-    """Read a recording's spectra, with pauses, so that the recording that runs is not held up.
+def read_test(
+    path: Path, wanted: SetUp, stopped: Callable[[], bool] = lambda: False
+) -> tuple[SessionTest, CrossSpectra | None]:
+    """Read a recording and its spectra, with pauses, so that the recording that runs is not held up.
 
     Raises
     ------
@@ -102,7 +130,8 @@ def read_test(path: Path, wanted: SetUp, stopped: Callable[[], bool] = lambda: F
         grown = spectra.grown()
         seconds = stream.n_samples / stream.sample_rate
         cross = None if grown is None else grown.cross
-        return SessionTest(path.name, cross, immersion_of(recording.setup), seconds, _speeds(recording))
+        immersion = immersion_of(recording.setup)
+        return SessionTest(path.name, force_power(cross), immersion, seconds, _speeds(recording)), cross
 
 
 def _speeds(recording: Recording) -> MilledSpeeds | None:

@@ -4,11 +4,11 @@ import threading
 from collections.abc import Sequence
 from pathlib import Path
 
-from estimation import CrossSpectra
+from estimation import CrossSpectra, sum_tests
 from foundation import MillfrfError
 
 from ..enough import BandProgress
-from .earlier_tests import SessionTest, SetUp, immersion_of, read_test, tests_beside
+from .earlier_tests import SessionTest, SetUp, force_power, immersion_of, read_test, tests_beside
 from .milled_speeds import MilledSpeeds
 from .planned_sweeps import SessionPlan
 from .standing import Standing, standing_of
@@ -35,6 +35,7 @@ class SessionTests:
         self.plan, self._out, self._pattern, self._setup = plan, out, pattern, setup
         self._notes = [note] if note else []
         self._earlier: list[SessionTest] = []
+        self._total: CrossSpectra | None = None
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._reading = ""
@@ -48,6 +49,11 @@ class SessionTests:
     def earlier(self) -> tuple[SessionTest, ...]:
         """Tests that were read so far."""
         return tuple(self._earlier)
+
+    @property
+    def total(self) -> CrossSpectra | None:
+        """Spectra of the tests that were read so far, summed: their number does not cost memory."""
+        return self._total
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -67,7 +73,10 @@ class SessionTests:
                 return
             self._reading = f"reading {path.name} ..."
             try:
-                self._earlier.append(read_test(path, wanted, self._stop.is_set))
+                test, spectra = read_test(path, wanted, self._stop.is_set)
+                if spectra is not None:
+                    self._total = spectra if self._total is None else sum_tests([self._total, spectra])
+                self._earlier.append(test)
             except (MillfrfError, OSError) as error:
                 self._notes.append(f"{path.name} is not stacked: {error}")
             self._reading = ""
@@ -80,7 +89,7 @@ class SessionTests:
     def running(self, spectra: CrossSpectra | None, seconds: float, speeds: MilledSpeeds) -> SessionTest:
         """The running test with its name and immersion, its spectra, duration (s) and speeds so far."""
         told = speeds if speeds.known else None
-        return SessionTest(self._out.name, spectra, immersion_of(self._setup), seconds, told)
+        return SessionTest(self._out.name, force_power(spectra), immersion_of(self._setup), seconds, told)
 
     def standing(
         self, now: SessionTest | None, ended: bool, bands: Sequence[BandProgress], frf_known: bool

@@ -155,14 +155,12 @@ def coverage(plan: SessionPlan, group: Sequence[SessionTest]) -> tuple[float, li
 
 def _milled_by(test: SessionTest, axis: NDArray[np.int64], plan: SessionPlan) -> NDArray[np.bool_]:
     """Whether a test has milled each speed (rpm)."""
-    spectra = test.spectra
-    if spectra is None:
+    if test.forces is None:
         return np.zeros(len(axis), dtype=bool)
-    passing, f = axis * plan.teeth / 60, spectra.frequencies
+    passing, f, power = axis * plan.teeth / 60, test.forces.frequencies, test.forces.power
     inside = (f >= 0.9 * plan.band[0]) & (f <= 1.1 * plan.band[1])
     if not inside.any():
         return np.zeros(len(axis), dtype=bool)
-    power = np.real(np.einsum("kii->ki", spectra.input_spectra))
     share = np.max(power / np.maximum(power[inside].max(axis=0), _TINY), axis=1)
     at_passing = np.interp(passing, f, share)
     if test.speeds is None:

@@ -18,7 +18,7 @@ from millfrf.live import LiveMonitor, SessionPlan
 from millfrf.live.drawings import all_drawings, first_choice
 from millfrf.live.enough import BandProgress
 from millfrf.live.monitor import Snapshot
-from millfrf.live.session import MilledSpeeds, SessionTest, standing_of
+from millfrf.live.session import MilledSpeeds, SessionTest, force_power, standing_of
 from replay_data import default_structure
 
 SESSION = """
@@ -198,7 +198,7 @@ def _spectra() -> CrossSpectra:
 def _test(name: str, immersion: tuple[float, float] | None, speeds: Sequence[float]) -> SessionTest:
     milled = MilledSpeeds()
     milled.add(np.array(speeds))
-    return SessionTest(name, _spectra(), immersion, 40.0, milled)
+    return SessionTest(name, force_power(_spectra()), immersion, 40.0, milled)
 
 
 WHOLE = tuple(np.linspace(420, 720, 400))
