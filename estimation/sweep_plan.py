@@ -125,7 +125,13 @@ def plan_sweeps(cutter: "MillingProcess", demand: SweepDemand) -> SweepPlan:
     low, high = demand.band
     frequencies = np.linspace(low, high, 101)
     spectra = predicted_spectra(processes, demand.depth, demand.band, frequencies)
-    inverse = np.linalg.inv(spectra)
+    try:
+        inverse = np.linalg.inv(spectra)
+    except np.linalg.LinAlgError as error:
+        raise InputError(
+            f"no forces in {low:g} to {high:g} Hz with depth_m = {demand.depth:g} and feed "
+            f"{cutter.feed_per_tooth:g} m; give a depth and a feed that cut"
+        ) from error
     weakest = np.sqrt(np.real(np.einsum("kqq->kq", inverse)) * demand.response_noise**2 / demand.resolution)
     duration = float((weakest.max() / demand.frf_error) ** 2 / len(processes))
     shortest = 10 / demand.resolution  # a sweep must dwell on each line for some periods of its bandwidth

@@ -98,6 +98,10 @@ def returned_power(frf: Frf, points: Sequence[DrivePoint]) -> float | None:
         return None
     rows, columns = [point.row for point in points], [point.column for point in points]
     block = mobility(frf)[chosen][:, rows][:, :, columns] * np.array([point.sign for point in points])
+    largest = np.abs(block).max()
+    if not 0 < largest < np.inf:
+        return None
+    block = block / largest  # values that are no machine's must not overflow before they are told
     fed = np.linalg.eigvalsh((block + block.conj().transpose(0, 2, 1)) / 2)
     fed = fed * np.sqrt(np.sum(np.abs(block) ** 2, axis=(1, 2)))[:, None]
     total = float(np.abs(fed).sum())

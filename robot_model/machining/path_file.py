@@ -29,8 +29,11 @@ def read_tool_path(path: str | os.PathLike[str]) -> ToolPath:
     """
     if not Path(path).is_file():
         raise InputError(f"no file {path}; check the name")
-    with Path(path).open(newline="", encoding="utf-8") as stream:
-        lines = stream.readlines()
+    try:
+        with Path(path).open(newline="", encoding="utf-8") as stream:
+            lines = stream.readlines()
+    except UnicodeDecodeError as error:
+        raise FileFormatError(f"{path} is not UTF-8 text; save the path as CSV in UTF-8") from error
     notes = len(lines) - len(apart(lines)[1])
     rows = list(csv.DictReader(apart(lines)[1]))
     missing = [name for name in COLUMNS if not rows or name not in rows[0]]

@@ -117,6 +117,9 @@ def _read(stored: Mapping[str, Any]) -> KeptCut:
     )
     kept = stored["spectrum"]
     arrays = {name: np.array([_or_nan(value) for value in kept[name]]) for name in _ARRAYS}
+    lengths = [len(arrays[name]) for name in _ARRAYS]
+    if len(set(lengths[:3])) != 1 or lengths[3] != lengths[4]:
+        raise ValueError("a spectrum's columns differ in length")
     cut = JudgedCut(str(stored["recording"]), float(stored["stated_speed_rpm"]), verdict)
     return KeptCut(cut, str(kept["channel"]), str(kept["unit"]), CutSpectrum(int(kept["number"]), **arrays))
 
