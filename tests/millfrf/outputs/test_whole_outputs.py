@@ -88,6 +88,8 @@ def _kill(command: Writing, bench: Path, trial: Trial, moments: int, seed: int) 
         for name in command.outputs:
             (bench / name).unlink(missing_ok=True)
         _lay_old(command, bench)
+        for leftover in _leftovers(bench):  # else it is taken for the writing that is waited for
+            shutil.rmtree(leftover, ignore_errors=True)
         at = float(generator.uniform())
         how = {"kill_in_writing": 0.05 * at**2} if number % 2 else {"kill_after": at * whole["seconds"]}
         trial(bench, command.words, **how)
