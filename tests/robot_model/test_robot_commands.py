@@ -158,7 +158,7 @@ def test_lobes_and_posture_map(tmp_path: Path, cut: str) -> None:
     assert len(read_lobes(out).depth_limits) == 3
     assert run(["robot", "lobes", *common, "--angles", "-20", "20", "3", "--speed", "3000"]) == DONE
     with out.open() as stream:
-        rows = list(csv.DictReader(stream))
+        rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
     assert [float(row["angle_deg"]) for row in rows] == pytest.approx([-20, 0, 20])
     picture = tmp_path / "map.png"
     drawn = ["--angles", "-20", "20", "3", "--speed", "3000", "--picture", str(picture), "--depth", "0.002"]

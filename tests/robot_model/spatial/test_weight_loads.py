@@ -250,7 +250,7 @@ def test_warnings_stand_in_what_is_written(tmp_path: Path, capsys: pytest.Captur
     *before, last = out.read_text().splitlines()
     out.write_text("\n".join([*before, "one," + last.partition(",")[2]]))
     assert run(["robot", "compensate", "fanuc_s420if", str(out), "--out", str(again)]) == BAD_INPUT
-    assert f"in line {len(said) + 2} is no number" in capsys.readouterr().err
+    assert f"in line {len(before) + 1} is no number" in capsys.readouterr().err
 
 
 def test_counted_weight() -> None:
