@@ -16,6 +16,9 @@ Real = NDArray[np.float64]
 FEWEST = 8
 """Pairs from which anything is told."""
 
+FEWEST_SLOPES = 15
+"""Slopes between windows from which their spread tells the error of the rate."""
+
 AROUND = 50
 """Pairs behind a gap of which several must keep the new lateness: a computer that stalls comes back from it."""
 
@@ -98,7 +101,7 @@ def check_clock(pairs: Real, stated_rate: float) -> ClockFindings:
         return nothing
     found = _gaps(pairs, period)
     if found:
-        # gaps taken out, windows can be long: the rate is told by all pairs
+        # a slope across a gap says nothing of the rate: the gaps are taken out, and the rate is told anew
         closed = pairs.copy()
         for gap in found:
             closed[pairs[:, 0] > gap.after_sample, 1] -= gap.seconds
@@ -119,8 +122,13 @@ def _period(pairs: Real) -> tuple[float, float]:
     if not period > 0:
         return float("nan"), float("inf")
     spread = 1.4826 * float(np.median(np.abs(slopes - period))) + 1e-5 / float(np.median(run[run > 0]))
-    # of few slopes the spread is itself uncertain
-    return period, 1.2533 * spread / np.sqrt(len(slopes)) / period * (1 + 10 / len(slopes))
+    error = 1.2533 * spread / np.sqrt(len(slopes)) / period
+    if len(slopes) >= FEWEST_SLOPES:
+        return period, error
+    # of few slopes the spread says little: the usual lateness over the whole recording bounds the error
+    late = pairs[:, 1] - period * pairs[:, 0]
+    usual = float(np.quantile(late, 0.9) - late.min())
+    return period, error + usual / (period * float(np.ptp(pairs[:, 0])))
 
 
 def _least_late(late: Real) -> NDArray[np.intp]:

@@ -68,7 +68,10 @@ def _write_h5(content: Content, path: Path, progress: Progress) -> None:
         written = 0
         for samples in content.streams:
             for block in row_blocks(samples):
-                writer.append(samples.description.name, block)
+                if np.isfinite(block).all():
+                    writer.append(samples.description.name, block)
+                else:
+                    writer.append_with_missing(samples.description.name, block, "missing in the recording it is from")
                 written += len(block)
                 progress(written)
         for name, (times, values) in content.events.items():

@@ -67,8 +67,8 @@ def _findings(recording: Recording, stream: str) -> ClockFindings:
 def _wrong_rate(found: ClockFindings, stream: str) -> str:
     percent = 100 * (found.true_rate / found.stated_rate - 1)
     return (
-        f"stream {stream} has a sample rate of {found.true_rate:.4g} Hz by this computer's clock, and the file says "
-        f"{found.stated_rate:.6g} Hz ({percent:+.2g} %): every frequency would be off as much; "
+        f"stream {stream} has a sample rate of {found.true_rate:.4g} Hz by the computer that recorded it, "
+        f"and the file says {found.stated_rate:.6g} Hz ({percent:+.2g} %): every frequency would be off as much; "
         "check the device's clock, and record again"
     )
 
@@ -80,6 +80,6 @@ def _gaps(found: ClockFindings, stream: str) -> list[str]:
     more = f", and {len(found.gaps) - 1} more" if len(found.gaps) > 1 else ""
     return [
         f"stream {stream}: {first.seconds:.2g} s are missing after {first.after_sample / found.stated_rate:.4g} s by "
-        f"this computer's clock{more}: samples were lost there, or the computer was asleep; record again, or use what "
-        "lies on one side of the gap"
+        f"the computer that recorded it{more}: samples were lost there, or the computer was asleep; record again, or "
+        "cut out what lies on one side of the gap with 'millfrf convert --span'"
     ]

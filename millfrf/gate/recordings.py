@@ -107,12 +107,13 @@ def check_channels(
         with Recording(path) as recording:
             source = recording.stream(stream)
             exciting, responding = chosen(source)
+            gaps = check_clock_of(recording, source.name)
             seen = _look(source, [*exciting, *responding], progress)
             idle = [level.channel.name for level in seen.levels[: len(exciting)] if level.n_samples and not level.peak]
             silent_in.update({name: Path(path).name for name in idle})
             alive |= set(exciting) - set(idle)
             found = _check_stream(source, seen, set(idle), excluding, remedy)
-            found += check_clock_of(recording, source.name)
+            found += gaps
             if segments is not None:
                 refuse_taps(source, seen.levels[: len(exciting)], segments)
             if recording.complete is False:

@@ -60,6 +60,20 @@ def test_a_wrong_rate_is_told_with_the_right_one(true_rate: float) -> None:
         assert found.true_rate == pytest.approx(true_rate, rel=1e-3)
 
 
+@pytest.mark.parametrize("seconds", [0.8, 1.0, 2.0, 5.0])
+def test_a_short_recording_with_a_right_rate_is_not_refused(seconds: float) -> None:
+    """A hammer test lasts some seconds: few pairs, late by milliseconds, must not make its rate wrong."""
+    for seed in range(60):
+        for stalls in (0.0, 0.02):
+            found = check_clock(pairs(seconds, seed, true_rate=RATE * (1 + 3e-4), stalls=stalls), RATE)
+            assert not found.rate_is_wrong
+
+
+def test_a_rate_that_is_off_by_a_tenth_is_told_after_a_second() -> None:
+    found = [check_clock(pairs(1.0, seed, true_rate=9216.0, stalls=0.0), RATE).rate_is_wrong for seed in range(40)]
+    assert all(found)
+
+
 def test_too_few_pairs_tell_nothing() -> None:
     found = check_clock(pairs(0.5, 0), RATE)
     assert np.isnan(found.true_rate)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from power_failures import image, logged_recording, true_rows
 
-from acquisition import HOST_AXIS, Channel, Events, Recording, RecordingWriter, StreamDescription, recover
+from acquisition import HOST_AXIS, Channel, Events, Recording, RecordingWriter, StreamDescription, convert, recover
 from foundation import FileFormatError, InputError
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="logs writes with the dynamic linker of Linux")
@@ -169,6 +169,22 @@ def test_a_closed_file_with_a_bad_sector_is_refused_and_recovered_around_it(tmp_
         np.testing.assert_array_equal(rows[21_000:], TRUE[21_000:50_000])
         (gone,) = recording.missing("main")
     assert (gone.first, gone.end, gone.reason) == (20_000, 21_000, "they do not match their checksum")
+
+
+def test_a_recovered_file_can_be_converted_and_keeps_what_is_missing(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    with RecordingWriter(path, [StreamDescription("main", 10_240.0, 0.0, CHANNELS)]) as writer:
+        writer.append("main", TRUE[:1000])
+        writer.append_with_missing("main", np.full((50, 4), np.nan), "they cannot be read")
+        writer.append("main", TRUE[1050:3000])
+    convert(path, tmp_path / "b.h5")
+    with Recording(tmp_path / "b.h5") as recording:
+        np.testing.assert_array_equal(recording.stream().read(1050, 3000), TRUE[1050:3000])
+        assert [(one.first, one.end) for one in recording.missing("main")] == [(1000, 1050)]
+    convert(path, tmp_path / "sound.h5", span=(0.2, 0.25))
+    with Recording(tmp_path / "sound.h5") as recording:
+        assert recording.missing("main") == ()
+        np.testing.assert_array_equal(recording.stream().read(), TRUE[2048:2560])
 
 
 def test_nan_rows_of_an_old_file_are_kept_as_missing(tmp_path: Path) -> None:
