@@ -18,7 +18,13 @@ NOT_YET: set[str] = set()
 FACE = "millfrf"
 """Its front is the face for notebooks. Examples may also ask the front of one of its shelves, or run its commands."""
 
-EAGER = {"foundation.results", "millfrf.commands", "mismatch.physics", "mismatch.adapters.cut.physics"}
+EAGER = {
+    "foundation.results",
+    "millfrf.commands",
+    "millfrf.robot.commands",
+    "mismatch.physics",
+    "mismatch.adapters.cut.physics",
+}
 """Fronts that load at once: the base of results, commands (nothing heavy), and libraries that find their own files."""
 
 FOUND_BY_ITSELF = "PHYSICS"

@@ -1,0 +1,39 @@
+"""The commands of `millfrf robot`, one a file. Their modules import nothing heavy, so that `--help` is quick."""
+
+from collections.abc import Callable
+
+import typer
+
+from ..diagnosis import diagnose
+from .compensate import compensate
+from .deviation import deviation
+from .frf import frf
+from .list_robots import list_robots
+from .lobes import lobes
+from .map_command import map_command
+from .modes import modes
+from .stiffness import stiffness
+
+COMMANDS: dict[str, Callable[..., None]] = {
+    "diagnose": diagnose,
+    "list": list_robots,
+    "modes": modes,
+    "frf": frf,
+    "stiffness": stiffness,
+    "deviation": deviation,
+    "lobes": lobes,
+    "map": map_command,
+    "compensate": compensate,
+}
+"""By name, in the order in which `--help` lists them."""
+
+robot_app = typer.Typer(
+    name="robot",
+    help="Robot models as data: a posture gives modes, FRF, stiffness, deviation and stability.",
+    add_completion=False,
+    rich_markup_mode=None,
+)
+for _name, _function in COMMANDS.items():
+    robot_app.command(_name)(_function)
+
+__all__ = ["robot_app"]

@@ -1,0 +1,32 @@
+"""`millfrf robot frf`: receptance at the tool tip in a posture."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import At, Feed, Joints, Links, Pose, Redundancy, Robot, Turn
+
+
+def frf(
+    robot: Robot,
+    out: Annotated[Path, typer.Option("--out", metavar="FILE", help=".h5: FRF; .json: modal model.")],
+    pose: Pose = None,
+    joints: Joints = None,
+    at: At = None,
+    feed: Feed = 0.0,
+    turn: Turn = 0.0,
+    redundancy: Redundancy = "tool",
+    links: Links = False,
+    band: Annotated[tuple[float, float], typer.Option("--band", metavar="LO HI", help="Hz.")] = (1.0, 100.0),
+    lines: Annotated[int, typer.Option("--lines", help="Frequency lines.")] = 1000,
+    sensor: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option("--sensor", metavar="X Y Z", help="Housing sensor, m from the tip: its motion too (.json)."),
+    ] = None,
+) -> None:
+    """Receptance at the tool tip in a posture, as an FRF file or as the modal model behind it."""
+    from ..postures import Asked
+    from ..results import write_receptance
+
+    write_receptance(robot, Asked(pose, joints, at, feed, turn, redundancy), out, band, lines, sensor, links)

@@ -1,0 +1,45 @@
+"""`millfrf robot lobes`: depth limit in a posture or over a redundancy angle."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import At, Feed, Joints, Pose, Redundancy, Robot, Speed, Turn
+
+
+def lobes(
+    robot: Robot,
+    cutting: Annotated[Path, typer.Option("--cutting", metavar="CUT.toml", help="Cutter, engagement, coefficients.")],
+    max_depth: Annotated[float, typer.Option("--max-depth", metavar="M", help="Largest depth looked at, m.")],
+    out: Annotated[Path, typer.Option("--out", metavar="FILE.csv", help="Lobes, or with --angles a posture map.")],
+    at: At = None,
+    pose: Pose = None,
+    joints: Joints = None,
+    feed: Feed = 0.0,
+    turn: Turn = 0.0,
+    redundancy: Redundancy = "table",
+    speeds: Annotated[
+        tuple[float, float, int] | None, typer.Option("--speeds", metavar="LO HI N", help="Spindle speeds, rpm.")
+    ] = None,
+    angles: Annotated[
+        tuple[float, float, int] | None, typer.Option("--angles", metavar="LO HI N", help="Redundancy angles, degrees.")
+    ] = None,
+    speed: Speed = None,
+    method: Annotated[str, typer.Option("--method", help="Solver of the lobes, as `millfrf lobes`.")] = "certified",
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="Picture of the lobes or the posture map.")
+    ] = None,
+    depth: Annotated[
+        float | None, typer.Option("--depth", metavar="M", help="Cut to mark in the picture of a posture map, m.")
+    ] = None,
+) -> None:
+    """Stability lobes in a posture (--speeds), or the depth limit over a redundancy angle (--angles and --speed)."""
+    from ..postures import Asked
+    from ..robot_lobes import write_lobes_in_posture, write_map_over_redundancy
+
+    asked = Asked(pose, joints, at, feed, turn, redundancy)
+    if angles is not None:
+        write_map_over_redundancy(robot, asked, cutting, angles, speed, max_depth, out, (picture, depth))
+    else:
+        write_lobes_in_posture(robot, asked, cutting, speeds, max_depth, method, out, picture)

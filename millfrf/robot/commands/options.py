@@ -1,0 +1,35 @@
+"""Arguments and options that several commands of `millfrf robot` share."""
+
+from typing import Annotated
+
+import typer
+
+Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file (.toml), or a name that `robot list` shows.")]
+Pose = Annotated[str | None, typer.Option("--pose", help="Posture named in the robot's file; default: its first.")]
+Joints = Annotated[
+    str | None,
+    typer.Option("--joints", metavar="V,V,...", help="Driven joints: degrees; metres of prismatic ones."),
+]
+At = Annotated[
+    tuple[float, float, float] | None, typer.Option("--at", metavar="X Y Z", help="Tip of a vertical tool, m.")
+]
+Feed = Annotated[float, typer.Option("--feed", metavar="DEG", help="Direction of feed from the base's x, with --at.")]
+Turn = Annotated[float, typer.Option("--turn", metavar="DEG", help="Turn of the redundancy, with --at.")]
+Redundancy = Annotated[
+    str, typer.Option("--redundancy", help="tool: about the tool's axis; table: tool and work about the feed.")
+]
+Links = Annotated[
+    bool, typer.Option("--links", help="Planar robots: the file's link sections too (others always take links in).")
+]
+PayloadMass = Annotated[float, typer.Option("--payload", metavar="KG", help="Carried besides the file's bodies.")]
+PayloadAt = Annotated[
+    tuple[float, float, float] | None,
+    typer.Option("--payload-at", metavar="X Y Z", help="Its centre of mass from the tip, tool frame, m."),
+]
+Weight = Annotated[
+    str,
+    typer.Option(
+        "--weight", help="Deflection under weight: all; change: from the first place on (touched off there); none."
+    ),
+]
+Speed = Annotated[float | None, typer.Option("--speed", metavar="RPM", help="Spindle speed of a posture map.")]

@@ -1,0 +1,33 @@
+"""`millfrf robot stiffness`: compliance and deflection in a posture."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .options import At, Feed, Joints, Links, PayloadAt, PayloadMass, Pose, Redundancy, Robot, Turn
+
+
+def stiffness(
+    robot: Robot,
+    pose: Pose = None,
+    joints: Joints = None,
+    at: At = None,
+    feed: Feed = 0.0,
+    turn: Turn = 0.0,
+    redundancy: Redundancy = "tool",
+    links: Links = False,
+    force: Annotated[float, typer.Option("--force", metavar="N", help="Force to deflect it with.")] = 650.0,
+    payload: PayloadMass = 0.0,
+    payload_at: PayloadAt = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE.json", help="The same as numbers, with the warnings.")
+    ] = None,
+) -> None:
+    """Compliance at the tool tip, softest and stiffest directions, deflection under a force, weight and payload."""
+    from ..asked_loads import loads_of
+    from ..loads import show_stiffness
+    from ..postures import Asked
+
+    asked = Asked(pose, joints, at, feed, turn, redundancy)
+    show_stiffness(robot, asked, force, loads_of(payload, payload_at), links, out)
