@@ -17,6 +17,7 @@ from .immersion import IMMERSIONS, immersion_angles
 from .milling_process import MillingProcess
 from .one_tooth import engaged_share, specific_forces, tooth_force, tooth_offsets, wrapped_immersion
 from .refusal import refuse_varied
+from .transverse_force import TransverseForce, bending_stiffness, edge_thicknesses, resultant_force
 
 __all__ = [
     "IMMERSIONS",
@@ -24,7 +25,9 @@ __all__ = [
     "DrillingLoad",
     "MillingProcess",
     "SpecificForce",
+    "TransverseForce",
     "average_directional_matrix",
+    "bending_stiffness",
     "catalogue_load",
     "chip_direction",
     "compiled",
@@ -34,6 +37,7 @@ __all__ = [
     "directional_matrix",
     "drilling_load",
     "edge_matrices",
+    "edge_thicknesses",
     "engaged_share",
     "fitted_to_catalogue",
     "force_direction",
@@ -42,6 +46,7 @@ __all__ = [
     "process_from_table",
     "read_cutting_process",
     "refuse_varied",
+    "resultant_force",
     "specific_forces",
     "tooth_force",
     "tooth_offsets",

@@ -100,22 +100,36 @@ def drilling_load(
     """
     if not feed > 0 or not depth >= 0:
         raise InputError(f"drilling: feed {feed!r} m/rev must be positive and depth {depth!r} m zero or more")
+    thickness = feed / drill.edges * np.sin(drill.edge_angle)
+    r, cut, thrust = _along_edge(drill, thickness, tangential, axial, depth)
+    return DrillingLoad(drill.edges * float(thrust.sum()), drill.edges * float(r @ cut))
+
+
+def edge_forces(
+    drill: Drill, thickness: float, tangential: SpecificForce, axial: SpecificForce, depth: float = np.inf
+) -> tuple[float, float]:
+    """Cutting force and thrust of one edge that cuts chips of ``thickness`` (m, normal to the edge), N."""
+    _, cut, thrust = _along_edge(drill, thickness, tangential, axial, depth)
+    return float(cut.sum()), float(thrust.sum())
+
+
+def _along_edge(
+    drill: Drill, thickness: float, tangential: SpecificForce, axial: SpecificForce, depth: float
+) -> tuple[Real, Real, Real]:
+    """Radius, m, and cutting force and thrust, N, of the pieces of one edge that is in the work."""
     radius = drill.diameter / 2
     outer = min(radius, depth * np.tan(drill.edge_angle)) if np.isfinite(depth) else radius
     r = outer * (_POINTS + 1) / 2
     weight = outer * _WEIGHTS / 2 / np.sin(drill.edge_angle)
-    thickness_mm = 1e3 * feed / drill.edges * np.sin(drill.edge_angle)
     rake = np.arctan(r / radius * np.tan(drill.rake))
     sine = radius / np.maximum(r, 1e-12) * np.sin(drill.inclination)
     inclination = np.arcsin(np.clip(sine, -1, 1))
 
     def per_length(force: SpecificForce) -> Real:
         shape = force.a + force.b * rake + force.c * inclination
-        return np.asarray(force.k0 * shape * 1e-3 * thickness_mm ** (1 - force.m))
+        return np.asarray(force.k0 * shape * 1e-3 * (1e3 * thickness) ** (1 - force.m))
 
-    thrust = drill.edges * float(weight @ per_length(axial))
-    torque = drill.edges * float((weight * r) @ per_length(tangential))
-    return DrillingLoad(thrust, torque)
+    return r, weight * per_length(tangential), weight * per_length(axial)
 
 
 def catalogue_load(diameter: float, feed: float, material: float = 1.01) -> DrillingLoad:

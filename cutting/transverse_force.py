@@ -1,0 +1,139 @@
+"""Transverse force of a drill that runs out of true: its edges cut unequal chips, so their forces do not cancel."""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import InputError
+
+from .drilling_force import Drill, SpecificForce, edge_forces
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TransverseForce:
+    """Force across a drill, in axes that turn with it: x along the first edge, y in the sense of rotation.
+
+    Parameters
+    ----------
+    force : (2,), N
+        Sum of all edges' forces on the drill. It turns with the spindle: its mean over a revolution is 0.
+    thicknesses : (edges,), m
+        Chip thickness of each edge, normal to it; equal for a drill that runs true.
+    """
+
+    force: Real
+    thicknesses: Real
+
+    @property
+    def size(self) -> float:
+        """``F_r``, N."""
+        return float(np.hypot(*self.force))
+
+
+def edge_thicknesses(drill: Drill, feed: float, runout: float, direction: float = 0.0) -> Real:
+    """Chip thickness of each edge, m, (edges,), for a drill whose axis stands beside the axis of rotation.
+
+    Edge i, at the angle ``theta_i = 2 pi i / N``, leaves a cone that the eccentricity e lowers by ``e c_i cot chi``,
+    ``c_i = cos(direction - theta_i)``. Edge i + k has passed k / N of a revolution before; of all that have, the lowest
+    counts: ``h_i = sin chi max(0, min_k (k f / N + e cot chi (c_i - c_(i+k))))``, k = 1 to N (as runout in milling:
+    Kline & DeVor 1983). For two edges ``h = (f / 2 +- 2 e cot chi cos(direction)) sin chi``.
+
+    Parameters
+    ----------
+    drill
+        Geometry of the drill.
+    feed : m
+        Feed per revolution.
+    runout : m
+        Runout rho: total indicator reading at the drill's tip, twice its eccentricity.
+    direction : rad
+        Angle of the eccentricity from the first edge, in the sense of rotation.
+
+    Raises
+    ------
+    InputError
+        A feed that is not positive, or a runout that is negative or larger than the drill's radius.
+
+    Examples
+    --------
+    >>> (1e6 * edge_thicknesses(Drill(8e-3, edge_angle=pi / 4), 0.2e-3, 20e-6)).round(2).tolist()
+    [84.85, 56.57]
+    """
+    if not feed > 0 or not 0 <= runout <= drill.diameter / 2:
+        raise InputError(
+            f"drilling: feed {feed!r} m/rev must be positive, runout {runout!r} m from 0 to half the drill's diameter"
+        )
+    edges = drill.edges
+    lowered = runout / 2 / np.tan(drill.edge_angle) * np.cos(direction - 2 * pi * np.arange(edges) / edges)
+    left = [k * feed / edges + lowered - np.roll(lowered, -k) for k in range(1, edges + 1)]
+    return np.asarray(np.sin(drill.edge_angle) * np.maximum(np.min(left, axis=0), 0.0))
+
+
+def resultant_force(
+    drill: Drill,
+    feed: float,
+    tangential: SpecificForce,
+    axial: SpecificForce,
+    runout: float,
+    *,
+    direction: float = 0.0,
+    depth: float = np.inf,
+) -> TransverseForce:
+    """Sum the edges' forces across the drill: what remains of them under runout.
+
+    Every edge carries the cutting force ``F_t`` against its motion and, as a chip's pressure acts normal to the edge,
+    ``F_a cot chi`` towards the axis beside its thrust ``F_a``. On a true drill both cancel; with runout a residual
+    turns with the spindle (Ferreras-Higuero et al., section 3 and Fig. 7a; they print no formula). Edges are taken
+    as radial; their levers are those of the true drill: the error is of the order of runout over diameter.
+
+    Parameters
+    ----------
+    drill, feed, tangential, axial, depth
+        Drill, feed per revolution (m), specific pressures and depth of the point, as in
+        :func:`cutting.drilling_load`.
+    runout, direction
+        Runout (m) and its angle from the first edge (rad), as in :func:`edge_thicknesses`.
+
+    Examples
+    --------
+    >>> resultant_force(Drill(8e-3), 2e-4, SpecificForce(1e9, 0.0), SpecificForce(1e9, 0.0), 0.0).size < 1e-9
+    True
+    """
+    thicknesses = edge_thicknesses(drill, feed, runout, direction)
+    along = np.zeros(2)
+    for index, thickness in enumerate(thicknesses):
+        if thickness > 0:
+            cut, thrust = edge_forces(drill, float(thickness), tangential, axial, depth)
+            angle = 2 * pi * index / drill.edges
+            outwards = np.array([np.cos(angle), np.sin(angle)])
+            forwards = np.array([-outwards[1], outwards[0]])
+            along += -cut * forwards - thrust / np.tan(drill.edge_angle) * outwards
+    return TransverseForce(along, thicknesses)
+
+
+def bending_stiffness(drill: Drill, overhang: float, *, young: float = 600e9, core: float = 0.7) -> float:
+    """Stiffness of a clamped drill against a force across its tip, N/m: ``3 E I / L^3``, ``I = pi (core D)^4 / 64``.
+
+    Parameters
+    ----------
+    drill
+        Drill whose diameter counts.
+    overhang : m
+        Length L out of its holder.
+    young : Pa
+        Young's modulus; 600 GPa: cemented carbide.
+    core
+        Diameter of the round bar that bends as the fluted drill does, over D (assumed: 0.7 is usual).
+
+    Raises
+    ------
+    InputError
+        An overhang that is not positive, or shorter than half the diameter.
+    """
+    if not overhang >= drill.diameter / 2:
+        raise InputError(f"overhang {overhang!r} m: give the drill's length out of its holder in metres")
+    return 3 * young * pi * (core * drill.diameter) ** 4 / 64 / overhang**3
