@@ -1,4 +1,4 @@
-"""Forming a frustum and a twisted pyramid with a soft robot, paths corrected off line (Belchior et al. 2013, section 5).
+"""Forming a frustum and a twisted pyramid with a soft robot, paths corrected off line (Belchior et al. 2013).
 
 Run it: `python examples/robot_path_compensation.py [PICTURE.png]`. The correction comes from a robot whose joint
 stiffnesses are off by 10 % each and from forces predicted 10 % too large, as in the paper; the deviation is that of the
@@ -35,11 +35,21 @@ PAPER = {"frustum": (1.8, 4.0, 0.25, 1.0), "twisted pyramid": (3.0, 6.0, 0.6, 1.
 
 @dataclass(frozen=True)
 class Outcome:
-    """Nominal path, and lengths of the true deviation at each point, m, with and without correction."""
+    """Nominal path, and the places to which the true robot is pushed without and with correction, m, (n, 3)."""
 
     nominal: ToolPath
-    without: np.ndarray
-    corrected: np.ndarray
+    places: np.ndarray
+    corrected_places: np.ndarray
+
+    @property
+    def without(self) -> np.ndarray:
+        """Length of the deviation at each point without correction, m."""
+        return np.asarray(np.linalg.norm(self.places - self.nominal.positions, axis=1))
+
+    @property
+    def corrected(self) -> np.ndarray:
+        """The same with correction, m."""
+        return np.asarray(np.linalg.norm(self.corrected_places - self.nominal.positions, axis=1))
 
 
 def frustum(points: int) -> ToolPath:
@@ -89,12 +99,12 @@ def imperfect(robot: SpatialRobot, seed: int = 4) -> SpatialRobot:
     return robot.with_stiffness(stiffness * np.exp(0.1 * np.random.default_rng(seed).normal(size=(len(stiffness), 1))))
 
 
-def true_deviation(sent: ToolPath, q: np.ndarray, nominal: ToolPath) -> np.ndarray:
-    """Length of the way from the nominal point to where the true robot is pushed, m."""
+def true_places(sent: ToolPath, q: np.ndarray, nominal: ToolPath) -> np.ndarray:
+    """Where the true robot is pushed under the true forces, m, (n, 3)."""
     pushed = [
         tip_compliance(structure_at(CASE.robot, posture)) @ w for posture, w in zip(q, nominal.wrenches, strict=True)
     ]
-    return np.asarray(np.linalg.norm(sent.positions + np.array(pushed)[:, :3] - nominal.positions, axis=1))
+    return np.asarray(sent.positions + np.array(pushed)[:, :3])
 
 
 def run(points: int = 80, shape: str = "frustum") -> Outcome:
@@ -109,8 +119,8 @@ def run(points: int = 80, shape: str = "frustum") -> Outcome:
         target[:3, :3] = Rotation.from_rotvec(attitude).as_matrix()
         target[:3, 3] = position
         uncorrected.append(inverse_kinematics(CASE.robot.mechanism, target, start))
-    without = true_deviation(nominal, np.array(uncorrected), nominal)
-    return Outcome(nominal, without, true_deviation(result.path, result.q, nominal))
+    without = true_places(nominal, np.array(uncorrected), nominal)
+    return Outcome(nominal, without, true_places(result.path, result.q, nominal))
 
 
 def draw(outcomes: dict[str, Outcome], picture: Path) -> None:
