@@ -47,8 +47,9 @@ def write_lobes_in_posture(
     method: str,
     out: Path,
     picture: Path | None = None,
+    links: bool = False,
 ) -> None:
-    """Lobes of one posture, in the axes of the cut."""
+    """Lobes of one posture, in the axes of the cut; ``links``: a planar robot's link sections count too."""
     check_output(out, (".csv",))
     if picture is not None:
         check_output(picture, (".png", ".pdf", ".svg"))
@@ -56,13 +57,13 @@ def write_lobes_in_posture(
         raise InputError("give --speeds LO HI N for lobes, or --angles LO HI N with --speed RPM for a posture map")
     case = read_robot(robot)
     driven, axes = posture_of(case, asked)
-    result = in_posture(case, driven, axes)
+    result = in_posture(case, driven, axes, links=links)
     process, doubts = read_checked_cutting(cutting)
     doubts += check_depth(max_depth, process)
     doubts += check_speeds(speeds, process, lowest_frequency(result.known_model().natural_frequencies))
     found = compute_lobes(at_the_tip(result.known_model()), process, speed_axis(*speeds), max_depth, method, bar)
     found = replace(found, warnings=(*doubts, *result.warnings, *found.warnings))
-    asked_for = {"speeds_rpm": speeds, "depth_max_m": max_depth, "method": method}
+    asked_for = {"speeds_rpm": speeds, "depth_max_m": max_depth, "method": method, "links": links}
     write_lobes(out, found, provenance=made("robot lobes", [robot, cutting], asked_for))
     for warning in found.warnings:
         typer.echo(f"warning: {warning}", err=True)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import At, Feed, Joints, Pose, Redundancy, Robot, Speed, Turn
+from .options import At, Feed, Joints, Links, Pose, Redundancy, Robot, Speed, Turn
 
 
 def lobes(
@@ -19,6 +19,7 @@ def lobes(
     feed: Feed = 0.0,
     turn: Turn = 0.0,
     redundancy: Redundancy = "table",
+    links: Links = False,
     speeds: Annotated[
         tuple[float, float, int] | None, typer.Option("--speeds", metavar="LO HI N", help="Spindle speeds, rpm.")
     ] = None,
@@ -42,4 +43,4 @@ def lobes(
     if angles is not None:
         write_map_over_redundancy(robot, asked, cutting, angles, speed, max_depth, out, (picture, depth))
     else:
-        write_lobes_in_posture(robot, asked, cutting, speeds, max_depth, method, out, picture)
+        write_lobes_in_posture(robot, asked, cutting, speeds, max_depth, method, out, picture, links)

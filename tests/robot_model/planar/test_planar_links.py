@@ -6,8 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cutting import read_cutting_process
+from estimation import Frf
+from foundation import TIP
 from millfrf.__main__ import DONE, run
 from robot_model import exact_receptance, flexible_chain, in_posture, read_planar_robot, rigid_matrices
+from stability import read_lobes, zero_order
 
 CHEN = read_planar_robot("chen_2026")
 
@@ -81,3 +85,29 @@ def test_commands_say_it_and_take_links_in(tmp_path: Path, capsys: pytest.Captur
     report = tmp_path / "report.html"
     assert run(["report", str(model), "--out", str(report)]) == DONE
     assert "link sections are left out" in report.read_text()
+
+
+def test_lobes_take_links_in(tmp_path: Path) -> None:
+    """Slotting at P2 (Chen et al., Fig. 8): limits with links are those of the exact chain's FRF, rigid ones are not."""
+    cut, out = tmp_path / "slot.toml", tmp_path / "lobes.csv"
+    cut.write_text(
+        "[cutting]\nteeth = 4\ndiameter_m = 0.006\nktc_pa = 800e6\nkrc = 0.3\nkac = 0.1\n"
+        "start_angle_deg = 0.0\nexit_angle_deg = 180.0\n"
+    )
+    asked = ["robot", "lobes", "chen_2026", "--pose", "P2", "--cutting", str(cut), "--max-depth", "0.005"]
+    asked += ["--speeds", "3000", "5000", "2", "--out", str(out)]
+    limits = []
+    for options in ([], ["--links"], ["--links", "--method", "zero-order"]):
+        assert run([*asked, *options]) == DONE
+        limits.append(1e3 * read_lobes(out).depth_limits)
+    assert limits[0] == pytest.approx([1.434, 2.329], abs=0.002)
+    assert limits[1] == pytest.approx([1.368, 2.226], abs=0.002)
+    lines = np.arange(2.0, 250.0, 0.02)
+    exact = exact_receptance(CHEN.robot, CHEN.poses["P2"], lines)
+    planar = exact.values[:, :2, :2]
+    values = np.zeros((len(lines), 3, 3), dtype=complex)  # X and Z of the plane; Y is rigid
+    values[:, ::2, ::2] = planar
+    frf = Frf(lines, values, TIP, TIP, "receptance", "m/N", np.ones(len(lines), dtype=bool))
+    expected = zero_order(frf, read_cutting_process(cut), np.array([3000.0, 5000.0]) * np.pi / 30, 0.005)
+    assert limits[2] == pytest.approx(1e3 * expected.depth_limits, rel=0.01)
+    assert limits[0] != pytest.approx(1e3 * expected.depth_limits, rel=0.03)
