@@ -30,7 +30,7 @@ class TransverseForce:
 
     @property
     def size(self) -> float:
-        """``F_r``, N."""
+        """Size F_r of the transverse force, N."""
         return float(np.hypot(*self.force))
 
 

@@ -88,7 +88,7 @@ def test_commands_say_it_and_take_links_in(tmp_path: Path, capsys: pytest.Captur
 
 
 def test_lobes_take_links_in(tmp_path: Path) -> None:
-    """Slotting at P2 (Chen et al., Fig. 8): limits with links are those of the exact chain's FRF, rigid ones are not."""
+    """Slotting at P2 (Chen et al., Fig. 8): limits with links are those of the exact chain."""
     cut, out = tmp_path / "slot.toml", tmp_path / "lobes.csv"
     cut.write_text(
         "[cutting]\nteeth = 4\ndiameter_m = 0.006\nktc_pa = 800e6\nkrc = 0.3\nkac = 0.1\n"
