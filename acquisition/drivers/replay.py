@@ -46,6 +46,7 @@ class ReplaySource:
         self._next: dict[str, int] = {}
         self._events: list[Events] = []
         self._due: list[Events] = []
+        self._finishing = False
 
     def open(self) -> None:
         """Open the file at its beginning."""
@@ -56,6 +57,7 @@ class ReplaySource:
             Events(name, *series.read(), None, series.read_texts()) for name, series in self._recording.events.items()
         ]
         self._due = []
+        self._finishing = False
         self._pace.start()
 
     def read(self) -> Block | Events | None:
@@ -73,11 +75,17 @@ class ReplaySource:
         if not due:
             self._take_events(math.inf)
             return self._due.pop(0) if self._due else None
+        if self._finishing:
+            return None
         end, name, start, stop = min(due)
         self._next[name] = stop
         self._take_events(end)
         samples = self._recording.streams[name].read(start, stop)
         return Block(name, start, samples, self._pace.wait_until(end - self._earliest))
+
+    def finish(self) -> None:
+        """End the replay in order: the events up to the last block's end, or all where no sample is left, then None."""
+        self._finishing = True
 
     def _take_events(self, end: float) -> None:
         """Events before ``end``, s, become due; the others stay."""

@@ -5,7 +5,7 @@ from .events import HOST_AXIS, SAMPLES_AXIS, TEXT_BYTES, EventAxis, Events, anno
 from .feeds import WithFeeds
 from .pacing import Pace, Paced
 from .receiver import Put
-from .source import Block, Source, StreamDescription
+from .source import Block, Finishes, Source, StreamDescription
 from .steady_stamps import Stamped, SteadyStamps
 from .threaded_feed import ThreadedFeed
 from .wall_clock import WallClock
@@ -27,6 +27,7 @@ __all__ = [
     "EventAxis",
     "EventFeed",
     "Events",
+    "Finishes",
     "Pace",
     "Paced",
     "Put",

@@ -14,7 +14,7 @@ from .device_log import DEVICES, DEVICES_AXIS, NOTE, device_event
 from .enduring_feed import RETRY, EnduringFeed
 from .event_feed import EventFeed
 from .events import EventAxis, Events, announced_events
-from .source import Block, Source
+from .source import Block, Finishes, Source
 from .wall_clock import WallClock
 
 
@@ -90,14 +90,14 @@ class WithFeeds(AroundSource):
     def finish(self) -> None:
         """End the recording in order: the next reads give what the feeds still have to tell, then None."""
         self._finishing = True
-        if isinstance(self._source, WithFeeds):
+        if isinstance(self._source, Finishes):
             self._source.finish()
 
     def _take(self) -> None:
         """A block or the end of the source, and the events that came meanwhile."""
         taken = None
         try:
-            if not self._finishing or isinstance(self._source, WithFeeds):
+            if not self._finishing or isinstance(self._source, Finishes):
                 taken = self._source.read()
         except MillfrfError as error:  # it is raised when what came before has been given away
             self._error = error

@@ -109,3 +109,11 @@ class Source(Protocol):
 
     def close(self) -> None:
         """Stop and release the device; harmless when not open."""
+
+
+@runtime_checkable
+class Finishes(Protocol):
+    """A source that has more to tell when its samples are over: events of the last block, last words of devices."""
+
+    def finish(self) -> None:
+        """Ask for the end: the next reads give no new sample, but what is still to be told, then None."""

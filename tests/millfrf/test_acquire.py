@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import Channel, Recording, StreamDescription
+from acquisition import SAMPLES_AXIS, Channel, Events, Recording, RecordingWriter, StreamDescription
 from millfrf.__main__ import run
 from millfrf.chain.measuring.signal_check import preflight
 
@@ -48,6 +48,23 @@ def test_a_session_is_recorded_with_its_set_up(tmp_path: Path, capsys: pytest.Ca
     assert run(["acquire", str(replay), "--out", str(tmp_path / "b.h5")]) == 0
     with Recording(out) as first, Recording(tmp_path / "b.h5") as second:
         np.testing.assert_array_equal(first.stream().read(), second.stream().read())
+
+
+@pytest.mark.parametrize("duration", [0.4, 1.0])
+def test_a_replay_that_stops_by_its_duration_keeps_the_events_of_its_last_block(
+    tmp_path: Path, duration: float
+) -> None:
+    stream = StreamDescription("main", 20480.0, 0.0, (Channel("fx", "force", "N", "TCP", "+X"),))
+    times = np.arange(0.0, 1.0, 0.05) + 0.001
+    with RecordingWriter(tmp_path / "a.h5", [stream], event_axes={"speed": SAMPLES_AXIS}) as writer:
+        writer.append("main", np.zeros((20480, 1)))
+        writer.append_events(Events("speed", times, times))
+    session = tmp_path / "replay.toml"
+    session.write_text(f'duration_s = {duration}\n[device]\ndriver = "replay"\nfile = "a.h5"\nspeed = 50.0\n')
+    assert run(["acquire", str(session), "--out", str(tmp_path / "b.h5")]) == 0
+    with Recording(tmp_path / "b.h5") as kept:
+        end = kept.stream().n_samples / 20480
+        np.testing.assert_allclose(kept.events["speed"].read()[0], times[times < end])
 
 
 @pytest.mark.parametrize(

@@ -18,10 +18,10 @@ from acquisition import (
     DeviceStory,
     DiskFull,
     Events,
+    Finishes,
     Session,
     SimulatedDevice,
     Source,
-    WithFeeds,
     build_source,
     device_story,
     record,
@@ -165,8 +165,8 @@ def acquire(
             watcher(taken)
 
     def ended(asked: bool) -> bool:
-        """Whether to end at once; a source with feeds is asked to end, so that they can say their last words."""
-        if asked and isinstance(opened.source, WithFeeds):
+        """Whether to end at once; one that finishes is asked to, so that it can tell the rest."""
+        if asked and isinstance(opened.source, Finishes):
             opened.source.finish()
             return False
         return asked
