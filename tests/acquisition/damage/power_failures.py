@@ -30,7 +30,7 @@ at = 0
 stream = StreamDescription("main", 10_240.0, 0.0, channels)
 with RecordingWriter(sys.argv[1], [stream], event_axes={"speed": HOST_AXIS}, block_length=int(sys.argv[4])) as writer:
     begun = time.monotonic()
-    while time.monotonic() - begun < float(sys.argv[3]):
+    while time.monotonic() - begun < float(sys.argv[3]) and at + 1500 <= len(rows):
         count = int(generator.integers(100, 1500))
         writer.append("main", rows[at : at + count], at)
         at += count
