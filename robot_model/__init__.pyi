@@ -10,7 +10,15 @@ from .dynamic_stiffness import (
     planar_dynamic_stiffness,
     spatial_dynamic_stiffness,
 )
-from .files import PlanarCase, SpatialCase, assumptions, read_planar_robot, read_spatial_robot, robot_names
+from .files import (
+    PlanarCase,
+    SpatialCase,
+    assumptions,
+    changed_robot_text,
+    read_planar_robot,
+    read_spatial_robot,
+    robot_names,
+)
 from .finite_elements import (
     STANDARD_GRAVITY,
     Beam,
@@ -200,6 +208,7 @@ __all__ = [
     "block_diagonal",
     "cell_structure_at",
     "changed_robot",
+    "changed_robot_text",
     "close_loops",
     "compensate_path",
     "constrained_system",

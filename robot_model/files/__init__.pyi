@@ -1,3 +1,4 @@
+from .changed_file import changed_robot_text
 from .planar_file import PlanarCase, read_planar_robot
 from .robot_files import assumptions, read_table, robot_names
 from .spatial_file import SpatialCase, read_spatial_robot
@@ -6,6 +7,7 @@ __all__ = [
     "PlanarCase",
     "SpatialCase",
     "assumptions",
+    "changed_robot_text",
     "read_planar_robot",
     "read_spatial_robot",
     "read_table",

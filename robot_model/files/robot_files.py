@@ -29,8 +29,8 @@ def robot_names() -> tuple[str, ...]:
     return tuple(sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml")))
 
 
-def read_table(robot: str | os.PathLike[str]) -> dict[str, Any]:
-    """Content of a robot file, given by path or by the name of one that comes along.
+def robot_text(robot: str | os.PathLike[str]) -> str:
+    """Text of a robot file, given by path or by the name of one that comes along.
 
     Raises
     ------
@@ -49,9 +49,23 @@ def read_table(robot: str | os.PathLike[str]) -> dict[str, Any]:
     else:
         raise InputError(f"no robot {robot}; give a .toml file or one of {', '.join(robot_names())}")
     try:
-        return tomllib.loads(text)
+        tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise FileFormatError(f"{robot} is not TOML: {error}") from error
+    return text
+
+
+def read_table(robot: str | os.PathLike[str]) -> dict[str, Any]:
+    """Content of a robot file, given by path or by the name of one that comes along.
+
+    Raises
+    ------
+    InputError
+        No such robot.
+    FileFormatError
+        Not TOML.
+    """
+    return tomllib.loads(robot_text(robot))
 
 
 def read_as(schema: type[Schema], robot: str | os.PathLike[str], kind: str) -> Schema:
