@@ -47,7 +47,7 @@ class JointStiffness:
     group: str
 
     def name(self, robot: SpatialRobot) -> str:
-        """``joint 2 turning``."""
+        """Name of the joint's frame and of the group, as in ``joint 2 turning``."""
         return f"joint {robot.joints[self.joint].frame} {self.group}"
 
     def value(self, robot: SpatialRobot) -> float:
@@ -92,7 +92,7 @@ class LinkSection:
     part: str
 
     def name(self, robot: SpatialRobot) -> str:
-        """``link 12-13 bending``."""
+        """Nodes of the link and the part, as in ``link 12-13 bending``."""
         first, second = robot.links[self.link].nodes
         return f"link {first}-{second} {self.part}"
 

@@ -23,7 +23,7 @@ class Deflection:
     Parameters
     ----------
     q : (n_moving,), rad or m
-        Joint values.
+        Joint values of the posture, loops closed.
     wrench : (6,), N and N m
         Change of force and moment at the tool tip, base frame.
     displacement : (3,), m
