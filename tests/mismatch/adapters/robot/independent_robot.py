@@ -92,16 +92,7 @@ def of_modes(natural: Real, shapes: Real, ratio: Real | float, frequencies: Real
 
 def modes(robot: OtherRobot, q: Real) -> tuple[Real, Real]:
     """Natural angular frequencies (n,), rad/s, and mass-normalised shapes of the tool tip (3, n)."""
-    placed = _placed(q)
-    mass = np.zeros((9, 9))
-    for lump in robot.lumps:
-        turn, origin = placed[lump.axis][:3, :3], placed[lump.axis][:3, 3]
-        moved, turned = _motion(placed, lump.axis, turn @ np.array(lump.centre) + origin)
-        inertia = turn @ np.diag(lump.inertia) @ turn.T
-        mass[:6, :6] += lump.mass * moved.T @ moved + turned.T @ inertia @ turned
-    turn = placed[5][:3, :3]
-    rigid, _ = _motion(placed, 5, turn @ np.array([0.0, 0.0, TIP]) + placed[5][:3, 3])
-    tip = np.hstack([rigid, turn])
+    mass, tip = mass_and_tip(robot.lumps, q)
     free = np.concatenate([np.ones(6, dtype=bool), np.array(robot.tool) > 0])
     mass += robot.tool_mass * tip.T @ tip if free[6:].any() else 0.0
     springs = np.concatenate([robot.springs, 1 / np.maximum(robot.tool, 1e-300)])
@@ -110,6 +101,28 @@ def modes(robot: OtherRobot, q: Real) -> tuple[Real, Real]:
     squares, vectors = np.linalg.eigh(root @ np.diag(springs) @ root.T)
     shapes = tip @ root.T @ vectors
     return np.sqrt(squares), shapes
+
+
+def mass_and_tip(lumps: tuple[Lump, ...], q: Real, tool: float = 0.0) -> tuple[Real, Real]:
+    """Mass matrix (9, 9) of six axes and a tool of a mass (kg) on a spring, and the tip's motion over them (3, 9)."""
+    placed = _placed(q)
+    mass = np.zeros((9, 9))
+    for lump in lumps:
+        turn, origin = placed[lump.axis][:3, :3], placed[lump.axis][:3, 3]
+        moved, turned = _motion(placed, lump.axis, turn @ np.array(lump.centre) + origin)
+        inertia = turn @ np.diag(lump.inertia) @ turn.T
+        mass[:6, :6] += lump.mass * moved.T @ moved + turned.T @ inertia @ turned
+    turn = placed[5][:3, :3]
+    rigid, _ = _motion(placed, 5, turn @ np.array([0.0, 0.0, TIP]) + placed[5][:3, 3])
+    tip = np.hstack([rigid, turn])
+    return mass + tool * tip.T @ tip, tip
+
+
+def weight_torques(lumps: tuple[Lump, ...], q: Real) -> Real:
+    """How the weight of the bodies turns each axis, N m, (6,)."""
+    placed = _placed(q)
+    places = [(one, placed[one.axis][:3, :3] @ np.array(one.centre) + placed[one.axis][:3, 3]) for one in lumps]
+    return -9.80665 * np.sum([one.mass * _motion(placed, one.axis, at)[0][2] for one, at in places], axis=0)
 
 
 def _placed(q: Real) -> list[Real]:

@@ -1,0 +1,143 @@
+"""`ModalBasis`: a robot's modes in a posture, with the part that each joint, its links and each body has in them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foundation import InputError
+
+from ..finite_elements import Spring, Structure, gravity_torques, rigid_motion
+from ..kinematics import close_loops
+from ..spatial import SpatialRobot, acceleration, modes_at
+
+Real = NDArray[np.float64]
+
+MOST_MODES = 30
+"""Modes of the basis: the lowest ones; a stiffness that changes moves them within the space that they span."""
+
+LEAST_ENERGY = 1e-9
+"""Links that hold less than this share of a mode's energy are rigid, and their stiffness is no unknown."""
+
+
+@dataclass(frozen=True)
+class ModalBasis:
+    """Mass-normalised modes of the robot as modelled, and what each part contributes to them.
+
+    ``diag(squares) = sum_k stiffness[k] + stiffness of weight`` and ``1 = sum_b mass[b]``, all over modal coordinates.
+
+    Parameters
+    ----------
+    squares : (n_modes,), (rad/s)^2
+        Squared angular natural frequencies, rising.
+    tip : (n_modes, 3), kg^-1/2
+        Motion of the tool tip in each mode, in the base frame.
+    stiffness : (n_stiffnesses, n_modes, n_modes), (rad/s)^2
+        Part of each elastic joint, and last of the links where they are flexible.
+    mass : (n_masses, n_modes, n_modes)
+        Part of each body, and last of the links where they have mass.
+    """
+
+    squares: Real
+    tip: Real
+    stiffness: Real
+    mass: Real
+
+
+@dataclass(frozen=True)
+class PosturePlace:
+    """Where a posture lies, as the kernels see it.
+
+    Parameters
+    ----------
+    driven : (n_active,), rad or m
+        Driven joint values.
+    own : (n_stiffnesses,), rad or m
+        Value of each elastic part's own joint; 0 where it has none.
+    load : (n_stiffnesses,), N m or N
+        Turning moment (or push) of the weight about that joint.
+    """
+
+    driven: Real
+    own: Real
+    load: Real
+
+
+def basis_at(robot: SpatialRobot, driven: Real) -> tuple[ModalBasis, PosturePlace]:
+    """Modes of a posture divided among joints, links and bodies; ``driven`` (n_active,) in rad and m.
+
+    Raises
+    ------
+    InputError
+        A robot without masses, or a posture that its loops cannot close.
+    """
+    if not robot.bodies and all(link.section is None for link in robot.links):
+        raise InputError("this robot's file gives stiffness but no masses: it has no modes to learn from")
+    q = close_loops(robot.mechanism, driven)
+    modes = modes_at(robot, q)
+    kept = slice(None, MOST_MODES)
+    squares, shapes, structure = modes.squares[kept], modes.shapes[kept], modes.structure
+    stiffness = [_spring(spring, structure, shapes) for spring in structure.springs]
+    mass = [_body(shapes[:, body.node], body.mass, body.centre, body.inertia) for body in structure.bodies]
+    if structure.beams:
+        flat = shapes.reshape(len(squares), -1)
+        weight = 0.0 if structure.weight is None else flat @ structure.weight @ flat.T
+        stiffness.append(np.diag(squares) - sum(stiffness) - weight)
+        mass.append(np.eye(len(squares)) - sum(mass, np.zeros((len(squares),) * 2)))
+    basis = ModalBasis(squares, shapes[:, structure.tip, :3], np.array(stiffness), np.array(mass))
+    return basis, _place(robot, driven, q, structure)
+
+
+def part_names(robot: SpatialRobot) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the stiffnesses and of the masses of :class:`ModalBasis`, in their order."""
+    flexible = any(link.section is not None for link in robot.links)
+    last = ("links",) if flexible else ()
+    springs = tuple(f"joint {joint.frame}" for joint in robot.joints)
+    bodies = tuple(f"body {number} on {body.frame}" for number, body in enumerate(robot.bodies, 1))
+    return (*springs, *last), (*bodies, *last)
+
+
+def arc_weights(robot: SpatialRobot, postures: Real) -> Real:
+    """How far the tip moves when each driven joint turns, over the farthest; at least ``0.15``; shape (n_active,).
+
+    Prismatic joints: one over the largest arm, 1/m, so that angles and travels are both arcs of the tip over the reach.
+    """
+    mechanism = robot.mechanism
+    tool = mechanism.index(mechanism.tool)
+    columns = np.flatnonzero(mechanism.active)
+    arms = np.zeros(len(columns))
+    for driven in postures:
+        placed = mechanism.transforms(close_loops(mechanism, driven))
+        arms += np.linalg.norm(mechanism.jacobian(placed, tool)[:3, columns], axis=0) / len(postures)
+    turns = np.array([mechanism.frames[mechanism.moving[column]].motion == "revolute" for column in columns])
+    reach = max(float(arms[turns].max(initial=0.0)), 0.1)
+    return np.where(turns, np.maximum(arms / reach, SMALLEST_ARC), 1 / reach)
+
+
+SMALLEST_ARC = 0.15
+"""A joint whose turn leaves the tip where it is still turns the masses and springs beyond it."""
+
+
+def _spring(spring: Spring, structure: Structure, shapes: Real) -> Real:
+    """Energy of one joint over modal coordinates."""
+    before, after = spring.motions(structure.positions)
+    relative = shapes[:, spring.nodes[1]] @ after.T - shapes[:, spring.nodes[0]] @ before.T
+    elastic = np.where(np.isfinite(spring.stiffness), spring.stiffness, 0.0)
+    return np.asarray((relative * elastic) @ relative.T)
+
+
+def _body(motion: Real, mass: float, centre: Real, inertia: Real) -> Real:
+    moved = motion @ rigid_motion(centre).T
+    return np.asarray(mass * moved[:, :3] @ moved[:, :3].T + moved[:, 3:] @ inertia @ moved[:, 3:].T)
+
+
+def _place(robot: SpatialRobot, driven: Real, q: Real, structure: Structure) -> PosturePlace:
+    mechanism = robot.mechanism
+    names = [mechanism.frames[index].name for index in mechanism.moving]
+    torques = gravity_torques(robot, q, structure, acceleration(robot))
+    count = len(robot.joints) + bool(structure.beams)
+    own, load = np.zeros(count), np.zeros(count)
+    for part, joint in enumerate(robot.joints):
+        if joint.frame in names:
+            own[part], load[part] = q[names.index(joint.frame)], torques[names.index(joint.frame)]
+    return PosturePlace(np.asarray(driven, dtype=float), own, load)
