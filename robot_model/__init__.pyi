@@ -134,6 +134,8 @@ from .posture_process import (
     learn_postures,
     measured_posture,
     predict_posture,
+    read_learned_postures,
+    write_learned_postures,
 )
 from .spatial import (
     NO_MASSES,
@@ -284,6 +286,7 @@ __all__ = [
     "predict_posture",
     "predicted_deflections",
     "rayleigh_constants",
+    "read_learned_postures",
     "read_planar_robot",
     "read_robot",
     "read_spatial_robot",
@@ -322,4 +325,5 @@ __all__ = [
     "with_tool_spring",
     "wrist_solutions",
     "write_compensated_path",
+    "write_learned_postures",
 ]

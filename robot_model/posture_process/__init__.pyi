@@ -1,3 +1,4 @@
+from .learned_file import read_learned_postures, write_learned_postures
 from .learning import LearnedPostures, learn_postures
 from .measured_posture import MeasuredPosture, measured_posture
 from .predicting import PredictedPosture, predict_posture
@@ -9,4 +10,6 @@ __all__ = [
     "learn_postures",
     "measured_posture",
     "predict_posture",
+    "read_learned_postures",
+    "write_learned_postures",
 ]

@@ -9,14 +9,14 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from .hyperparameters import Evidence, covariance_of
 from .learning import LearnedPostures
 from .modal_basis import PosturePlace
-from .posture_kernels import SquaredDistances, squared_distances
+from .posture_kernels import SquaredDistances, joint_kernels, squared_distances
 from .process_covariance import covariance_parts
 from .process_rows import Rows
 
 Real = NDArray[np.float64]
 
-VARYING = (1, 3)
-"""Parts of the covariance that measurements in other postures tell of only as far as these are near."""
+EXACT = 0.02
+"""Variance of a measurement, as a share, that counts as exact: how far a posture is must not depend on noise."""
 
 
 @dataclass(frozen=True)
@@ -59,15 +59,6 @@ class Conditioned:
         reduced = solve_triangular(self.root, cross.T, lower=True)
         return cross @ self.pulled, own - reduced.T @ reduced
 
-    def left_unknown(self, row: Rows, across: SquaredDistances, within: SquaredDistances) -> float:
-        """Share of one row's variance over postures that the measurements leave."""
-        squares = np.exp(2 * self.hyper[:-1])[list(VARYING)]
-        cross = covariance_parts(row, self.evidence.rows, across, self.length, False)[list(VARYING)]
-        own = covariance_parts(row, row, within, self.length, True)[list(VARYING)]
-        before = float(np.tensordot(squares, own, 1)[0, 0])
-        reduced = solve_triangular(self.root, np.tensordot(squares, cross, 1)[0], lower=True)
-        return 1 - float(reduced @ reduced) / max(before, 1e-300)
-
 
 def conditioned(evidence: Evidence, hyper: Real) -> Conditioned:
     """Factor the measured rows' covariance once, for all that is asked of it."""
@@ -75,11 +66,32 @@ def conditioned(evidence: Evidence, hyper: Real) -> Conditioned:
     return Conditioned(hyper, evidence, np.tril(factor[0]), cho_solve(factor, evidence.rows.value))
 
 
-def distances_to(
-    learned: LearnedPostures, places: list[PosturePlace]
-) -> tuple[SquaredDistances, SquaredDistances]:
+def distances_to(learned: LearnedPostures, places: list[PosturePlace]) -> tuple[SquaredDistances, SquaredDistances]:
     """Squared distances of new postures to the measured ones, and among themselves."""
     return (
         squared_distances(learned.metric, places, list(learned.places)),
         squared_distances(learned.metric, places, places),
     )
+
+
+def left_unknown(learned: LearnedPostures, energy: Real, across: SquaredDistances) -> float:
+    """Share of the variance over postures that exact measurements would leave in one new posture.
+
+    ``1 - k^T (K + 0.02 I)^-1 k`` of each elastic part's kernel, weighed by the parts' shares of energy.
+
+    Parameters
+    ----------
+    learned
+        Process over postures.
+    energy : (n_stiffnesses,)
+        Shares of the elastic parts in the energy of the modes that matter.
+    across
+        Squared distances of the posture to the measured ones.
+    """
+    length = float(np.exp(learned.best[-1]))
+    own = joint_kernels(learned.evidence.distances, length)
+    left = [
+        1 - float(near[0] @ np.linalg.solve(among + EXACT * np.eye(len(among)), near[0]))
+        for near, among in zip(joint_kernels(across, length), own, strict=True)
+    ]
+    return float(np.asarray(energy) @ np.array(left) / np.sum(energy))

@@ -1,6 +1,6 @@
 """`learn_postures`: from modal models measured in some postures to a process over all postures."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from .hyperparameters import MEDIANS, Evidence, best_hyperparameters, covariance
 from .measured_posture import MeasuredPosture
 from .modal_basis import ModalBasis, PosturePlace, arc_weights, basis_at
 from .mode_pairs import mode_pairs
-from .posture_kernels import PostureMetric, posture_metric, squared_distances
+from .posture_kernels import PostureMetric, SquaredDistances, posture_metric, squared_distances
 from .process_covariance import covariance_parts
 from .process_rows import Rows, joined, measured_rows, unknown_rows
 
@@ -66,6 +66,14 @@ class LearnedPostures:
     metric: PostureMetric
     places: tuple[PosturePlace, ...]
 
+    def frequency_ratios(self) -> tuple[Real, ...]:
+        """Measured over modelled frequencies of the paired modes in each posture, before anything was learned."""
+        found = []
+        for one, pairs in zip(self.measured, self.pairs, strict=True):
+            natural = np.sqrt(basis_at(self.robot, one.driven)[0].squares) / (2 * np.pi)
+            found.append(np.array([one.frequencies[i] / natural[r] for i, r in pairs]))
+        return tuple(found)
+
     @property
     def unpaired(self) -> tuple[tuple[str, float], ...]:
         """Measured modes that no computed mode stands for: posture and frequency, Hz."""
@@ -87,9 +95,13 @@ class _Cell:
     places: tuple[PosturePlace, ...]
     metric: PostureMetric
 
+    def distances(self) -> SquaredDistances:
+        """Squared distances of the measured postures among themselves."""
+        return squared_distances(self.metric, list(self.places), list(self.places))
+
 
 def learn_postures(
-    robot: SpatialRobot, measured: Sequence[MeasuredPosture], *, hyperparameters: tuple[Real, Real] | None = None
+    robot: SpatialRobot, measured: Sequence[MeasuredPosture], progress: Callable[[], None] | None = None
 ) -> LearnedPostures:
     """Learn how a robot's measured modes differ from its model, over postures.
 
@@ -103,8 +115,8 @@ def learn_postures(
         Robot as modelled, best after its constants were updated.
     measured
         Modes measured in two postures or more.
-    hyperparameters
-        Logarithms at the largest posterior and draws of them, where they are known; None: found here.
+    progress
+        Function that is called after each round.
 
     Raises
     ------
@@ -113,33 +125,47 @@ def learn_postures(
     """
     if len(measured) < 2:
         raise InputError(f"{len(measured)} measured posture: give two or more, best eight")
-    prepared = [basis_at(robot, one.driven) for one in measured]
-    places = tuple(place for _, place in prepared)
-    weights = arc_weights(robot, np.array([one.driven for one in measured]))
-    cell = _Cell(
-        robot,
-        tuple(measured),
-        tuple(basis for basis, _ in prepared),
-        places,
-        posture_metric(robot, weights, list(places)),
-    )
-    best = np.log(MEDIANS) if hyperparameters is None else hyperparameters[0]
-    stiffness = np.zeros((len(places), len(cell.bases[0].stiffness)))
+    cell = _cell(robot, tuple(measured))
+    best = np.log(MEDIANS)
+    stiffness = np.zeros((len(cell.places), len(cell.bases[0].stiffness)))
     mass = np.zeros(len(cell.bases[0].mass))
     pairs: Pairs | None = None
     for turn in range(ROUNDS):
         for _ in range(STEPS):
-            rows, pairs = _linear_rows(cell, stiffness, mass, None if turn == 0 else pairs)
+            rows, pairs = _linear_rows(cell, stiffness, mass, pairs if turn else None)
             stiffness, mass = _most_probable(cell, rows, best, stiffness, mass)
         rows, pairs = _linear_rows(cell, stiffness, mass, pairs if turn else None)
-        evidence = Evidence(rows, squared_distances(cell.metric, list(places), list(places)))
-        if hyperparameters is None:
-            best = best_hyperparameters(evidence, best)
+        best = best_hyperparameters(Evidence(rows, cell.distances()), best)
+        if progress is not None:
+            progress()
     assert pairs is not None
-    draws = drawn_hyperparameters(evidence, best) if hyperparameters is None else hyperparameters[1]
-    return LearnedPostures(
-        robot, cell.measured, pairs, best, draws, stiffness, mass, evidence, cell.metric, cell.places
-    )
+    draws = drawn_hyperparameters(Evidence(rows, cell.distances()), best)
+    return assembled(robot, measured, pairs, (best, draws), (stiffness, mass))
+
+
+def assembled(
+    robot: SpatialRobot,
+    measured: Sequence[MeasuredPosture],
+    pairs: Pairs,
+    hyperparameters: tuple[Real, Real],
+    unknown: tuple[Real, Real],
+) -> LearnedPostures:
+    """The process from measurements, pairs, hyperparameters (best, draws) and unknowns (stiffness, mass) as known.
+
+    It is what :func:`learn_postures` ends with, and what a file holds.
+    """
+    cell = _cell(robot, tuple(measured))
+    rows, pairs = _linear_rows(cell, *unknown, pairs)
+    evidence = Evidence(rows, cell.distances())
+    return LearnedPostures(robot, cell.measured, pairs, *hyperparameters, *unknown, evidence, cell.metric, cell.places)
+
+
+def _cell(robot: SpatialRobot, measured: tuple[MeasuredPosture, ...]) -> _Cell:
+    prepared = [basis_at(robot, one.driven) for one in measured]
+    places = tuple(place for _, place in prepared)
+    weights = arc_weights(robot, np.array([one.driven for one in measured]))
+    metric = posture_metric(robot, weights, list(places))
+    return _Cell(robot, measured, tuple(basis for basis, _ in prepared), places, metric)
 
 
 def _linear_rows(cell: _Cell, stiffness: Real, mass: Real, pairs: Pairs | None) -> tuple[Rows, Pairs]:
@@ -165,14 +191,13 @@ def _linear_rows(cell: _Cell, stiffness: Real, mass: Real, pairs: Pairs | None) 
 
 def _most_probable(cell: _Cell, rows: Rows, hyper: Real, stiffness: Real, mass: Real) -> tuple[Real, Real]:
     """One step of Newton and Gauss towards the most probable unknowns."""
-    places = list(cell.places)
-    distances = squared_distances(cell.metric, places, places)
+    distances = cell.distances()
     factor = cho_factor(covariance_of(hyper, Evidence(rows, distances)), lower=True)
-    wanted = joined([unknown_rows(p, stiffness.shape[1], len(mass)) for p in range(len(places))])
+    wanted = joined([unknown_rows(p, stiffness.shape[1], len(mass)) for p in range(len(stiffness))])
     across = np.tensordot(
         np.exp(2 * hyper[:-1]), covariance_parts(wanted, rows, distances, float(np.exp(hyper[-1])), False), 1
     )
-    found = (across @ cho_solve(factor, rows.value)).reshape(len(places), -1)
+    found = (across @ cho_solve(factor, rows.value)).reshape(len(stiffness), -1)
     n = stiffness.shape[1]
     new = np.clip(found[:, :n] - stiffness, -LARGEST_STEP, LARGEST_STEP) + stiffness
     return new, np.clip(found[0, n : n + len(mass)] - mass, -LARGEST_STEP, LARGEST_STEP) + mass

@@ -140,9 +140,9 @@ def _errors(model: ModalModel, places: _Places) -> Real:
     if known is not None:
         errors[:, 0] = known[0] / model.natural_frequencies
         errors[:, 1] = known[1] / model.damping_ratios
-    return np.maximum(errors, FLOORS)
+    return np.asarray(np.maximum(errors, FLOORS))
 
 
 def _signed(shapes: Real, reference: Real) -> Real:
     turned = np.sum(shapes * reference, axis=1) < 0
-    return np.where(turned[:, None], -shapes, shapes)
+    return np.asarray(np.where(turned[:, None], -shapes, shapes))

@@ -9,15 +9,12 @@ from foundation import InputError
 
 from ..finite_elements import Spring, Structure, gravity_torques, rigid_motion
 from ..kinematics import close_loops
-from ..spatial import SpatialRobot, acceleration, modes_at
+from ..spatial import SpatialRobot, StructureModes, acceleration, modes_at
 
 Real = NDArray[np.float64]
 
-MOST_MODES = 30
-"""Modes of the basis: the lowest ones; a stiffness that changes moves them within the space that they span."""
-
-LEAST_ENERGY = 1e-9
-"""Links that hold less than this share of a mode's energy are rigid, and their stiffness is no unknown."""
+LOWEST_MODES = 24
+"""Modes that a basis keeps, beside one static deflection for each direction in which a joint gives way."""
 
 
 @dataclass(frozen=True)
@@ -75,8 +72,8 @@ def basis_at(robot: SpatialRobot, driven: Real) -> tuple[ModalBasis, PosturePlac
         raise InputError("this robot's file gives stiffness but no masses: it has no modes to learn from")
     q = close_loops(robot.mechanism, driven)
     modes = modes_at(robot, q)
-    kept = slice(None, MOST_MODES)
-    squares, shapes, structure = modes.squares[kept], modes.shapes[kept], modes.structure
+    structure = modes.structure
+    squares, shapes = _narrowed(modes)
     stiffness = [_spring(spring, structure, shapes) for spring in structure.springs]
     mass = [_body(shapes[:, body.node], body.mass, body.centre, body.inertia) for body in structure.bodies]
     if structure.beams:
@@ -92,7 +89,11 @@ def part_names(robot: SpatialRobot) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names of the stiffnesses and of the masses of :class:`ModalBasis`, in their order."""
     flexible = any(link.section is not None for link in robot.links)
     last = ("links",) if flexible else ()
-    springs = tuple(f"joint {joint.frame}" for joint in robot.joints)
+    frames = [joint.frame for joint in robot.joints]
+    springs = tuple(
+        f"joint {frame}" + (f" ({frames[:i].count(frame) + 1})" if frame in frames[:i] else "")
+        for i, frame in enumerate(frames)
+    )
     bodies = tuple(f"body {number} on {body.frame}" for number, body in enumerate(robot.bodies, 1))
     return (*springs, *last), (*bodies, *last)
 
@@ -118,10 +119,31 @@ SMALLEST_ARC = 0.15
 """A joint whose turn leaves the tip where it is still turns the masses and springs beyond it."""
 
 
+def _narrowed(modes: StructureModes) -> tuple[Real, Real]:
+    """Squares and shapes of the lowest modes and the joints' static deflections, which a softer joint adds to them."""
+    count, structure = len(modes.squares), modes.structure
+    relative = [
+        _relative(spring, structure, modes.shapes)[:, np.isfinite(spring.stiffness)] for spring in structure.springs
+    ]
+    static = np.hstack(relative) / modes.squares[:, None]
+    if count <= LOWEST_MODES + static.shape[1]:
+        return modes.squares, modes.shapes
+    static[:LOWEST_MODES] = 0.0
+    wide, sizes, _ = np.linalg.svd(static, full_matrices=False)
+    basis = np.hstack([np.eye(count)[:, :LOWEST_MODES], wide[:, sizes > 1e-6 * sizes.max(initial=0.0)]])
+    squares, turned = np.linalg.eigh(basis.T @ (modes.squares[:, None] * basis))
+    return squares, np.tensordot((basis @ turned).T, modes.shapes, 1)
+
+
+def _relative(spring: Spring, structure: Structure, shapes: Real) -> Real:
+    """Relative motion at a joint in each mode, in its axes, (n_modes, 6)."""
+    before, after = spring.motions(structure.positions)
+    return np.asarray(shapes[:, spring.nodes[1]] @ after.T - shapes[:, spring.nodes[0]] @ before.T)
+
+
 def _spring(spring: Spring, structure: Structure, shapes: Real) -> Real:
     """Energy of one joint over modal coordinates."""
-    before, after = spring.motions(structure.positions)
-    relative = shapes[:, spring.nodes[1]] @ after.T - shapes[:, spring.nodes[0]] @ before.T
+    relative = _relative(spring, structure, shapes)
     elastic = np.where(np.isfinite(spring.stiffness), spring.stiffness, 0.0)
     return np.asarray((relative * elastic) @ relative.T)
 

@@ -9,18 +9,21 @@ from scipy.optimize import linear_sum_assignment
 from foundation import TIP
 from modal_fit import ModalModel, Residuals, pack_parameters
 
-from .conditioned import conditioned, distances_to
+from .conditioned import conditioned, distances_to, left_unknown
 from .corrected_modes import CorrectedModes, corrected_modes, modelled_damping
 from .learning import LearnedPostures
 from .modal_basis import ModalBasis, basis_at
-from .process_rows import Rows, joined, mode_rows, unknown_rows
+from .process_rows import joined, mode_rows, unknown_rows
 
 Real = NDArray[np.float64]
 
 SAMPLES = 240
 """Modal models that are drawn."""
 
-FAR = 0.7
+LOWEST = 3
+"""Modes whose energy says which joints matter for how far a posture is."""
+
+FAR = 0.5
 """Share of the variance over postures, left by the measurements, from which a posture is far from all of them."""
 
 REACH = 2.0
@@ -38,8 +41,8 @@ class PredictedPosture:
     draws
         Modal models drawn, their modes in the order of ``model``.
     left_unknown
-        Share of the variance of the lowest modes' frequencies over postures that the measurements leave: 0 at a
-        measured posture, 1 where only the model is known.
+        Share of the variance over postures that the measurements would leave if they were exact: 0 at a measured
+        posture, 1 where nothing is known but what all postures share.
     """
 
     model: ModalModel
@@ -58,7 +61,7 @@ class PredictedPosture:
             return ()
         return (
             f"far from every measured posture: the measurements leave {100 * self.left_unknown:.0f} % of the variance "
-            "over postures, and the band is nearly that of the model alone; measure nearer",
+            "over postures, and the band goes back to what all postures share; measure nearer",
         )
 
     def frequency_band(self, share: float = 0.95) -> Real:
@@ -104,8 +107,7 @@ def predict_posture(
     across, within = distances_to(learned, [place])
     count = len(basis.stiffness), len(basis.mass)
     unknown = unknown_rows(0, *count)
-    middle = conditioned(learned.evidence, learned.best)
-    mean = middle.given(unknown, across, within)[0]
+    mean = conditioned(learned.evidence, learned.best).given(unknown, across, within)[0]
     modes = corrected_modes(basis, mean[: count[0]], mean[count[0] : sum(count)])
     kept = _kept(learned, modes)
     rows = joined([unknown, *[mode_rows(0, modes, r, np.eye(3)) for r in range(kept)]])
@@ -116,10 +118,10 @@ def predict_posture(
     for hyper in learned.draws:
         average, covariance = conditioned(learned.evidence, hyper).given(rows, across, within)
         values, vectors = np.linalg.eigh(covariance)
-        spread = vectors * np.sqrt(np.maximum(values, 0.0))
-        drawn += [_drawn(target, one) for one in average + rng.normal(size=(share, len(rows))) @ spread.T]
-    unknown_left = [middle.left_unknown(_frequency_row(modes, r), across, within) for r in range(min(3, kept))]
-    return PredictedPosture(_in_the_middle(drawn), tuple(drawn), float(np.mean(unknown_left)))
+        spread = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T  # the one root that rounding does not turn
+        drawn += [_drawn(target, one) for one in average + rng.normal(size=(share, len(rows))) @ spread]
+    energy = modes.shares[: min(LOWEST, kept)].mean(axis=0)
+    return PredictedPosture(_in_the_middle(drawn), tuple(drawn), left_unknown(learned, energy, across))
 
 
 @dataclass(frozen=True)
@@ -186,13 +188,6 @@ def _in_the_middle(drawn: list[ModalModel]) -> ModalModel:
     )
     away = np.array([pack_parameters(one) for one in drawn]) - pack_parameters(model)
     return replace(model, covariance=away.T @ away / len(drawn))
-
-
-def _frequency_row(modes: CorrectedModes, mode: int) -> Rows:
-    """The frequency of one mode over the stiffnesses, and its discrepancy."""
-    rows = mode_rows(0, modes, mode, np.zeros((0, 3)))
-    rows = replace(rows, stiffness=np.vstack([modes.shares[mode] / 2, np.zeros_like(modes.shares[mode])]))
-    return Rows(**{name: getattr(rows, name)[:1] for name in rows.__dataclass_fields__})
 
 
 def _band(values: Real, share: float) -> Real:

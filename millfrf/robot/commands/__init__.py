@@ -8,6 +8,7 @@ from ..diagnosis import diagnose
 from .compensate import compensate
 from .deviation import deviation
 from .frf import frf
+from .learn import learn
 from .list_robots import list_robots
 from .lobes import lobes
 from .map_command import map_command
@@ -24,6 +25,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "lobes": lobes,
     "map": map_command,
     "compensate": compensate,
+    "learn": learn,
 }
 """By name, in the order in which `--help` lists them."""
 

@@ -5,12 +5,16 @@ from typing import Annotated
 
 import typer
 
-from .options import At, Feed, Joints, Links, Pose, Redundancy, Robot, Turn
+from foundation import InputError
+
+from .options import At, Feed, Joints, Learned, Links, Pose, Redundancy, Robot, Turn
 
 
 def frf(
     robot: Robot,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE", help=".h5: FRF; .json: modal model.")],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FILE", help=".h5: FRF; .json: modal model; .csv: band (--learned).")
+    ],
     pose: Pose = None,
     joints: Joints = None,
     at: At = None,
@@ -24,9 +28,21 @@ def frf(
         tuple[float, float, float] | None,
         typer.Option("--sensor", metavar="X Y Z", help="Housing sensor, m from the tip: its motion too (.json)."),
     ] = None,
+    learned: Learned = None,
 ) -> None:
     """Receptance at the tool tip in a posture, as an FRF file or as the modal model behind it."""
     from ..postures import Asked
+
+    asked = Asked(pose, joints, at, feed, turn, redundancy)
+    if learned is not None:
+        from ..learned import write_learned_receptance
+
+        if sensor is not None or links:
+            raise InputError(
+                "--sensor and --links have no place beside --learned, which knows the tip of robots in space"
+            )
+        write_learned_receptance(robot, learned, asked, out, band, lines)
+        return
     from ..results import write_receptance
 
-    write_receptance(robot, Asked(pose, joints, at, feed, turn, redundancy), out, band, lines, sensor, links)
+    write_receptance(robot, asked, out, band, lines, sensor, links)

@@ -1,5 +1,6 @@
 """Arguments and options that several commands of `millfrf robot` share."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -33,3 +34,7 @@ Weight = Annotated[
     ),
 ]
 Speed = Annotated[float | None, typer.Option("--speed", metavar="RPM", help="Spindle speed of a posture map.")]
+Learned = Annotated[
+    Path | None,
+    typer.Option("--learned", metavar="POSTURES.json", help="What `robot learn` wrote: a band from measured postures."),
+]

@@ -85,4 +85,3 @@ def drawn_cell(rng: np.random.Generator) -> tuple[NonlinearCell, tuple[Lump, ...
 def drawn_postures(rng: np.random.Generator, count: int) -> Real:
     """Postures of the range, rad, (count, 6)."""
     return np.radians(rng.uniform(LOWEST, HIGHEST, (count, 6)))
-

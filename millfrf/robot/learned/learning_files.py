@@ -1,0 +1,96 @@
+"""The step from a robot's file and modal models measured in several postures to learned postures."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from foundation import InputError, writing_whole_file
+from modal_fit import read_modal_model
+from robot_model import (
+    LearnedPostures,
+    SpatialCase,
+    learn_postures,
+    measured_posture,
+    read_robot,
+    shown_values,
+    tool_down,
+    write_learned_postures,
+)
+
+from ...options import check_output
+from ...progress import bar
+from ...provenance import add_to_json, origin
+from ...tables import Table, show
+from ..asked_loads import check_degrees
+from ..postures import Asked, posture_of, spatial
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LearningFrom:
+    """Options of learning as they were typed: a posture for each model, and the direction of their X axes."""
+
+    poses: tuple[str, ...]
+    feed: float | None = None
+
+
+def learn_from_files(robot: str, models: Sequence[Path], asking: LearningFrom, out: Path) -> LearnedPostures:
+    """Learn, write the file, print the table of postures.
+
+    Raises
+    ------
+    InputError
+        Files or postures that cannot be used together.
+    """
+    check_output(out, (".json",), models)
+    case = spatial(read_robot(robot))
+    axes = axes_of(asking.feed)
+    if len(asking.poses) != len(models):
+        raise InputError(
+            f"{len(asking.poses)} postures for {len(models)} modal models; give --pose once for each, in the same order"
+        )
+    measured = [
+        measured_posture(path.stem, driven_of(case, pose), read_modal_model(path), axes)
+        for path, pose in zip(models, asking.poses, strict=True)
+    ]
+    with bar("learning"):
+        learned = learn_postures(case.robot, measured)
+    with writing_whole_file(out) as temporary:
+        write_learned_postures(temporary, learned)
+        add_to_json(temporary, {"robot": robot, **origin("robot learn", [robot, *models], asdict(asking))})
+    _show(case, learned)
+    for name, frequency in learned.unpaired:
+        typer.echo(f"warning: {name}: the mode at {frequency:.2f} Hz is near none of the model's; left out", err=True)
+    typer.echo(f"wrote {out}: {len(measured)} postures, {sum(len(one) for one in learned.pairs)} modes")
+    return learned
+
+
+def driven_of(case: SpatialCase, pose: str) -> Real:
+    """Driven joint values of a posture's name, or of degrees (prismatic joints: metres) with commas."""
+    asked = Asked(joints=pose) if "," in pose else Asked(pose=pose)
+    return posture_of(case, asked)[0]
+
+
+def axes_of(feed: float | None) -> Real:
+    """Axes X, Y, Z of models whose X lies ``feed`` degrees from the base's x, Z upwards; None: the base's."""
+    if feed is None:
+        return np.eye(3)
+    check_degrees(feed=feed)
+    return tool_down([0.0, 0.0, 0.0], np.radians(feed)).axes
+
+
+def _show(case: SpatialCase, learned: LearnedPostures) -> None:
+    """A row for each posture: what was measured, and how far the model was off."""
+    rows = []
+    for one, pairs, evidence in zip(learned.measured, learned.pairs, learned.frequency_ratios(), strict=True):
+        first = f"{one.frequencies.min():.2f}"
+        off = 100 * float(np.sqrt(np.mean((evidence - 1) ** 2)))
+        posture = shown_values(case.robot.mechanism, one.driven)
+        rows.append((one.name, posture, f"{len(pairs)} of {len(one.frequencies)}", first, f"{off:.2g}"))
+    columns = ("model", "posture", "modes paired", "lowest (Hz)", "model off by (%)")
+    show(Table("Measured postures", columns, tuple(rows)))

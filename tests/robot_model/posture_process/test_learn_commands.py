@@ -1,0 +1,73 @@
+"""`millfrf robot learn` and `robot frf --learned`: files that the other commands read."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimation import read_frf
+from millfrf.__main__ import BAD_INPUT, DONE, run
+from modal_fit import read_modal_model, write_modal_model
+from robot_model import modal_model_at, read_spatial_robot, with_joint_factor
+
+ROBOT = "kuka_kr90_r3100"
+POSTURES = ("0,-10,100,0,90,0", "20,25,70,40,60,0", "-15,45,30,80,-50,0", "10,5,85,20,75,30")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Models of a robot whose second joint is 15 % softer than its file says, and what was learned from them."""
+    where = tmp_path_factory.mktemp("learned")
+    softer = with_joint_factor(read_spatial_robot(ROBOT).robot, "2", 0.85)
+    names = []
+    for number, posture in enumerate(POSTURES, 1):
+        q = np.radians([float(value) for value in posture.split(",")])
+        names.append(str(where / f"hall_{number}.json"))
+        write_modal_model(names[-1], modal_model_at(softer, q, highest_frequency=45.0))
+    poses = [word for posture in POSTURES for word in ("--pose", posture)]
+    assert run(["robot", "learn", ROBOT, *names, *poses, "--out", str(where / "postures.json")]) == DONE
+    return where
+
+
+def _frf(folder: Path, out: str, *more: str) -> None:
+    learned = ["--learned", str(folder / "postures.json"), "--out", str(folder / out)]
+    assert run(["robot", "frf", ROBOT, "--joints", "5,10,80,10,80,0", *learned, *more]) == DONE
+
+
+def test_a_predicted_model_is_nearer_to_the_softer_robot_and_lobes_read_it(folder: Path) -> None:
+    _frf(folder, "model.json")
+    found = read_modal_model(folder / "model.json")
+    robot, q = read_spatial_robot(ROBOT).robot, np.radians([5, 10, 80, 10, 80, 0])
+    truth = modal_model_at(with_joint_factor(robot, "2", 0.85), q).natural_frequencies[:4]
+    modelled = modal_model_at(robot, q).natural_frequencies[:4]
+    left = np.abs(found.natural_frequencies[:4] / truth - 1).max()
+    assert left < 0.3 * np.abs(modelled / truth - 1).max()
+    assert found.covariance is not None
+    cut = folder / "cut.toml"
+    cut.write_text(
+        "[cutting]\nteeth = 2\ndiameter_m = 0.02\nedge_angle_deg = 90.0\nktc_pa = 700e6\nkrc = 0.3\nkac = 0.1\n"
+        "start_angle_deg = 90.0\nexit_angle_deg = 180.0\nfeed_per_tooth_m = 1e-4\n"
+    )
+    asked = ["--cutting", str(cut), "--speeds", "2900", "3100", "3", "--max-depth", "0.01"]
+    assert run(["lobes", str(folder / "model.json"), *asked, "--out", str(folder / "lobes.csv")]) == DONE
+
+
+def test_the_band_holds_the_frf_of_the_same_prediction(folder: Path) -> None:
+    _frf(folder, "band.csv", "--lines", "20")
+    _frf(folder, "frf.h5", "--lines", "20")
+    rows = [line.split(",") for line in (folder / "band.csv").read_text().splitlines() if not line.startswith("#")]
+    middle, low, high = np.array([row[3:] for row in rows[1:]], dtype=float).T
+    assert np.abs(read_frf(folder / "frf.h5").values).ravel() == pytest.approx(middle, rel=1e-4)
+    diagonal = np.array([row[1] == row[2] for row in rows[1:]])
+    assert np.mean((low <= middle) & (middle <= high), where=diagonal) > 0.95
+
+
+def test_mistakes_end_in_one_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    models = [str(folder / "hall_1.json"), str(folder / "hall_2.json")]
+    for words, said in (
+        (["robot", "learn", ROBOT, *models, "--pose", POSTURES[0], "--out", "p.json"], "1 postures for 2"),
+        (["robot", "frf", "staubli_rx170", "--learned", str(folder / "postures.json"), "--out", "m.json"], "robot"),
+        (["robot", "frf", ROBOT, "--learned", str(folder / "hall_1.json"), "--out", "m.json"], "learned postures"),
+    ):
+        assert run(words) == BAD_INPUT
+        assert said in " ".join(capsys.readouterr().err.split())
