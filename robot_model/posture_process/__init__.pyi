@@ -1,6 +1,6 @@
 from .learned_file import read_learned_postures, write_learned_postures
 from .learning import LearnedPostures, learn_postures
-from .measured_posture import MeasuredPosture, measured_posture
+from .posture_measurement import MeasuredPosture, measured_posture
 from .predicting import PredictedPosture, predict_posture
 
 __all__ = [

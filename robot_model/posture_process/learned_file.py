@@ -15,8 +15,8 @@ from ..kinematics import typed_values
 from ..spatial import SpatialRobot
 from .hyperparameters import NAMES
 from .learning import LearnedPostures, assembled
-from .measured_posture import MeasuredPosture
 from .modal_basis import ModalBasis, basis_at, part_names
+from .posture_measurement import MeasuredPosture
 
 Real = NDArray[np.float64]
 

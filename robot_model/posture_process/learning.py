@@ -12,10 +12,10 @@ from foundation import InputError
 from ..spatial import SpatialRobot
 from .corrected_modes import corrected_modes, modelled_damping
 from .hyperparameters import MEDIANS, Evidence, best_hyperparameters, covariance_of, drawn_hyperparameters
-from .measured_posture import MeasuredPosture
 from .modal_basis import ModalBasis, PosturePlace, arc_weights, basis_at
 from .mode_pairs import mode_pairs
 from .posture_kernels import PostureMetric, SquaredDistances, posture_metric, squared_distances
+from .posture_measurement import MeasuredPosture
 from .process_covariance import covariance_parts
 from .process_rows import Rows, joined, measured_rows, unknown_rows
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .corrected_modes import CorrectedModes, shape_slopes
-from .measured_posture import MeasuredPosture
 from .modal_basis import ModalBasis
+from .posture_measurement import MeasuredPosture
 
 Real = NDArray[np.float64]
 Index = NDArray[np.int64]
