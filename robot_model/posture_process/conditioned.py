@@ -28,7 +28,7 @@ class Conditioned:
     hyper
         Logarithms of the hyperparameters.
     evidence
-        Measured rows.
+        Measured rows and the distances of their postures.
     root
         Lower Cholesky factor of their covariance.
     pulled

@@ -50,7 +50,7 @@ class LearnedPostures:
     mass : (n_masses,)
         Logarithms of the mass factors.
     evidence
-        Measured rows.
+        Measured rows and the distances of their postures.
     metric, places
         Distances of postures, and where the measured ones lie.
     """

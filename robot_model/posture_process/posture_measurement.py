@@ -31,7 +31,7 @@ class MeasuredPosture:
     frequencies : (n_modes,), Hz
         Undamped natural frequencies.
     damping : (n_modes,)
-        Damping ratios.
+        Damping ratios of the measured modes.
     shapes : (n_modes, n_directions), kg^-1/2
         Mass-normalised motion of the tip along the measured directions, its sign free.
     errors : (n_modes, 3)
