@@ -4,7 +4,7 @@ from .generalised_coordinates import coordinate_basis
 from .gravity import STANDARD_GRAVITY, gravity_hessian, gravity_stiffness, gravity_torques, with_gravity
 from .modal_damping import modal_damping_matrix, rayleigh_constants
 from .modal_reduction import from_real_modes, modal_model
-from .section import Material, Section, hollow_circle
+from .section import Material, Section, hollow_circle, tube_diameters
 from .structure import (
     Beam,
     Body,
@@ -46,5 +46,6 @@ __all__ = [
     "stiffness_matrix",
     "tip_compliance",
     "tip_stiffness",
+    "tube_diameters",
     "with_gravity",
 ]

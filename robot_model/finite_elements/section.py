@@ -104,3 +104,28 @@ def hollow_circle(outer: float, inner: float, material: Material, *, timoshenko:
         rotary_z=rotary,
         polar=2 * material.density * second_moment,
     )
+
+
+def tube_diameters(area: float, second_moment: float) -> tuple[float, float]:
+    """Outer and inner diameter, m, of the round tube with an area (m^2) and a second moment of area (m^4).
+
+    ``D^2 = 8 I / A + 2 A / pi``, ``d^2 = 8 I / A - 2 A / pi``.
+
+    Raises
+    ------
+    InputError
+        No tube has them: ``I < A^2 / (4 pi)``, less than a solid bar's.
+
+    Examples
+    --------
+    >>> outer, inner = 0.16, 0.13
+    >>> area, moment = math.pi / 4 * (outer**2 - inner**2), math.pi / 64 * (outer**4 - inner**4)
+    >>> [round(diameter, 9) for diameter in tube_diameters(area, moment)]
+    [0.16, 0.13]
+    """
+    if not (area > 0 and second_moment >= area**2 / (4 * math.pi) * (1 - 1e-12)):
+        raise InputError(
+            f"no round tube has {area:g} m^2 with {second_moment:g} m^4; the least is {area**2 / (4 * math.pi):g} m^4"
+        )
+    mean, half = 8 * second_moment / area, 2 * area / math.pi
+    return math.sqrt(mean + half), math.sqrt(max(mean - half, 0.0))

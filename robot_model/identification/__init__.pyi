@@ -1,4 +1,6 @@
+from .deflection_file import deflection_columns, read_deflections
 from .elastic_parameters import ElasticParameter, JointStiffness, LinkSection, joint_parameters, link_parameters
+from .held_out import HeldOut, verify_elastic
 from .parameter_search import Identification, identify
 from .planar_identification import apply_identified, identify_from_frequencies, identify_from_frfs
 from .stiffness_identification import (
@@ -14,12 +16,14 @@ from .stiffness_identification import (
 __all__ = [
     "Deflection",
     "ElasticParameter",
+    "HeldOut",
     "Identification",
     "JointStiffness",
     "LinkSection",
     "apply_elastic",
     "apply_identified",
     "apply_joint_stiffness",
+    "deflection_columns",
     "identify",
     "identify_elastic",
     "identify_from_frequencies",
@@ -28,5 +32,7 @@ __all__ = [
     "joint_parameters",
     "link_parameters",
     "predicted_deflections",
+    "read_deflections",
     "stiffness_names",
+    "verify_elastic",
 ]

@@ -1,5 +1,13 @@
 from .damped_least_squares import inverse_kinematics
-from .joint_values import LARGEST_TRAVEL, driven_values, named_values, shown_values, typed_values, unit_doubts
+from .joint_values import (
+    LARGEST_TRAVEL,
+    driven_values,
+    joint_unit,
+    named_values,
+    shown_values,
+    typed_values,
+    unit_doubts,
+)
 from .loop_closure import close_loops, posture_warnings, tool_jacobian
 from .mechanism import Frame, Mechanism, drive_direction, rotation_vector
 from .spherical_wrist import has_spherical_wrist, nearest_solution, wrist_solutions
@@ -13,6 +21,7 @@ __all__ = [
     "driven_values",
     "has_spherical_wrist",
     "inverse_kinematics",
+    "joint_unit",
     "named_values",
     "nearest_solution",
     "posture_warnings",

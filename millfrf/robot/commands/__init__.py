@@ -8,6 +8,7 @@ from ..diagnosis import diagnose
 from .compensate import compensate
 from .deviation import deviation
 from .frf import frf
+from .identify import identify
 from .learn import learn
 from .list_robots import list_robots
 from .lobes import lobes
@@ -26,6 +27,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "map": map_command,
     "compensate": compensate,
     "learn": learn,
+    "identify": identify,
 }
 """By name, in the order in which `--help` lists them."""
 
