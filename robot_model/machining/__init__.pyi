@@ -7,7 +7,7 @@ from .drilling_deviation import (
     sag_parts,
 )
 from .path_compensation import CompensatedPath, ToolPath, compensate_path
-from .path_file import read_tool_path, write_compensated_path
+from .path_file import MOMENTS, read_tool_path, write_compensated_path
 from .redundancy import CutPlace, PostureMap, frequencies_over, posture_map, target_of, tool_down, turned_place
 from .uncertainty_budget import (
     LoadUncertainty,
@@ -23,6 +23,7 @@ from .uncertainty_budget import (
 )
 
 __all__ = [
+    "MOMENTS",
     "CompensatedPath",
     "CutPlace",
     "DeviationMap",

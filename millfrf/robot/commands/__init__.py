@@ -14,6 +14,7 @@ from .list_robots import list_robots
 from .lobes import lobes
 from .map_command import map_command
 from .modes import modes
+from .path_command import path_command
 from .stiffness import stiffness
 
 COMMANDS: dict[str, Callable[..., None]] = {
@@ -28,6 +29,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "compensate": compensate,
     "learn": learn,
     "identify": identify,
+    "path": path_command,
 }
 """By name, in the order in which `--help` lists them."""
 

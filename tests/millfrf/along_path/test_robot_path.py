@@ -1,0 +1,99 @@
+"""`millfrf robot path`: what it writes, and that what it chooses is better, continuous and certified."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from millfrf.__main__ import run
+
+CUT = """[cutting]
+teeth = 2
+diameter_m = 0.012
+edge_angle_deg = 90.0
+ktc_pa = 600e6
+krc = 0.3
+kac = 0.1
+start_angle_deg = 90.0
+exit_angle_deg = 180.0
+feed_per_tooth_m = 0.1e-3
+"""
+
+
+@pytest.fixture
+def inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    rows = [f"{x:.4f},0.1,0.7,0,0,1" for x in np.linspace(1.5, 1.6, 5)]
+    (tmp_path / "path.csv").write_text("\n".join(["x_m,y_m,z_m,i,j,k", *rows]) + "\n", encoding="utf-8")
+    (tmp_path / "cut.toml").write_text(CUT, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def command(robot: str, *more: str) -> list[str]:
+    words = f"robot path {robot} path.csv --cutting cut.toml --speed 3000 --depth 0.002 --turns -180 150 12"
+    return [*words.split(), *more]
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    return list(csv.DictReader(lines))
+
+
+def test_depth_grows_and_the_folder_holds_all(inputs: Path) -> None:
+    assert run(command("kuka_kr90_angled", "--out", "out")) == 0
+    rows = table(inputs / "out" / "path.csv")
+    depth = np.array([float(row["depth_limit_m"]) for row in rows])
+    before = np.array([float(row["before_depth_limit_m"]) for row in rows])
+    assert len(rows) == 5
+    assert depth.min() > 3 * before.min()
+    assert {row["status"] for row in rows} == {"verified"}
+    joints = np.array([[float(row[f"q{i + 1}"]) for i in range(6)] for row in rows])
+    assert np.abs(np.diff(joints, axis=0)).max() <= 15
+    assert min(float(row["limit_margin_deg"]) for row in rows) >= 5
+    assert (inputs / "out" / "path.png").stat().st_size > 10_000
+    corrected = table(inputs / "out" / "compensated.csv")
+    moved = [float(row["x_m"]) - float(given["x_m"]) for row, given in zip(corrected, rows, strict=True)]
+    assert np.abs(moved).max() < 2e-3
+    assert np.abs(moved).min() > 1e-6
+
+
+def test_a_spindle_in_line_with_the_last_joint_gains_nothing_and_stays(inputs: Path) -> None:
+    assert run(command("kuka_kr90_r3100", "--out", "table.csv")) == 0
+    for row in table(inputs / "table.csv"):
+        assert float(row["depth_limit_m"]) == pytest.approx(float(row["before_depth_limit_m"]), rel=1e-6)
+        assert float(row["tool_turn_deg"]) == pytest.approx(0, abs=1e-6)
+
+
+def test_deviation_and_both_choose_what_they_say(inputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(command("kuka_kr90_angled", "--optimise", "deviation", "--out", "stiff.csv")) == 0
+    assert run(command("kuka_kr90_angled", "--optimise", "depth", "--out", "deep.csv")) == 0
+    assert run(command("kuka_kr90_angled", "--optimise", "both", "--out", "both.csv")) == 0
+    assert "front:" in capsys.readouterr().out
+    worst = {}
+    for name in ("stiff", "deep", "both"):
+        rows = table(inputs / f"{name}.csv")
+        moved = [[float(row[f"deviation_{a}_m"]) for a in ("along", "across", "axial")] for row in rows]
+        worst[name] = np.linalg.norm(moved, axis=1).max(), min(float(row["depth_limit_m"]) for row in rows)
+    assert worst["stiff"][0] <= 1.001 * min(size for size, _ in worst.values())
+    assert worst["deep"][1] >= 0.97 * max(depth for _, depth in worst.values())
+    assert worst["stiff"][0] <= 1.001 * worst["both"][0] <= 1.002 * worst["deep"][0]
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--optimise", "speed"), "is none of depth, deviation, both"),
+        (("--balance", "2"), "from 0 to 1"),
+        (("--table-at", "1", "0", "0"), "--table LO HI N"),
+        (("--limit-margin", "120"), "from 0 to 90"),
+        (("--limit-margin", "80"), "in no posture that keeps the margins"),
+        (("--joint-step", "0.01"), "no continuous sequence"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_one_line(
+    inputs: Path, capsys: pytest.CaptureFixture[str], more: tuple[str, ...], words: str
+) -> None:
+    assert run(command("kuka_kr90_angled", "--out", "out", *more)) == 2
+    assert words in capsys.readouterr().err
+    assert not (inputs / "out").exists()
