@@ -145,6 +145,7 @@ from .posture_process import (
 from .spatial import (
     NO_MASSES,
     ElasticJoint,
+    JointDrive,
     Link,
     LumpedBody,
     NaturalRobot,
@@ -210,6 +211,7 @@ __all__ = [
     "Frame",
     "HeldOut",
     "Identification",
+    "JointDrive",
     "JointStiffness",
     "LearnedPostures",
     "Link",

@@ -55,13 +55,15 @@ def coupled_frf_at(robot: SpatialRobot, q: Real, frequencies: Real, loss_factor:
     Raises
     ------
     InputError
-        Frequencies that are not positive, a part without mass (its receptance is infinite), or gravity.
+        Frequencies that are not positive, a part without mass (its receptance is infinite), gravity, or drives.
     """
     if np.min(frequencies) <= 0:
         raise InputError("free links have no receptance at 0 Hz; ask for frequencies above 0, or exact_frf_at")
     if robot.gravity:
         raise InputError("weight acts between parts: receptance coupling takes none; use exact_frf_at")
     structure = structure_at(robot, q)
+    if structure.drives:
+        raise InputError("a motor's inertia acts between parts: receptance coupling takes none; use exact_frf_at")
     omega = 2 * np.pi * np.asarray(frequencies, dtype=float)
     try:
         apart: Complex = np.asarray(np.linalg.inv(_links_and_bodies(structure, omega, loss_factor)), dtype=complex)

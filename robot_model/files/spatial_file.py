@@ -13,6 +13,7 @@ from foundation import InputError
 from ..finite_elements import Material, Section, hollow_circle, rayleigh_constants
 from ..kinematics import LARGEST_TRAVEL, Frame, Mechanism, named_values
 from ..spatial import ElasticJoint, Link, LumpedBody, SpatialRobot, check_tip
+from .drive_table import DriveKeys, drive_of
 from .robot_files import Table, read_as
 
 
@@ -41,7 +42,7 @@ class _Frame(Table):
     limits_m: tuple[float, float] | None = None
 
 
-class _Joint(Table):
+class _Joint(DriveKeys):
     frame: str
     nodes: tuple[int, int]
     radial_n_per_m: float | None = Field(None, gt=0)
@@ -163,7 +164,7 @@ def _case(content: _File) -> SpatialCase:
     closures = tuple(closure.frames for closure in content.closures)
     spatial = SpatialRobot(
         mechanism=Mechanism(frames, content.robot.tool_frame, closures),
-        joints=tuple(ElasticJoint(row.frame, row.nodes, _stiffness(row)) for row in content.joints),
+        joints=tuple(_joint(row, frames) for row in content.joints),
         links=tuple(_link(row) for row in content.links),
         bodies=tuple(_body(row) for row in content.bodies),
         points={row.node: (row.frame, np.array(row.at_m)) for row in content.points},
@@ -243,6 +244,11 @@ def _limits(row: _Frame) -> tuple[float, float]:
     if max(map(abs, given)) > LARGEST_TRAVEL:
         raise InputError(f"frame {row.name}: limits_m = {list(given)}: give metres, at most {LARGEST_TRAVEL:g}")
     return given
+
+
+def _joint(row: _Joint, frames: tuple[Frame, ...]) -> ElasticJoint:
+    frame = next((frame for frame in frames if frame.name == row.frame), None)
+    return ElasticJoint(row.frame, row.nodes, _stiffness(row), drive_of(row, frame))
 
 
 def _stiffness(row: _Joint) -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ from .section import Material, Section, hollow_circle, tube_diameters
 from .structure import (
     Beam,
     Body,
+    Drive,
     Spring,
     Structure,
     cross_matrix,
@@ -22,6 +23,7 @@ __all__ = [
     "STANDARD_GRAVITY",
     "Beam",
     "Body",
+    "Drive",
     "Material",
     "Section",
     "Spring",

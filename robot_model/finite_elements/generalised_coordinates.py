@@ -43,7 +43,7 @@ def _next_node(structure: Structure, motion: _Motion, width: int) -> tuple[int, 
             if known in motion and new not in motion:
                 shift = rigid_motion(structure.positions[new] - structure.positions[known])
                 return new, [(columns, shift @ block) for columns, block in motion[known]], 0
-    for spring in structure.springs:
+    for spring in structure.couplings:
         first, second = spring.nodes
         for known, new in ((first, second), (second, first)):
             if known in motion and new not in motion and np.isinf(spring.stiffness).any():

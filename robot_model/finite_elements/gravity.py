@@ -91,10 +91,11 @@ def gravity_stiffness(robot: SpatialRobot, q: Real, structure: Structure) -> Rea
     rows = np.zeros((len(hessian), 6 * len(structure.positions)))
     moving = [robot.mechanism.frames[index] for index in robot.mechanism.moving]
     first = {joint.frame: spring for joint, spring in zip(robot.joints[::-1], structure.springs[::-1], strict=True)}
+    nodes = {joint.frame: joint.nodes for joint in robot.joints[::-1]}
     for row, frame in zip(rows, moving, strict=True):
-        spring = first.get(frame.name)
-        if spring is None:
+        if frame.name not in first:
             continue
+        spring = replace(first[frame.name], nodes=nodes[frame.name])  # from body to body, past a drive's rotor
         motions = spring.motions(structure.positions)
         for node, sign, motion in zip(spring.nodes, (-1.0, 1.0), motions, strict=True):
             row[6 * node : 6 * node + 6] += sign * motion[drive_direction(frame)]

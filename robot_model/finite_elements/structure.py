@@ -47,6 +47,26 @@ class Spring:
 
 
 @dataclass(frozen=True)
+class Drive:
+    """A motor's rotor between the body before a joint and its gear, as a node of its own.
+
+    Parameters
+    ----------
+    servo
+        The controller's hold on it, from the node before the joint to the rotor's: rigid but for ``direction``.
+    direction
+        The joint's own motion: 5, about z, or 2, along z.
+    inertia : kg m^2 or kg
+        ``N^2 J`` on the joint's side. Only the rotor's own turning counts (Spong 1987, ASME J. Dyn. Syst. 109,
+        310-319: what is left out is smaller by the gear ratio); its mass belongs to the body that carries it.
+    """
+
+    servo: Spring
+    direction: int
+    inertia: float
+
+
+@dataclass(frozen=True)
 class Beam:
     """A flexible link from one node to another; ``axes`` (3, 3) has its local x, y, z as columns."""
 
@@ -84,6 +104,8 @@ class Structure:
         Number of the node of the tool tip.
     weight : (6 n_nodes, 6 n_nodes) or None
         Stiffness by the weight that the joints carry; None: left out.
+    drives
+        Rotors of the joints' motors. The spring of a joint with a drive begins at its rotor's node.
     """
 
     positions: Real
@@ -93,13 +115,19 @@ class Structure:
     bodies: tuple[Body, ...]
     tip: int
     weight: Real | None = None
+    drives: tuple[Drive, ...] = ()
+
+    @property
+    def couplings(self) -> tuple[Spring, ...]:
+        """Springs of joints, and the controller's hold on their motors."""
+        return (*self.springs, *(drive.servo for drive in self.drives))
 
 
 def stiffness_matrix(structure: Structure) -> Real:
     """Stiffness over all nodes before the clamp, shape (6 H, 6 H); rigid directions of joints are left out."""
     size = 6 * len(structure.positions)
     whole = np.zeros((size, size)) if structure.weight is None else structure.weight.copy()
-    for spring in structure.springs:
+    for spring in structure.couplings:
         elastic = np.where(np.isfinite(spring.stiffness), spring.stiffness, 0.0)
         before, after = spring.motions(structure.positions)
         first, second = (slice(6 * node, 6 * node + 6) for node in spring.nodes)
@@ -126,7 +154,18 @@ def mass_matrix(structure: Structure) -> Real:
         own[3:, 3:] = body.inertia
         start = 6 * body.node
         whole[start : start + 6, start : start + 6] += shift.T @ own @ shift
+    for drive in structure.drives:
+        row = _own_motion(drive, structure)
+        whole += drive.inertia * np.outer(row, row)
     return whole
+
+
+def _own_motion(drive: Drive, structure: Structure) -> Real:
+    """Turn of a rotor against the body that carries it, over all nodes, (6 H,)."""
+    row = np.zeros(6 * len(structure.positions))
+    for node, sign, motion in zip(drive.servo.nodes, (-1, 1), drive.servo.motions(structure.positions), strict=True):
+        row[6 * node : 6 * node + 6] += sign * motion[drive.direction]
+    return row
 
 
 def rigid_rows(structure: Structure) -> Real:
@@ -141,7 +180,7 @@ def rigid_rows(structure: Structure) -> Real:
         block[:, 6 * v : 6 * v + 6] = np.eye(6)
         block[:, 6 * u : 6 * u + 6] = -rigid_motion(structure.positions[v] - structure.positions[u])
         rows.append(block)
-    for spring in structure.springs:
+    for spring in structure.couplings:
         stiff = np.isinf(spring.stiffness)
         if stiff.any():
             block = np.zeros((int(stiff.sum()), size))

@@ -1,5 +1,6 @@
 from .cell_structure import cell_structure_at
 from .compliant_tool import housing_node, tool_spring, with_tool_spring
+from .joint_drive import JointDrive
 from .natural_coordinates import NaturalRobot, natural_robot
 from .spatial_modes import (
     TIP_ROTATIONS,
@@ -29,6 +30,7 @@ __all__ = [
     "NO_MASSES",
     "TIP_ROTATIONS",
     "ElasticJoint",
+    "JointDrive",
     "Link",
     "LumpedBody",
     "NaturalRobot",

@@ -10,6 +10,8 @@ from foundation import InputError
 
 from ..finite_elements import Beam, Body, Section, Spring, Structure, cross_matrix, gravity_stiffness
 from ..kinematics import Mechanism, drive_direction
+from .drive_nodes import with_rotors
+from .joint_drive import JointDrive
 from .robot_check import check_robot
 
 Real = NDArray[np.float64]
@@ -20,12 +22,14 @@ class ElasticJoint:
     """Joint at the origin of a frame, between two nodes.
 
     ``stiffness`` (6,) is ``(K_r, K_r, K_a, K_rr, K_rr, K_ar)`` in N/m and N m/rad about the frame's axes, infinite
-    where rigid (Belchior et al. 2013, Eq. 6).
+    where rigid (Belchior et al. 2013, Eq. 6). A ``drive`` puts its motor's inertia before this stiffness, held by the
+    controller; without one the motor stands still.
     """
 
     frame: str
     nodes: tuple[int, int]
     stiffness: Real
+    drive: JointDrive | None = None
 
 
 @dataclass(frozen=True)
@@ -129,10 +133,11 @@ def structure_at(robot: SpatialRobot, q: Real) -> Structure:
     for link in robot.links:
         if link.section is not None:
             _divide(link, frames, places, beams, extra)
+    springs, drives = with_rotors(robot, springs, extra, len(places))
     positions = np.vstack([places, *extra]) if extra else places
     rigid = tuple(link.nodes for link in robot.links if link.section is None)
     bodies = tuple(_body(body, frames[body.frame][:3, :3]) for body in robot.bodies)
-    structure = Structure(positions, springs, tuple(beams), rigid, bodies, robot.tip)
+    structure = Structure(positions, springs, tuple(beams), rigid, bodies, robot.tip, drives=drives)
     if not robot.gravity:
         return structure
     return replace(structure, weight=gravity_stiffness(robot, q, structure))
@@ -141,15 +146,21 @@ def structure_at(robot: SpatialRobot, q: Real) -> Structure:
 def drive_stiffness(robot: SpatialRobot) -> Real:
     """Stiffness of each driven joint along its own motion, (n_active,): N m/rad about z, N/m along z if prismatic.
 
-    In the order of the driven frames, whatever the order of ``robot.joints``; infinite where a frame has no joint.
+    In the order of the driven frames, whatever the order of ``robot.joints``; infinite where a frame has no joint. A
+    drive's position gain is in series: ``1 / (1 / k + 1 / K_pos)``.
     """
     found = []
     for index in robot.mechanism.moving:
         frame = robot.mechanism.frames[index]
         if frame.active:
-            own = [joint.stiffness[drive_direction(frame)] for joint in robot.joints if joint.frame == frame.name]
+            own = [_in_series(joint, drive_direction(frame)) for joint in robot.joints if joint.frame == frame.name]
             found.append(float(sum(own)) if own else np.inf)
     return np.array(found)
+
+
+def _in_series(joint: ElasticJoint, direction: int) -> float:
+    stiffness = float(joint.stiffness[direction])
+    return stiffness if joint.drive is None else 1 / (1 / stiffness + 1 / joint.drive.position_gain)
 
 
 def _node_places(robot: SpatialRobot, frames: dict[str, Real]) -> Real:
