@@ -16,6 +16,7 @@ from foundation import InputError, LeftoverRemoved, MillfrfError, MillfrfWarning
 
 from .commands import COMMANDS
 from .cut import cut_app
+from .new import new_app
 from .number_lists import options_of_several, with_lists_apart
 from .robot import robot_app
 from .terminal import printable
@@ -36,6 +37,7 @@ app = typer.Typer(
 for _function in COMMANDS:
     app.command()(_function)
 app.add_typer(robot_app)
+app.add_typer(new_app)
 app.add_typer(cut_app)
 
 

@@ -10,7 +10,7 @@ from scipy.linalg import eigh
 from foundation import TIP, InputError
 from modal_fit import ModalModel
 
-from .files import PlanarCase, SpatialCase, read_planar_robot, read_spatial_robot, read_table
+from .files import PlanarCase, SpatialCase, read_planar_robot, read_serial_robot, read_spatial_robot, read_table
 from .kinematics import close_loops, posture_warnings
 from .planar import TIP_IN_PLANE, flexible_chain, planar_compliance, planar_sag, rigid_matrices, rigid_model
 from .spatial import (
@@ -84,7 +84,9 @@ def read_robot(robot: str | os.PathLike[str]) -> PlanarCase | SpatialCase:
     """
     head = read_table(robot).get("robot")
     kind = head.get("kind") if isinstance(head, dict) else None
-    return read_planar_robot(robot) if kind == "planar" else read_spatial_robot(robot)
+    if kind == "planar":
+        return read_planar_robot(robot)
+    return read_serial_robot(robot) if kind == "serial" else read_spatial_robot(robot)
 
 
 def named_posture(case: PlanarCase | SpatialCase, name: str | None) -> Real:
@@ -128,7 +130,7 @@ def in_posture(
     static = static_response(robot, structure)
     turn = np.eye(6) if axes is None else np.kron(np.eye(2), np.asarray(axes))
     compliance = turn.T @ static.compliance @ turn
-    warnings = (*posture_warnings(robot.mechanism, q), *rigid_arms(robot, structure))
+    warnings = (*case.assumed, *posture_warnings(robot.mechanism, q), *rigid_arms(robot, structure))
     labels = (*TIP, *TIP_ROTATIONS)
     if static.own_weight is None:
         return PostureResult(np.zeros(0), None, compliance, labels, (*warnings, NO_MASSES))

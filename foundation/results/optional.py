@@ -1,4 +1,4 @@
-"""Libraries that only a notebook needs: loaded when they are asked for, with the remedy where they are missing."""
+"""Libraries that only some need: loaded when they are asked for, with the remedy where they are missing."""
 
 import importlib
 from types import ModuleType
@@ -6,7 +6,7 @@ from types import ModuleType
 from ..errors import InputError
 
 
-def optional_library(name: str, purpose: str) -> ModuleType:
+def optional_library(name: str, purpose: str, extra: str = "notebook") -> ModuleType:
     """The library, imported.
 
     Parameters
@@ -15,6 +15,8 @@ def optional_library(name: str, purpose: str) -> ModuleType:
         Name of the module, such as ``xarray``.
     purpose
         What needs it, such as ``Frf.to_xarray``, for the message.
+    extra
+        Extra of the package that brings it, for the message.
 
     Raises
     ------
@@ -32,4 +34,4 @@ def optional_library(name: str, purpose: str) -> ModuleType:
     except ModuleNotFoundError as error:
         if error.name != name:
             raise
-        raise InputError(f'{purpose} needs {name}: pip install "millfrf[notebook]"') from error
+        raise InputError(f'{purpose} needs {name}: pip install "millfrf[{extra}]"') from error

@@ -19,6 +19,7 @@ from robot_model import (
     inverse_kinematics,
     named_posture,
     nearest_solution,
+    reach,
     tool_down,
     turned_place,
     unit_doubts,
@@ -107,22 +108,22 @@ def cut_place(asked: Asked) -> CutPlace:
 
 
 def solve_place(robot: SpatialRobot, place: CutPlace, start: Real) -> Real:
-    """Driven joint values at a place: the branch nearest to ``start`` where there is a closed form, else in steps.
+    """Driven joint values at a place, within the limits, as near to ``start`` as the branches allow.
 
     Raises
     ------
     InputError
-        Out of reach.
+        Out of reach; the line says how near the tool comes.
     """
     target = np.eye(4)
     target[:3, :3], target[:3, 3] = place.attitude, place.position
-    if robot.mechanism.closures or not has_spherical_wrist(robot.mechanism):
+    if robot.mechanism.closures:
         q = inverse_kinematics(robot.mechanism, target, start)
         return np.asarray(q[robot.mechanism.active])
+    if not has_spherical_wrist(robot.mechanism):
+        return reach(robot.mechanism, target, start)
     found = nearest_solution(robot.mechanism, target, close_loops(robot.mechanism, start))
-    if found is None:
-        raise InputError(f"the tool does not reach {place.position.tolist()} m in that attitude; move or turn it")
-    return found
+    return reach(robot.mechanism, target, start) if found is None else found
 
 
 def spatial(case: PlanarCase | SpatialCase) -> SpatialCase:

@@ -1,6 +1,7 @@
 from .changed_file import changed_robot_text
 from .planar_file import PlanarCase, read_planar_robot
 from .robot_files import assumptions, read_table, robot_names
+from .serial_file import read_serial_robot
 from .spatial_file import SpatialCase, read_spatial_robot
 
 __all__ = [
@@ -9,6 +10,7 @@ __all__ = [
     "assumptions",
     "changed_robot_text",
     "read_planar_robot",
+    "read_serial_robot",
     "read_spatial_robot",
     "read_table",
     "robot_names",

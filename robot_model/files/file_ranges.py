@@ -21,8 +21,8 @@ _RANGES = (
     ("repeatability_m", 1e-6, 5e-3, "the pose repeatability of ISO 9283 in metres; 0.06 mm is 6e-5"),
     ("_m", 0.0, 20.0, "metres"),
 )
-_OWN_CHECK = ("driven", "driven_deg", "angles_deg", "limits_m", "limits_deg", "measured_first_mode_hz")
-"""Joint values and limits: their unit follows from the joint's motion."""
+_OWN_CHECK = ("driven", "driven_deg", "angles_deg", "limits_m", "limits_deg", "measured_first_mode_hz", "inertia_kg_m2")
+"""Joint values and limits: their unit follows from the joint's motion; inertias are judged as a whole."""
 
 
 def check_ranges(content: Any) -> None:

@@ -1,6 +1,7 @@
 """Robots in space from their files."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot, inf, radians
 
@@ -12,6 +13,7 @@ from foundation import InputError
 
 from ..finite_elements import Material, Section, hollow_circle, rayleigh_constants
 from ..kinematics import LARGEST_TRAVEL, Frame, Mechanism, named_values
+from ..serial_chains import inertia_fault, symmetric
 from ..spatial import ElasticJoint, Link, LumpedBody, SpatialRobot, check_tip
 from .drive_table import DriveKeys, drive_of
 from .robot_files import Table, read_as
@@ -79,10 +81,10 @@ class _Body(Table):
     frame: str
     mass_kg: float = Field(gt=0)
     centre_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    inertia_kg_m2: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    inertia_kg_m2: tuple[float, float, float] | tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0)
 
 
-class _Damping(Table):
+class Damping(Table):
     """Either two ratios at two frequencies (Rayleigh), or one ratio for all modes."""
 
     frequencies_hz: tuple[float, float] | None = None
@@ -94,8 +96,8 @@ class _Closure(Table):
     frames: tuple[str, str]
 
 
-class _Pose(Table):
-    """``driven`` in degrees, of prismatic joints in metres; ``driven_deg`` is its older name and is read alike."""
+class Pose(Table):
+    """A posture: ``driven`` in degrees, of prismatic joints in metres; ``driven_deg`` is its older name."""
 
     name: str
     driven: list[float] | None = None
@@ -112,8 +114,8 @@ class _File(BaseModel):
     links: list[_Link] = []
     points: list[_Point] = []
     bodies: list[_Body] = []
-    damping: _Damping | None = None
-    poses: list[_Pose] = []
+    damping: Damping | None = None
+    poses: list[Pose] = []
 
 
 @dataclass(frozen=True)
@@ -130,12 +132,15 @@ class SpatialCase:
         Driven joint values by name, rad and (prismatic joints) m.
     repeatability : m
         Pose repeatability after ISO 9283 (RP: radius of the sphere); None: the file does not tell it.
+    assumed
+        What the file marks as assumed and what decides results: one sentence each, for the warnings of every result.
     """
 
     name: str
     robot: SpatialRobot
     poses: dict[str, NDArray[np.float64]]
     repeatability: float | None = None
+    assumed: tuple[str, ...] = ()
 
 
 def read_spatial_robot(robot: str | os.PathLike[str]) -> SpatialCase:
@@ -169,26 +174,28 @@ def _case(content: _File) -> SpatialCase:
         bodies=tuple(_body(row) for row in content.bodies),
         points={row.node: (row.frame, np.array(row.at_m)) for row in content.points},
         tip=content.robot.tip_node,
-        rayleigh=_rayleigh(content.damping),
+        rayleigh=rayleigh_of(content.damping),
         damping_ratio=None if content.damping is None else content.damping.ratio,
         gravity=content.robot.gravity_m_per_s2,
-        up=_upwards(content.robot.up),
+        up=upwards(content.robot.up),
     )
     check_tip(spatial)
-    poses = _poses(content, spatial.mechanism)
+    poses = named_postures(content.poses, spatial.mechanism)
     return SpatialCase(content.robot.name, spatial, poses, content.robot.repeatability_m)
 
 
-def _upwards(given: tuple[float, float, float]) -> tuple[float, float, float]:
+def upwards(given: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Unit vector against weight."""
     length = hypot(*given)
     if not length > 0:
         raise InputError(f"up = {list(given)} has no direction; give the base frame's axis against weight: [0, 0, 1]")
     return given[0] / length, given[1] / length, given[2] / length
 
 
-def _poses(content: _File, mechanism: Mechanism) -> dict[str, NDArray[np.float64]]:
+def named_postures(poses: Sequence[Pose], mechanism: Mechanism) -> dict[str, NDArray[np.float64]]:
+    """Postures of a file by name, rad and m."""
     typed = []
-    for pose in content.poses:
+    for pose in poses:
         given = [values for values in (pose.driven, pose.driven_deg) if values is not None]
         if len(given) != 1:
             raise InputError(f"posture {pose.name!r}: give driven = [...] once: degrees, prismatic joints in metres")
@@ -196,7 +203,8 @@ def _poses(content: _File, mechanism: Mechanism) -> dict[str, NDArray[np.float64
     return named_values(mechanism, typed)
 
 
-def _rayleigh(damping: _Damping | None) -> tuple[float, float]:
+def rayleigh_of(damping: Damping | None) -> tuple[float, float]:
+    """Rayleigh's constants of a file's damping, 1/s and s; zero where it gives one ratio."""
     if damping is None:
         return (0.0, 0.0)
     if damping.ratio is not None:
@@ -280,12 +288,8 @@ def _section(tube: _Tube) -> Section:
 
 
 def _body(row: _Body) -> LumpedBody:
-    inertia = sorted(row.inertia_kg_m2)
-    if inertia[0] < 0:
-        raise InputError(f"body at node {row.node}: inertia_kg_m2 = {list(row.inertia_kg_m2)} must be 0 or more")
-    if inertia[2] > (1 + 1e-6) * (inertia[0] + inertia[1]) and inertia[0] > 0:
-        raise InputError(
-            f"body at node {row.node}: inertia_kg_m2 = {list(row.inertia_kg_m2)}: no body has one moment of inertia "
-            "that is larger than the other two together; check units and axes"
-        )
-    return LumpedBody(row.node, row.frame, row.mass_kg, np.array(row.centre_m), np.diag(row.inertia_kg_m2))
+    inertia = symmetric(row.inertia_kg_m2)
+    fault = inertia_fault(inertia)
+    if fault is not None:
+        raise InputError(f"body at node {row.node}: inertia_kg_m2 = {list(row.inertia_kg_m2)}: {fault}")
+    return LumpedBody(row.node, row.frame, row.mass_kg, np.array(row.centre_m), inertia)

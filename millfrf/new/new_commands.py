@@ -1,0 +1,20 @@
+"""The commands of `millfrf new`, one a file."""
+
+import typer
+
+from .new_robot import new_robot
+
+new_app = typer.Typer(
+    name="new",
+    help="A commented file to begin with, filled in from what there is.",
+    add_completion=False,
+    rich_markup_mode=None,
+)
+
+
+@new_app.callback()
+def _new() -> None:
+    """A commented file to begin with, filled in from what there is."""
+
+
+new_app.command("robot")(new_robot)

@@ -1,0 +1,193 @@
+"""Serial robots from their files: joints and bodies in a row; nodes are built, not numbered."""
+
+import os
+from math import inf, radians
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from foundation import InputError
+
+from ..kinematics import LARGEST_TRAVEL
+from ..serial_chains import RigidPart, SerialChain, SerialJoint, inertia_fault, place_of, spatial_robot, symmetric
+from ..spatial import check_tip
+from .robot_files import Table, read_as
+from .spatial_file import Damping, Pose, SpatialCase, named_postures, rayleigh_of, upwards
+
+Real = NDArray[np.float64]
+Vector = tuple[float, float, float]
+Inertia = Vector | tuple[float, float, float, float, float, float]
+
+
+class _Head(Table):
+    name: str
+    kind: str
+    gravity_m_per_s2: float = Field(0.0, ge=0, le=30)
+    up: Vector = (0.0, 0.0, 1.0)
+    repeatability_m: float | None = Field(None, gt=0, le=0.01)
+
+
+class _Place(Table):
+    at_m: Vector = (0.0, 0.0, 0.0)
+    turned_deg: Vector = (0.0, 0.0, 0.0)
+
+
+class _Stiffness(Table):
+    """``drive``: along the joint's own motion; the rest gives way across it."""
+
+    drive_nm_per_rad: float | None = Field(None, gt=0)
+    drive_n_per_m: float | None = Field(None, gt=0)
+    radial_n_per_m: float | None = Field(None, gt=0)
+    axial_n_per_m: float | None = Field(None, gt=0)
+    tilting_nm_per_rad: float | None = Field(None, gt=0)
+    turning_nm_per_rad: float | None = Field(None, gt=0)
+
+
+class _Joint(_Place):
+    name: str
+    motion: str = "revolute"
+    axis: Vector = (0.0, 0.0, 1.0)
+    limits_deg: tuple[float, float] | None = None
+    limits_m: tuple[float, float] | None = None
+    stiffness: _Stiffness
+
+
+class _Mass(Table):
+    mass_kg: float = Field(gt=0)
+    centre_m: Vector = (0.0, 0.0, 0.0)
+    inertia_kg_m2: Inertia = (0.0, 0.0, 0.0)
+
+
+class _Body(_Mass):
+    name: str
+    joint: str
+
+
+class _File(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    robot: _Head
+    base: _Place | None = None
+    joints: list[_Joint] = Field(min_length=1)
+    bodies: list[_Body] = []
+    flange: _Place | None = None
+    tool: _Place | None = None
+    spindle: _Mass | None = None
+    damping: Damping | None = None
+    poses: list[Pose] = []
+
+
+def read_serial_robot(robot: str | os.PathLike[str]) -> SpatialCase:
+    """Read a robot of kind ``serial``, by path or by name.
+
+    Raises
+    ------
+    InputError
+        No such robot, or joints and bodies that do not fit together.
+    FileFormatError
+        Not a serial robot, or a key unknown, missing or of the wrong type.
+    """
+    content = read_as(_File, robot, "serial")
+    try:
+        return _case(content)
+    except InputError as error:
+        raise InputError(f"{robot}: {error}") from error
+
+
+def _case(content: _File) -> SpatialCase:
+    flange = _place(content.flange)
+    joints = tuple(_joint(row) for row in content.joints)
+    parts = [_part(row, row.name, row.joint, np.eye(4)) for row in content.bodies]
+    if content.spindle is not None:
+        parts.append(_part(content.spindle, "spindle", joints[-1].name, flange))
+    chain = SerialChain(joints, tuple(parts), _place(content.base), flange, _place(content.tool))
+    built = spatial_robot(
+        chain,
+        rayleigh=rayleigh_of(content.damping),
+        damping_ratio=None if content.damping is None else content.damping.ratio,
+        gravity=content.robot.gravity_m_per_s2,
+        up=upwards(content.robot.up),
+    )
+    check_tip(built)
+    poses = named_postures(content.poses, built.mechanism)
+    return SpatialCase(content.robot.name, built, poses, content.robot.repeatability_m, _assumed(content))
+
+
+def _assumed(content: _File) -> tuple[str, ...]:
+    """One sentence for what was assumed and decides results: stiffness, masses, damping."""
+    joints = [row.name for row in content.joints if "assumed" in row.stiffness.source]
+    bodies = [row.name for row in content.bodies if "assumed" in row.source]
+    bodies += ["spindle"] if content.spindle is not None and "assumed" in content.spindle.source else []
+    found = []
+    if joints:
+        found.append(
+            f"the stiffness of joints {', '.join(joints)} is assumed, not known: frequencies, deflections and depth "
+            "limits may be off by a factor of two or more until it is measured"
+        )
+    if bodies:
+        found.append(f"mass and inertia of {', '.join(bodies)} are assumed, not known")
+    if content.damping is not None and "assumed" in content.damping.source:
+        found.append("damping is assumed, not known: depth limits are proportional to it")
+    if not content.bodies:
+        found.append("the file gives no [[bodies]]: modes, FRFs and lobes hold only the spindle's mass, if any")
+    return tuple(found)
+
+
+def _place(row: _Place | None) -> Real:
+    if row is None:
+        return np.eye(4)
+    return place_of(row.at_m, [radians(angle) for angle in row.turned_deg])
+
+
+def _joint(row: _Joint) -> SerialJoint:
+    lower, upper = _limits(row)
+    return SerialJoint(row.name, row.motion, _place(row), np.array(row.axis), lower, upper, _stiffness(row))
+
+
+def _limits(row: _Joint) -> tuple[float, float]:
+    """Limits in rad or m, by the joint's motion."""
+    sliding = row.motion == "prismatic"
+    given, wrong, right = (
+        (row.limits_m, row.limits_deg, "limits_m") if sliding else (row.limits_deg, row.limits_m, "limits_deg")
+    )
+    if wrong is not None:
+        raise InputError(f"joint {row.name}: limits {list(wrong)} of a {row.motion} joint; give {right}")
+    if given is None:
+        return -inf, inf
+    if not sliding:
+        return radians(given[0]), radians(given[1])
+    if max(map(abs, given)) > LARGEST_TRAVEL:
+        raise InputError(f"joint {row.name}: limits_m = {list(given)}: give metres, at most {LARGEST_TRAVEL:g}")
+    return given
+
+
+def _stiffness(row: _Joint) -> Real:
+    """What is left out across the axis is rigid; along the joint's own motion a number is needed."""
+    given, sliding = row.stiffness, row.motion == "prismatic"
+    own, other = (
+        (given.drive_n_per_m, given.drive_nm_per_rad) if sliding else (given.drive_nm_per_rad, given.drive_n_per_m)
+    )
+    key = "drive_n_per_m" if sliding else "drive_nm_per_rad"
+    clash = given.axial_n_per_m if sliding else given.turning_nm_per_rad
+    if own is None or other is not None or clash is not None:
+        raise InputError(
+            f"joint {row.name}: its stiffness along its own motion is missing or given in another unit; give {key} of "
+            f"this {row.motion} joint in [joints.stiffness], once"
+        )
+    radial, axial, tilting, turning = (
+        inf if value is None else value
+        for value in (given.radial_n_per_m, given.axial_n_per_m, given.tilting_nm_per_rad, given.turning_nm_per_rad)
+    )
+    axial, turning = (own, turning) if sliding else (axial, own)
+    return np.array([radial, radial, axial, tilting, tilting, turning])
+
+
+def _part(row: _Mass, name: str, joint: str, frame: Real) -> RigidPart:
+    inertia = symmetric(row.inertia_kg_m2)
+    fault = inertia_fault(inertia)
+    if fault is not None:
+        raise InputError(f"body {name}: inertia_kg_m2 = {list(row.inertia_kg_m2)}: {fault}")
+    turn = frame[:3, :3]
+    centre = turn @ np.array(row.centre_m) + frame[:3, 3]
+    return RigidPart(name, joint, row.mass_kg, centre, turn @ inertia @ turn.T)
