@@ -1,8 +1,8 @@
-from .axis_frames import axis_frames, fixed_frames, turn_onto
 from .chain_file import Told, chain_text
 from .chain_robot import spatial_robot
 from .dh_chain import CONVENTIONS, read_dh
-from .ready_posture import ready_posture
+from .first_posture import ready_posture
+from .frames_of_axes import axis_frames, fixed_frames, turn_onto
 from .rigid_places import inertia_fault, place_of, shift_and_angles, six_of, symmetric
 from .serial_chain import BASE, RigidPart, SerialChain, SerialJoint
 from .stiffness_ranges import CLASSES, StiffnessClass, class_of, typical

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..kinematics import Mechanism
 from ..spatial import ElasticJoint, Link, LumpedBody, SpatialRobot
-from .axis_frames import axis_frames, fixed_frames
+from .frames_of_axes import axis_frames, fixed_frames
 from .serial_chain import BASE, SerialChain
 
 Real = NDArray[np.float64]
