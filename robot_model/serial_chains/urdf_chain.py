@@ -38,7 +38,7 @@ def read_urdf(path: str | os.PathLike[str], tip: str | None = None) -> ReadChain
     Parameters
     ----------
     path
-        URDF file.
+        Path of the URDF file.
     tip
         Link at whose origin the flange is, z away from the robot; None: the only end, or ``tool0`` on the last body.
 
