@@ -1,10 +1,10 @@
 from .asked_path import AskedPath
+from .certified_search import Wanted
 from .number_of_modes import KeptModes, kept_modes
-from .optimum import PathOptimum, Wanted, optimised
-from .path_picture import draw_path, path_figure
+from .optimum import PathOptimum, optimised
 from .path_state import Loading, PathState, state_of
-from .path_table import write_path_table
 from .posture_values import PathCut, PostureValues, Request, values_of
+from .telling import draw_path, path_figure, write_path_table
 from .write_path import write_optimised_path
 
 __all__ = [

@@ -8,8 +8,8 @@ from foundation import InputError
 from robot_model import CutPath, Redundancy, RotaryTable
 
 from ..asked_loads import check_degrees, check_places, check_positive
+from .certified_search import Wanted
 from .objectives import OBJECTIVES
-from .optimum import Wanted
 
 
 @dataclass(frozen=True)

@@ -1,51 +1,76 @@
-"""How many modes the limits of a path need: as many as settle them at a few of its postures."""
+"""How many modes the limits of a path need: as many as give the limits of many more at some of its postures."""
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from robot_model import modes_at
 
 from .posture_values import PathCut, Request, values_of
 
+Real = NDArray[np.float64]
+
 SETTLED = 5e-3
 """Relative change of the limits at which more modes change nothing that a cut would show."""
 
-_COUNTS = (6, 8, 11, 15, 20, 27, 36, 48)
+_COUNTS = (8, 11, 15, 20, 27, 36, 48)
+"""Numbers of modes that are tried."""
+
+_MOST_TURNS = 40.0
+"""Turns of the highest mode in a tooth period up to which the reference goes: the cost grows with the third power."""
 
 
 @dataclass(frozen=True)
 class KeptModes:
-    """Modes up to ``highest_frequency`` (Hz); ``change``: by how much the next step of modes moves limits, a share."""
+    """Modes up to which limits are computed.
+
+    Parameters
+    ----------
+    highest_frequency : Hz
+        Natural frequency up to which modes are kept.
+    reference : Hz
+        The same of the reference that the limits were compared with.
+    change
+        Largest relative difference of a limit from the reference's.
+    checked
+        Number of postures that were compared.
+    """
 
     highest_frequency: float
+    reference: float
     change: float
     checked: int
 
 
-def kept_modes(cut: PathCut, samples: Sequence[Request]) -> KeptModes:
-    """Raise the number of modes until the limits at the sampled postures change by less than 0.5 %.
+def kept_modes(cut: PathCut, samples: Sequence[Request], pool: Executor | None = None) -> KeptModes:
+    """Find the fewest modes whose limits lie within 0.5 % of a reference with many more, at the sampled postures.
 
-    Higher modes are left as their static flexibility, so what changes is their dynamics alone. A tooth period holds
-    many turns of a mode at kilohertz, which costs a thousand times more than the low modes that robots chatter with.
+    Modes that are not kept are left as their static flexibility, so what is lost is their dynamics alone. The
+    reference has all modes that turn at most 40 times in a tooth period. A step that changes nothing proves nothing: a
+    mode at 400 Hz can lower a limit that was the same with 8 modes and with 11.
     """
     frequencies = [modes_at(cut.robot, one.q).frequencies for one in samples]
     size = min(len(one) for one in frequencies)
-    steps = [count for count in _COUNTS if count < size]
-    cuts = [1.0001 * max(float(one[count - 1]) for one in frequencies) for count in steps] + [np.inf]
-    before = _limits(replace(cut, highest_frequency=cuts[0]), samples)
-    change = 0.0
-    for i in range(1, len(cuts)):
-        if i == len(cuts) - 1 and change < 0.02:
-            return KeptModes(cuts[i - 1], change, len(samples))
-        after = _limits(replace(cut, highest_frequency=cuts[i]), samples)
-        change = float(np.abs(after / before - 1).max())
+    steps = [1.0001 * max(float(one[count - 1]) for one in frequencies) for count in _COUNTS if count < size] + [np.inf]
+    all_of_them = 1.0001 * max(float(one[-1]) for one in frequencies)
+    most = _MOST_TURNS * cut.process.teeth * cut.speed / (2 * np.pi)
+    steps = [step for step in steps if min(step, all_of_them) <= most] or steps[:1]
+    truth = _limits(replace(cut, highest_frequency=steps[-1]), samples, pool)
+    for step in steps[:-1]:
+        change = float(np.abs(_limits(replace(cut, highest_frequency=step), samples, pool) / truth - 1).max())
         if change < SETTLED:
-            return KeptModes(cuts[i - 1], change, len(samples))
-        before = after
-    return KeptModes(cuts[-1], 0.0, len(samples))
+            return KeptModes(step, steps[-1], change, len(samples))
+    return KeptModes(steps[-1], steps[-1], 0.0, len(samples))
 
 
-def _limits(cut: PathCut, samples: Sequence[Request]) -> np.ndarray:
-    return np.maximum(values_of(cut, samples).known_depth(cut.max_depth), 1e-9)
+def change_with_more(cut: PathCut, reference: float, samples: Sequence[Request], pool: Executor | None) -> float:
+    """Largest relative change of the limits at some postures if modes up to ``reference`` (Hz) are kept."""
+    few, many = (_limits(one, samples, pool) for one in (cut, replace(cut, highest_frequency=reference)))
+    return float(np.abs(few / many - 1).max())
+
+
+def _limits(cut: PathCut, samples: Sequence[Request], pool: Executor | None) -> Real:
+    return np.maximum(values_of(cut, samples, pool).known_depth(cut.max_depth), 1e-9)

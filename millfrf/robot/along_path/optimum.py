@@ -1,4 +1,4 @@
-"""The optimisation: sample, screen, search, certify what was chosen, refine, and keep the best that is certified."""
+"""The optimisation: sample, screen, search, refine, smooth, and keep the best sequence that is certified throughout."""
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
@@ -6,38 +6,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solveh_banded
 
 from foundation import InputError
-from robot_model import CutPath, PointPostures, Redundancy, counted_weight, path_postures, point_postures, reached_near
+from robot_model import CutPath, PointPostures, Redundancy, path_postures, reached_near
 
-from .number_of_modes import KeptModes, kept_modes
-from .objectives import Costs, FrontPoint, chosen_sequence
-from .path_state import Loading, PathState, request_at, state_of
+from .certified_search import Found, PathJob, Posture, Wanted, searched
+from .number_of_modes import SETTLED, KeptModes, change_with_more, kept_modes
+from .objectives import FrontPoint
+from .path_state import Loading, PathState, request_at
 from .posture_values import PathCut, Request
-from .screening import Screened, distinct, screened
+from .refinement import finer_postures, smoothed
 
 Real = NDArray[np.float64]
-Index = NDArray[np.int64]
-
-_ROUNDS = 4
-"""Searches with certified values put in place of interpolated ones."""
-
-_TURNED = 1e-3
-"""Share of a node's cost that one radian squared of turning is worth: equals stay where the path puts them."""
 
 _WORSE = 0.01
 """Share of the objective that may be given up for a smooth sequence."""
 
-
-@dataclass(frozen=True)
-class Wanted:
-    """What is optimised: objective, balance of ``both``, largest joint and table steps (rad, m) between points."""
-
-    objective: str
-    balance: float
-    joint_step: float
-    table_step: float
+_ENLARGED = 3
+"""Times that the number of modes is chosen: again, where the chosen postures need more than the sampled ones."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +39,7 @@ class PathOptimum:
     kept
         Modes that were kept.
     evaluated
-        Number of postures whose limit was asked for.
+        Number of postures that were evaluated: screened, and certified.
     rounds
         What was done, one sentence each.
     """
@@ -62,7 +48,7 @@ class PathOptimum:
     after: PathState
     front: tuple[FrontPoint, ...]
     kept: KeptModes
-    evaluated: int
+    evaluated: tuple[int, int]
     rounds: tuple[str, ...]
 
 
@@ -71,10 +57,9 @@ def optimised(
 ) -> PathOptimum:
     """Choose the postures of a path.
 
-    All postures over the sampled redundancy are screened with straight edges at equal pitch; dynamic programming finds
-    the sequence; its limits are certified with the whole process and replace the screened ones, and the search is
-    repeated until it chooses what is certified. Then the angles are refined about the sequence and smoothed. What is
-    returned is certified at every point.
+    All postures over the sampled redundancy are screened at some points and interpolated between; dynamic programming
+    finds the sequence; certified values replace interpolated ones, and the search is repeated until it keeps what it
+    promises. The angles are refined about the sequence and smoothed. Every value of the result is certified.
 
     Parameters
     ----------
@@ -82,38 +67,68 @@ def optimised(
         Robot and cut, path, sampled angles, forces, objective.
     start : (n_moving,), rad and m
         Joint values from which the unturned sequence begins.
+    pool
+        Processes that evaluate; None: this one.
+
+    Raises
+    ------
+    InputError
+        A point that no posture reaches within the margins, or no continuous sequence.
     """
     postures = path_postures(cut.robot, path, free, start[cut.robot.mechanism.active])
-    unreached = [k for k, one in enumerate(postures) if not len(one)]
-    if unreached:
-        raise InputError(
-            f"point {unreached[0] + 1} of {len(postures)} is reached in no posture that keeps the margins "
-            f"({len(unreached)} points in all): move the path, or allow less --limit-margin"
-        )
-    kept = kept_modes(cut, _samples(path, free, postures, loading))
-    cut = replace(cut, highest_frequency=kept.highest_frequency)
-    before = state_of(cut, path, free, loading, unturned(cut, path, free, start), pool)
-    coarse, front, count, note = _searched(cut, path, [free] * len(postures), postures, loading, wanted, pool)
-    notes, best, total = [note], coarse, count
+    _refuse_unreached(postures)
+    samples = _samples(path, free, postures, loading)
+    for turn in range(_ENLARGED):
+        kept = kept_modes(cut, samples, pool)
+        job = PathJob(replace(cut, highest_frequency=kept.highest_frequency), path, loading, wanted, pool, {})
+        found = _chosen(job, free, postures, start, kept)
+        critical = [one for state in (found.before, found.after) for one in _critical(job, free, state)]
+        change = change_with_more(job.cut, kept.reference, critical, pool)
+        if change < 2 * SETTLED or turn == _ENLARGED - 1:
+            break
+        samples = [*samples, *critical]
+    told = replace(kept, change=max(kept.change, change), checked=kept.checked + len(critical))
+    return replace(found, kept=told)
+
+
+def _chosen(
+    job: PathJob, free: Redundancy, postures: Sequence[PointPostures], start: Real, kept: KeptModes
+) -> PathOptimum:
+    """Search, refine and certify with one number of modes."""
+    before = job.state(free, unturned(job.cut, job.path, free, start))
+    best = searched(job, [free] * len(postures), postures)
+    front, screened, notes, rivals = best.front, best.evaluated, [best.told], [best]
     if len(free.tool) > 1 or len(free.table) > 1:
-        finer, fine = _finer(cut, path, free, coarse, wanted)
+        finer, fine = finer_postures(job, free, best.postures)
         if all(len(one) for one in fine):
-            refined, _, count, note = _searched(cut, path, finer, fine, loading, wanted, pool)
-            total += count
-            best, kept_it = _better(best, refined, cut, wanted)
-            notes.append(f"finer angles: {note}{'' if kept_it else '; not better, left'}")
-        smooth = _smoothed(cut, path, free, best, wanted)
-        if smooth is not None:
-            state = state_of(cut, path, free, loading, smooth, pool)
-            if _worth(state, cut, wanted, best) >= (1 - _WORSE) * _worth(best, cut, wanted, best):
-                best, text = state, "smoothed angles kept"
-            else:
-                text = "smoothed angles were worse, left"
-            notes.append(text)
-    return PathOptimum(before, best, front, kept, total, tuple(notes))
+            best = searched(job, finer, fine)
+            screened += best.evaluated
+            notes.append(f"finer angles: {best.told}")
+            rivals.append(best)
+    after, words = _certified(job, free, rivals, best)
+    return PathOptimum(before, after, front, kept, (screened, len(job.memory)), (*notes, words))
 
 
-def unturned(cut: PathCut, path: CutPath, free: Redundancy, start: Real) -> list[tuple[Real, float, float]]:
+def _certified(job: PathJob, free: Redundancy, rivals: list[Found], best: Found) -> tuple[PathState, str]:
+    """The first sequence that keeps its promise at every point: smoothed, finer, coarse; else the best of them."""
+    against = float(best.depth.min()), float(best.deviation.max())
+    promise = job.worth(best.depth, best.deviation, against)
+    tried: list[tuple[float, PathState, str]] = []
+    smooth = smoothed(job, free, best.postures)
+    sequences = [(smooth, "smoothed")] + [(one.postures, "as searched") for one in reversed(rivals)]
+    for postures, words in sequences:
+        if postures is None:
+            continue
+        state = job.state(free, postures)
+        worth = job.worth(state.values.known_depth(job.cut.max_depth), state.sizes, against)
+        if worth >= (1 - _WORSE) * promise:
+            return state, words
+        tried.append((worth, state, words))
+    _, state, words = max(tried, key=lambda one: one[0])
+    return state, f"{words}; the search promised more than could be certified"
+
+
+def unturned(cut: PathCut, path: CutPath, free: Redundancy, start: Real) -> list[Posture]:
     """Posture at each point with both redundancies at zero, each nearest to the one before; NaN where not reached."""
     found, near = [], start
     for place in path.places:
@@ -123,161 +138,30 @@ def unturned(cut: PathCut, path: CutPath, free: Redundancy, start: Real) -> list
     return found
 
 
+def _refuse_unreached(postures: Sequence[PointPostures]) -> None:
+    unreached = [k for k, one in enumerate(postures) if not len(one)]
+    if unreached:
+        raise InputError(
+            f"point {unreached[0] + 1} of {len(postures)} is reached in no posture that keeps the margins "
+            f"({len(unreached)} points in all): move the path, or allow less --limit-margin"
+        )
+
+
+def _critical(job: PathJob, free: Redundancy, state: PathState) -> list[Request]:
+    """Where modes that are missing would show: the shallowest point of a sequence, its ends and its middle."""
+    depth = np.where(state.reached, state.values.known_depth(job.cut.max_depth), np.inf)
+    n = len(depth)
+    points = sorted({int(depth.argmin()), 0, n // 2, n - 1} & set(np.flatnonzero(state.reached).tolist()))
+    rows = [(k, (state.q[k], float(state.tool[k]), float(state.table[k]))) for k in points]
+    return [request_at(job.path, free, job.loading, k, posture) for k, posture in rows]
+
+
 def _samples(path: CutPath, free: Redundancy, postures: Sequence[PointPostures], loading: Loading) -> list[Request]:
-    """Three postures far from each other on the path and among the angles."""
+    """Four postures far from each other on the path and among the angles."""
     found = []
-    for share in (0.0, 0.5, 1.0):
+    for share in (0.0, 0.33, 0.67, 1.0):
         k = round(share * (len(postures) - 1))
         s = round(share * 0.8 * (len(postures[k]) - 1))
         posture = (postures[k].q[s], float(postures[k].tool[s]), float(postures[k].table[s]))
         found.append(request_at(path, free, loading, k, posture))
     return found
-
-
-def _searched(
-    cut: PathCut,
-    path: CutPath,
-    free: Sequence[Redundancy],
-    postures: Sequence[PointPostures],
-    loading: Loading,
-    wanted: Wanted,
-    pool: Executor | None,
-) -> tuple[PathState, tuple[FrontPoint, ...], int, str]:
-    """Screen, search and certify until the search chooses what is certified."""
-    plain = replace(cut, process=replace(cut.process, helix_angle=0.0, pitch_angles=(), process_damping=0.0))
-    values, count = screened(plain, path, free, postures, loading, pool)
-    which = [distinct(one) for one in postures]
-    nodes = [_nodes(one, wanted) for one in postures]
-    reference = np.zeros(6)
-    best: PathState | None = None
-    front: tuple[FrontPoint, ...] = ()
-    promised = 0.0
-    searches = 0
-    while searches < _ROUNDS:
-        searches += 1
-        costs = _costs(values, postures, which, nodes, loading, reference)
-        sequence, front = chosen_sequence(costs, wanted.objective, wanted.balance)
-        chosen = [(p.q[i], float(p.tool[i]), float(p.table[i])) for p, i in zip(postures, sequence.chosen, strict=True)]
-        promised = promised or float(min(c[i] for c, i in zip(costs.depth, sequence.chosen, strict=True)))
-        state = state_of(cut, path, free[0], loading, chosen, pool)
-        count += len(chosen)
-        best = state if best is None else _better(best, state, cut, wanted)[0]
-        proven = state.values.known_depth(cut.max_depth)
-        settled = True
-        for k, i in enumerate(sequence.chosen):
-            s = which[k][i]
-            settled &= abs(values[k].depth[s] - proven[k]) <= 0.02 * max(proven[k], 1e-9)
-            values[k].depth[s], values[k].cut[s], values[k].weight[s] = (
-                proven[k],
-                state.values.cut[k],
-                state.values.weight[k],
-            )
-        if loading.weight == "change":
-            settled &= bool(np.abs(state.values.weight[0] - reference).max() < 1e-6)
-            reference = state.values.weight[0]
-        if settled:
-            break
-    assert best is not None
-    proven = best.values.known_depth(cut.max_depth)
-    told = f"screening promised {1e3 * promised:.3g} mm, certified {1e3 * proven.min():.3g} mm, searches: {searches}"
-    return best, front, count, told
-
-
-def _nodes(postures: PointPostures, wanted: Wanted) -> Real:
-    return np.column_stack([postures.q / wanted.joint_step, postures.table / wanted.table_step])
-
-
-def _costs(
-    values: Sequence[Screened],
-    postures: Sequence[PointPostures],
-    which: Sequence[Index],
-    nodes: Sequence[Real],
-    loading: Loading,
-    reference: Real,
-) -> Costs:
-    moved = []
-    for one in values:
-        counts = counted_weight(one.weight, "all" if loading.weight == "change" else loading.weight)
-        moved.append(np.linalg.norm((one.cut + counts - reference)[:, :3], axis=1))
-    return Costs(
-        [one.depth[at] for one, at in zip(values, which, strict=True)],
-        [size[at] for size, at in zip(moved, which, strict=True)],
-        nodes,
-        [_TURNED * (one.tool**2 + one.table**2) for one in postures],
-    )
-
-
-def _worth(state: PathState, cut: PathCut, wanted: Wanted, against: PathState) -> float:
-    """Number that is larger for a better sequence; positive."""
-    depth = float(state.values.known_depth(cut.max_depth).min())
-    stiff = 1 / max(float(state.sizes.max()), 1e-12)
-    if wanted.objective == "depth":
-        return depth
-    if wanted.objective == "deviation":
-        return stiff
-    first = max(float(against.values.known_depth(cut.max_depth).min()), 1e-9)
-    return wanted.balance * depth / first + (1 - wanted.balance) * stiff * float(against.sizes.max())
-
-
-def _better(first: PathState, second: PathState, cut: PathCut, wanted: Wanted) -> tuple[PathState, bool]:
-    wins = _worth(second, cut, wanted, first) > _worth(first, cut, wanted, first)
-    return (second, True) if wins else (first, False)
-
-
-def _finer(
-    cut: PathCut, path: CutPath, free: Redundancy, state: PathState, wanted: Wanted
-) -> tuple[list[Redundancy], list[PointPostures]]:
-    """Angles at quarters of a step about the sequence, and the postures of its own branch there."""
-    offsets = np.array([-0.5, -0.25, 0.0, 0.25, 0.5])
-    steps = [float(np.diff(axis)[0]) if len(axis) > 1 else 0.0 for axis in (free.tool, free.table)]
-    finer, found = [], []
-    for k, place in enumerate(path.places):
-        axes = []
-        for step, axis, angle in zip(steps, (free.tool, free.table), (state.tool[k], state.table[k]), strict=True):
-            bounded = axis is free.table
-            near = angle + step * offsets if step else np.array([angle])
-            axes.append(np.unique(np.clip(near, axis.min(), axis.max())) if bounded else near)
-        here = replace(free, tool=axes[0], table=axes[1])
-        every = point_postures(cut.robot, place, here, [state.q[k][cut.robot.mechanism.active]])
-        near_it = np.abs(every.q - state.q[k]).max(axis=1) < max(
-            wanted.joint_step, 1.5 * abs(steps[0]), 1.5 * abs(steps[1])
-        )
-        finer.append(here)
-        found.append(PointPostures(*(getattr(every, name)[near_it] for name in PointPostures.__dataclass_fields__)))
-    return finer, found
-
-
-def _smoothed(
-    cut: PathCut, path: CutPath, free: Redundancy, state: PathState, wanted: Wanted
-) -> list[tuple[Real, float, float]] | None:
-    """The sequence with angles that bend little, at most half a step away; None where a step or a margin breaks."""
-    angles = []
-    for axis, chosen in ((free.tool, state.tool), (free.table, state.table)):
-        half = 0.5 * float(np.diff(axis)[0]) if len(axis) > 1 else 0.0
-        angles.append(np.clip(whittaker(np.unwrap(chosen)), np.unwrap(chosen) - half, np.unwrap(chosen) + half))
-    found, near = [], state.q[0]
-    for k, place in enumerate(path.places):
-        tool, table = float(angles[0][k]), float(angles[1][k])
-        q = reached_near(cut.robot, free.place(place, tool, table), state.q[k])
-        if q is None or (k and np.abs(q - near).max() > wanted.joint_step):
-            return None
-        found.append((q, tool, table))
-        near = q
-    return found
-
-
-def whittaker(values: Real, weight: float = 30.0) -> Real:
-    """Smooth a sequence: ``min sum (z - y)^2 + weight sum (second difference of z)^2`` (Whittaker 1923; Eilers 2003).
-
-    Examples
-    --------
-    >>> np.allclose(whittaker(np.arange(6.0)), np.arange(6.0))
-    True
-    """
-    n = len(values)
-    if n < 5:
-        return np.asarray(values, dtype=float)
-    difference = np.diff(np.eye(n), 2, axis=0)
-    normal = np.eye(n) + weight * difference.T @ difference
-    banded = np.array([np.append(np.diagonal(normal, i), np.zeros(i)) for i in range(3)])
-    return np.asarray(solveh_banded(banded, values, lower=True))

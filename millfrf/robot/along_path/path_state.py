@@ -8,9 +8,12 @@ from numpy.typing import NDArray
 
 from robot_model import CutPath, Redundancy, SpatialRobot, counted_weight, limit_margin, singular_values
 
-from .posture_values import PathCut, PostureValues, Request, values_of
+from .posture_values import PathCut, PostureValues, Request, ValueRow, of_rows, values_of
 
 Real = NDArray[np.float64]
+
+Memory = dict[tuple[int, bytes], ValueRow]
+"""Values by point and joint values."""
 
 
 @dataclass(frozen=True)
@@ -84,11 +87,19 @@ def state_of(
     loading: Loading,
     postures: list[tuple[Real, float, float]],
     pool: Executor | None = None,
+    memory: Memory | None = None,
 ) -> PathState:
-    """Evaluate one posture a point; rows of NaN where it is not reached."""
+    """Evaluate one posture a point; rows of NaN where it is not reached.
+
+    What ``memory`` knows of the same cut is not computed again; what is new is put there.
+    """
+    memory = {} if memory is None else memory
     reached = np.array([not np.isnan(q).any() for q, _, _ in postures])
-    requests = [request_at(path, free, loading, i, postures[i]) for i in np.flatnonzero(reached).tolist()]
-    values = _spread(values_of(cut, requests, pool), reached)
+    keys = {int(i): (int(i), np.round(postures[i][0], 9).tobytes()) for i in np.flatnonzero(reached)}
+    new = [i for i, key in keys.items() if key not in memory]
+    fresh = values_of(cut, [request_at(path, free, loading, i, postures[i]) for i in new], pool)
+    memory.update({keys[i]: row for i, row in zip(new, fresh.rows(), strict=True)})
+    values = _spread(of_rows([memory[key] for key in keys.values()]), reached)
     places = [free.place(p, tool, table) for p, (_, tool, table) in zip(path.places, postures, strict=True)]
     axes = np.array([place.axes for place in places])
     moved = values.cut + counted_weight(values.weight, loading.weight)

@@ -18,7 +18,10 @@ _SAME = 1e-7
 """Relative difference of poles and residues below which two postures have one limit."""
 
 _CHUNK = 24
-"""Postures that one process takes at a time."""
+"""Postures that one process takes at a time, at most: those of one point stand together."""
+
+ValueRow = tuple[float, float, str, str, float, Real, Real]
+"""Values of one posture, in the order of the fields of :class:`PostureValues`."""
 
 
 @dataclass(frozen=True)
@@ -84,12 +87,14 @@ class PostureValues:
     cut: Real
     weight: Real
 
+    def rows(self) -> list[ValueRow]:
+        """One row a posture, in the order of the fields."""
+        columns = (self.depth, self.frequency, self.kind, self.status, self.lowest, self.cut, self.weight)
+        return list(zip(*columns, strict=True))
+
     def known_depth(self, max_depth: float) -> Real:
         """Depth that is proven, m, (n,): at most ``max_depth``, zero where nothing is known."""
         return np.minimum(np.where(np.isnan(self.depth), 0.0, self.depth), max_depth)
-
-
-_Row = tuple[float, float, str, str, float, Real, Real]
 
 
 def values_of(cut: PathCut, requests: Sequence[Request], pool: Executor | None = None) -> PostureValues:
@@ -98,18 +103,23 @@ def values_of(cut: PathCut, requests: Sequence[Request], pool: Executor | None =
     :func:`stability.certified_lobes` of the modal model in the axes of the cut. Postures whose poles and residues agree
     share one solution: on a spindle in line with the last joint, all turns about the tool.
     """
-    parts = [list(requests[i : i + _CHUNK]) for i in range(0, len(requests), _CHUNK)]
+    size = max(1, min(_CHUNK, len(requests) // 4))
+    parts = [list(requests[i : i + size]) for i in range(0, len(requests), size)]
     found = list((map if pool is None else pool.map)(_rows, [cut] * len(parts), parts))
-    rows = [row for part in found for row in part]
+    return of_rows([row for part in found for row in part])
+
+
+def of_rows(rows: Sequence[ValueRow]) -> PostureValues:
+    """Values from one row a posture, in the order of the fields."""
     depth, frequency, lowest = (np.array([row[i] for row in rows], dtype=float) for i in (0, 1, 4))
     moved, sag = (np.array([row[i] for row in rows]).reshape(len(rows), 6) for i in (5, 6))
     kind, status = (tuple(str(row[i]) for row in rows) for i in (2, 3))
     return PostureValues(depth, frequency, kind, status, lowest, moved, sag)
 
 
-def _rows(cut: PathCut, requests: Sequence[Request]) -> list[_Row]:
+def _rows(cut: PathCut, requests: Sequence[Request]) -> list[ValueRow]:
     known: list[tuple[ModalModel, tuple[float, float, str, str]]] = []
-    rows: list[_Row] = []
+    rows: list[ValueRow] = []
     for one in requests:
         modes = modes_at(cut.robot, one.q)
         model = model_of_modes(modes, cut.robot, axes=one.axes, highest_frequency=cut.highest_frequency)

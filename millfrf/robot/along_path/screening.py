@@ -15,7 +15,7 @@ from .posture_values import PathCut, values_of
 Real = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-ANCHORS = 21
+ANCHORS = 17
 """Points of a path at which every posture is evaluated; between them values are interpolated."""
 
 _NEAR = 0.8

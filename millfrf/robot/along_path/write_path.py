@@ -34,11 +34,9 @@ from ..postures import Asked, posture_of, spatial
 from ..results import RPM, say_doubts
 from .asked_path import AskedPath
 from .optimum import PathOptimum, optimised
-from .path_picture import draw_path
 from .path_state import Loading
-from .path_table import write_path_table
-from .path_words import doubts, summary
 from .posture_values import PathCut
+from .telling import doubts, draw_path, summary, write_path_table
 
 Real = NDArray[np.float64]
 

@@ -6,8 +6,9 @@ import numpy as np
 
 from robot_model import CutPath
 
-from .optimum import PathOptimum, Wanted
-from .path_state import PathState
+from ..certified_search import Wanted
+from ..optimum import PathOptimum
+from ..path_state import PathState
 
 
 def summary(found: PathOptimum, wanted: Wanted, max_depth: float, planned: float | None) -> list[str]:
@@ -20,7 +21,7 @@ def summary(found: PathOptimum, wanted: Wanted, max_depth: float, planned: float
         f"largest joint step {steps:.1f} deg; nearest joint limit {np.degrees(found.after.margin.min()):.1f} deg away, "
         f"smallest singular value {found.after.smallest.min():.3f}"
     )
-    lines.append(f"{found.evaluated} limits in all; {'; '.join(found.rounds)}")
+    lines.append(f"{found.evaluated[1]} postures certified; {'; '.join(found.rounds)}")
     if wanted.objective == "both":
         lines += [
             f"front: {1e3 * one.depth:.3g} mm deep with {1e3 * one.deviation:.3g} mm of deviation"
@@ -63,10 +64,11 @@ def doubts(found: PathOptimum, path: CutPath) -> list[str]:
             "feeds as at the nearest other point, not of plunging"
         )
     kept = found.kept
-    if np.isfinite(kept.highest_frequency):
+    if np.isfinite(kept.highest_frequency) and kept.highest_frequency < kept.reference:
         lines.append(
-            f"modes above {kept.highest_frequency:.0f} Hz are left as their static flexibility; more modes move the "
-            f"limits at {kept.checked} sampled postures by at most {100 * kept.change:.2g} %"
+            f"modes above {kept.highest_frequency:.0f} Hz are left as their static flexibility; with modes "
+            f"{_up_to(kept.reference)} the limits at {kept.checked} postures change by at most "
+            f"{100 * kept.change:.2g} %"
         )
     return lines
 
@@ -74,3 +76,7 @@ def doubts(found: PathOptimum, path: CutPath) -> list[str]:
 def _few(points: Sequence[int]) -> str:
     shown = ", ".join(str(point) for point in points[:5])
     return shown if len(points) <= 5 else f"{shown} and {len(points) - 5} more"
+
+
+def _up_to(frequency: float) -> str:
+    return f"up to {frequency:.0f} Hz" if np.isfinite(frequency) else "of all frequencies"

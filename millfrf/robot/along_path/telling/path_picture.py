@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from figures import COLOURS, LINE_STYLES, SHADE, house_style, new_figure, panel_letter, save_figure
 from robot_model import CutPath
 
-from .path_state import PathState
+from ..path_state import PathState
 
 
 def draw_path(

@@ -9,7 +9,7 @@ import numpy as np
 from foundation import warning_lines
 from robot_model import Mechanism, typed_values
 
-from .path_state import PathState
+from ..path_state import PathState
 
 PLACE = ("point", "x_m", "y_m", "z_m", "i", "j", "k")
 CUT = (
