@@ -2,6 +2,7 @@
 
 import os
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +18,14 @@ from .spatial import (
     NO_MASSES,
     TIP_ROTATIONS,
     damping_warnings,
+    modal_model_at,
     model_of_modes,
     modes_at,
     rigid_arms,
     static_response,
     structure_at,
 )
+from .uncertain_robot import apart_from_higher, with_model_covariance
 
 Real = NDArray[np.float64]
 
@@ -36,7 +39,8 @@ class PostureResult:
     frequencies : (n_modes,), Hz
         All undamped natural frequencies; empty where the robot's file gives no masses.
     model
-        Modal model at the tool tip, or None without masses.
+        Modal model at the tool tip, or None without masses; with the covariance that an update left, where there was
+        one; its highest modes are static flexibility then.
     compliance : (n_dof, n_dof), m/N, rad/N, rad/(N m)
         Static compliance at the tool over ``labels``.
     labels
@@ -136,6 +140,10 @@ def in_posture(
         return PostureResult(np.zeros(0), None, compliance, labels, (*warnings, NO_MASSES))
     modes = modes_at(robot, q)
     model = model_of_modes(modes, robot, axes=axes)
+    if case.uncertainty is not None:
+        top = apart_from_higher(modes.frequencies)
+        given = partial(modal_model_at, q=q, axes=axes, highest_frequency=top)
+        model = with_model_covariance(robot, case.uncertainty, given)
     warnings = (*warnings, *damping_warnings(robot, modes))
     return PostureResult(modes.frequencies, model, compliance, labels, warnings, turn.T @ static.own_weight)
 

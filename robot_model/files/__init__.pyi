@@ -1,6 +1,6 @@
 from .changed_file import changed_robot_text
 from .planar_file import PlanarCase, read_planar_robot
-from .robot_files import assumptions, read_table, robot_names
+from .robot_files import assumptions, read_table, robot_names, robot_text
 from .serial_file import read_serial_robot
 from .spatial_file import SpatialCase, read_spatial_robot
 
@@ -14,4 +14,5 @@ __all__ = [
     "read_spatial_robot",
     "read_table",
     "robot_names",
+    "robot_text",
 ]

@@ -12,9 +12,11 @@ from pydantic import BaseModel, ConfigDict, Field
 from foundation import InputError
 
 from ..finite_elements import Material, Section, hollow_circle, rayleigh_constants
+from ..full_update import UpdateParameter
 from ..kinematics import LARGEST_TRAVEL, Frame, Mechanism, named_values
 from ..serial_chains import inertia_fault, symmetric
 from ..spatial import ElasticJoint, Link, LumpedBody, SpatialRobot, check_tip
+from ..uncertain_robot import RobotUncertainty
 from .drive_table import DriveKeys, drive_of
 from .robot_files import Table, read_as
 
@@ -51,6 +53,8 @@ class _Joint(DriveKeys):
     axial_n_per_m: float | None = Field(None, gt=0)
     tilting_nm_per_rad: float | None = Field(None, gt=0)
     turning_nm_per_rad: float | None = Field(None, gt=0)
+    damping_nms_per_rad: float = 0.0
+    damping_ns_per_m: float = 0.0
 
 
 class _Tube(Table):
@@ -79,7 +83,7 @@ class _Point(Table):
 class _Body(Table):
     node: int
     frame: str
-    mass_kg: float = Field(gt=0)
+    mass_kg: float
     centre_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     inertia_kg_m2: tuple[float, float, float] | tuple[float, float, float, float, float, float] = (0.0, 0.0, 0.0)
 
@@ -104,6 +108,30 @@ class Pose(Table):
     driven_deg: list[float] | None = None
 
 
+class _Number(Table):
+    """A number that ``robot update`` freed."""
+
+    name: str
+    kind: str
+    unit: str = ""
+    frame: str = ""
+    group: str = ""
+    axis: int = 0
+    spread: float
+    value: float
+    standard_error: float = 0.0
+    told: bool = True
+
+
+class _Update(Table):
+    """What ``robot update`` did to the file."""
+
+    verdict: str
+    named: list[str]
+    covariance: list[list[float]]
+    numbers: list[_Number]
+
+
 class _File(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
@@ -116,6 +144,7 @@ class _File(BaseModel):
     bodies: list[_Body] = []
     damping: Damping | None = None
     poses: list[Pose] = []
+    update: _Update | None = None
 
 
 @dataclass(frozen=True)
@@ -134,6 +163,8 @@ class SpatialCase:
         Pose repeatability after ISO 9283 (RP: radius of the sphere); None: the file does not tell it.
     assumed
         What the file marks as assumed and what decides results: one sentence each, for the warnings of every result.
+    uncertainty
+        What an update left open of the file's numbers; None: the file was never updated.
     """
 
     name: str
@@ -141,6 +172,7 @@ class SpatialCase:
     poses: dict[str, NDArray[np.float64]]
     repeatability: float | None = None
     assumed: tuple[str, ...] = ()
+    uncertainty: RobotUncertainty | None = None
 
 
 def read_spatial_robot(robot: str | os.PathLike[str]) -> SpatialCase:
@@ -181,7 +213,26 @@ def _case(content: _File) -> SpatialCase:
     )
     check_tip(spatial)
     poses = named_postures(content.poses, spatial.mechanism)
-    return SpatialCase(content.robot.name, spatial, poses, content.robot.repeatability_m)
+    _check_masses(content.bodies)
+    uncertainty = None if content.update is None else _uncertainty(content.update)
+    return SpatialCase(content.robot.name, spatial, poses, content.robot.repeatability_m, uncertainty=uncertainty)
+
+
+def _uncertainty(table: _Update) -> RobotUncertainty:
+    rows = table.numbers
+    freed = tuple(UpdateParameter(r.name, r.kind, r.unit, r.spread, r.frame, r.group, r.axis) for r in rows)
+    return RobotUncertainty(freed, np.array([row.value for row in rows]), np.array(table.covariance, ndmin=2))
+
+
+def _check_masses(rows: list[_Body]) -> None:
+    """A negative mass is what another body of its node has too much; what is left must be one."""
+    for number, row in enumerate(rows, start=1):
+        left = sum(other.mass_kg for other in rows if other.node == row.node)
+        if (row.mass_kg < 0 and left <= -0.5) or row.mass_kg == 0:
+            raise InputError(
+                f"bodies[{number}].mass_kg must be above 0, not {row.mass_kg!r}; a negative mass stands for what "
+                f"another body of node {row.node} has too much, and {left:g} kg are left there"
+            )
 
 
 def upwards(given: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -255,8 +306,15 @@ def _limits(row: _Frame) -> tuple[float, float]:
 
 
 def _joint(row: _Joint, frames: tuple[Frame, ...]) -> ElasticJoint:
+    """A joint; its damping has the unit of its motion."""
     frame = next((frame for frame in frames if frame.name == row.frame), None)
-    return ElasticJoint(row.frame, row.nodes, _stiffness(row), drive_of(row, frame))
+    slides = frame is not None and frame.motion == "prismatic"
+    wrong = row.damping_nms_per_rad if slides else row.damping_ns_per_m
+    if wrong:
+        given, wanted = ("damping_nms_per_rad", "damping_ns_per_m")[:: 1 if slides else -1]
+        raise InputError(f"joint {row.frame}: {given} = {wrong:g} has not the unit of its motion; give {wanted}")
+    damping = row.damping_ns_per_m if slides else row.damping_nms_per_rad
+    return ElasticJoint(row.frame, row.nodes, _stiffness(row), drive_of(row, frame), damping)
 
 
 def _stiffness(row: _Joint) -> NDArray[np.float64]:

@@ -1,6 +1,7 @@
 from .causes import Cause, PostureFrequencies, equivalent_causes, explain_frequencies
 from .change import Change, Companion, Numbered
 from .variations import (
+    end_bodies,
     with_damping_factor,
     with_joint_factor,
     with_lighter_end,
@@ -17,6 +18,7 @@ __all__ = [
     "Numbered",
     "PostureFrequencies",
     "changed_robot",
+    "end_bodies",
     "equivalent_causes",
     "explain_frequencies",
     "possible_changes",

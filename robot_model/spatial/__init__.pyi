@@ -1,10 +1,11 @@
 from .cell_structure import cell_structure_at
-from .compliant_tool import housing_node, tool_spring, with_tool_spring
+from .compliant_tool import TOOL_MASS, housing_node, tool_spring, with_tool_spring
 from .joint_drive import JointDrive
 from .natural_coordinates import NaturalRobot, natural_robot
 from .spatial_modes import (
     TIP_ROTATIONS,
     StructureModes,
+    damping_of_modes,
     damping_warnings,
     frf_at,
     modal_damping,
@@ -29,6 +30,7 @@ from .weight import (
 __all__ = [
     "NO_MASSES",
     "TIP_ROTATIONS",
+    "TOOL_MASS",
     "ElasticJoint",
     "JointDrive",
     "Link",
@@ -42,6 +44,7 @@ __all__ = [
     "cell_structure_at",
     "check_tip",
     "counted_weight",
+    "damping_of_modes",
     "damping_warnings",
     "drive_stiffness",
     "frf_at",

@@ -7,7 +7,7 @@ from foundation import HOUSING, TIP, InputError
 from modal_fit import ModalModel
 
 from .compliant_tool import housing_node
-from .spatial_modes import modal_damping, modes_at
+from .spatial_modes import damping_of_modes, modes_at
 from .spatial_robot import SpatialRobot
 
 Real = NDArray[np.float64]
@@ -21,7 +21,8 @@ def cell_structure_at(
     The sensor sits on the spindle: it moves by ``t + theta x r`` with the translation and rotation, in every mode, of
     the tip, or of the node before the tool's spring where the robot has one (Mohammadi & Ahmadi, Fig. 12 a). Modes are
     real, so that ``sum 2 Re(right left^T) = 0``: a step of force gives no step of velocity. Higher and overdamped modes
-    are dropped, without a residual: the cell integrates modes.
+    are dropped, without a residual: the cell integrates modes. Of the joints' own damping each mode gets its share;
+    what couples modes is left out.
 
     Parameters
     ----------
@@ -46,7 +47,7 @@ def cell_structure_at(
     tip = modes.shapes[:, modes.structure.tip]
     housing = modes.shapes[:, housing_node(robot)]
     moved, held, turned = tip[:, :3] @ turn, housing[:, :3] @ turn, housing[:, 3:] @ turn
-    natural, twice = np.sqrt(modes.squares), modal_damping(robot, modes.squares)
+    natural, twice = np.sqrt(modes.squares), np.diag(damping_of_modes(robot, modes))
     kept = (natural < 2 * np.pi * highest_frequency) & (twice < 2 * natural) & (twice > 0)
     if not kept.any():
         raise InputError("no damped mode is left for the simulated cell; give the robot damping, or more modes")

@@ -10,7 +10,16 @@ from estimation import Frf
 from foundation import TIP, InputError
 from modal_fit import ModalModel
 
-from ..finite_elements import Structure, coordinate_basis, from_real_modes, mass_matrix, six_by_six, stiffness_matrix
+from ..finite_elements import (
+    Structure,
+    coordinate_basis,
+    from_real_modes,
+    mass_matrix,
+    modal_model,
+    six_by_six,
+    stiffness_matrix,
+)
+from ..kinematics import drive_direction
 from .spatial_robot import SpatialRobot, structure_at
 
 Real = NDArray[np.float64]
@@ -105,6 +114,9 @@ def model_of_modes(
     tip = modes.shapes[:, modes.structure.tip] @ turn.T
     labels = (*TIP, *TIP_ROTATIONS) if rotations else TIP
     shapes = tip[:, : len(labels)].T
+    if any(joint.damping for joint in robot.joints):
+        unit, stiffness = np.eye(len(modes.squares)), np.diag(modes.squares)
+        return modal_model(unit, damping_of_modes(robot, modes), stiffness, shapes, labels, highest_frequency)
     damping = modal_damping(robot, modes.squares)
     return from_real_modes(modes.squares, shapes, damping, np.eye(len(labels)), labels, highest_frequency)
 
@@ -117,9 +129,38 @@ def modal_damping(robot: SpatialRobot, squares: Real) -> Real:
     return a + b * squares
 
 
+def damping_of_modes(robot: SpatialRobot, modes: StructureModes) -> Real:
+    """Damping matrix over mass-normalised modes, ``diag(2 zeta omega) + sum_j c_j b_j b_j^T``, rad/s, (n, n).
+
+    ``b_j`` holds each mode's motion in joint j, about or along the joint's axis; c_j is that joint's own damping.
+
+    Raises
+    ------
+    InputError
+        A direction that is not damped: the joints' damping of negative sign is more than the robot's.
+    """
+    whole = np.diag(modal_damping(robot, modes.squares))
+    if not any(joint.damping for joint in robot.joints):
+        return whole
+    motions = {frame.name: drive_direction(frame) for frame in robot.mechanism.frames}
+    for joint, spring in zip(robot.joints, modes.structure.springs, strict=True):
+        if joint.damping:
+            before, after = (part[motions[joint.frame]] for part in spring.motions(modes.structure.positions))
+            first, second = spring.nodes
+            moved = modes.shapes[:, second] @ after - modes.shapes[:, first] @ before
+            whole += joint.damping * np.outer(moved, moved)
+    least = float(np.linalg.eigvalsh(whole)[0])
+    if least < -1e-9 * float(np.abs(whole).max()):
+        raise InputError(
+            f"the joints' damping leaves a motion with {least:.3g} 1/s: it must not be negative; "
+            "raise damping_nms_per_rad, or the robot's [damping]"
+        )
+    return whole
+
+
 def damping_warnings(robot: SpatialRobot, modes: StructureModes) -> tuple[str, ...]:
     """Warn in one sentence of large Rayleigh damping in high modes; empty where all stay below 20 %."""
-    ratios = modal_damping(robot, modes.squares) / (2 * np.sqrt(modes.squares))
+    ratios = np.diag(damping_of_modes(robot, modes)) / (2 * np.sqrt(modes.squares))
     high = modes.frequencies > 20.0
     if not np.any(ratios[high] > 0.2):
         return ()
@@ -137,7 +178,12 @@ def frf_at(robot: SpatialRobot, q: Real, frequencies: Real, *, axes: Real | None
     turn = np.eye(3) if axes is None else np.asarray(axes, dtype=float)
     tip = modes.shapes[:, modes.structure.tip, :3] @ turn
     omega = 2 * np.pi * np.asarray(frequencies, dtype=float)[:, None]
-    gain = 1 / (modes.squares - omega**2 + 1j * omega * modal_damping(robot, modes.squares))
-    values = np.einsum("kr,rp,rq->kpq", gain, tip, tip, optimize=True)
+    damping = damping_of_modes(robot, modes)
+    if any(joint.damping for joint in robot.joints):
+        stiffness = np.eye(len(damping)) * (modes.squares - omega**2)[:, None, :]
+        values = tip.T @ np.linalg.solve(stiffness + 1j * omega[:, :, None] * damping, tip.astype(complex))
+    else:
+        gain = 1 / (modes.squares - omega**2 + 1j * omega * np.diag(damping))
+        values = np.einsum("kr,rp,rq->kpq", gain, tip, tip, optimize=True)
     valid = np.ones(len(omega), dtype=bool)
     return Frf(omega[:, 0] / (2 * np.pi), values, TIP, TIP, "receptance", "m/N", valid)

@@ -23,13 +23,15 @@ class ElasticJoint:
 
     ``stiffness`` (6,) is ``(K_r, K_r, K_a, K_rr, K_rr, K_ar)`` in N/m and N m/rad about the frame's axes, infinite
     where rigid (Belchior et al. 2013, Eq. 6). A ``drive`` puts its motor's inertia before this stiffness, held by the
-    controller; without one the motor stands still.
+    controller; without one the motor stands still. ``damping`` is the viscous damping of the joint's own motion (about
+    z, or along z of a prismatic joint), N m s/rad or N s/m, beside the robot's own damping and of either sign.
     """
 
     frame: str
     nodes: tuple[int, int]
     stiffness: Real
     drive: JointDrive | None = None
+    damping: float = 0.0
 
 
 @dataclass(frozen=True)

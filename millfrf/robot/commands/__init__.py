@@ -16,9 +16,11 @@ from .map_command import map_command
 from .modes import modes
 from .path_command import path_command
 from .stiffness import stiffness
+from .update import update
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "diagnose": diagnose,
+    "update": update,
     "list": list_robots,
     "modes": modes,
     "frf": frf,

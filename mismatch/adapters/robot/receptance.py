@@ -8,7 +8,7 @@ from scipy.optimize import linear_sum_assignment
 
 from estimation import WindowedSpectrum
 from foundation import HOUSING, TIP
-from robot_model import SpatialRobot, housing_node, modal_damping, modes_at
+from robot_model import SpatialRobot, damping_of_modes, housing_node, modes_at
 
 from ...inference import LabError
 from .posed_recording import PosedRecording
@@ -201,7 +201,7 @@ def robot_modes(robot: SpatialRobot, recording: PosedRecording, offset: Real, se
     natural = np.sqrt(modes.squares)
     return RobotModes(
         natural,
-        modal_damping(robot, modes.squares) / (2 * natural),
+        np.diag(damping_of_modes(robot, modes)) / (2 * natural),
         shapes,
         tuple(places.index(label) for label in recording.responses),
         tuple(places.index(label) for label in recording.excitations),

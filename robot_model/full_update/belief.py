@@ -1,0 +1,173 @@
+"""The most probable numbers of a robot, and the belief about them: Gauss-Newton, Laplace, and how far modes are off."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError
+
+from .misfit import Problem, Sums, sums_at, weighed
+from .response import UpdateParameter
+
+Real = NDArray[np.float64]
+
+STAGES = (0.2, 0.05, 0.02)
+"""How far modes may be off while the numbers are sought: from a coarse likelihood without traps to a fine one."""
+
+MODES_OFF = np.concatenate([[0.0], np.geomspace(2e-5, 0.2, 33)])
+"""Values of the modes' deviation among which the most probable one is chosen."""
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What the measurements say of the freed numbers.
+
+    Parameters
+    ----------
+    x : (n_parameters,)
+        Most probable differences.
+    covariance : (n_parameters, n_parameters)
+        Laplace's covariance about them.
+    scale
+        Variance of the whitened errors: 1 where the stated noise holds.
+    modes_off
+        Standard deviation of the modes' relative frequencies about the robot's, as the measurements show it.
+    """
+
+    x: Real
+    covariance: Real
+    scale: float
+    modes_off: float
+
+    @property
+    def errors(self) -> Real:
+        """Standard errors, (n_parameters,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+
+def sought(problem: Problem, starts: Sequence[Real] | None = None) -> Belief:
+    """Seek the most probable numbers from the file's, and from further starts.
+
+    Parameters
+    ----------
+    problem
+        What is freed and measured.
+    starts
+        Differences to start from; None: the file.
+    """
+    begin = [np.zeros(len(problem.parameters))] if starts is None else list(starts)
+    best, least = begin[0], np.inf
+    for start in begin:
+        x = start
+        for stage in STAGES:
+            x, value = descended(problem, x, 1.0, stage)
+        if value < least:
+            best, least = x, value
+    return settled(problem, best)
+
+
+def settled(problem: Problem, x: Real, held: NDArray[np.bool_] | None = None, rounds: int = 3) -> Belief:
+    """Refine numbers near the best, with the noise's size and the modes' deviation estimated in turn.
+
+    Parameters
+    ----------
+    held : (n_parameters,), bool, or None
+        Numbers that stay where they are.
+    """
+    scale, off = 1.0, STAGES[-1]
+    for _ in range(rounds):
+        x, _ = descended(problem, x, scale, off, held)
+        sums = sums_at(problem, x)
+        scale = noise_scale(sums)
+        off = modes_deviation(problem, sums, scale)
+    x, _ = descended(problem, x, scale, off, held)
+    return Belief(x, covariance_of(problem, sums_at(problem, x), scale, off), scale, off)
+
+
+def covariance_of(problem: Problem, sums: Sequence[Sums], scale: float, off: float) -> Real:
+    """Laplace's covariance: the inverse of Fisher's information and the belief before."""
+    root = np.sqrt(problem.precision)
+    matrix = weighed(sums, scale, off)[2] / np.outer(root, root) + np.eye(len(root))
+    return np.asarray(np.linalg.inv(matrix) / np.outer(root, root))
+
+
+def noise_scale(sums: Sequence[Sums]) -> float:
+    """Variance of the whitened errors, at least 1, with what neighbouring lines share counted once."""
+    spare = float(np.mean([one.outside for one in sums]))
+    shared = max(1 + 2 * one.likeness for one in sums)
+    return max(spare, 1.0) * shared
+
+
+def modes_deviation(problem: Problem, sums: Sequence[Sums], scale: float) -> float:
+    """The modes' deviation with most evidence (restricted likelihood, Patterson & Thompson 1971)."""
+    return float(min(MODES_OFF, key=lambda off: _evidence_against(problem, sums, scale, float(off))))
+
+
+def _evidence_against(problem: Problem, sums: Sequence[Sums], scale: float, off: float) -> float:
+    misfit, gradient, matrix = weighed(sums, scale, off)
+    whole = matrix + np.diag(problem.precision)
+    value = misfit - float(gradient @ np.linalg.solve(whole, gradient)) + float(np.linalg.slogdet(whole)[1])
+    for one in sums:
+        value += float(np.linalg.slogdet(np.eye(len(one.gg)) + off**2 * one.gg / scale)[1])
+    return value
+
+
+def descended(
+    problem: Problem, x: Real, scale: float, off: float, held: NDArray[np.bool_] | None = None, steps: int = 25
+) -> tuple[Real, float]:
+    """Levenberg-Marquardt descent of misfit plus belief (Nocedal & Wright, section 10.3); numbers and their value."""
+    free = np.ones(len(x), dtype=bool) if held is None else ~np.asarray(held, dtype=bool)
+    precision = problem.precision
+    lift, current = 1e-3, _at(problem, x, scale, off)
+    if current is None:
+        return x, np.inf
+    for _ in range(steps):
+        value, gradient, matrix = current
+        whole = (matrix + np.diag(precision))[np.ix_(free, free)]
+        slope = (gradient + precision * x)[free]
+        step = np.zeros_like(x)
+        step[free] = -np.linalg.solve(whole + lift * np.diag(np.diag(whole)), slope)
+        step /= max(1.0, float(np.max(np.abs(step) * np.sqrt(precision))) / 0.7)
+        trial = _at(problem, x + step, scale, off)
+        if trial is None or trial[0] > value:
+            lift *= 8
+            if lift > 1e6:
+                break
+            continue
+        x, current, lift = x + step, trial, max(lift / 5, 1e-9)
+        if value - trial[0] < 1e-3 + 1e-7 * value:
+            break
+    return x, current[0]
+
+
+def _at(problem: Problem, x: Real, scale: float, off: float) -> tuple[float, Real, Real] | None:
+    """Misfit plus belief, and the misfit's gradient and matrix; None where the numbers leave no robot."""
+    try:
+        misfit, gradient, matrix = weighed(sums_at(problem, x), scale, off)
+    except (LinAlgError, np.linalg.LinAlgError):
+        return None
+    return misfit + float(problem.precision @ x**2), gradient, matrix
+
+
+def added_parts(parameters: Sequence[UpdateParameter]) -> NDArray[np.bool_]:
+    """Whether a number stands for a part that the file does not have, and that cannot be negative."""
+    return np.array([one.kind in ("tool", "base", "joint damping") for one in parameters], dtype=bool)
+
+
+def without_doubtful_parts(problem: Problem, found: Belief) -> Belief:
+    """Put added springs and dampers that are not above twice their error at zero, and settle the others anew.
+
+    A tool or a base that gives way, and a joint's own damper, are parts of their own in the file: they are added where
+    they are seen. Their errors stay.
+    """
+    springs = added_parts(problem.parameters)
+    held = np.zeros(len(found.x), dtype=bool)
+    for _ in range(3):
+        low = springs & ~held & (found.x < 2 * found.errors)
+        if not low.any():
+            break
+        held |= low
+        x = np.where(held, 0.0, found.x)
+        found = replace(settled(problem, x, held, rounds=2))
+    return found
