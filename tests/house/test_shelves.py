@@ -11,6 +11,7 @@ MOST = 12
 ONE_KIND = {
     "millfrf.commands": "one command a file",
     "millfrf.gate": "one question of the gate a file",
+    "millfrf.robot.commands": "one command a file",
     "mismatch.physics": "one physics a file",
 }
 """Folders that hold more, because all their modules are of the kind named here."""
