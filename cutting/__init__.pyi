@@ -17,13 +17,21 @@ from .immersion import IMMERSIONS, immersion_angles
 from .milling_process import MillingProcess
 from .one_tooth import engaged_share, specific_forces, tooth_force, tooth_offsets, wrapped_immersion
 from .refusal import refuse_varied
-from .transverse_force import TransverseForce, bending_stiffness, edge_thicknesses, resultant_force
+from .transverse_force import (
+    SettledDrill,
+    TransverseForce,
+    bending_stiffness,
+    edge_thicknesses,
+    resultant_force,
+    settled_drill,
+)
 
 __all__ = [
     "IMMERSIONS",
     "Drill",
     "DrillingLoad",
     "MillingProcess",
+    "SettledDrill",
     "SpecificForce",
     "TransverseForce",
     "average_directional_matrix",
@@ -47,6 +55,7 @@ __all__ = [
     "read_cutting_process",
     "refuse_varied",
     "resultant_force",
+    "settled_drill",
     "specific_forces",
     "tooth_force",
     "tooth_offsets",

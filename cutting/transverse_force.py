@@ -5,6 +5,7 @@ from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import root
 
 from foundation import InputError
 
@@ -88,7 +89,8 @@ def resultant_force(
     Every edge carries the cutting force ``F_t`` against its motion and, as a chip's pressure acts normal to the edge,
     ``F_a cot chi`` towards the axis beside its thrust ``F_a``. On a true drill both cancel; with runout a residual
     turns with the spindle (Ferreras-Higuero et al., section 3 and Fig. 7a; they print no formula). Edges are taken
-    as radial; their levers are those of the true drill: the error is of the order of runout over diameter.
+    as radial; their levers are those of the true drill: the error is of the order of runout over diameter. The drill
+    is stiff here; one that gives way centres itself and carries far less: :func:`settled_drill`.
 
     Parameters
     ----------
@@ -113,6 +115,73 @@ def resultant_force(
             forwards = np.array([-outwards[1], outwards[0]])
             along += -cut * forwards - thrust / np.tan(drill.edge_angle) * outwards
     return TransverseForce(along, thicknesses)
+
+
+@dataclass(frozen=True)
+class SettledDrill:
+    """A drill that gives way under its transverse force, in axes that turn with it (:class:`TransverseForce`).
+
+    Parameters
+    ----------
+    force
+        Transverse force in equilibrium.
+    eccentricity : (2,), m
+        Place of the tip beside the axis of rotation in equilibrium.
+    bending : (2,), m
+        How far the tip gave way from its eccentricity at rest.
+    """
+
+    force: TransverseForce
+    eccentricity: Real
+    bending: Real
+
+
+def settled_drill(
+    drill: Drill,
+    feed: float,
+    tangential: SpecificForce,
+    axial: SpecificForce,
+    runout: float,
+    compliance: float,
+    *,
+    direction: float = 0.0,
+) -> SettledDrill:
+    """Solve ``e = e_0 + C F(e)``: the deeper edge is pushed back towards the axis, so the point centres itself.
+
+    For two edges and constant pressures ``F = -(K_r, K_t) e_x`` with ``K_r = 2 k_a D cot^2 chi`` and
+    ``K_t = 2 k_t D cot chi``: ``e_x = e_0x / (1 + C K_r)``, ``e_y = e_0y - C K_t e_x``. Long drills have C K_r of 3 to
+    30, so their tip goes sideways by K_t / K_r times its eccentricity at most, and the force is what bends it so far.
+    The walls of the hole, which hold the drill once it is in, are left out.
+
+    Parameters
+    ----------
+    drill, feed, tangential, axial, runout, direction
+        As in :func:`resultant_force`; the runout is that at rest.
+    compliance : m/N
+        Compliance C of the tip across the drill, the same in all directions.
+
+    Raises
+    ------
+    InputError
+        A compliance that is negative, or no equilibrium (the tip would leave the drill's radius).
+    """
+    if not compliance >= 0:
+        raise InputError(f"compliance {compliance!r} m/N of a drill must be zero or more")
+    at_rest = runout / 2 * np.array([np.cos(direction), np.sin(direction)])
+
+    def force_at(place: Real) -> TransverseForce:
+        size, angle = 2 * float(np.hypot(*place)), float(np.arctan2(place[1], place[0]))
+        return resultant_force(drill, feed, tangential, axial, min(size, drill.diameter / 2), direction=angle)
+
+    unit = max(runout, 1e-9)
+    found = root(lambda x: x - (at_rest + compliance * force_at(unit * x).force) / unit, at_rest / unit, tol=1e-12)
+    place = unit * np.asarray(found.x)
+    left = place - at_rest - compliance * force_at(place).force
+    if not np.abs(left).max() <= 1e-6 * unit or np.hypot(*place) > drill.diameter / 4:
+        raise InputError(
+            f"a drill of {1e3 * drill.diameter:g} mm with {compliance:g} m/N settles nowhere; make it shorter"
+        )
+    return SettledDrill(force_at(place), place, place - at_rest)
 
 
 def bending_stiffness(drill: Drill, overhang: float, *, young: float = 600e9, core: float = 0.7) -> float:

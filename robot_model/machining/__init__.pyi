@@ -8,6 +8,7 @@ from .drilling_deviation import (
 )
 from .path_compensation import CompensatedPath, ToolPath, compensate_path
 from .path_file import MOMENTS, read_tool_path, write_compensated_path
+from .process_deviation import ProcessDeviation, orbit_radius, process_deviation
 from .redundancy import CutPlace, PostureMap, frequencies_over, posture_map, target_of, tool_down, turned_place
 from .uncertainty_budget import (
     LoadUncertainty,
@@ -29,6 +30,7 @@ __all__ = [
     "DeviationMap",
     "LoadUncertainty",
     "PostureMap",
+    "ProcessDeviation",
     "ToolPath",
     "UncertaintyBudget",
     "compensate_path",
@@ -42,9 +44,11 @@ __all__ = [
     "machining_uncertainty",
     "measured_machining_uncertainty",
     "monte_carlo_deformation",
+    "orbit_radius",
     "position_tolerance",
     "position_verdict",
     "posture_map",
+    "process_deviation",
     "read_tool_path",
     "sag_parts",
     "target_of",

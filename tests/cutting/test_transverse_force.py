@@ -15,6 +15,7 @@ from cutting import (
     edge_thicknesses,
     fitted_to_catalogue,
     resultant_force,
+    settled_drill,
 )
 from foundation import InputError
 
@@ -111,3 +112,32 @@ def test_a_clamped_drill_bends_as_a_bar() -> None:
     with pytest.raises(InputError, match="overhang"):
         bending_stiffness(Drill(10e-3), 60e-6)
     assert Drill(8e-3).edge_angle == radians(70)
+
+
+def test_a_drill_that_gives_way_centres_itself() -> None:
+    """Constant pressures: ``e_x = e_0x / (1 + C K_r)``, ``e_y = e_0y - C K_t e_x`` by hand, and the force behind it."""
+    kt, ka, rho, direction = 900e6, 500e6, 20e-6, 0.7
+    flat = [SpecificForce(k, 0.0, 1.0, 0.0, 0.0) for k in (kt, ka)]
+    cot = 1 / tan(DRILL.edge_angle)
+    radial, across = 2 * ka * DRILL.diameter * cot**2, 2 * kt * DRILL.diameter * cot
+    for compliance in (0.0, 1e-7, 2e-6, 1e-5):
+        found = settled_drill(DRILL, 0.2e-3, *flat, rho, compliance, direction=direction)
+        x = rho / 2 * cos(direction) / (1 + compliance * radial)
+        y = rho / 2 * sin(direction) - compliance * across * x
+        assert found.eccentricity == pytest.approx([x, y], rel=1e-6, abs=1e-12)
+        assert found.force.force == pytest.approx([-radial * x, -across * x], rel=1e-6, abs=1e-9)
+    with pytest.raises(InputError, match="zero or more"):
+        settled_drill(DRILL, 0.2e-3, *flat, rho, -1.0)
+
+
+def test_long_drills_carry_less_force_and_bend_no_further_than_their_pressures_say() -> None:
+    forces = fitted_to_catalogue(DRILL)
+    settled = [
+        settled_drill(DRILL, 0.2e-3, *forces, 20e-6, 1 / bending_stiffness(DRILL, length))
+        for length in (0.01, 0.03, 0.05, 0.1, 0.2)
+    ]
+    sizes = [one.force.size for one in settled]
+    assert np.all(np.diff(sizes) < 0)
+    assert sizes[0] > 80  # nearly the 89 N of a stiff drill
+    assert sizes[2] == pytest.approx(18.6, abs=0.1)
+    assert max(np.hypot(*one.bending) for one in settled) < 40e-6

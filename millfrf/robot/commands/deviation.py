@@ -37,17 +37,34 @@ def deviation(
     stiffness_error: Annotated[
         float, typer.Option("--stiffness-error", metavar="PERCENT", help="Of joint stiffnesses; 10 is assumed.")
     ] = 10.0,
+    runout: Annotated[
+        float | None,
+        typer.Option("--runout", metavar="UM", help="Reading at the drill's tip, at rest: how holes widen."),
+    ] = None,
+    overhang: Annotated[
+        float | None, typer.Option("--overhang", metavar="MM", help="Drill out of its holder, with --runout.")
+    ] = None,
+    spindle_speed: Annotated[
+        float | None, typer.Option("--spindle-speed", metavar="RPM", help="With --runout.")
+    ] = None,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE.csv", help="Deviation of every hole.")] = None,
     picture: Annotated[Path | None, typer.Option("--picture", metavar="FILE.png", help="Map of the deviation.")] = None,
 ) -> None:
     """Deviation of drilled holes over a work area (vertical drill, aluminium), and the position tolerance they need."""
+    from math import pi
+
     from robot_model import LoadUncertainty
 
     from ..asked_loads import loads_of
-    from ..loads import Accuracy, DrillingArea, show_deviation
+    from ..loads import Accuracy, DrillingArea, RunningOut, show_deviation
 
     area = DrillingArea(1e-3 * drill, 1e-3 * feed_rev, x, y, z, links)
     known = LoadUncertainty(1e-2 * force_error, 1e-2 * stiffness_error)
     in_metres = [None if value is None else 1e-3 * value for value in (repeatability, position_tolerance)]
     accuracy = Accuracy(in_metres[0], in_metres[1], known)
-    show_deviation(robot, area, out, picture, accuracy, loads_of(payload, payload_at, weight))
+    turning = RunningOut(
+        None if runout is None else 1e-6 * runout,
+        None if overhang is None else 1e-3 * overhang,
+        None if spindle_speed is None else spindle_speed * pi / 30,
+    )
+    show_deviation(robot, area, out, picture, accuracy, loads_of(payload, payload_at, weight), turning)

@@ -36,6 +36,7 @@ from ...provenance import add_comment, origin
 from ...tables import Table, show
 from ..asked_loads import Loads, check_axis, check_places, check_positive
 from ..postures import spatial
+from .running_out import RunningOut, show_running_out
 
 Real = NDArray[np.float64]
 
@@ -138,13 +139,20 @@ class _Holes:
 
 
 def show_deviation(
-    robot: str, area: DrillingArea, out: Path | None, picture: Path | None, accuracy: Accuracy, loads: Loads
+    robot: str,
+    area: DrillingArea,
+    out: Path | None,
+    picture: Path | None,
+    accuracy: Accuracy,
+    loads: Loads,
+    turning: RunningOut = RunningOut(),  # noqa: B008 (frozen)
 ) -> None:
     """Deviation under thrust and weight, the position tolerance that holes need; CSV and map where asked."""
     for path, suffixes in ((out, (".csv",)), (picture, (".png", ".pdf"))):
         if path is not None:
             check_output(path, suffixes)
     _check(area, accuracy)
+    turning.check()
     case = spatial(read_robot(robot))
     drill = Drill(area.diameter)
     load = drilling_load(drill, area.feed, *fitted_to_catalogue(drill))
@@ -159,6 +167,7 @@ def show_deviation(
     _show_sizes("deviation under thrust", found.deviations)
     if case.robot.bodies:
         _show_sizes("deflection under weight", found.weight)
+    show_running_out(case.robot, area.diameter, area.feed, found, turning)
     needed = np.full(len(places), np.nan)
     radial = np.maximum(*_radial(found.deviations, weight))
     for hole in np.flatnonzero(found.reached):
