@@ -8,8 +8,8 @@ from .drilling_deviation import (
 )
 from .path_compensation import CompensatedPath, ToolPath, compensate_path
 from .path_file import MOMENTS, read_tool_path, write_compensated_path
-from .process_deviation import ProcessDeviation, orbit_radius, process_deviation
 from .redundancy import CutPlace, PostureMap, frequencies_over, posture_map, target_of, tool_down, turned_place
+from .runout_deviation import ProcessDeviation, orbit_radius, process_deviation
 from .uncertainty_budget import (
     LoadUncertainty,
     UncertaintyBudget,
