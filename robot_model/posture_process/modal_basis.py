@@ -30,7 +30,7 @@ class ModalBasis:
     tip : (n_modes, 3), kg^-1/2
         Motion of the tool tip in each mode, in the base frame.
     stiffness : (n_stiffnesses, n_modes, n_modes), (rad/s)^2
-        Part of each elastic joint, and last of the links where they are flexible.
+        Part of each elastic joint, and last of flexible links and motors where there are some.
     mass : (n_masses, n_modes, n_modes)
         Part of each body, and last of the links where they have mass.
     """
@@ -76,7 +76,7 @@ def basis_at(robot: SpatialRobot, driven: Real) -> tuple[ModalBasis, PosturePlac
     squares, shapes = _narrowed(modes)
     stiffness = [_spring(spring, structure, shapes) for spring in structure.springs]
     mass = [_body(shapes[:, body.node], body.mass, body.centre, body.inertia) for body in structure.bodies]
-    if structure.beams:
+    if structure.beams or structure.drives:
         flat = shapes.reshape(len(squares), -1)
         weight = 0.0 if structure.weight is None else flat @ structure.weight @ flat.T
         stiffness.append(np.diag(squares) - sum(stiffness) - weight)
@@ -88,7 +88,9 @@ def basis_at(robot: SpatialRobot, driven: Real) -> tuple[ModalBasis, PosturePlac
 def part_names(robot: SpatialRobot) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names of the stiffnesses and of the masses of :class:`ModalBasis`, in their order."""
     flexible = any(link.section is not None for link in robot.links)
-    last = ("links",) if flexible else ()
+    motors = any(joint.drive is not None for joint in robot.joints)
+    rest = " and ".join(name for name, there in (("links", flexible), ("motors", motors)) if there)
+    last = (rest,) if rest else ()
     frames = [joint.frame for joint in robot.joints]
     springs = tuple(
         f"joint {frame}" + (f" ({frames[:i].count(frame) + 1})" if frame in frames[:i] else "")
@@ -157,7 +159,7 @@ def _place(robot: SpatialRobot, driven: Real, q: Real, structure: Structure) -> 
     mechanism = robot.mechanism
     names = [mechanism.frames[index].name for index in mechanism.moving]
     torques = gravity_torques(robot, q, structure, acceleration(robot))
-    count = len(robot.joints) + bool(structure.beams)
+    count = len(robot.joints) + bool(structure.beams or structure.drives)
     own, load = np.zeros(count), np.zeros(count)
     for part, joint in enumerate(robot.joints):
         if joint.frame in names:

@@ -33,6 +33,7 @@ from robot_model import (
     tip_compliance,
     tool_jacobian,
 )
+from robot_model.posture_process.modal_basis import basis_at, part_names
 
 KUKA = read_spatial_robot("kuka_kr90_r3100")
 
@@ -196,6 +197,20 @@ def test_a_whole_robot_with_drives() -> None:
     assert frf_at(undamped, q, lines).values == pytest.approx(exact, rel=2e-3, abs=1e-10)
     with pytest.raises(InputError, match="motor's inertia"):
         coupled_frf_at(robot, q, lines)
+
+
+@pytest.mark.parametrize("flexible", [True, False])
+def test_parts_of_a_posture_add_up_with_motors(flexible: bool) -> None:
+    """What measured postures are learned about divides modal stiffness and mass among parts: motors may not be lost."""
+    robot = with_drives(150.0, 3.0)
+    if not flexible:
+        robot = replace(robot, links=tuple(replace(link, section=None, elements=1) for link in robot.links))
+    basis, _ = basis_at(robot, KUKA.poses["ready"])
+    names = part_names(robot)
+    assert [len(one) for one in names] == [len(basis.stiffness), len(basis.mass)]
+    assert names[0][-1] == ("links and motors" if flexible else "motors")
+    assert basis.stiffness.sum(axis=0) == pytest.approx(np.diag(basis.squares), abs=1e-9 * basis.squares.max())
+    assert basis.mass.sum(axis=0) == pytest.approx(np.eye(len(basis.squares)), abs=1e-9)
 
 
 def test_drives_come_from_the_file(tmp_path: Path) -> None:
