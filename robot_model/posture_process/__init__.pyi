@@ -1,14 +1,17 @@
 from .learned_file import read_learned_postures, write_learned_postures
 from .learning import LearnedPostures, learn_postures
-from .posture_measurement import MeasuredPosture, measured_posture
+from .modes import MeasuredModes, measured_modes
+from .next_postures import ChosenPosture, choose_postures
 from .predicting import PredictedPosture, predict_posture
 
 __all__ = [
+    "ChosenPosture",
     "LearnedPostures",
-    "MeasuredPosture",
+    "MeasuredModes",
     "PredictedPosture",
+    "choose_postures",
     "learn_postures",
-    "measured_posture",
+    "measured_modes",
     "predict_posture",
     "read_learned_postures",
     "write_learned_postures",

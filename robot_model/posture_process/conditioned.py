@@ -8,7 +8,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from .hyperparameters import Evidence, covariance_of
 from .learning import LearnedPostures
-from .modal_basis import PosturePlace
+from .modes import PosturePlace
 from .posture_kernels import SquaredDistances, joint_kernels, squared_distances
 from .process_covariance import covariance_parts
 from .process_rows import Rows

@@ -1,5 +1,6 @@
 """Amplitudes and length of the process: their priors, their best values, and draws that say how far they are known."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,8 +65,18 @@ def log_posterior(hyper: Real, evidence: Evidence) -> tuple[float, Real]:
     return logarithm, slopes - away / np.log(FACTORS)
 
 
-def best_hyperparameters(evidence: Evidence, start: Real) -> Real:
-    """Logarithms of the hyperparameters at the largest posterior."""
+def best_hyperparameters(evidence: Evidence, start: Real, fixed: Sequence[int] = ()) -> Real:
+    """Logarithms of the hyperparameters at the largest posterior.
+
+    Parameters
+    ----------
+    evidence
+        Measured rows and the distances of their postures.
+    start : (n_hyperparameters,)
+        Logarithms to begin with.
+    fixed
+        Numbers of those that keep their start.
+    """
 
     def negative(hyper: Real) -> tuple[float, Real]:
         value, slope = log_posterior(hyper, evidence)
@@ -74,15 +85,32 @@ def best_hyperparameters(evidence: Evidence, start: Real) -> Real:
     spans = [
         (m - 3.5 * f, m + 3.5 * f) for m, f in zip(np.log(MEDIANS).tolist(), np.log(FACTORS).tolist(), strict=True)
     ]
+    for k in fixed:
+        spans[k] = (float(start[k]), float(start[k]))
     found = minimize(negative, start, jac=True, method="L-BFGS-B", bounds=spans, options={"maxiter": 60})
     return np.asarray(found.x)
 
 
-def drawn_hyperparameters(evidence: Evidence, best: Real, seed: int = 0, count: int = DRAWS) -> Real:
+def drawn_hyperparameters(
+    evidence: Evidence, best: Real, seed: int = 0, count: int = DRAWS, fixed: Sequence[int] = ()
+) -> Real:
     """Draws of the logarithms, (count, n_hyperparameters): few postures do not tell amplitudes to a point.
 
     Draws of a t distribution about the best values, with the curvature there, are weighed by the posterior over their
     density and drawn again (sampling, importance resampling: Rubin 1988).
+
+    Parameters
+    ----------
+    evidence
+        Measured rows and the distances of their postures.
+    best : (n_hyperparameters,)
+        Logarithms at the largest posterior.
+    seed
+        Seed of the generator that draws.
+    count
+        Number of draws.
+    fixed
+        Numbers of those that keep their best value.
     """
     size, rng = len(best), np.random.default_rng(seed)
     step = 0.05
@@ -93,6 +121,7 @@ def drawn_hyperparameters(evidence: Evidence, best: Real, seed: int = 0, count: 
     curvature = -(np.array(slopes) + np.array(slopes).T) / 2
     values, vectors = np.linalg.eigh(curvature)
     spread = vectors / np.sqrt(np.maximum(values, 0.3 / np.log(FACTORS).max() ** 2))
+    spread[list(fixed)] = 0.0
     tried = 6 * count
     wide = np.sqrt(FREEDOM / rng.chisquare(FREEDOM, tried))
     normal = rng.normal(size=(tried, size))

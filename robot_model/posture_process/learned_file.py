@@ -15,8 +15,7 @@ from ..kinematics import typed_values
 from ..spatial import SpatialRobot
 from .hyperparameters import NAMES
 from .learning import LearnedPostures, assembled
-from .modal_basis import ModalBasis, basis_at, part_names
-from .posture_measurement import MeasuredPosture
+from .modes import MeasuredModes, ModalBasis, basis_at, part_names
 
 Real = NDArray[np.float64]
 
@@ -165,8 +164,8 @@ def _posture(learned: LearnedPostures, number: int, joints: tuple[str, ...]) -> 
     }
 
 
-def _measured(one: _Posture) -> MeasuredPosture:
-    return MeasuredPosture(
+def _measured(one: _Posture) -> MeasuredModes:
+    return MeasuredModes(
         one.name,
         np.array(one.driven_rad_m, dtype=float),
         np.array([mode.frequency_hz for mode in one.modes]),

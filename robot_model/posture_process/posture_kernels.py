@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..spatial import SpatialRobot
-from .modal_basis import PosturePlace
+from .modes import PosturePlace
 
 Real = NDArray[np.float64]
 

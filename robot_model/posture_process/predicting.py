@@ -10,9 +10,8 @@ from foundation import TIP
 from modal_fit import ModalModel, Residuals, pack_parameters
 
 from .conditioned import conditioned, distances_to, left_unknown
-from .corrected_modes import CorrectedModes, corrected_modes, modelled_damping
 from .learning import LearnedPostures
-from .modal_basis import ModalBasis, basis_at
+from .modes import CorrectedModes, ModalBasis, basis_at, corrected_modes, modelled_damping
 from .process_rows import joined, mode_rows, unknown_rows
 
 Real = NDArray[np.float64]

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .corrected_modes import CorrectedModes, shape_slopes
-from .modal_basis import ModalBasis
-from .posture_measurement import MeasuredPosture
+from .modes import CorrectedModes, MeasuredModes, ModalBasis, shape_slopes
 
 Real = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -64,9 +62,14 @@ def joined(parts: list[Rows]) -> Rows:
     return Rows(**{one.name: np.concatenate([getattr(part, one.name) for part in parts]) for one in fields(Rows)})
 
 
+def picked(rows: Rows, chosen: NDArray[np.bool_]) -> Rows:
+    """Rows that are chosen, (n,) bool."""
+    return Rows(**{one.name: getattr(rows, one.name)[chosen] for one in fields(Rows)})
+
+
 def measured_rows(
     posture: int,
-    measured: MeasuredPosture,
+    measured: MeasuredModes,
     pairs: tuple[tuple[int, int], ...],
     basis: ModalBasis,
     modes: CorrectedModes,
@@ -85,39 +88,40 @@ def measured_rows(
     directions = measured.directions
     parts = []
     for i, r in pairs:
-        slopes = shape_slopes(basis, modes, *unknown, r)
-        size = max(float(np.linalg.norm(directions @ modes.tip[r])), 1e-12)
-        computed = directions @ modes.tip[r] / size
-        seen = measured.shapes[i] / size * (1.0 if measured.shapes[i] @ computed >= 0 else -1.0)
-        by_stiffness = np.vstack([modes.shares[r] / 2, np.zeros_like(modes.shares[r]), directions @ slopes[0] / size])
-        by_mass = np.vstack([-modes.masses[r] / 2, np.zeros_like(modes.masses[r]), directions @ slopes[1] / size])
-        left = np.concatenate(
-            [
-                [np.log(measured.frequencies[i] * 2 * np.pi / modes.natural[r])],
-                [np.log(measured.damping[i] / ratios[r])],
-                seen - computed,
-            ]
-        )
+        rows = linear_mode_rows(posture, basis, modes, r, directions, unknown)
+        computed = directions @ modes.tip[r]
+        size = max(float(np.linalg.norm(computed)), 1e-12)
+        seen = measured.shapes[i] * (1.0 if measured.shapes[i] @ computed >= 0 else -1.0)
+        left = [
+            np.log(measured.frequencies[i] * 2 * np.pi / modes.natural[r]),
+            np.log(measured.damping[i] / ratios[r]),
+            *((seen - computed) / size),
+        ]
         noise = np.append(measured.errors[i, :2], np.full(len(directions), measured.errors[i, 2]))
-        value = left + by_stiffness @ unknown[0] + by_mass @ unknown[1]
-        rows = mode_rows(posture, modes, r, directions)
-        damping = np.zeros_like(rows.damping)
-        damping[1] = np.append(1.0, modes.shares[r])
-        parts.append(
-            Rows(
-                rows.posture,
-                rows.kind,
-                by_stiffness,
-                by_mass,
-                damping,
-                rows.energy,
-                rows.motion,
-                rows.direction,
-                value,
-                noise,
-            )
-        )
+        value = np.array(left) + rows.stiffness @ unknown[0] + rows.mass @ unknown[1]
+        parts.append(replace(rows, value=value, noise=noise))
     return joined(parts)
+
+
+def linear_mode_rows(
+    posture: int, basis: ModalBasis, modes: CorrectedModes, mode: int, directions: Real, unknown: tuple[Real, Real]
+) -> Rows:
+    """Frequency, damping and shape of one mode over the unknowns, with their discrepancies; nothing measured.
+
+    ``d log w = shares . ds / 2 - mass shares . dm / 2``; a shape's components are shares of its size.
+    """
+    slopes = shape_slopes(basis, modes, *unknown, mode)
+    size = max(float(np.linalg.norm(directions @ modes.tip[mode])), 1e-12)
+    shares, masses = modes.shares[mode], modes.masses[mode]
+    rows = mode_rows(posture, modes, mode, directions)
+    damping = np.zeros_like(rows.damping)
+    damping[1] = np.append(1.0, shares)
+    return replace(
+        rows,
+        stiffness=np.vstack([shares / 2, np.zeros_like(shares), directions @ slopes[0] / size]),
+        mass=np.vstack([-masses / 2, np.zeros_like(masses), directions @ slopes[1] / size]),
+        damping=damping,
+    )
 
 
 def mode_rows(posture: int, modes: CorrectedModes, mode: int, directions: Real) -> Rows:

@@ -5,7 +5,9 @@ from typing import Annotated
 
 import typer
 
-from .options import At, Feed, Joints, Links, Pose, Redundancy, Robot, Speed, Turn
+from foundation import InputError
+
+from .options import At, Feed, Joints, Learned, Links, Pose, Redundancy, Robot, Speed, Turn
 
 
 def lobes(
@@ -34,13 +36,20 @@ def lobes(
     depth: Annotated[
         float | None, typer.Option("--depth", metavar="M", help="Cut to mark in the picture of a posture map, m.")
     ] = None,
+    learned: Learned = None,
 ) -> None:
     """Stability lobes in a posture (--speeds), or the depth limit over a redundancy angle (--angles and --speed)."""
     from ..postures import Asked
     from ..robot_lobes import write_lobes_in_posture, write_map_over_redundancy
 
     asked = Asked(pose, joints, at, feed, turn, redundancy)
-    if angles is not None:
+    if learned is not None:
+        from ..learned import write_learned_lobes
+
+        if angles is not None or links:
+            raise InputError("--learned gives lobes in one posture: leave --angles and --links out")
+        write_learned_lobes(robot, learned, asked, (cutting, speeds, max_depth, method), out, picture)
+    elif angles is not None:
         write_map_over_redundancy(robot, asked, cutting, angles, speed, max_depth, out, (picture, depth))
     else:
         write_lobes_in_posture(robot, asked, cutting, speeds, max_depth, method, out, picture, links)

@@ -14,7 +14,7 @@ from robot_model import (
     LearnedPostures,
     SpatialCase,
     learn_postures,
-    measured_posture,
+    measured_modes,
     read_robot,
     shown_values,
     tool_down,
@@ -27,16 +27,31 @@ from ...provenance import add_to_json, origin
 from ...tables import Table, show
 from ..asked_loads import check_degrees
 from ..postures import Asked, posture_of, spatial
+from .posture_choice import WorkArea, show_next_postures
 
 Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class LearningFrom:
-    """Options of learning as they were typed: a posture for each model, and the direction of their X axes."""
+    """Options of learning as they were typed.
+
+    Parameters
+    ----------
+    poses
+        A posture for each model.
+    feed
+        Direction of the models' X axes from the base's x, degrees; None: the base's.
+    next_postures
+        Number of postures to choose for the next measurements, or None.
+    area
+        Area over which predictions matter; None: the range of the measured joints.
+    """
 
     poses: tuple[str, ...]
     feed: float | None = None
+    next_postures: int | None = None
+    area: WorkArea | None = None
 
 
 def learn_from_files(robot: str, models: Sequence[Path], asking: LearningFrom, out: Path) -> LearnedPostures:
@@ -55,7 +70,7 @@ def learn_from_files(robot: str, models: Sequence[Path], asking: LearningFrom, o
             f"{len(asking.poses)} postures for {len(models)} modal models; give --pose once for each, in the same order"
         )
     measured = [
-        measured_posture(path.stem, driven_of(case, pose), read_modal_model(path), axes)
+        measured_modes(path.stem, driven_of(case, pose), read_modal_model(path), axes)
         for path, pose in zip(models, asking.poses, strict=True)
     ]
     with bar("learning"):
@@ -67,6 +82,8 @@ def learn_from_files(robot: str, models: Sequence[Path], asking: LearningFrom, o
     for name, frequency in learned.unpaired:
         typer.echo(f"warning: {name}: the mode at {frequency:.2f} Hz is near none of the model's; left out", err=True)
     typer.echo(f"wrote {out}: {len(measured)} postures, {sum(len(one) for one in learned.pairs)} modes")
+    if asking.next_postures is not None:
+        show_next_postures(case, learned, asking.next_postures, asking.area)
     return learned
 
 

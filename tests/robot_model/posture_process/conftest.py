@@ -19,3 +19,5 @@ def _loaded(path: Path) -> None:
 _loaded(HERE.parents[1] / "mismatch/adapters/robot/independent_robot.py")
 _loaded(HERE / "nonlinear_cell.py")
 _loaded(HERE / "measured_cell.py")
+_loaded(HERE / "plain_process.py")
+_loaded(HERE / "trial.py")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from foundation import TIP
 from modal_fit import ModalModel, ModeErrors
-from robot_model import LumpedBody, MeasuredPosture, SpatialRobot, measured_posture, read_spatial_robot
+from robot_model import LumpedBody, MeasuredModes, SpatialRobot, measured_modes, read_spatial_robot
 
 Real = NDArray[np.float64]
 
@@ -33,10 +33,10 @@ class MeasuredCell:
     postures: Real
 
     @property
-    def measured(self) -> tuple[MeasuredPosture, ...]:
+    def measured(self) -> tuple[MeasuredModes, ...]:
         """Its measurements as the process takes them."""
         pairs = zip(self.postures, self.models, strict=True)
-        return tuple(measured_posture(f"posture {i}", q, model) for i, (q, model) in enumerate(pairs, 1))
+        return tuple(measured_modes(f"posture {i}", q, model) for i, (q, model) in enumerate(pairs, 1))
 
 
 def believed(lumps: tuple[Lump, ...], springs: tuple[float, ...]) -> SpatialRobot:

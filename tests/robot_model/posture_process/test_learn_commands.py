@@ -5,13 +5,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cutting import read_cutting_process
 from estimation import read_frf
 from millfrf.__main__ import BAD_INPUT, DONE, run
 from modal_fit import read_modal_model, write_modal_model
 from robot_model import modal_model_at, read_spatial_robot, with_joint_factor
+from stability import certified_lobes, read_lobes
 
 ROBOT = "kuka_kr90_r3100"
 POSTURES = ("0,-10,100,0,90,0", "20,25,70,40,60,0", "-15,45,30,80,-50,0", "10,5,85,20,75,30")
+
+
+CUT = (
+    "[cutting]\nteeth = 2\ndiameter_m = 0.02\nedge_angle_deg = 90.0\nktc_pa = 700e6\nkrc = 0.3\nkac = 0.1\n"
+    "start_angle_deg = 90.0\nexit_angle_deg = 180.0\nfeed_per_tooth_m = 1e-4\n"
+)
 
 
 @pytest.fixture(scope="module")
@@ -44,10 +52,7 @@ def test_a_predicted_model_is_nearer_to_the_softer_robot_and_lobes_read_it(folde
     assert left < 0.3 * np.abs(modelled / truth - 1).max()
     assert found.covariance is not None
     cut = folder / "cut.toml"
-    cut.write_text(
-        "[cutting]\nteeth = 2\ndiameter_m = 0.02\nedge_angle_deg = 90.0\nktc_pa = 700e6\nkrc = 0.3\nkac = 0.1\n"
-        "start_angle_deg = 90.0\nexit_angle_deg = 180.0\nfeed_per_tooth_m = 1e-4\n"
-    )
+    cut.write_text(CUT)
     asked = ["--cutting", str(cut), "--speeds", "2900", "3100", "3", "--max-depth", "0.01"]
     assert run(["lobes", str(folder / "model.json"), *asked, "--out", str(folder / "lobes.csv")]) == DONE
 
@@ -60,6 +65,33 @@ def test_the_band_holds_the_frf_of_the_same_prediction(folder: Path) -> None:
     assert np.abs(read_frf(folder / "frf.h5").values).ravel() == pytest.approx(middle, rel=1e-4)
     diagonal = np.array([row[1] == row[2] for row in rows[1:]])
     assert np.mean((low <= middle) & (middle <= high), where=diagonal) > 0.95
+
+
+def test_lobes_have_a_band_beside_them_and_a_picture(folder: Path) -> None:
+    cut = folder / "cut_of_band.toml"
+    cut.write_text(CUT)
+    learned = ["--learned", str(folder / "postures.json"), "--joints", "5,10,80,10,80,0", "--cutting", str(cut)]
+    asked = ["--speeds", "2900", "3100", "2", "--max-depth", "0.02", "--picture", str(folder / "band.png")]
+    assert run(["robot", "lobes", ROBOT, *learned, *asked, "--out", str(folder / "limits.csv")]) == DONE
+    lobes = read_lobes(folder / "limits.csv")
+    rows = [line.split(",") for line in (folder / "limits_band.csv").read_text().splitlines() if line[0] != "#"]
+    speed, low, middle, high = np.array(rows[1:], dtype=float).T
+    assert speed == pytest.approx(lobes.spindle_speeds_rpm)
+    assert np.all((low < middle) & (middle < high))
+    assert np.all((low < lobes.depth_limits) & (lobes.depth_limits < high))
+    q = np.radians([5, 10, 80, 10, 80, 0])
+    truth = modal_model_at(with_joint_factor(read_spatial_robot(ROBOT).robot, "2", 0.85), q, highest_frequency=300.0)
+    limits = certified_lobes(truth, read_cutting_process(cut), lobes.spindle_speeds, 0.02).depth_limits
+    assert np.all((low < limits) & (limits < high))
+    assert (folder / "band.png").stat().st_size > 10_000
+
+
+def test_the_next_postures_are_told(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    models = [str(folder / f"hall_{i}.json") for i in range(1, 5)]
+    poses = [word for posture in POSTURES for word in ("--pose", posture)]
+    asked = ["--next", "2", "--x", "1.3", "1.9", "4", "--y", "-0.5", "0.5", "4", "--z", "0.6"]
+    assert run(["robot", "learn", ROBOT, *models, *poses, *asked, "--out", str(folder / "again.json")]) == DONE
+    assert "Measure next" in capsys.readouterr().out
 
 
 def test_mistakes_end_in_one_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

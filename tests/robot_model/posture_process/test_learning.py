@@ -10,6 +10,7 @@ from nonlinear_cell import drawn_postures
 from foundation import FileFormatError, InputError
 from robot_model import (
     LearnedPostures,
+    choose_postures,
     learn_postures,
     modes_at,
     predict_posture,
@@ -17,7 +18,7 @@ from robot_model import (
     with_joint_factor,
     write_learned_postures,
 )
-from robot_model.posture_process.mode_pairs import mode_pairs
+from robot_model.posture_process.modes import mode_pairs
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +76,19 @@ def test_far_from_all_postures_the_band_is_wide_and_the_answer_says_so(
     widths = [np.log(one.frequency_band()[1] / one.frequency_band()[0])[:6].mean() for one in (here, away)]
     assert widths[1] > 1.3 * widths[0]
     assert not here.warnings
+
+
+def test_the_next_posture_lies_where_predictions_matter(cell: MeasuredCell, learned: LearnedPostures) -> None:
+    targets = np.radians([[50.0, 40, 50, 80, 40, 0], [45, 35, 55, 85, 45, 10]])
+    offered = np.vstack([drawn_postures(np.random.default_rng(5), 4), targets.mean(axis=0)])
+    first, second = choose_postures(learned, offered, targets, 2)
+    assert first.driven == pytest.approx(targets.mean(axis=0))
+    assert first.after < 0.9 * first.before
+    # what is expected after the first is what is there before the second
+    assert second.before == pytest.approx(first.after, rel=1e-6)
+    assert second.after <= second.before
+    with pytest.raises(InputError, match="candidates"):
+        choose_postures(learned, offered, targets, 9)
 
 
 def test_one_posture_is_refused(cell: MeasuredCell) -> None:

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from measured_cell import MeasuredCell, measured_cell
 
-from robot_model import measured_posture, modal_model_at, modes_at, read_spatial_robot, with_joint_factor
-from robot_model.posture_process.corrected_modes import corrected_modes, shape_slopes
+from robot_model import measured_modes, modal_model_at, modes_at, read_spatial_robot, with_joint_factor
 from robot_model.posture_process.hyperparameters import MEDIANS, Evidence, log_posterior
 from robot_model.posture_process.learning import assembled
-from robot_model.posture_process.modal_basis import basis_at, part_names
-from robot_model.posture_process.mode_pairs import mode_pairs
+from robot_model.posture_process.modes import basis_at, corrected_modes, mode_pairs, part_names, shape_slopes
 from robot_model.posture_process.posture_kernels import joint_kernels, whole_kernel
 
 KUKA = read_spatial_robot("kuka_kr90_r3100").robot
@@ -72,13 +70,13 @@ def test_shapes_and_their_frame_come_back_from_a_modal_model() -> None:
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     modes = modes_at(KUKA, Q)
     model = modal_model_at(KUKA, Q, axes=turn, highest_frequency=60.0)
-    found = measured_posture("one", Q, model, turn)
+    found = measured_modes("one", Q, model, turn)
     tip = modes.shapes[: len(model.poles), modes.structure.tip, :3]
     for r, shape in enumerate(found.shapes):
         in_base = shape @ found.directions
         assert np.abs(in_base) == pytest.approx(np.abs(tip[r]), rel=1e-9, abs=1e-12)
     only = replace(model, right=model.right[:, [0, 2]], responses=("TCP:+X", "TCP:+Z"))
-    part = measured_posture("two", Q, replace(only, left=model.left[:, :1], excitations=("TCP:+X",)), turn)
+    part = measured_modes("two", Q, replace(only, left=model.left[:, :1], excitations=("TCP:+X",)), turn)
     assert np.abs(part.shapes) == pytest.approx(np.abs(found.shapes[:, [0, 2]]), rel=1e-9, abs=1e-12)
 
 

@@ -1,4 +1,4 @@
-"""`MeasuredPosture`: what a modal model that was measured in one posture says of frequency, damping and tip motion."""
+"""`MeasuredModes`: what a modal model that was measured in one posture says of frequency, damping and tip motion."""
 
 from dataclasses import dataclass
 
@@ -19,7 +19,7 @@ UNKNOWN = (3e-3, 0.1, 0.1)
 
 
 @dataclass(frozen=True)
-class MeasuredPosture:
+class MeasuredModes:
     """Modes measured in one posture.
 
     Parameters
@@ -49,7 +49,7 @@ class MeasuredPosture:
     directions: Real
 
 
-def measured_posture(name: str, driven: Real, model: ModalModel, axes: Real | None = None) -> MeasuredPosture:
+def measured_modes(name: str, driven: Real, model: ModalModel, axes: Real | None = None) -> MeasuredModes:
     """Take frequencies, damping and mass-normalised tip motion out of a measured modal model.
 
     ``R = 2 i w_d A`` of a mode with residue A is ``phi phi^T`` where damping is light; ``phi`` is the largest
@@ -83,7 +83,7 @@ def measured_posture(name: str, driven: Real, model: ModalModel, axes: Real | No
         raise InputError(f"{name}: the model has no modes, or one that does not decay; fit it again")
     axes = np.eye(3) if axes is None else np.asarray(axes, dtype=float)
     places = _Places(rows, {axis: columns[axis] for axis in shared})
-    return MeasuredPosture(
+    return MeasuredModes(
         name,
         np.asarray(driven, dtype=float),
         model.natural_frequencies,

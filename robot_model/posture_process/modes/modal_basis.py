@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..finite_elements import Spring, Structure, gravity_torques, rigid_motion
-from ..kinematics import close_loops
-from ..spatial import SpatialRobot, StructureModes, acceleration, modes_at
+from ...finite_elements import Spring, Structure, gravity_torques, rigid_motion
+from ...kinematics import close_loops
+from ...spatial import SpatialRobot, StructureModes, acceleration, modes_at
 
 Real = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from ..spatial import SpatialRobot
+from ...spatial import SpatialRobot
 from .modal_basis import ModalBasis
 
 Real = NDArray[np.float64]
