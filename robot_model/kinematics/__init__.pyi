@@ -1,4 +1,9 @@
-from .damped_least_squares import inverse_kinematics
+from .branches import (
+    tool_postures,
+)
+from .damped_least_squares import (
+    inverse_kinematics,
+)
 from .joint_values import (
     LARGEST_TRAVEL,
     driven_values,
@@ -8,10 +13,27 @@ from .joint_values import (
     typed_values,
     unit_doubts,
 )
-from .loop_closure import close_loops, posture_warnings, tool_jacobian
-from .mechanism import Frame, Mechanism, drive_direction, rotation_vector
-from .reaching import all_postures, nearest_approach, reach
-from .spherical_wrist import has_spherical_wrist, nearest_solution, wrist_solutions
+from .loop_closure import (
+    close_loops,
+    posture_warnings,
+    tool_jacobian,
+)
+from .mechanism import (
+    Frame,
+    Mechanism,
+    drive_direction,
+    rotation_vector,
+)
+from .reaching import (
+    all_postures,
+    nearest_approach,
+    reach,
+)
+from .spherical_wrist import (
+    has_spherical_wrist,
+    nearest_solution,
+    wrist_solutions,
+)
 
 __all__ = [
     "LARGEST_TRAVEL",
@@ -32,6 +54,7 @@ __all__ = [
     "rotation_vector",
     "shown_values",
     "tool_jacobian",
+    "tool_postures",
     "typed_values",
     "unit_doubts",
     "wrist_solutions",

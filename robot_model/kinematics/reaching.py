@@ -95,6 +95,12 @@ def all_postures(mechanism: Mechanism, target: Real, start: Real, *, starts: int
     return np.array(found).reshape(-1, len(mechanism.moving))
 
 
+def reach_from(mechanism: Mechanism, target: Real, first: Real) -> Real | None:
+    """The posture (n_moving,) that one start leads to, or None where it does not reach the target (4, 4)."""
+    q, error = _descend(mechanism, target, first)
+    return q if error <= REACHED else None
+
+
 def nearest_approach(mechanism: Mechanism, target: Real, start: Real, *, starts: int = _STARTS) -> Nearest:
     """The posture with the smallest error that the starts lead to."""
     tried = [_descend(mechanism, target, first) for first in _starts(mechanism, start, starts)]

@@ -10,6 +10,9 @@ from .mechanism import Frame, Mechanism
 Real = NDArray[np.float64]
 
 _QUARTER = np.pi / 2
+_NOTHING = 1e-12
+"""Lengths (m) and angles (rad) below which axes meet or are parallel: rounding of a file's numbers."""
+
 _SINGULAR = 1e-9
 """|sin theta_5| below which axes 4 and 6 count as one line."""
 
@@ -38,8 +41,8 @@ def wrist_solutions(mechanism: Mechanism, target: Real) -> Real:
     InputError
         Another kind of robot.
     """
-    frames, tool = _six_frames(mechanism)
-    flange = target @ np.linalg.inv(tool)
+    base, frames, tool = _six_frames(mechanism)
+    flange = np.linalg.inv(base) @ target @ np.linalg.inv(tool)
     centre = flange[:3, 3] - flange[:3, :3] @ np.array([0.0, 0.0, frames[5].r])
     found = []
     for theta1 in _first(frames, centre):
@@ -61,16 +64,20 @@ def nearest_solution(mechanism: Mechanism, target: Real, near: Real) -> Real | N
     return np.asarray(solutions[np.argmin(np.abs(solutions - near).max(axis=1))])
 
 
-def _six_frames(mechanism: Mechanism) -> tuple[tuple[Frame, ...], Real]:
+def _six_frames(mechanism: Mechanism) -> tuple[Real, tuple[Frame, ...], Real]:
+    """What is fixed before the first joint, the six joints, and what is fixed after the last."""
     if not has_spherical_wrist(mechanism):
         raise InputError(
             "this robot has no spherical wrist on a shoulder and elbow (six revolute joints), which maps over places "
             "need; ask for single postures: inverse_kinematics in Python, --joints or --at on the command line"
         )
-    tool = np.eye(4)
-    for frame in mechanism.frames[6:]:
+    first = mechanism.moving[0]
+    base, tool = np.eye(4), np.eye(4)
+    for frame in mechanism.frames[:first]:
+        base = base @ frame.transform(0.0)
+    for frame in mechanism.frames[first + 6 :]:
         tool = tool @ frame.transform(0.0)
-    return mechanism.frames[:6], tool
+    return base, mechanism.frames[first : first + 6], tool
 
 
 def has_spherical_wrist(mechanism: Mechanism) -> bool:
@@ -82,11 +89,11 @@ def has_spherical_wrist(mechanism: Mechanism) -> bool:
     return bool(
         chain
         and len(moving) == 6
-        and tuple(moving) == mechanism.frames[:6]
+        and tuple(moving) == mechanism.frames[mechanism.moving[0] : mechanism.moving[0] + 6]
         and all(frame.motion == "revolute" and frame.gamma == 0 for frame in moving)
         and all(abs(abs(alpha) - _QUARTER) < 1e-12 for alpha in quarters)
-        and moving[0].alpha == moving[2].alpha == moving[0].d == 0
-        and moving[4].d == moving[5].d == moving[4].r == 0
+        and all(abs(moving[i].alpha) < _NOTHING for i in (0, 2))
+        and all(abs(length) < _NOTHING for length in (moving[0].d, moving[4].d, moving[5].d, moving[4].r))
         and all(frame.b == 0 for frame in moving[1:])
     )
 

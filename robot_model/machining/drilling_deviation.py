@@ -9,7 +9,7 @@ from cutting import DrillingLoad
 from foundation import InputError
 
 from ..finite_elements import gravity_torques, tip_compliance
-from ..kinematics import tool_jacobian, wrist_solutions
+from ..kinematics import tool_jacobian, tool_postures
 from ..spatial import (
     Payload,
     SpatialRobot,
@@ -117,7 +117,7 @@ def deviation_map(
     Parameters
     ----------
     robot
-        Robot with a spherical wrist.
+        Robot, an open chain.
     places
         Tool axis and position of each hole.
     load, position_gain
@@ -135,11 +135,12 @@ def deviation_map(
     if links and position_gain is not None:
         raise InputError("deviation map: give either links or a position gain")
     n = len(places)
-    deviations, sags, postures = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full((n, 6), np.nan)
+    deviations, sags = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
+    postures = np.full((n, len(robot.mechanism.moving)), np.nan)
     reached, switches = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool)
     last: Real | None = None
     for i, place in enumerate(places):
-        solutions = wrist_solutions(robot.mechanism, target_of(place))
+        solutions = tool_postures(robot.mechanism, target_of(place), last)
         if not len(solutions):
             continue
         q = solutions[0] if last is None else solutions[np.argmin(np.abs(solutions - last).max(axis=1))]

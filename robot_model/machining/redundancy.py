@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from foundation import InputError
 from modal_fit import ModalModel
 
-from ..kinematics import wrist_solutions
+from ..kinematics import tool_postures
 from ..spatial import SpatialRobot, model_of_modes, modes_at
 
 Real = NDArray[np.float64]
@@ -47,7 +47,7 @@ class PostureMap:
         Redundancy angles that were tried.
     values : (n_angles,)
         Values of the criterion; NaN exactly where ``reached`` is False.
-    q : (n_angles, 6), rad
+    q : (n_angles, n_moving), rad or m
         Joint values behind each value; NaN where the place is not reached.
     frequencies : (n_angles,), Hz
         Lowest natural frequency at each angle.
@@ -92,7 +92,7 @@ def posture_map(
     Parameters
     ----------
     robot
-        Robot with a spherical wrist.
+        Robot, an open chain.
     place
         Position and attitude of the tool, and axes of the cut.
     angles : (n_angles,), rad
@@ -112,11 +112,11 @@ def posture_map(
     if redundancy not in REDUNDANCIES or branches not in ("best", "near"):
         raise InputError(f"redundancy {redundancy!r}, branches {branches!r}: use tool or table, best or near")
     n = len(angles)
-    values, q, lowest = np.full(n, np.nan), np.full((n, 6), np.nan), np.full(n, np.nan)
+    values, q, lowest = np.full(n, np.nan), np.full((n, len(robot.mechanism.moving)), np.nan), np.full(n, np.nan)
     last: Real | None = None
     for i, angle in enumerate(angles):
         turned = turned_place(place, float(angle), redundancy)
-        solutions = wrist_solutions(robot.mechanism, target_of(turned))
+        solutions = tool_postures(robot.mechanism, target_of(turned), last)
         if branches == "near" and len(solutions):
             if last is not None:
                 solutions = solutions[[np.argmin(np.abs(solutions - last).max(axis=1))]]
@@ -164,7 +164,7 @@ def frequencies_over(
     table, reached = np.full((len(places), n_modes), np.nan), np.zeros(len(places), dtype=bool)
     last: Real | None = None
     for i, place in enumerate(places):
-        solutions = wrist_solutions(robot.mechanism, target_of(place))
+        solutions = tool_postures(robot.mechanism, target_of(place), last)
         if not len(solutions):
             continue
         last = solutions[0] if last is None else solutions[np.argmin(np.abs(solutions - last).max(axis=1))]

@@ -11,6 +11,9 @@ from .serial_chain import SerialJoint
 
 Real = NDArray[np.float64]
 
+BASE_FRAME = "base (fixed)"
+"""Name of the frame on which the first joint turns."""
+
 _PARALLEL = 1e-12
 """|sin alpha| below which two axes are parallel."""
 
@@ -56,6 +59,9 @@ def axis_frames(joints: Sequence[SerialJoint], base: Real) -> AxisFrames:
     for joint in joints:
         upright = turn_onto(joint.axis)
         target = np.asarray(inside @ joint.place @ upright)
+        if not frames:  # what lies before the first joint stands apart from it, wherever the robot is bolted
+            frames += fixed_frames(BASE_FRAME, "0", target)
+            before, target = BASE_FRAME, np.eye(4)
         placement, frame = _placed(joint.name, before, target)
         if movable and not placement:
             slide = _about_own_axis(frame.gamma, frame.b)

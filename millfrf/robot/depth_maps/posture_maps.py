@@ -19,7 +19,7 @@ from robot_model import (
     modes_at,
     posture_map,
     target_of,
-    wrist_solutions,
+    tool_postures,
 )
 
 from .depth_map import depth_limits
@@ -79,9 +79,11 @@ def _places(
     places: Sequence[CutPlace],
 ) -> tuple[Real, Real]:
     limits, lowest, models, at = np.full(len(places), np.nan), np.full(len(places), np.nan), [], []
+    last: Real | None = None
     for i, place in enumerate(places):
-        solutions = wrist_solutions(robot.mechanism, target_of(place))
+        solutions = tool_postures(robot.mechanism, target_of(place), last)
         if len(solutions):
+            last = solutions[0]
             modes = modes_at(robot, solutions[0])
             lowest[i] = modes.frequencies[0]
             models.append(model_of_modes(modes, robot, axes=place.axes))
