@@ -3,12 +3,14 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import typer
 from numpy.typing import NDArray
 
 from estimation import write_frf
+from figures import save_figure
 from foundation import InputError, writing_whole_file
 from modal_fit import write_modal_model
 from robot_model import (
@@ -69,8 +71,10 @@ def write_receptance(
     lines: int,
     sensor: tuple[float, float, float] | None = None,
     links: bool = False,
+    drawn: tuple[Path | None, Path | None] = (None, None),
 ) -> None:
-    """FRF or modal model at the tool tip; with a sensor, a modal model with the housing's motion."""
+    """FRF or modal model at the tool tip; with a sensor, the housing's motion too; ``drawn``: a picture, a table."""
+    check_drawn(drawn, out)
     check_output(out, (".json",) if sensor is not None else (".h5", ".json"))
     check_band(band)
     check_positive("band", band[1], "Hz", 1e6)
@@ -96,8 +100,38 @@ def write_receptance(
             add_to_json(temporary, provenance)
     else:
         write_frf(out, model.frf(np.linspace(*band, lines)), provenance=json.dumps(provenance))
+    _draw_receptance(result, np.linspace(*band, lines), drawn, origin("robot frf", [robot]))
     warn(result)
     typer.echo(f"wrote {out}: {len(model.poles)} modes from {model.natural_frequencies.min():.2f} Hz")
+
+
+def check_drawn(drawn: tuple[Path | None, Path | None], out: Path | None = None) -> None:
+    """Refuse names of a picture or a table that cannot be written, or that are the output itself.
+
+    Raises
+    ------
+    InputError
+        Another suffix, or one name twice.
+    """
+    for path, suffixes in zip(drawn, ((".png", ".pdf", ".svg"), (".csv",)), strict=True):
+        if path is not None:
+            check_output(path, suffixes, [] if out is None else [out])
+
+
+def _draw_receptance(
+    result: PostureResult, frequencies: Real, drawn: tuple[Path | None, Path | None], stated: dict[str, Any]
+) -> None:
+    """Picture and table of the receptance at the tip, where they were asked for."""
+    from .shown import receptance_figure, write_receptance_table
+
+    picture, table = drawn
+    frf = result.known_model().frf(frequencies)
+    if picture is not None:
+        save_figure(receptance_figure(frf, result.frequencies), picture)
+        typer.echo(f"wrote {picture}")
+    if table is not None:
+        write_receptance_table(table, frf, result.warnings, stated)
+        typer.echo(f"wrote {table}")
 
 
 def write_workspace_map(
@@ -123,6 +157,7 @@ def write_workspace_map(
     if speed is not None:
         check_positive("speed", speed, "rpm", 1e6)
     case = spatial(read_robot(robot))
+    say_doubts(case.assumed)
     places = [tool_down([u, v, z], np.radians(feed)) for u in np.linspace(*x) for v in np.linspace(*y)]
     process, doubts = (None, []) if cutting is None else read_checked_cutting(cutting)
     say_doubts([*doubts, *check_depth(max_depth, process), *([] if speed is None else check_speed(speed, process))])
@@ -141,6 +176,7 @@ def write_compensation(robot: str, path: Path, asked: Asked, out: Path, loads: L
     """Corrected path, and what it is worth."""
     check_output(out, (".csv",), [path])
     case = spatial(read_robot(robot))
+    say_doubts(case.assumed)
     start = posture_of(case, asked)[0]
     close_loops(case.robot.mechanism, start)
     with bar("compensating"):

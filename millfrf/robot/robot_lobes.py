@@ -9,7 +9,7 @@ import typer
 from figures import lobes_figure, save_figure
 from foundation import TIP, InputError, writing_whole_file
 from modal_fit import ModalModel, Residuals
-from robot_model import in_posture, read_robot
+from robot_model import SpatialCase, in_posture, read_robot
 from stability import with_residual_flexibility, write_lobes
 
 from ..chain import compute_lobes, lobes_summary, speed_axis
@@ -73,6 +73,12 @@ def write_lobes_in_posture(
         typer.echo(f"wrote {picture}")
 
 
+def _sliding(case: SpatialCase) -> list[bool]:
+    """Which moving joints are prismatic."""
+    mechanism = case.robot.mechanism
+    return [mechanism.frames[index].motion == "prismatic" for index in mechanism.moving]
+
+
 def write_map_over_redundancy(
     robot: str,
     asked: Asked,
@@ -96,6 +102,7 @@ def write_map_over_redundancy(
         raise InputError(f"{angles[2]} angles up to a depth of {max_depth!r} m: both must be positive")
     case = spatial(read_robot(robot))
     process, doubts = read_checked_cutting(cutting)
+    doubts = [*case.assumed, *doubts]
     doubts += [*check_depth(max_depth, process), *check_speed(speed, process)]
     say_doubts(doubts)
     axis = np.radians(np.linspace(*angles))
@@ -105,7 +112,7 @@ def write_map_over_redundancy(
         )
     best = found.best()
     with writing_whole_file(out) as unfinished:
-        write_posture_map(unfinished, found, doubts)
+        write_posture_map(unfinished, found, doubts, _sliding(case))
         add_comment(unfinished, origin("robot lobes", [robot, cutting], {"speed_rpm": speed, "depth_max_m": max_depth}))
     typer.echo(
         f"wrote {out}: {found.reached.sum()} of {len(axis)} angles reached; best {1e3 * found.values[best]:.3g} mm at "

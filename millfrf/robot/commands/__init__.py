@@ -15,6 +15,7 @@ from .lobes import lobes
 from .map_command import map_command
 from .modes import modes
 from .path_command import path_command
+from .show import show
 from .stiffness import stiffness
 from .update import update
 
@@ -22,6 +23,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "diagnose": diagnose,
     "update": update,
     "list": list_robots,
+    "show": show,
     "modes": modes,
     "frf": frf,
     "stiffness": stiffness,

@@ -7,7 +7,7 @@ import typer
 
 from foundation import InputError
 
-from .options import At, Feed, Joints, Learned, Links, Pose, Redundancy, Robot, Turn
+from .options import At, Feed, Joints, Learned, Links, Numbers, Picture, Pose, Redundancy, Robot, Turn
 
 
 def frf(
@@ -29,6 +29,8 @@ def frf(
         typer.Option("--sensor", metavar="X Y Z", help="Housing sensor, m from the tip: its motion too (.json)."),
     ] = None,
     learned: Learned = None,
+    picture: Picture = None,
+    table: Numbers = None,
 ) -> None:
     """Receptance at the tool tip in a posture, as an FRF file or as the modal model behind it."""
     from ..postures import Asked
@@ -37,12 +39,13 @@ def frf(
     if learned is not None:
         from ..learned import write_learned_receptance
 
-        if sensor is not None or links:
+        if sensor is not None or links or picture is not None or table is not None:
             raise InputError(
-                "--sensor and --links have no place beside --learned, which knows the tip of robots in space"
+                "--sensor, --links, --picture and --table have no place beside --learned, which knows the tip of "
+                "robots in space"
             )
         write_learned_receptance(robot, learned, asked, out, band, lines)
         return
     from ..results import write_receptance
 
-    write_receptance(robot, asked, out, band, lines, sensor, links)
+    write_receptance(robot, asked, out, band, lines, sensor, links, (picture, table))

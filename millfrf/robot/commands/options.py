@@ -33,6 +33,8 @@ Weight = Annotated[
         "--weight", help="Deflection under weight: all; change: from the first place on (touched off there); none."
     ),
 ]
+Picture = Annotated[Path | None, typer.Option("--picture", metavar="FILE", help="Picture: .png, .pdf or .svg.")]
+Numbers = Annotated[Path | None, typer.Option("--table", metavar="FILE.csv", help="The same numbers as a table.")]
 Speed = Annotated[float | None, typer.Option("--speed", metavar="RPM", help="Spindle speed of a posture map.")]
 Learned = Annotated[
     Path | None,

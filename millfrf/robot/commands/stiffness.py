@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from .options import At, Feed, Joints, Links, PayloadAt, PayloadMass, Pose, Redundancy, Robot, Turn
+from .options import At, Feed, Joints, Links, Numbers, PayloadAt, PayloadMass, Picture, Pose, Redundancy, Robot, Turn
 
 
 def stiffness(
@@ -23,6 +23,8 @@ def stiffness(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE.json", help="The same as numbers, with the warnings.")
     ] = None,
+    picture: Picture = None,
+    table: Numbers = None,
 ) -> None:
     """Compliance at the tool tip, softest and stiffest directions, deflection under a force, weight and payload."""
     from ..asked_loads import loads_of
@@ -30,4 +32,4 @@ def stiffness(
     from ..postures import Asked
 
     asked = Asked(pose, joints, at, feed, turn, redundancy)
-    show_stiffness(robot, asked, force, loads_of(payload, payload_at), links, out)
+    show_stiffness(robot, asked, force, loads_of(payload, payload_at), links, out, (picture, table))

@@ -93,15 +93,20 @@ def _places(
     return limits, lowest
 
 
-def write_posture_map(path: str | os.PathLike[str], found: PostureMap, warnings: Sequence[str] = ()) -> None:
-    """CSV: ``angle_deg, depth_limit_m, lowest_frequency_hz, q1_deg ... q6_deg``; empty cells where not reached.
+def write_posture_map(
+    path: str | os.PathLike[str], found: PostureMap, warnings: Sequence[str] = (), sliding: Sequence[bool] = ()
+) -> None:
+    """CSV: ``angle_deg, depth_limit_m, lowest_frequency_hz, q1_deg`` and so on; empty cells where not reached.
 
-    Warnings stand above the headings, one ``# warning: ...`` a line.
+    Warnings stand above the headings, one ``# warning: ...`` a line. ``sliding`` says which joints are prismatic: their
+    columns are in metres, ``q1_m``.
     """
     with writing_whole_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
         stream.writelines(warning_lines(warnings))
         writer = csv.writer(stream)
-        writer.writerow(["angle_deg", "depth_limit_m", "lowest_frequency_hz", *(f"q{i + 1}_deg" for i in range(6))])
+        slides = [place < len(sliding) and sliding[place] for place in range(found.q.shape[1])]
+        joints = [f"q{place + 1}_{'m' if slide else 'deg'}" for place, slide in enumerate(slides)]
+        writer.writerow(["angle_deg", "depth_limit_m", "lowest_frequency_hz", *joints])
         for angle, value, frequency, q in zip(found.angles, found.values, found.frequencies, found.q, strict=True):
-            cells = [value, frequency, *np.degrees(q)]
+            cells = [value, frequency, *np.where(slides, q, np.degrees(q))]
             writer.writerow([f"{np.degrees(angle):.6g}", *("" if np.isnan(cell) else f"{cell:.9g}" for cell in cells)])

@@ -36,6 +36,7 @@ from ...provenance import add_comment, origin
 from ...tables import Table, show
 from ..asked_loads import Loads, check_axis, check_places, check_positive
 from ..postures import spatial
+from ..results import say_doubts
 from .running_out import RunningOut, show_running_out
 
 Real = NDArray[np.float64]
@@ -154,6 +155,7 @@ def show_deviation(
     _check(area, accuracy)
     turning.check()
     case = spatial(read_robot(robot))
+    say_doubts(case.assumed)
     drill = Drill(area.diameter)
     load = drilling_load(drill, area.feed, *fitted_to_catalogue(drill))
     places = [tool_down([x, y, area.z]) for x in np.linspace(*area.x) for y in np.linspace(*area.y)]

@@ -2,11 +2,13 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import typer
 from numpy.typing import NDArray
 
+from figures import save_figure
 from foundation import writing_whole_file
 from robot_model import PlanarCase, PostureResult, SpatialCase, in_posture, read_robot, shown_values
 
@@ -15,16 +17,24 @@ from ...provenance import origin
 from ...tables import Table, show
 from ..asked_loads import Loads, check_positive
 from ..postures import Asked, mechanism_of, posture_of
-from ..results import warn
+from ..results import check_drawn, warn
+from ..shown import compliance_figure, joint_shares, write_compliance_table
 from .carried import carried_wrench, largest_together
 
 Real = NDArray[np.float64]
 
 
 def show_stiffness(
-    robot: str, asked: Asked, force: float, loads: Loads, links: bool = False, out: Path | None = None
+    robot: str,
+    asked: Asked,
+    force: float,
+    loads: Loads,
+    links: bool = False,
+    out: Path | None = None,
+    drawn: tuple[Path | None, Path | None] = (None, None),
 ) -> None:
-    """Compliance table, principal directions, deflection under the force, under weight, and under both."""
+    """Compliance, principal directions, deflection under the force, under weight, and both; picture and table."""
+    check_drawn(drawn, out)
     check_positive("force", force, "newtons", 1e6)
     if out is not None:
         check_output(out, (".json",))
@@ -48,6 +58,7 @@ def show_stiffness(
     if sag.any():
         typer.echo(f"largest deflection under weight and {force:g} N together: {1e3 * together:.3f} mm")
     warn(result)
+    _draw(case, (driven, axes), result, force, drawn, origin("robot stiffness", [robot]))
     if out is None:
         return
     found = {
@@ -56,6 +67,29 @@ def show_stiffness(
         "largest_deflection_together_m": float(together),
     }
     _write(out, robot, posture, result, force, found)
+
+
+def _draw(
+    case: PlanarCase | SpatialCase,
+    posture: tuple[Real, Real | None],
+    result: PostureResult,
+    force: float,
+    drawn: tuple[Path | None, Path | None],
+    stated: dict[str, Any],
+) -> None:
+    """Picture and table, where they were asked for."""
+    picture, table = drawn
+    if picture is not None:
+        driven, axes = posture
+        moving = [i for i, label in enumerate(result.labels) if "R" not in label.split(":")[1]]
+        values, directions = np.linalg.eigh(result.compliance[np.ix_(moving, moving)])
+        softest = directions[:, -1] if axes is None else axes @ directions[:, -1]
+        shares = joint_shares(case, driven, softest)
+        save_figure(compliance_figure(result, force, shares, float(values[-1])), picture)
+        typer.echo(f"wrote {picture}")
+    if table is not None:
+        write_compliance_table(table, result, stated)
+        typer.echo(f"wrote {table}")
 
 
 def _sags(
