@@ -53,6 +53,9 @@ def new_robot(
     base_turned: Annotated[
         Triple, typer.Option("--base-turned", metavar="R P Y", help="Base axes, degrees; 180 0 0: from a ceiling.")
     ] = (0.0, 0.0, 0.0),
+    source: Annotated[
+        str | None, typer.Option("--source", metavar="TEXT", help="Where the file comes from, beside its name.")
+    ] = None,
     damping: Annotated[
         float | None, typer.Option("--damping", metavar="RATIO", help="Damping ratio of all modes; 0.03 is assumed.")
     ] = None,
@@ -72,6 +75,7 @@ def new_robot(
         (spindle_mass, spindle_centre, spindle_inertia),
         (base, base_turned),
         damping,
+        source,
     )
     for line in write_new_robot(robot, out, asked):
         typer.echo(line, err=line.startswith("warning: "))

@@ -26,7 +26,9 @@ class Told:
     damping
         Damping ratio of all modes, and its source.
     origin
-        Source of joints and bodies.
+        Source of joints and bodies, in full.
+    short
+        The same in a word or two, for each table.
     tool
         Source of the tool tip's place.
     base
@@ -43,6 +45,7 @@ class Told:
     spindle: tuple[float, Real, Real, str] | None
     damping: tuple[float, str]
     origin: str
+    short: str
     tool: str
     base: str
     posture: tuple[Sequence[float], str]
@@ -57,9 +60,9 @@ def chain_text(name: str, chain: SerialChain, told: Told) -> str:
     blocks += [_joint(joint, *own, told) for joint, own in zip(chain.joints, told.stiffness, strict=True)]
     for part in chain.parts:
         lines = ["[[bodies]]", f"name = {_text(part.name)}", f"joint = {_text(part.joint)}"]
-        source = told.bodies.get(part.name, told.origin)
+        source = told.bodies.get(part.name, told.short)
         blocks.append(lines + _mass(part.mass, part.centre, part.inertia, source))
-    blocks.append(_place("flange", chain.flange, told.origin, "in the axes of the last joint's body"))
+    blocks.append(_place("flange", chain.flange, told.short, "in the axes of the last joint's body"))
     blocks.append(_place("tool", chain.tool, told.tool, "tip of the tool in the axes of the flange; z along the tool"))
     if told.spindle is not None:
         mass, centre, inertia, source = told.spindle
@@ -105,7 +108,7 @@ def _joint(joint: SerialJoint, stiffness: float, source: str, told: Told) -> lis
     if np.isfinite([joint.lower, joint.upper]).all():
         limits = np.array([joint.lower, joint.upper])
         lines.append(f"limits_m = {_list(limits)}" if sliding else f"limits_deg = {_list(np.degrees(limits))}")
-    lines += [f"source = {_text(told.origin)}", "", "[joints.stiffness]"]
+    lines += [f"source = {_text(told.short)}", "", "[joints.stiffness]"]
     lines.append(f"drive_{'n_per_m' if sliding else 'nm_per_rad'} = {float(stiffness)!r}")
     return [*lines, f"source = {_text(source)}"]
 

@@ -54,6 +54,7 @@ class Asked:
     spindle: tuple[float | None, Triple | None, Triple | None]
     base: tuple[Triple, Triple]
     damping: float | None
+    source: str | None = None
 
 
 def write_new_robot(path: Path, out: Path, asked: Asked) -> list[str]:
@@ -111,7 +112,7 @@ def _typed_place(option: str, shift: Triple, turned: Triple) -> Real:
 
 def _told(path: Path, read: ReadChain, chain: SerialChain, asked: Asked) -> tuple[Told, list[str]]:
     """Sources of all numbers, and what should be said of them."""
-    origin = f"{path.name} (SHA-256 {sha256(path)[:16]})"
+    origin = f"{path.name} (SHA-256 {sha256(path)[:16]})" + (f"; {asked.source}" if asked.source else "")
     notes = [note for note in read.notes if asked.total_mass is None or "no masses" not in note]
     doubts = [*notes, *mass_doubts(chain)]
     stiffness, doubt = _stiffness(chain, asked)
@@ -137,6 +138,7 @@ def _told(path: Path, read: ReadChain, chain: SerialChain, asked: Asked) -> tupl
         spindle,
         (float(damping[0] or 0.0), damping[1]),
         origin,
+        path.name,
         tool,
         "base of the robot in the cell, whose z points up",
         ([float(value) for value in posture], "chosen: well-conditioned" + (", tool vertical" if upright else "")),
