@@ -28,13 +28,13 @@ def tool_postures(mechanism: Mechanism, target: Real, near: Real | None = None) 
     Parameters
     ----------
     mechanism
-        Open chain.
+        Mechanism of the robot, an open chain.
     target : (4, 4)
         Wanted tool frame in the base frame.
     near : (n_moving,), rad or m
         Posture from which motion counts; None: the middle of the joints' ranges.
     """
-    if has_spherical_wrist(mechanism):
+    if mechanism.closures or has_spherical_wrist(mechanism):  # loops are refused there
         return wrist_solutions(mechanism, target)
     ideal = _rounded(mechanism)
     if has_spherical_wrist(ideal):
