@@ -1,6 +1,7 @@
 """What an identification changes in a robot's file: numbers, and what each table's source says of them."""
 
 from collections.abc import Sequence
+from math import log
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,8 @@ KEYS = {
 
 
 def identified_values(
-    robot: str, table: str, parameters: Sequence[ElasticParameter], found: Identification
-) -> dict[Place, float | str]:
+    robot: str, table: str, parameters: Sequence[ElasticParameter], found: Identification, prior: float
+) -> dict[Place, Any]:
     """New values by their place in the file, :func:`robot_model.changed_robot_text`.
 
     What the data does not fix is written too: its combination with the rest is what predicts. Its table says so.
@@ -34,9 +35,11 @@ def identified_values(
         Name of the table of deflections, for the sources.
     parameters, found
         Numbers that were identified, and what was found of them.
+    prior
+        Standard deviation of ln p before the data spoke.
     """
     content = read_table(robot)
-    changes: dict[Place, float | str] = {}
+    changes: dict[Place, Any] = {}
     words: dict[Place, tuple[list[str], list[str]]] = {}
     tubes: dict[int, dict[str, tuple[float, bool]]] = {}
     for parameter, value, error, known in zip(
@@ -56,12 +59,36 @@ def identified_values(
         tube = content["links"][link]["tube"]
         outer, inner = _tube(tube, parts["bending"][0], parts["axial"][0] if parts["axial"][1] else None)
         changes["links", link, "tube", "outer_m"], changes["links", link, "tube", "inner_m"] = outer, inner
+    changes["update",] = _update_table(robot, table, parameters, found, prior)
     for place, (told, untold) in words.items():
         source: Any = content
         for step in place:
             source = source[step]
         changes[*place, "source"] = _source(table, told, untold, source["source"])
     return changes
+
+
+def _update_table(
+    robot: str, table: str, parameters: Sequence[ElasticParameter], found: Identification, prior: float
+) -> dict[str, Any]:
+    """The file's ``[update]``: what is open of the joints' stiffnesses, from which bands follow elsewhere.
+
+    Sections of links have no number there: they are taken as certain, the stiffnesses with the rest left open.
+    """
+    content, source = read_table(robot), f"robot identify: {table}"
+    joints = [index for index, one in enumerate(parameters) if isinstance(one, JointStiffness)]
+    numbers = []
+    for index in joints:
+        one = parameters[index]
+        assert isinstance(one, JointStiffness)
+        row, error = content["joints"][one.joint], float(found.relative_errors[index])
+        number = {"name": f"joint {row['frame']} {one.group}", "kind": "stiffness", "frame": row["frame"]}
+        number |= {"group": one.group, "spread": prior, "value": log(found.values[index] / row[KEYS[one.group]])}
+        numbers.append(number | {"standard_error": error, "told": bool(found.identifiable[index]), "source": source})
+    covariance = found.covariance[np.ix_(joints, joints)]
+    told = [str(number["name"]) for number in numbers if number["told"]]
+    rows = [[float(f"{value:.10g}") for value in row] for row in covariance]
+    return {"source": source, "verdict": "identified", "named": told, "covariance": rows, "numbers": numbers}
 
 
 def _tube(tube: dict[str, float], bending: float, axial: float | None) -> tuple[float, float]:

@@ -63,13 +63,13 @@ def write_identified(robot: str, table: Path, out: Path, error: float, links: bo
         held = verify_elastic(case.robot, measured, error, parameters, prior=float(np.log(prior)))
         found = identify_elastic(case.robot, measured, error, parameters, prior=float(np.log(prior)))
     _show_found(case, parameters, found)
-    doubts = [*_radians(case, measured), *_doubts(found, held, error)]
+    doubts = [*_radians(case, measured), *_doubts(found, held, error), *_forgotten(case)]
     _show_held_out(held, error)
     for doubt in doubts:
         typer.echo(f"warning: {doubt}", err=True)
     if held is not None:
         _refuse_what_does_not_hold(held, error)
-    text = changed_robot_text(robot, identified_values(robot, table.name, parameters, found))
+    text = changed_robot_text(robot, identified_values(robot, table.name, parameters, found, float(np.log(prior))))
     with writing_whole_file(out) as unfinished:
         unfinished.write_text(text, encoding="utf-8")
         add_comment(unfinished, origin("robot identify", [robot, table], {"error_m": error, "prior": prior}))
@@ -107,9 +107,11 @@ def _show_held_out(held: HeldOut | None, error: float) -> None:
 def _refuse_what_does_not_hold(held: HeldOut, error: float) -> None:
     before, after, size = (float(np.sqrt(np.mean(one**2))) for one in (held.before, held.after, held.deflections))
     if after >= before:
+        holds = before / np.sqrt(3) <= _MUCH * error
+        remedy = "the file's hold already" if holds else "measure more postures, or larger loads"
         raise MillfrfError(
             f"on {held.postures} postures held out the numbers found miss {1e3 * after:.3f} mm, the file's "
-            f"{1e3 * before:.3f} mm: nothing is written; measure more postures, or larger loads"
+            f"{1e3 * before:.3f} mm: nothing is written; {remedy}"
         )
     if after > _MOST_LEFT * size and held.times(error) > _MUCH:
         raise MillfrfError(
@@ -129,6 +131,18 @@ def _doubts(found: Identification, held: HeldOut | None, error: float) -> list[s
     if found.at_bound:
         doubts.append(f"at a bound, so their errors mean little: {', '.join(found.at_bound)}")
     return doubts
+
+
+def _forgotten(case: SpatialCase) -> list[str]:
+    """What an earlier update left open of numbers that are not identified here."""
+    freed = () if case.uncertainty is None else case.uncertainty.parameters
+    other = [one.name for one in freed if one.kind != "stiffness"]
+    if not other:
+        return []
+    return [
+        f"the file's [update] is exchanged for one of stiffnesses: what it left open of {', '.join(other[:3])}"
+        f"{' and more' if len(other) > 3 else ''} is taken as certain from here on"
+    ]
 
 
 def _radians(case: SpatialCase, measured: Sequence[Any]) -> tuple[str, ...]:

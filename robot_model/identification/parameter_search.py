@@ -36,6 +36,8 @@ class Identification:
         Names of parameters that ended at a bound: their errors mean little.
     residual : float
         Root mean square of the residuals, which are in units of their expected error.
+    covariance : (n_parameters, n_parameters)
+        Covariance of the logarithms; without a prior, within the identifiable directions only.
     """
 
     names: tuple[str, ...]
@@ -45,6 +47,7 @@ class Identification:
     unidentifiable: tuple[str, ...]
     at_bound: tuple[str, ...]
     residual: float
+    covariance: Real
 
     @property
     def standard_errors(self) -> Real:
@@ -153,12 +156,13 @@ def judged(
     information = 1 / errors**2 + 1 / prior**2
     both = np.divide(1, np.sqrt(information), out=np.full(n_parameters, np.inf), where=information > 0)
     told = known | np.isfinite(both)
-    variance = (directions[told] ** 2).T @ both[told] ** 2
+    covariance = (directions[told].T * both[told] ** 2) @ directions[told]
     share = np.sum(directions[~known] ** 2, axis=0)
     combinations = tuple(_combination(names, direction) for direction in _simplified(directions[~known]))
     root_mean_square = float(np.sqrt(np.mean(residual**2))) if n_data else 0.0
     identifiable = share < 1e-2
-    return Identification(names, values, np.sqrt(variance), identifiable, combinations, at_bound, root_mean_square)
+    deviations = np.sqrt(np.diag(covariance))
+    return Identification(names, values, deviations, identifiable, combinations, at_bound, root_mean_square, covariance)
 
 
 def _simplified(directions: Real) -> Real:

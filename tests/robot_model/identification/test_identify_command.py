@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from millfrf.__main__ import BAD_INPUT, DONE, FAILED, run
-from robot_model import assumptions, read_deflections, read_robot, read_spatial_robot
+from modal_fit import frequency_and_damping_errors
+from robot_model import assumptions, in_posture, modes_at, read_deflections, read_robot, read_spatial_robot
 
 FOLDER = Path(__file__).resolve().parents[3] / "robot_model" / "robots"
 TRUE = np.array([0.7e7, 2.0e7, 0.9e7, 1.5e6, 0.8e6, 0.75e6])
@@ -111,6 +112,32 @@ def test_stiffnesses_are_found_and_written_into_the_users_file(
     assert "# my robot" in text
     assert not any(line.startswith("joints") for line in assumptions(out))
     assert any(line.startswith("bodies") for line in assumptions(out))
+
+
+def test_what_is_open_goes_on_into_modes(robot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Errors of natural frequencies from the written file against draws of stiffnesses from its covariance."""
+    table, out = write_table(tmp_path / "d.csv", 40, 10e-6), tmp_path / "found.toml"
+    assert run(["robot", "identify", str(robot), str(table), "--out", str(out), "--error", "10"]) == DONE
+    case = read_spatial_robot(out)
+    assert case.uncertainty is not None
+    errors = frequency_and_damping_errors(in_posture(case, case.poses["ready"]).known_model())
+    assert errors is not None
+    rng, nominal = np.random.default_rng(2), np.array([joint.stiffness for joint in case.robot.joints])
+    drawn = []
+    for logarithms in rng.multivariate_normal(np.zeros(6), case.uncertainty.covariance, size=400):
+        stiffness = nominal.copy()
+        stiffness[:, 5] *= np.exp(logarithms)
+        drawn.append(modes_at(case.robot.with_stiffness(stiffness), case.poses["ready"]).frequencies[:3])
+    assert errors[0][:3] == pytest.approx(np.std(drawn, axis=0), rel=0.12)
+    again = tmp_path / "again.toml"
+    assert run(["robot", "identify", str(out), str(table), "--out", str(again), "--error", "10"]) == FAILED
+    assert "nothing is written; the file's hold already" in " ".join(capsys.readouterr().err.split())
+    stale = out.read_text(encoding="utf-8").replace("turning_nm_per_rad = 7", "turning_nm_per_rad = 9", 1)
+    stale = stale.replace('kind = "stiffness"', 'kind = "damping"', 1)
+    out.write_text(stale, encoding="utf-8")
+    assert run(["robot", "identify", str(out), str(table), "--out", str(again), "--error", "10"]) == DONE
+    assert "what it left open of joint 1 turning is taken as certain" in " ".join(capsys.readouterr().err.split())
+    assert again.read_text(encoding="utf-8").count("[update]") == 1
 
 
 def test_error_bars_cover(robot: Path, tmp_path: Path) -> None:
