@@ -33,7 +33,7 @@ from robot_model import (
     tip_compliance,
     tool_jacobian,
 )
-from robot_model.posture_process.modal_basis import basis_at, part_names
+from robot_model.posture_process.modes import basis_at, part_names
 
 KUKA = read_spatial_robot("kuka_kr90_r3100")
 
