@@ -1,8 +1,8 @@
 """Modal models measured in eight postures, and what they say of a posture between and beyond them.
 
 Run it: `python examples/robot_learned_postures.py [PICTURE.png]`. The robot that is measured is the KUKA that ships,
-but its second joint is up to 20 % softer near the vertical, and its third up to 10 % over its angle: what no constant of
-the model explains. Its modal models in eight postures are learned; along a movement of the second joint the lowest
+but its second joint is up to 20 % softer near the vertical, and its third up to 10 % over its angle: no constant of the
+model explains that. Its modal models in eight postures are learned; along a movement of the second joint the lowest
 frequencies are predicted with their 95 % band, which grows beyond the measured range. The last lines say which posture
 to measure next.
 """
