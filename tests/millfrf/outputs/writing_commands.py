@@ -34,6 +34,11 @@ class Writing:
 
 ROBOT = "staubli_rx170 --pose ready"
 LOBES = "--cutting cut.toml --speeds 600 1200 4 --max-depth 0.01 --method zero-order"
+DEFLECTIONS = """joint_1_deg,joint_2_deg,joint_3_deg,joint_4_deg,joint_5_deg,joint_6_deg,fx_n,fy_n,fz_n,dx_m,dy_m,dz_m
+0,-20,110,0,90,0,100,0,0,8e-4,0,1e-4
+30,-30,100,20,60,10,0,100,-200,1e-4,9e-4,-6e-4
+-40,0,90,-60,80,40,50,-80,-300,3e-4,-5e-4,-9e-4
+"""
 COMMANDS = (
     Writing("recover", "recover killed.h5 --out out.h5", ("out.h5",)),
     Writing("convert npz", "convert up.h5 out.npz", ("out.npz",)),
@@ -81,6 +86,11 @@ COMMANDS = (
     Writing("robot lobes", f"robot lobes {ROBOT} {LOBES} --out out.csv", ("out.csv",)),
     Writing("robot map", "robot map staubli_rx170 --picture out.png --x 1 1.1 2 --y 0 0.1 2", ("out.png",)),
     Writing("robot compensate", "robot compensate staubli_rx170 path.csv --out out.csv", ("out.csv",)),
+    Writing(
+        "robot identify",
+        "robot identify staubli_rx170 deflections.csv --error 10 --out out.toml",
+        ("out.toml",),
+    ),
 )
 
 
@@ -91,6 +101,7 @@ def make_inputs(folder: Path) -> None:
     good_files.make(folder)
     _killed(folder / "killed.h5")
     _can_log(folder)
+    (folder / "deflections.csv").write_text(DEFLECTIONS, encoding="utf-8")
     (folder / "points.csv").write_text("point,x [m],y [m],z [m]\n1,0,0,0\n2,0.1,0,0\n", encoding="utf-8")
     for source, target in (("frf_tip.h5", "given.uff"), ("model_tip.json", "given.unv")):
         assert run(["convert", str(folder / source), str(folder / target)]) == 0
