@@ -12,8 +12,10 @@ from foundation import InputError, writing_whole_file
 from modal_fit import read_modal_model
 from robot_model import (
     LearnedPostures,
+    LeftOutPosture,
     SpatialCase,
     learn_postures,
+    left_out_postures,
     measured_modes,
     read_robot,
     shown_values,
@@ -30,6 +32,9 @@ from ..postures import Asked, posture_of, spatial
 from .posture_choice import WorkArea, show_next_postures
 
 Real = NDArray[np.float64]
+
+WRONG = 0.6
+"""A posture of whose frequencies fewer than this share lie in their bands may be another than is stated."""
 
 
 @dataclass(frozen=True)
@@ -75,10 +80,12 @@ def learn_from_files(robot: str, models: Sequence[Path], asking: LearningFrom, o
     ]
     with bar("learning"):
         learned = learn_postures(case.robot, measured)
+        left_out = left_out_postures(learned)
     with writing_whole_file(out) as temporary:
         write_learned_postures(temporary, learned)
         add_to_json(temporary, {"robot": robot, **origin("robot learn", [robot, *models], asdict(asking))})
     _show(case, learned)
+    _tell_left_out(left_out)
     for name, frequency in learned.unpaired:
         typer.echo(f"warning: {name}: the mode at {frequency:.2f} Hz is near none of the model's; left out", err=True)
     typer.echo(f"wrote {out}: {len(measured)} postures, {sum(len(one) for one in learned.pairs)} modes")
@@ -99,6 +106,26 @@ def axes_of(feed: float | None) -> Real:
         return np.eye(3)
     check_degrees(feed=feed)
     return tool_down([0.0, 0.0, 0.0], np.radians(feed)).axes
+
+
+def _tell_left_out(left_out: Sequence[LeftOutPosture]) -> None:
+    """Say whether bands hold postures that were left out in turn, and warn of one that the others contradict."""
+    if not left_out:
+        typer.echo("warning: two postures say nothing of whether bands hold; measure three or more", err=True)
+        return
+    held = np.vstack([one.held for one in left_out])
+    errors = np.sqrt(np.mean(np.vstack([one.errors for one in left_out]) ** 2, axis=0))
+    typer.echo(
+        f"each posture left out in turn: frequencies {100 * errors[0]:.2g} % off, damping {100 * errors[1]:.2g} %; "
+        f"95 % bands hold {held[:, 0].sum()} and {held[:, 1].sum()} of {len(held)}"
+    )
+    for one in left_out:
+        if len(one.held) and one.held[:, 0].mean() < WRONG:
+            typer.echo(
+                f"warning: {one.name}: {int((~one.held[:, 0]).sum())} of {len(one.held)} frequencies lie outside of "
+                "what the other postures say; is it the posture that --pose states?",
+                err=True,
+            )
 
 
 def _show(case: SpatialCase, learned: LearnedPostures) -> None:

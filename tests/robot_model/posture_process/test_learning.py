@@ -1,5 +1,6 @@
 """Learned postures of a cell that shares no code with the package: bands hold, files keep them, far is said."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from robot_model import (
     LearnedPostures,
     choose_postures,
     learn_postures,
+    left_out_postures,
     modes_at,
     predict_posture,
     read_learned_postures,
@@ -76,6 +78,18 @@ def test_far_from_all_postures_the_band_is_wide_and_the_answer_says_so(
     widths = [np.log(one.frequency_band()[1] / one.frequency_band()[0])[:6].mean() for one in (here, away)]
     assert widths[1] > 1.3 * widths[0]
     assert not here.warnings
+
+
+def test_bands_hold_postures_left_out_and_a_wrong_posture_shows(cell: MeasuredCell, learned: LearnedPostures) -> None:
+    found = left_out_postures(learned)
+    held = np.vstack([one.held for one in found])
+    assert len(held) == 48
+    assert held.sum(axis=0).min() >= 41
+    wrong = list(cell.measured)
+    wrong[2] = replace(wrong[2], driven=wrong[2].driven + np.radians([0.0, 35.0, -30.0, 0.0, 0.0, 0.0]))
+    bent = left_out_postures(learn_postures(cell.robot, wrong))
+    size = [float(np.abs(one.errors[:, 0]).max(initial=0.0)) for one in bent]
+    assert int(np.argmax(size)) == 2
 
 
 def test_the_next_posture_lies_where_predictions_matter(cell: MeasuredCell, learned: LearnedPostures) -> None:
