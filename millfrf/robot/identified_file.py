@@ -1,5 +1,6 @@
 """What an identification changes in a robot's file: numbers, and what each table's source says of them."""
 
+import tomllib
 from collections.abc import Sequence
 from math import log
 from typing import Any
@@ -7,7 +8,14 @@ from typing import Any
 import numpy as np
 
 from foundation import InputError
-from robot_model import ElasticParameter, Identification, JointStiffness, LinkSection, read_table, tube_diameters
+from robot_model import (
+    ElasticParameter,
+    Identification,
+    JointStiffness,
+    LinkSection,
+    numbered_robot_text,
+    tube_diameters,
+)
 
 Place = tuple[str | int, ...]
 
@@ -38,7 +46,7 @@ def identified_values(
     prior
         Standard deviation of ln p before the data spoke.
     """
-    content = read_table(robot)
+    content = tomllib.loads(numbered_robot_text(robot))
     changes: dict[Place, Any] = {}
     words: dict[Place, tuple[list[str], list[str]]] = {}
     tubes: dict[int, dict[str, tuple[float, bool]]] = {}

@@ -1,14 +1,33 @@
-from .changed_file import changed_robot_text
-from .planar_file import PlanarCase, read_planar_robot
-from .robot_files import assumptions, read_table, robot_names, robot_text
-from .serial_file import read_serial_robot
-from .spatial_file import SpatialCase, read_spatial_robot
+from .changed_file import (
+    changed_robot_text,
+)
+from .numbered_text import (
+    numbered_robot_text,
+)
+from .planar_file import (
+    PlanarCase,
+    read_planar_robot,
+)
+from .robot_files import (
+    assumptions,
+    read_table,
+    robot_names,
+    robot_text,
+)
+from .serial_file import (
+    read_serial_robot,
+)
+from .spatial_file import (
+    SpatialCase,
+    read_spatial_robot,
+)
 
 __all__ = [
     "PlanarCase",
     "SpatialCase",
     "assumptions",
     "changed_robot_text",
+    "numbered_robot_text",
     "read_planar_robot",
     "read_serial_robot",
     "read_spatial_robot",

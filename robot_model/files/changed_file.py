@@ -9,7 +9,7 @@ from tomlkit.exceptions import NonExistentKey
 
 from foundation import InputError
 
-from .robot_files import robot_text
+from .numbered_text import numbered_robot_text
 
 Place = tuple[str | int, ...]
 """Where a value stands: ``("joints", 2, "turning_nm_per_rad")``, tables counted from 0."""
@@ -38,7 +38,7 @@ def changed_robot_text(robot: str | os.PathLike[str], changes: Mapping[Place, An
     >>> text.splitlines()[0].startswith("#"), "mass_kg = 43.0" in text
     (True, True)
     """
-    document = tomlkit.parse(robot_text(robot))
+    document = tomlkit.parse(numbered_robot_text(robot))
     for place, value in changes.items():
         table: Any = document
         try:

@@ -168,7 +168,7 @@ def _descend(mechanism: Mechanism, target: Real, first: Real, most: int = 80) ->
         gain = error @ error - new @ new
         if gain > 0:
             settled = gain < 1e-14 * (error @ error)
-            q, error, damping = trial, new, max(damping / 10, 1e-16)
+            q, error, damping = trial, new, max(damping / 10, 1e-12)
             if settled:
                 break
         else:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from foundation import FileFormatError, InputError, optional_library
 
@@ -43,6 +44,12 @@ def read_tree(path: Path) -> UrdfTree:
     head = path.read_text(encoding="utf-8", errors="replace")
     if "xacro:" in head and "${" in head:
         raise FileFormatError(f"{path} is a xacro file; expand it first: xacro {path.name} > robot.urdf")
+    try:  # the library's reader mends broken XML in silence, and so reads half a robot from half a file
+        root = ElementTree.fromstring(path.read_bytes())
+    except ElementTree.ParseError as error:
+        raise FileFormatError(f"{path} is not a URDF: {error}") from error
+    if root.tag != "robot":
+        raise FileFormatError(f"{path} is not a URDF: its first element is <{root.tag}>, not <robot>")
     library = optional_library("yourdfpy", "Reading URDF", "urdf")
     try:
         robot = library.URDF.load(

@@ -6,7 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from foundation import InputError, MillfrfError, writing_whole_file
-from robot_model import read_robot, robot_text, update_robot, updated_document
+from robot_model import numbered_robot_text, read_robot, update_robot, updated_document
 
 from ...options import check_output
 from ...progress import bar
@@ -46,7 +46,7 @@ def update_robot_file(robot: str, paths: Sequence[Path], out: Path, report: Path
     if found.verdict == "unexplained":
         raise MillfrfError("\n".join([*lines, f"{out} was not written: no update of these numbers holds elsewhere"]))
     with writing_whole_file(out) as temporary:
-        temporary.write_text(updated_document(robot_text(robot), case.robot, found), encoding="utf-8")
+        temporary.write_text(updated_document(numbered_robot_text(robot), case.robot, found), encoding="utf-8")
         add_comment(temporary, made)
     read_robot(out)
     return [*lines, f"wrote {out}: the robot's file with {len(found.parameters)} numbers updated and their covariance"]

@@ -1,0 +1,105 @@
+"""A robot's file in the form whose numbers are changed: of kind `spatial`, with numbered nodes."""
+
+import json
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..kinematics import Frame
+from ..spatial import ElasticJoint, SpatialRobot
+from .robot_files import read_table, robot_text
+from .serial_file import read_serial_robot
+
+Real = NDArray[np.float64]
+
+_GROUPS = ((0, "radial_n_per_m"), (2, "axial_n_per_m"), (3, "tilting_nm_per_rad"), (5, "turning_nm_per_rad"))
+
+
+def numbered_robot_text(robot: str | os.PathLike[str]) -> str:
+    """Text of a robot's file; a serial robot is written out with its frames and nodes, as kind ``spatial``.
+
+    An update adds springs, bodies and frames, for which the short form has no place. The long form is the same robot.
+
+    Parameters
+    ----------
+    robot
+        Path of a file, or name of a robot that comes along.
+
+    Raises
+    ------
+    InputError
+        No such robot, or one whose parts do not fit together.
+    FileFormatError
+        Not a robot file.
+
+    Examples
+    --------
+    >>> 'kind = "spatial"' in numbered_robot_text("staubli_rx160")
+    True
+    """
+    content = read_table(robot)
+    if content.get("robot", {}).get("kind") != "serial":
+        return robot_text(robot)
+    built = read_serial_robot(robot).robot
+    head = content["robot"]
+    lines = ["# Written out from a file of kind serial: the same robot with frames and numbered nodes.", "", "[robot]"]
+    lines += [f"{key} = {_value(value)}" for key, value in head.items() if key not in ("kind", "source")]
+    lines += ['kind = "spatial"', f"tip_node = {built.tip}", f"tool_frame = {_value(built.mechanism.tool)}"]
+    lines.append(f"source = {_value(head['source'])}")
+    blocks = ["\n".join(lines), *(_frame(frame) for frame in built.mechanism.frames), *_nodes(built)]
+    sources = [row["stiffness"]["source"] for row in content["joints"]]
+    blocks += [_joint(joint, source) for joint, source in zip(built.joints, sources, strict=True)]
+    blocks += [_block("links", [("nodes", list(link.nodes)), ("source", "rigid")]) for link in built.links]
+    blocks += _bodies(built, content)
+    if "damping" in content:
+        blocks.append(_block("damping", list(content["damping"].items()), many=False))
+    blocks += [_block("poses", list(pose.items())) for pose in content.get("poses", [])]
+    return "\n\n".join(blocks) + "\n"
+
+
+def _frame(frame: Frame) -> str:
+    rows: list[tuple[str, Any]] = [("name", frame.name), ("antecedent", frame.antecedent), ("motion", frame.motion)]
+    rows += [(f"{key}_deg", float(np.degrees(getattr(frame, key)))) for key in ("gamma", "alpha", "theta")]
+    rows += [(f"{key}_m", float(getattr(frame, key))) for key in ("b", "d", "r")]
+    limits = np.array([frame.lower, frame.upper])
+    if frame.motion != "fixed" and np.isfinite(limits).all():
+        sliding = frame.motion == "prismatic"
+        rows.append(("limits_m" if sliding else "limits_deg", (limits if sliding else np.degrees(limits)).tolist()))
+    return _block("frames", [*rows, ("source", "from the joints' places and axes")])
+
+
+def _nodes(robot: SpatialRobot) -> list[str]:
+    return [
+        _block("points", [("node", node), ("frame", name), ("at_m", place.tolist()), ("source", "joint or tip")])
+        for node, (name, place) in robot.points.items()
+    ]
+
+
+def _joint(joint: ElasticJoint, source: str) -> str:
+    rows: list[tuple[str, Any]] = [("frame", joint.frame), ("nodes", list(joint.nodes))]
+    rows += [(key, float(joint.stiffness[at])) for at, key in _GROUPS if np.isfinite(joint.stiffness[at])]
+    return _block("joints", [*rows, ("source", source)])
+
+
+def _bodies(robot: SpatialRobot, content: dict[str, Any]) -> list[str]:
+    sources = [row["source"] for row in content.get("bodies", []) if row["joint"] != "base"]
+    sources += [content["spindle"]["source"]] if "spindle" in content else []
+    blocks = []
+    for body, source in zip(robot.bodies, sources, strict=True):
+        inertia = [float(body.inertia[at]) for at in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+        rows = [("node", body.node), ("frame", body.frame), ("mass_kg", body.mass), ("centre_m", body.centre.tolist())]
+        blocks.append(_block("bodies", [*rows, ("inertia_kg_m2", inertia), ("source", source)]))
+    return blocks
+
+
+def _block(table: str, rows: Sequence[tuple[str, Any]], many: bool = True) -> str:
+    head = f"[[{table}]]" if many else f"[{table}]"
+    return "\n".join([head, *(f"{key} = {_value(value)}" for key, value in rows)])
+
+
+def _value(value: Any) -> str:
+    """A number, a list or a text as TOML writes it: JSON's form serves all three."""
+    return json.dumps(value, ensure_ascii=False)
