@@ -83,7 +83,7 @@ def _update_table(
 
     Sections of links have no number there: they are taken as certain, the stiffnesses with the rest left open.
     """
-    content, source = read_table(robot), f"robot identify: {table}"
+    content, source = tomllib.loads(numbered_robot_text(robot)), f"robot identify: {table}"
     joints = [index for index, one in enumerate(parameters) if isinstance(one, JointStiffness)]
     numbers = []
     for index in joints:
