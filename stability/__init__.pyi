@@ -1,4 +1,4 @@
-from .certification import certified_lobes
+from .certification import CouplingJudgement, certified_lobes, judge_mode_coupling
 from .chatter import (
     ChatterVerdict,
     CutSpectrum,
@@ -21,7 +21,14 @@ from .limit_uncertainty import (
     sampled_limits,
 )
 from .lobes import STATUSES, StabilityLimits, StabilityLobes, read_lobes, write_lobes
-from .milling_loop import DelaySystem, ToolReceptance, delay_system, tool_receptance, with_residual_flexibility
+from .milling_loop import (
+    DelaySystem,
+    ToolReceptance,
+    delay_system,
+    tool_receptance,
+    with_residual_flexibility,
+    with_static_high_modes,
+)
 from .recommendation import RecommendedCut, certified_cut, lowered, recommended_cut
 from .solvers import (
     ModeCouplingLimit,
@@ -46,6 +53,7 @@ from .solvers import (
 __all__ = [
     "STATUSES",
     "ChatterVerdict",
+    "CouplingJudgement",
     "CutSpectrum",
     "DelaySystem",
     "Evidence",
@@ -72,6 +80,7 @@ __all__ = [
     "drawn",
     "gather_evidence",
     "is_stable",
+    "judge_mode_coupling",
     "limit_band",
     "limit_sensitivities",
     "lowered",
@@ -92,6 +101,7 @@ __all__ = [
     "trace_boundary",
     "unstable_poles",
     "with_residual_flexibility",
+    "with_static_high_modes",
     "write_lobes",
     "zero_order",
 ]
