@@ -22,17 +22,14 @@ from robot_model import (
     read_robot,
     read_tool_path,
     shown_values,
-    tool_down,
     write_compensated_path,
 )
 
-from ..gate import check_depth, check_speed, read_checked_cutting
 from ..options import check_band, check_output
 from ..progress import bar
 from ..provenance import add_comment, add_to_json, origin
 from ..tables import Table, show
-from .asked_loads import Loads, check_axis, check_degrees, check_near, check_places, check_positive
-from .depth_maps import depth_over_places
+from .asked_loads import Loads, check_near, check_positive
 from .postures import Asked, mechanism_of, posture_of, spatial
 
 Real = NDArray[np.float64]
@@ -134,56 +131,28 @@ def _draw_receptance(
         typer.echo(f"wrote {table}")
 
 
-def write_workspace_map(
-    robot: str,
-    picture: Path,
-    area: tuple[tuple[float, float, int], tuple[float, float, int], float, float],
-    cutting: Path | None,
-    speed: float | None,
-    max_depth: float,
+def write_compensation(
+    robot: str, path: Path, asked: Asked, out: Path, loads: Loads, picture: Path | None = None
 ) -> None:
-    """Map of the lowest frequency, and of the depth limit where a cut is given."""
-    from .picture import draw_workspace
-
-    check_output(picture, (".png", ".pdf"))
-    if (cutting is None) != (speed is None):
-        raise InputError("a map of depth limits needs both --cutting CUT.toml and --speed RPM")
-    x, y, z, feed = area
-    check_axis("x", x)
-    check_axis("y", y)
-    check_places(z=z)
-    check_degrees(feed=feed)
-    check_positive("max-depth", max_depth, "metres", 1.0)
-    if speed is not None:
-        check_positive("speed", speed, "rpm", 1e6)
-    case = spatial(read_robot(robot))
-    say_doubts(case.assumed)
-    places = [tool_down([u, v, z], np.radians(feed)) for u in np.linspace(*x) for v in np.linspace(*y)]
-    process, doubts = (None, []) if cutting is None else read_checked_cutting(cutting)
-    say_doubts([*doubts, *check_depth(max_depth, process), *([] if speed is None else check_speed(speed, process))])
-    with bar("map"):
-        limits, lowest = depth_over_places(case.robot, places, process, (speed or 1.0) * RPM, max_depth, workers=2)
-    if np.isnan(lowest).all():
-        raise InputError("no place of the area is reached; move --x, --y or --z")
-    draw_workspace(picture, places, (x[2], y[2]), lowest, limits)
-    typer.echo(f"lowest frequency {np.nanmin(lowest):.2f} to {np.nanmax(lowest):.2f} Hz")
-    if process is not None:
-        typer.echo(f"depth limit {1e3 * np.nanmin(limits):.2f} to {1e3 * np.nanmax(limits):.2f} mm")
-    typer.echo(f"wrote {picture}: {np.isfinite(lowest).sum()} of {len(places)} places reached")
-
-
-def write_compensation(robot: str, path: Path, asked: Asked, out: Path, loads: Loads) -> None:
     """Corrected path, and what it is worth."""
     check_output(out, (".csv",), [path])
+    if picture is not None:
+        check_output(picture, (".png", ".pdf", ".svg"))
     case = spatial(read_robot(robot))
     say_doubts(case.assumed)
     start = posture_of(case, asked)[0]
     close_loops(case.robot.mechanism, start)
+    nominal = read_tool_path(path)
     with bar("compensating"):
-        result = compensate_path(case.robot, read_tool_path(path), start, payload=loads.payload, weight=loads.weight)
+        result = compensate_path(case.robot, nominal, start, payload=loads.payload, weight=loads.weight)
     with writing_whole_file(out) as unfinished:
         write_compensated_path(unfinished, result)
         add_comment(unfinished, origin("robot compensate", [robot, path], {"payload_and_weight": loads}))
+    if picture is not None:
+        from .compensation_figure import draw_compensation
+
+        draw_compensation(picture, nominal, result)
+        typer.echo(f"wrote {picture}")
     before, after, sag = (
         1e3 * np.linalg.norm(moved[:, :3], axis=1) for moved in (result.deviations, result.left, result.weight)
     )

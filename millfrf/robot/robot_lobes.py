@@ -6,11 +6,12 @@ from pathlib import Path
 import numpy as np
 import typer
 
+from cutting import MillingProcess
 from figures import lobes_figure, save_figure
 from foundation import TIP, InputError, writing_whole_file
 from modal_fit import ModalModel, Residuals
 from robot_model import SpatialCase, in_posture, read_robot
-from stability import with_residual_flexibility, write_lobes
+from stability import StabilityLobes, judge_mode_coupling, with_residual_flexibility, write_lobes
 
 from ..chain import compute_lobes, lobes_summary, speed_axis
 from ..gate import check_depth, check_speed, check_speeds, lowest_frequency, read_checked_cutting
@@ -20,6 +21,10 @@ from ..provenance import add_comment, made, origin
 from .depth_maps import depth_over_redundancy, write_posture_map
 from .postures import Asked, cut_place, posture_of, spatial
 from .results import RPM, say_doubts
+from .settled_modes import settled_modes
+
+_TIME_PERIODIC = ("certified", "collocation", "semi-discretization")
+"""Methods whose cost grows with the highest mode."""
 
 
 def at_the_tip(model: ModalModel) -> ModalModel:
@@ -61,12 +66,19 @@ def write_lobes_in_posture(
     process, doubts = read_checked_cutting(cutting)
     doubts += check_depth(max_depth, process)
     doubts += check_speeds(speeds, process, lowest_frequency(result.known_model().natural_frequencies))
-    found = compute_lobes(at_the_tip(result.known_model()), process, speed_axis(*speeds), max_depth, method, bar)
-    found = replace(found, warnings=(*doubts, *result.warnings, *found.warnings))
-    asked_for = {"speeds_rpm": speeds, "depth_max_m": max_depth, "method": method, "links": links}
+    model = at_the_tip(result.known_model())
+    told: tuple[str, ...] = ()
+    if method in _TIME_PERIODIC:
+        model, told = settled_modes(model, process, speed_axis(*speeds), max_depth)
+    found = compute_lobes(model, process, speed_axis(*speeds), max_depth, method, bar)
+    found = replace(found, warnings=(*doubts, *result.warnings, *told, *found.warnings))
+    coupling = _coupling(model, process, found, max_depth)
+    asked_for: dict[str, object] = {"speeds_rpm": speeds, "depth_max_m": max_depth, "method": method, "links": links}
+    asked_for["mode_coupling"] = coupling
     write_lobes(out, found, provenance=made("robot lobes", [robot, cutting], asked_for))
     for warning in found.warnings:
         typer.echo(f"warning: {warning}", err=True)
+    typer.echo(coupling)
     typer.echo(f"wrote {out}: {lobes_summary(found, max_depth)}")
     if picture is not None:
         save_figure(lobes_figure({found.method: found}), picture)
@@ -77,6 +89,14 @@ def _sliding(case: SpatialCase) -> list[bool]:
     """Which moving joints are prismatic."""
     mechanism = case.robot.mechanism
     return [mechanism.frames[index].motion == "prismatic" for index in mechanism.moving]
+
+
+def _coupling(model: ModalModel, process: MillingProcess, found: StabilityLobes, max_depth: float) -> str:
+    """Whether mode coupling decides, at the speed of the lowest limit, and its ground."""
+    if not np.isfinite(found.depth_limits).any():
+        return "mode coupling is not judged: no speed has a limit"
+    lowest = int(np.nanargmin(np.where(np.isfinite(found.depth_limits), found.depth_limits, np.nan)))
+    return judge_mode_coupling(model, process, float(found.spindle_speeds[lowest]), max_depth).words
 
 
 def write_map_over_redundancy(

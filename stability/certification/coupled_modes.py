@@ -41,7 +41,7 @@ class CouplingJudgement:
     """
 
     limit: float
-    uncoupled: float
+    alone: float
     without_regeneration: float
     decides: str
     words: str

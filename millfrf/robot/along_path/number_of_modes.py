@@ -19,7 +19,7 @@ SETTLED = 5e-3
 _COUNTS = (8, 11, 15, 20, 27, 36, 48)
 """Numbers of modes that are tried."""
 
-_MOST_TURNS = 40.0
+_MOST_TURNS = 15.0
 """Turns of the highest mode in a tooth period up to which the reference goes: the cost grows with the third power."""
 
 
@@ -49,7 +49,7 @@ def kept_modes(cut: PathCut, samples: Sequence[Request], pool: Executor | None =
     """Find the fewest modes whose limits lie within 0.5 % of a reference with many more, at the sampled postures.
 
     Modes that are not kept are left as their static flexibility, so what is lost is their dynamics alone. The
-    reference has all modes that turn at most 40 times in a tooth period. A step that changes nothing proves nothing: a
+    reference has all modes that turn at most 15 times in a tooth period. A step that changes nothing proves nothing: a
     mode at 400 Hz can lower a limit that was the same with 8 modes and with 11.
     """
     frequencies = [modes_at(cut.robot, one.q).frequencies for one in samples]

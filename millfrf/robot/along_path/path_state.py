@@ -99,7 +99,7 @@ def state_of(
     new = [i for i, key in keys.items() if key not in memory]
     fresh = values_of(cut, [request_at(path, free, loading, i, postures[i]) for i in new], pool)
     memory.update({keys[i]: row for i, row in zip(new, fresh.rows(), strict=True)})
-    values = _spread(of_rows([memory[key] for key in keys.values()]), reached)
+    values = of_rows([memory[key] for key in keys.values()]).over(reached)
     places = [free.place(p, tool, table) for p, (_, tool, table) in zip(path.places, postures, strict=True)]
     axes = np.array([place.axes for place in places])
     moved = values.cut + counted_weight(values.weight, loading.weight)
@@ -123,27 +123,3 @@ def _margins(robot: SpatialRobot, q: Real) -> tuple[float, float, float]:
     if np.isnan(q).any():
         return np.nan, np.nan, np.nan
     return limit_margin(robot.mechanism, q), *singular_values(robot.mechanism, q)
-
-
-def _spread(values: PostureValues, reached: NDArray[np.bool_]) -> PostureValues:
-    """Values over all points, NaN where not reached."""
-    if reached.all():
-        return values
-    n, at = len(reached), np.cumsum(reached) - 1
-
-    def wide(column: Real) -> Real:
-        full = np.full((n, *column.shape[1:]), np.nan)
-        full[reached] = column
-        return full
-
-    kind = tuple(values.kind[at[i]] if reached[i] else "none" for i in range(n))
-    status = tuple(values.status[at[i]] if reached[i] else "not reached" for i in range(n))
-    return PostureValues(
-        wide(values.depth),
-        wide(values.frequency),
-        kind,
-        status,
-        wide(values.lowest),
-        wide(values.cut),
-        wide(values.weight),
-    )

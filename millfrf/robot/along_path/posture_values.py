@@ -92,6 +92,14 @@ class PostureValues:
         columns = (self.depth, self.frequency, self.kind, self.status, self.lowest, self.cut, self.weight)
         return list(zip(*columns, strict=True))
 
+    def over(self, reached: NDArray[np.bool_]) -> "PostureValues":
+        """The values over all places of which these were ``reached``: NaN and ``not reached`` at the others."""
+        if reached.all():
+            return self
+        missing: ValueRow = (np.nan, np.nan, "none", "not reached", np.nan, np.full(6, np.nan), np.full(6, np.nan))
+        rows = iter(self.rows())
+        return of_rows([next(rows) if here else missing for here in reached])
+
     def known_depth(self, max_depth: float) -> Real:
         """Depth that is proven, m, (n,): at most ``max_depth``, zero where nothing is known."""
         return np.minimum(np.where(np.isnan(self.depth), 0.0, self.depth), max_depth)

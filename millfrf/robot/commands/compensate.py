@@ -17,10 +17,13 @@ def compensate(
     payload: PayloadMass = 0.0,
     payload_at: PayloadAt = None,
     weight: Weight = "all",
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE.png", help="Deviation along the path, before and after.")
+    ] = None,
 ) -> None:
     """Move a tool path against the deflection that its forces, the robot's weight and a payload will cause."""
     from ..asked_loads import loads_of
     from ..postures import Asked
     from ..results import write_compensation
 
-    write_compensation(robot, path, Asked(pose, joints), out, loads_of(payload, payload_at, weight))
+    write_compensation(robot, path, Asked(pose, joints), out, loads_of(payload, payload_at, weight), picture)

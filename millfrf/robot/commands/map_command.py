@@ -10,7 +10,10 @@ from .options import Feed, Robot, Speed
 
 def map_command(
     robot: Robot,
-    picture: Annotated[Path, typer.Option("--picture", metavar="FILE.png", help="Map over the area.")],
+    picture: Annotated[Path | None, typer.Option("--picture", metavar="FILE.png", help="Map over the area.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE.csv", help="Frequency, limit, status, joints of every place.")
+    ] = None,
     x: Annotated[tuple[float, float, int], typer.Option("--x", metavar="LO HI N", help="Area, m.")] = (0.5, 1.4, 19),
     y: Annotated[tuple[float, float, int], typer.Option("--y", metavar="LO HI N", help="m.")] = (-0.7, 0.7, 29),
     z: Annotated[float, typer.Option("--z", metavar="M", help="Height of the tool's tip, m.")] = 0.8,
@@ -22,6 +25,6 @@ def map_command(
     max_depth: Annotated[float, typer.Option("--max-depth", metavar="M", help="Largest depth looked at, m.")] = 0.02,
 ) -> None:
     """Lowest natural frequency of a vertical tool over an area, and with --cutting the depth limit."""
-    from ..results import write_workspace_map
+    from ..depth_maps import Area, write_workspace_map
 
-    write_workspace_map(robot, picture, (x, y, z, feed), cutting, speed, max_depth)
+    write_workspace_map(robot, picture, Area(x, y, z, feed), cutting, speed, max_depth, out)

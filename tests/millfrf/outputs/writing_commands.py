@@ -85,6 +85,13 @@ COMMANDS = (
     ),
     Writing("robot lobes", f"robot lobes {ROBOT} {LOBES} --out out.csv", ("out.csv",)),
     Writing("robot map", "robot map staubli_rx170 --picture out.png --x 1 1.1 2 --y 0 0.1 2", ("out.png",)),
+    Writing("robot map table", "robot map staubli_rx170 --out out.csv --x 1 1.1 2 --y 0 0.1 2", ("out.csv",)),
+    Writing(
+        "robot path",
+        "robot path kuka_kr90_angled cut_path.csv --cutting cut.toml --speed 3000 --depth 0.001 "
+        "--turns -9 0 2 --out out",
+        ("out/path.csv", "out/path.png", "out/compensated.csv"),
+    ),
     Writing("robot compensate", "robot compensate staubli_rx170 path.csv --out out.csv", ("out.csv",)),
     Writing(
         "robot identify",
@@ -102,6 +109,7 @@ def make_inputs(folder: Path) -> None:
     _killed(folder / "killed.h5")
     _can_log(folder)
     (folder / "deflections.csv").write_text(DEFLECTIONS, encoding="utf-8")
+    (folder / "cut_path.csv").write_text("x_m,y_m,z_m,i,j,k\n1.5,0.1,0.7,0,0,1\n1.6,0.1,0.7,0,0,1\n", encoding="utf-8")
     (folder / "points.csv").write_text("point,x [m],y [m],z [m]\n1,0,0,0\n2,0.1,0,0\n", encoding="utf-8")
     for source, target in (("frf_tip.h5", "given.uff"), ("model_tip.json", "given.unv")):
         assert run(["convert", str(folder / source), str(folder / target)]) == 0

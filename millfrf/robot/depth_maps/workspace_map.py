@@ -1,0 +1,172 @@
+"""`millfrf robot map`: lowest frequency and certified depth limit over an area, as a picture and as a table."""
+
+import csv
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+from foundation import InputError, warning_lines, writing_whole_file
+from robot_model import CutPlace, Payload, SpatialRobot, read_robot, target_of, tool_down, typed_values, wrist_solutions
+
+from ...gate import check_depth, check_speed, read_checked_cutting
+from ...options import check_output
+from ...progress import bar
+from ...provenance import add_comment, origin
+from ..along_path import PathCut, PostureValues, Request, kept_modes, values_of
+from ..asked_loads import check_axis, check_degrees, check_places, check_positive
+from ..postures import spatial
+from .posture_maps import depth_over_places
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Area:
+    """Places of a vertical tool: axes x and y as ``LO HI N`` (m), height z (m), direction of feed (degrees)."""
+
+    x: tuple[float, float, int]
+    y: tuple[float, float, int]
+    z: float
+    feed: float
+
+    def places(self) -> list[CutPlace]:
+        """Places, y running first."""
+        feed = np.radians(self.feed)
+        return [tool_down([u, v, self.z], feed) for u in np.linspace(*self.x) for v in np.linspace(*self.y)]
+
+
+def write_workspace_map(
+    robot: str,
+    picture: Path | None,
+    area: Area,
+    cutting: Path | None,
+    speed: float | None,
+    max_depth: float,
+    out: Path | None = None,
+) -> None:
+    """Map of the lowest frequency, and of the depth limit where a cut is given; a picture, a table, or both."""
+    _check(picture, area, cutting, speed, max_depth, out)
+    case = spatial(read_robot(robot))
+    places = area.places()
+    process, doubts = (None, []) if cutting is None else read_checked_cutting(cutting)
+    doubts += [*check_depth(max_depth, process), *([] if speed is None else check_speed(speed, process))]
+    with bar("map"):
+        if process is None or speed is None:
+            _, lowest = depth_over_places(case.robot, places, None, 1.0, max_depth, workers=2)
+            values = None
+        else:
+            cut = PathCut(case.robot, process, speed * np.pi / 30, max_depth, Payload())
+            values, lowest, told = certified_over_places(cut, places)
+            doubts += told
+    if np.isnan(lowest).all():
+        raise InputError("no place of the area is reached; move --x, --y or --z")
+    limits = np.full(len(places), np.nan) if values is None else np.minimum(values.depth, max_depth)
+    if picture is not None:
+        from ..picture import draw_workspace
+
+        draw_workspace(picture, places, (area.x[2], area.y[2]), lowest, limits)
+    if out is not None:
+        asked = {"area": area, "speed_rpm": speed, "depth_max_m": max_depth}
+        with writing_whole_file(out) as unfinished:
+            _write(unfinished, case.robot, places, lowest, values, max_depth, doubts)
+            add_comment(unfinished, origin("robot map", [robot, *([] if cutting is None else [cutting])], asked))
+    _tell(lowest, limits, values, [one for one in (picture, out) if one is not None])
+    for doubt in doubts:
+        typer.echo(f"warning: {doubt}", err=True)
+
+
+def certified_over_places(cut: PathCut, places: Sequence[CutPlace]) -> tuple[PostureValues, Real, list[str]]:
+    """Certified limits at places on the first branch of the inverse kinematics, lowest frequencies, and doubts.
+
+    Values are NaN and the status is ``not reached`` where no posture holds the tool.
+    """
+    solutions = [wrist_solutions(cut.robot.mechanism, target_of(place)) for place in places]
+    at = np.array([len(one) > 0 for one in solutions])
+    requests = [Request(solutions[i][0], places[i].axes, np.zeros(6)) for i in np.flatnonzero(at).tolist()]
+    if not requests:
+        raise InputError("no place of the area is reached; move --x, --y or --z")
+    doubts = []
+    with ProcessPoolExecutor(2) as pool:
+        samples = [requests[i] for i in np.unique(np.round(np.linspace(0, len(requests) - 1, 5)).astype(int))]
+        kept = kept_modes(cut, samples, pool)
+        found = values_of(replace(cut, highest_frequency=kept.highest_frequency), requests, pool)
+    if kept.highest_frequency < kept.reference:
+        doubts.append(
+            f"modes above {kept.highest_frequency:.0f} Hz are left as their static flexibility; more modes change the "
+            f"limits at {kept.checked} places by at most {100 * kept.change:.2g} %"
+        )
+    unsure = len(found.status) - found.status.count("verified")
+    if unsure:
+        doubts.append(f"at {unsure} of {len(found.status)} places the limit is not verified: see status in the table")
+    values = found.over(at)
+    return values, values.lowest, doubts
+
+
+def _check(
+    picture: Path | None, area: Area, cutting: Path | None, speed: float | None, max_depth: float, out: Path | None
+) -> None:
+    if picture is None and out is None:
+        raise InputError("a map needs a place to go: --picture FILE.png, --out FILE.csv, or both")
+    for path, suffixes in ((picture, (".png", ".pdf")), (out, (".csv",))):
+        if path is not None:
+            check_output(path, suffixes)
+    if (cutting is None) != (speed is None):
+        raise InputError("a map of depth limits needs both --cutting CUT.toml and --speed RPM")
+    check_axis("x", area.x)
+    check_axis("y", area.y)
+    check_places(z=area.z)
+    check_degrees(feed=area.feed)
+    check_positive("max-depth", max_depth, "metres", 1.0)
+    if speed is not None:
+        check_positive("speed", speed, "rpm", 1e6)
+
+
+def _tell(lowest: Real, limits: Real, values: PostureValues | None, written: Sequence[Path]) -> None:
+    typer.echo(f"lowest frequency {np.nanmin(lowest):.2f} to {np.nanmax(lowest):.2f} Hz")
+    if values is not None:
+        kinds = sorted(set(values.status) - {"not reached"})
+        counts = ", ".join(f"{values.status.count(kind)} {kind}" for kind in kinds)
+        typer.echo(
+            f"depth limit {1e3 * np.nanmin(limits):.2f} to {1e3 * np.nanmax(limits):.2f} mm, time-periodic solution "
+            f"checked by Floquet multipliers: {counts}"
+        )
+    names = " and ".join(str(one) for one in written)
+    typer.echo(f"wrote {names}: {np.isfinite(lowest).sum()} of {len(lowest)} places reached")
+
+
+def _write(
+    out: Path,
+    robot: SpatialRobot,
+    places: Sequence[CutPlace],
+    lowest: Real,
+    values: PostureValues | None,
+    max_depth: float,
+    doubts: Sequence[str],
+) -> None:
+    """One row a place; empty cells where it is not reached, or where a limit is not known."""
+    names = ["x_m", "y_m", "z_m", "reached", "lowest_frequency_hz"]
+    names += ["depth_limit_m", "status", "bifurcation", "chatter_frequency_hz"] if values is not None else []
+    names += [f"q{i + 1}" for i in range(6)]
+    with out.open("w", newline="", encoding="utf-8") as stream:
+        stream.writelines(warning_lines(doubts))
+        writer = csv.writer(stream)
+        writer.writerow(names)
+        for i, place in enumerate(places):
+            here = wrist_solutions(robot.mechanism, target_of(place))
+            cells: list[object] = [*place.position, "yes" if len(here) else "no", lowest[i]]
+            if values is not None:
+                depth = np.minimum(values.depth[i], max_depth)
+                cells += [depth, values.status[i], values.kind[i], values.frequency[i]]
+            cells += [*typed_values(robot.mechanism, here[0])] if len(here) else [np.nan] * 6
+            writer.writerow([_cell(cell) for cell in cells])
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return "" if np.isnan(value) else f"{value:.9g}"
+    return str(value)
