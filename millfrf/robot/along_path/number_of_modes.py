@@ -16,8 +16,8 @@ Real = NDArray[np.float64]
 SETTLED = 5e-3
 """Relative change of the limits at which more modes change nothing that a cut would show."""
 
-_COUNTS = (8, 11, 15, 20, 27, 36, 48)
-"""Numbers of modes that are tried."""
+_COUNTS = (8, 11, 15, 20, 27)
+"""Numbers of modes that are tried; the last is the reference, a kilohertz on a heavy robot."""
 
 _MOST_TURNS = 15.0
 """Turns of the highest mode in a tooth period up to which the reference goes: the cost grows with the third power."""
@@ -54,7 +54,8 @@ def kept_modes(cut: PathCut, samples: Sequence[Request], pool: Executor | None =
     """
     frequencies = [modes_at(cut.robot, one.q).frequencies for one in samples]
     size = min(len(one) for one in frequencies)
-    steps = [1.0001 * max(float(one[count - 1]) for one in frequencies) for count in _COUNTS if count < size] + [np.inf]
+    steps = [1.0001 * max(float(one[count - 1]) for one in frequencies) for count in _COUNTS if count < size]
+    steps += [np.inf] if size <= _COUNTS[-1] else []
     all_of_them = 1.0001 * max(float(one[-1]) for one in frequencies)
     most = _MOST_TURNS * cut.process.teeth * cut.speed / (2 * np.pi)
     steps = [step for step in steps if min(step, all_of_them) <= most] or steps[:1]

@@ -73,7 +73,7 @@ def chosen_sequence(costs: Costs, objective: str, balance: float) -> tuple[Postu
         FrontPoint(float(_along(costs.depth, one).min()), float(_along(costs.deviation, one).max()))
         for one in sequences
     )
-    return sequences[_balanced(front, balance)], front
+    return sequences[_balanced(front, balance)], tuple(dict.fromkeys(front))
 
 
 def _balanced(front: Sequence[FrontPoint], balance: float) -> int:
