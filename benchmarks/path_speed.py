@@ -1,8 +1,8 @@
 """Seconds of the optimisation of a tool path on the KUKA, and the least that its limits cost.
 
 Run it: `python benchmarks/path_speed.py [NUMBER OF POINTS] [RPM]`. The floor is the number of limits that the result
-states, before and after, times the seconds of one of them. What lies above it is the choice. Processor seconds count all
-processes: on two free cores the run takes about half of them, on a busy machine it takes longer.
+states, before and after, times the seconds of one of them. What lies above it is the choice. Processor seconds count
+all processes: on two free cores the run takes about half of them, on a busy machine it takes longer.
 """
 
 import resource

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from foundation import InputError
 
-from ..kinematics import has_spherical_wrist, inverse_kinematics, wrist_solutions
+from ..kinematics import has_spherical_wrist, inverse_kinematics, tool_postures, wrist_solutions
 from ..machining import CutPlace, target_of, turned_place
 from ..spatial import SpatialRobot
 from .joint_margins import limit_margin, singular_values
@@ -107,7 +107,10 @@ def path_postures(robot: SpatialRobot, path: CutPath, free: Redundancy, start: R
         One entry a point, without postures where nothing reaches it.
     """
     found: list[PointPostures] = []
-    seeds = [start]
+    mechanism, seeds = robot.mechanism, [start]
+    if not mechanism.closures and not has_spherical_wrist(mechanism):
+        target = target_of(free.place(path.places[0], float(free.tool[0]), float(free.table[0])))
+        seeds += list(tool_postures(mechanism, target, start)[:, mechanism.active])
     for place in path.places:
         here = point_postures(robot, place, free, seeds)
         found.append(here)

@@ -71,6 +71,7 @@ def write_optimised_path(
     process, warnings = read_checked_cutting(cutting)
     warnings += [*check_depth(max_depth, process), *check_speed(rpm, process)]
     case = spatial(read_robot(robot))
+    say_doubts(case.assumed)
     if not case.robot.bodies:
         raise InputError(f"{robot} gives no masses: it has statics, but no modes and no depth limits; add [[bodies]]")
     path = read_cut_path(path_file)

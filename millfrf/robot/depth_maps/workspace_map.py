@@ -11,7 +11,7 @@ import typer
 from numpy.typing import NDArray
 
 from foundation import InputError, warning_lines, writing_whole_file
-from robot_model import CutPlace, Payload, SpatialRobot, read_robot, target_of, tool_down, typed_values, wrist_solutions
+from robot_model import CutPlace, Payload, SpatialRobot, read_robot, target_of, tool_down, tool_postures, typed_values
 
 from ...gate import check_depth, check_speed, read_checked_cutting
 from ...options import check_output
@@ -20,6 +20,7 @@ from ...provenance import add_comment, origin
 from ..along_path import PathCut, PostureValues, Request, kept_modes, values_of
 from ..asked_loads import check_axis, check_degrees, check_places, check_positive
 from ..postures import spatial
+from ..results import say_doubts
 from .posture_maps import depth_over_places
 
 Real = NDArray[np.float64]
@@ -52,17 +53,19 @@ def write_workspace_map(
     """Map of the lowest frequency, and of the depth limit where a cut is given; a picture, a table, or both."""
     _check(picture, area, cutting, speed, max_depth, out)
     case = spatial(read_robot(robot))
+    say_doubts(case.assumed)
     places = area.places()
     process, doubts = (None, []) if cutting is None else read_checked_cutting(cutting)
     doubts += [*check_depth(max_depth, process), *([] if speed is None else check_speed(speed, process))]
     with bar("map"):
         if process is None or speed is None:
             _, lowest = depth_over_places(case.robot, places, None, 1.0, max_depth, workers=2)
-            values = None
+            values, postures = None, first_postures(case.robot, places) if out is not None else []
         else:
             cut = PathCut(case.robot, process, speed * np.pi / 30, max_depth, Payload())
-            values, lowest, told = certified_over_places(cut, places)
-            doubts += told
+            postures = first_postures(case.robot, places)
+            values, told = certified_over_places(cut, places, postures)
+            lowest, doubts = values.lowest, [*doubts, *told]
     if np.isnan(lowest).all():
         raise InputError("no place of the area is reached; move --x, --y or --z")
     limits = np.full(len(places), np.nan) if values is None else np.minimum(values.depth, max_depth)
@@ -73,21 +76,37 @@ def write_workspace_map(
     if out is not None:
         asked = {"area": area, "speed_rpm": speed, "depth_max_m": max_depth}
         with writing_whole_file(out) as unfinished:
-            _write(unfinished, case.robot, places, lowest, values, max_depth, doubts)
+            _write(unfinished, case.robot, (places, postures), lowest, values, max_depth, doubts)
             add_comment(unfinished, origin("robot map", [robot, *([] if cutting is None else [cutting])], asked))
     _tell(lowest, limits, values, [one for one in (picture, out) if one is not None])
-    for doubt in doubts:
-        typer.echo(f"warning: {doubt}", err=True)
+    say_doubts(doubts)
 
 
-def certified_over_places(cut: PathCut, places: Sequence[CutPlace]) -> tuple[PostureValues, Real, list[str]]:
-    """Certified limits at places on the first branch of the inverse kinematics, lowest frequencies, and doubts.
+def first_postures(robot: SpatialRobot, places: Sequence[CutPlace]) -> list[Real | None]:
+    """The first posture that the inverse kinematics gives at each place, (n_moving,); None where there is none."""
+    found: list[Real | None] = []
+    last: Real | None = None
+    for place in places:
+        solutions = tool_postures(robot.mechanism, target_of(place), last)
+        last = solutions[0] if len(solutions) else last
+        found.append(solutions[0] if len(solutions) else None)
+    return found
+
+
+def certified_over_places(
+    cut: PathCut, places: Sequence[CutPlace], postures: Sequence[Real | None]
+) -> tuple[PostureValues, list[str]]:
+    """Certified limits and lowest frequencies at places in given postures, and doubts.
 
     Values are NaN and the status is ``not reached`` where no posture holds the tool.
+
+    Raises
+    ------
+    InputError
+        No place has a posture.
     """
-    solutions = [wrist_solutions(cut.robot.mechanism, target_of(place)) for place in places]
-    at = np.array([len(one) > 0 for one in solutions])
-    requests = [Request(solutions[i][0], places[i].axes, np.zeros(6)) for i in np.flatnonzero(at).tolist()]
+    at = np.array([posture is not None for posture in postures])
+    requests = [Request(q, place.axes, np.zeros(6)) for place, q in zip(places, postures, strict=True) if q is not None]
     if not requests:
         raise InputError("no place of the area is reached; move --x, --y or --z")
     doubts = []
@@ -103,8 +122,7 @@ def certified_over_places(cut: PathCut, places: Sequence[CutPlace]) -> tuple[Pos
     unsure = len(found.status) - found.status.count("verified")
     if unsure:
         doubts.append(f"at {unsure} of {len(found.status)} places the limit is not verified: see status in the table")
-    values = found.over(at)
-    return values, values.lowest, doubts
+    return found.over(at), doubts
 
 
 def _check(
@@ -142,7 +160,7 @@ def _tell(lowest: Real, limits: Real, values: PostureValues | None, written: Seq
 def _write(
     out: Path,
     robot: SpatialRobot,
-    places: Sequence[CutPlace],
+    held: tuple[Sequence[CutPlace], Sequence[Real | None]],
     lowest: Real,
     values: PostureValues | None,
     max_depth: float,
@@ -151,18 +169,19 @@ def _write(
     """One row a place; empty cells where it is not reached, or where a limit is not known."""
     names = ["x_m", "y_m", "z_m", "reached", "lowest_frequency_hz"]
     names += ["depth_limit_m", "status", "bifurcation", "chatter_frequency_hz"] if values is not None else []
-    names += [f"q{i + 1}" for i in range(6)]
+    n_joints = int(robot.mechanism.active.sum())
+    names += [f"q{i + 1}" for i in range(n_joints)]
     with out.open("w", newline="", encoding="utf-8") as stream:
         stream.writelines(warning_lines(doubts))
         writer = csv.writer(stream)
         writer.writerow(names)
-        for i, place in enumerate(places):
-            here = wrist_solutions(robot.mechanism, target_of(place))
-            cells: list[object] = [*place.position, "yes" if len(here) else "no", lowest[i]]
+        for i, (place, q) in enumerate(zip(*held, strict=True)):
+            cells: list[object] = [*place.position, "no" if q is None else "yes", lowest[i]]
             if values is not None:
                 depth = np.minimum(values.depth[i], max_depth)
                 cells += [depth, values.status[i], values.kind[i], values.frequency[i]]
-            cells += [*typed_values(robot.mechanism, here[0])] if len(here) else [np.nan] * 6
+            active = robot.mechanism.active
+            cells += [np.nan] * n_joints if q is None else [*typed_values(robot.mechanism, q[active])]
             writer.writerow([_cell(cell) for cell in cells])
 
 
