@@ -14,8 +14,16 @@ from pathlib import Path
 import numpy as np
 
 from cutting import MillingProcess, force_harmonics
-from millfrf.robot import depth_over_redundancy
-from millfrf.robot.along_path import Loading, PathCut, PathOptimum, Wanted, draw_path, optimised
+from millfrf.robot import (
+    Loading,
+    PathCut,
+    PathOptimum,
+    Wanted,
+    certified_over_places,
+    draw_path,
+    first_postures,
+    optimised,
+)
 from robot_model import (
     CutPath,
     Payload,
@@ -27,6 +35,7 @@ from robot_model import (
     named_posture,
     read_spatial_robot,
     tool_down,
+    turned_place,
 )
 
 CUT = MillingProcess(2, 0.012, pi / 2, 600e6, 0.3, 0.1, pi / 2, pi, 1e-4)
@@ -40,8 +49,10 @@ ANGLES = np.radians(np.arange(-90.0, 91, 30))
 def over_angles(robot: str, redundancy: str) -> np.ndarray:
     """Depth limits of a cut at (1.6, 0.1, 0.7) m over seven angles, m; NaN where the place is not reached."""
     case = read_spatial_robot(robot)
-    place = tool_down([1.6, 0.1, 0.7])
-    return depth_over_redundancy(case.robot, place, ANGLES, CUT, SPEED, MAX_DEPTH, redundancy).values
+    places = [turned_place(tool_down([1.6, 0.1, 0.7]), float(angle), redundancy) for angle in ANGLES]
+    cut = PathCut(case.robot, CUT, SPEED, MAX_DEPTH, Payload())
+    values, _ = certified_over_places(cut, places, first_postures(case.robot, places))
+    return np.minimum(values.depth, MAX_DEPTH)
 
 
 def straight(points: int) -> CutPath:

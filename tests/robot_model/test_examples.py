@@ -112,3 +112,14 @@ def test_a_robot_that_mills_is_diagnosed(tmp_path: Path, change: str, name: str)
     assert cause["parameters"][name] == pytest.approx(truth, abs=3.5 * cause["standard_errors"][name])
     for one in content["held_out"]:
         assert one["after"] < 0.15 * one["before"]
+
+
+def test_both_redundancies() -> None:
+    """In line with joint 6 a turn about the tool changes nothing; across the flange it changes the limit by half."""
+    example = load("robot_path")
+    in_line = example.over_angles("kuka_kr90_r3100", "tool")
+    assert np.ptp(in_line) < 1e-6 * in_line.max()
+    across = example.over_angles("kuka_kr90_angled", "tool")
+    assert np.nanmax(across) > 1.5 * np.nanmin(across)
+    table = example.over_angles("kuka_kr90_r3100", "table")
+    assert np.nanmax(table) > 1.5 * np.nanmin(table)
