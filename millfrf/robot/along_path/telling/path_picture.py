@@ -68,7 +68,7 @@ def _depths(
     limits[0] = np.where(before.reached, limits[0], np.nan)
     highest = float(max(np.nanmax(limit, initial=0.0) for limit in limits))
     top = 1.15 * min(1e3 * max_depth, highest) or 1.0
-    found = limits[1] < max_depth
+    found = limits[1] < 1e3 * max_depth
     axes.fill_between(way, limits[1], top, where=found, color=SHADE, label="unstable in the chosen postures")
     axes.plot(way, limits[0], color=COLOURS[0], linestyle=LINE_STYLES[1], label="limit, redundancy at zero")
     axes.plot(way, limits[1], color=COLOURS[1], label="limit, chosen postures")
