@@ -14,6 +14,7 @@ from ..serial_chains import RigidPart, SerialChain, SerialJoint, inertia_fault, 
 from ..spatial import check_tip
 from .robot_files import Table, read_as
 from .spatial_file import Damping, Pose, SpatialCase, named_postures, rayleigh_of, upwards
+from .update_table import UpdateTable, uncertainty_of, with_late_numbers
 
 Real = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -76,6 +77,7 @@ class _File(BaseModel):
     spindle: _Mass | None = None
     damping: Damping | None = None
     poses: list[Pose] = []
+    update: UpdateTable | None = None
 
 
 def read_serial_robot(robot: str | os.PathLike[str]) -> SpatialCase:
@@ -109,9 +111,12 @@ def _case(content: _File) -> SpatialCase:
         gravity=content.robot.gravity_m_per_s2,
         up=upwards(content.robot.up),
     )
+    if content.update is not None:
+        built = with_late_numbers(built, content.update)
     check_tip(built)
     poses = named_postures(content.poses, built.mechanism)
-    return SpatialCase(content.robot.name, built, poses, content.robot.repeatability_m, _assumed(content))
+    uncertainty = None if content.update is None else uncertainty_of(content.update)
+    return SpatialCase(content.robot.name, built, poses, content.robot.repeatability_m, _assumed(content), uncertainty)
 
 
 def _assumed(content: _File) -> tuple[str, ...]:

@@ -12,13 +12,13 @@ from pydantic import BaseModel, ConfigDict, Field
 from foundation import InputError
 
 from ..finite_elements import Material, Section, hollow_circle, rayleigh_constants
-from ..full_update import UpdateParameter
 from ..kinematics import LARGEST_TRAVEL, Frame, Mechanism, named_values
 from ..serial_chains import inertia_fault, symmetric
 from ..spatial import ElasticJoint, Link, LumpedBody, SpatialRobot, check_tip
 from ..uncertain_robot import RobotUncertainty
 from .drive_table import DriveKeys, drive_of
 from .robot_files import Table, read_as
+from .update_table import UpdateTable, uncertainty_of
 
 
 class _Head(Table):
@@ -108,30 +108,6 @@ class Pose(Table):
     driven_deg: list[float] | None = None
 
 
-class _Number(Table):
-    """A number that ``robot update`` freed."""
-
-    name: str
-    kind: str
-    unit: str = ""
-    frame: str = ""
-    group: str = ""
-    axis: int = 0
-    spread: float
-    value: float
-    standard_error: float = 0.0
-    told: bool = True
-
-
-class _Update(Table):
-    """What ``robot update`` did to the file."""
-
-    verdict: str
-    named: list[str]
-    covariance: list[list[float]]
-    numbers: list[_Number]
-
-
 class _File(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
@@ -144,7 +120,7 @@ class _File(BaseModel):
     bodies: list[_Body] = []
     damping: Damping | None = None
     poses: list[Pose] = []
-    update: _Update | None = None
+    update: UpdateTable | None = None
 
 
 @dataclass(frozen=True)
@@ -214,14 +190,8 @@ def _case(content: _File) -> SpatialCase:
     check_tip(spatial)
     poses = named_postures(content.poses, spatial.mechanism)
     _check_masses(content.bodies)
-    uncertainty = None if content.update is None else _uncertainty(content.update)
+    uncertainty = None if content.update is None else uncertainty_of(content.update)
     return SpatialCase(content.robot.name, spatial, poses, content.robot.repeatability_m, uncertainty=uncertainty)
-
-
-def _uncertainty(table: _Update) -> RobotUncertainty:
-    rows = table.numbers
-    freed = tuple(UpdateParameter(r.name, r.kind, r.unit, r.spread, r.frame, r.group, r.axis) for r in rows)
-    return RobotUncertainty(freed, np.array([row.value for row in rows]), np.array(table.covariance, ndmin=2))
 
 
 def _check_masses(rows: list[_Body]) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .belief import Belief, added_parts, settled
+from .belief import Belief, added_parts, descended
 from .misfit import Problem, misfit_of
 
 Real = NDArray[np.float64]
@@ -40,8 +40,8 @@ def left_out(problem: Problem, found: Belief) -> tuple[LeftOut, ...]:
         held = _at_zero(problem, found)
         results = []
         for i, (measured, _) in enumerate(problem.postures):
-            without = settled(problem.without(i), found.x, held, rounds=2)
-            results.append(_judged(problem, i, measured.name, without.x))
+            x, _ = descended(problem.without(i), found.x, found.scale, found.modes_off, held)
+            results.append(_judged(problem, i, measured.name, x))
         return tuple(results)
     measured, system = problem.postures[0]
     if measured.projection is not None:
@@ -50,8 +50,8 @@ def left_out(problem: Problem, found: Belief) -> tuple[LeftOut, ...]:
     results = []
     for side in (0, 1):
         parts = [Problem(problem.parameters, ((measured.part(block % 2 == s), system),)) for s in (side, 1 - side)]
-        without = settled(parts[0], found.x, _at_zero(problem, found), rounds=2)
-        results.append(_judged(parts[1], 0, f"{measured.name}, half {side + 1} of the lines", without.x))
+        x, _ = descended(parts[0], found.x, found.scale, found.modes_off, _at_zero(problem, found))
+        results.append(_judged(parts[1], 0, f"{measured.name}, half {side + 1} of the lines", x))
     return tuple(results)
 
 

@@ -29,6 +29,8 @@ LEAST = {
     "tool mass": 0.3,
     "tool": 5e-9,
     "base": 5e-10,
+    "inertia": np.inf,
+    "sprung mass": np.inf,
 }
 """Smallest difference that is named, in the parameter's unit: what is less is within what files are known to."""
 
@@ -40,7 +42,8 @@ def told_numbers(parameters: Sequence[UpdateParameter], found: Belief) -> NDArra
     for i, one in enumerate(parameters):
         if one.kind == "payload" and one.axis == 3 and not abs(found.x[i]) > 3 * found.errors[i]:
             told[[k for k, other in enumerate(parameters) if other.kind == "payload" and other.axis < 3]] = False
-    return np.asarray(told)
+    sprung = any(one.kind == "tool" and value > 0 for one, value in zip(parameters, found.x, strict=True))
+    return np.asarray(told & np.array([one.kind != "sprung mass" or sprung for one in parameters]))
 
 
 def names_of(

@@ -20,6 +20,12 @@ FINEST = 1e-3
 LINES_A_MODE = 24
 """Lines about each pole on which a modal model is compared."""
 
+MOST_LINES = 120
+"""Lines that are compared at most: neighbours of a finer estimate tell nearly the same."""
+
+SMOOTHED = 20
+"""Lines on either side over which the covariance of the responses is averaged."""
+
 FITTED_ERRORS = (0.002, 0.05, 0.03)
 """Errors of frequency, damping and shapes, as shares, where a modal model states none."""
 
@@ -48,6 +54,8 @@ class PosedReceptance:
         For a modal model, what whitens real and imaginary parts of all lines together; then left and right are empty.
     window : (n_taps,) or None
         Weights by which a windowed estimate averages the FRF over half lines about each line; None: it does not.
+    half_line : Hz
+        Half the distance of the estimate's lines.
     sensor : (3,), m, or None
         Housing sensor from the tip, in the channels' axes.
     independent : float
@@ -65,6 +73,7 @@ class PosedReceptance:
     right: Complex
     projection: Real | None = None
     window: Real | None = None
+    half_line: float = 0.0
     sensor: Real | None = None
     independent: float = 1.0
 
@@ -73,17 +82,15 @@ class PosedReceptance:
         """Frequencies at which the model is asked, Hz: half lines too where a window averages over them."""
         if self.window is None:
             return self.frequencies
-        step, reach = np.diff(self.frequencies).min() / 2, len(self.window) // 2
-        count = round((self.frequencies[-1] - self.frequencies[0]) / step)
-        return np.asarray(np.maximum(self.frequencies[0] + step * np.arange(-reach, count + reach + 1), 1e-3))
+        taps = self.half_line * (np.arange(len(self.window)) - len(self.window) // 2)
+        return np.asarray(np.maximum(self.frequencies[:, None] + taps, 1e-3).ravel())
 
     def as_measured(self, model: Complex) -> Complex:
         """The model's values on :attr:`lines` as this measurement shows them, (..., n_lines, p, q)."""
         if self.window is None:
             return model
-        step = np.diff(self.frequencies).min() / 2
-        at = np.round((self.frequencies - self.frequencies[0]) / step).astype(int)
-        return np.asarray(sum(w * model[..., at + i, :, :] for i, w in enumerate(self.window)))
+        taps = model.reshape(*model.shape[:-3], len(self.frequencies), len(self.window), *model.shape[-2:])
+        return np.asarray(np.tensordot(taps, self.window, axes=(-3, 0)))
 
     def whitened(self, error: Complex) -> Real:
         """Errors (..., n_lines, p, q) as real numbers of unit variance, (..., n)."""
@@ -169,6 +176,10 @@ def measured_frf(
     kept = found.valid & (found.frequencies >= band[0]) & (found.frequencies <= band[1])
     if kept.sum() < 10:
         raise InputError(f"{name}: {kept.sum()} valid lines from {band[0]:g} to {band[1]:g} Hz; 10 are the least")
+    spacing = float(np.diff(found.frequencies).min())
+    places = np.flatnonzero(kept)
+    kept = np.zeros_like(kept)
+    kept[places[:: -(-len(places) // MOST_LINES)]] = True
     left, right = _whiteners(found, kept)
     values = found.values[kept]
     return PosedReceptance(
@@ -182,6 +193,7 @@ def measured_frf(
         left,
         right,
         window=window,
+        half_line=spacing / 2,
         sensor=sensor,
     )
 
@@ -192,7 +204,8 @@ def _whiteners(frf: Frf, kept: NDArray[np.bool_]) -> tuple[Complex, Complex]:
     size = np.sqrt(np.mean(np.abs(values) ** 2, axis=(1, 2)))
     p, q = values.shape[1:]
     if frf.covariance is not None:
-        response, excitation = frf.covariance.response[kept], frf.covariance.excitation[kept]
+        response = _smoothed(frf.covariance.response)[kept]
+        excitation = frf.covariance.excitation[kept]
         scale = np.einsum("kqq->k", excitation).real / q
         level = response * scale[:, None, None] + (FINEST * size)[:, None, None] ** 2 * np.eye(p)
         unit = excitation / np.maximum(scale, 1e-300)[:, None, None]
@@ -204,6 +217,19 @@ def _whiteners(frf: Frf, kept: NDArray[np.bool_]) -> tuple[Complex, Complex]:
     level = np.sqrt(known.mean(axis=2) + (FINEST * size)[:, None] ** 2)
     left = np.eye(p) / level[:, :, None]
     return left.astype(complex), np.broadcast_to(np.eye(q, dtype=complex), (len(values), q, q))
+
+
+def _smoothed(covariance: Complex) -> Complex:
+    """Mean over neighbouring lines: whitening by a covariance of few averages makes every error seem larger.
+
+    With nu averages and p responses the squared errors grow by ``nu / (nu - p)`` (Hotelling 1931).
+    """
+    half = min(SMOOTHED, (len(covariance) - 1) // 8)
+    if half < 1:
+        return covariance
+    flat = np.pad(covariance.reshape(len(covariance), -1), ((half, half), (0, 0)), mode="edge")
+    whole = np.cumsum(np.vstack([np.zeros((1, flat.shape[1])), flat]), axis=0)
+    return np.asarray((whole[2 * half + 1 :] - whole[: -2 * half - 1]) / (2 * half + 1)).reshape(covariance.shape)
 
 
 def _inverse_root(matrices: Complex) -> Complex:

@@ -89,6 +89,7 @@ def update_robot(
     measured: Sequence[PosedReceptance],
     poses: Mapping[str, Real] | None = None,
     *,
+    plan: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> RobotUpdate:
     """Update all numbers of a robot together by FRFs and modal models at one posture or more.
@@ -104,6 +105,8 @@ def update_robot(
         What was measured, each in its posture.
     poses
         Postures of the file, driven values, that may be measured next; None: random ones only.
+    plan
+        Whether a posture to measure next is sought.
     progress
         Callable that is told what is being done.
 
@@ -125,7 +128,7 @@ def update_robot(
     named, _ = names_of(robot, problem, found, held)
     verdict, reason = _verdict(held, fitted, bool(named.any()))
     say("weighing postures to measure next")
-    following = next_posture(robot, poses or {}, problem, found)
+    following = next_posture(robot, poses or {}, problem, found) if plan else None
     told = told_numbers(parameters, found)
     worst = max([1.0, *(one.after for one in held)])
     wider = found.covariance if verdict in ("none", "explained") else found.covariance * worst**2

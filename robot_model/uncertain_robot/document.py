@@ -39,39 +39,53 @@ def updated_document(text: str, robot: SpatialRobot, update: RobotUpdate) -> str
     """The text of a robot's file with the numbers of an update, and its covariance in ``[update]``.
 
     Stiffnesses, damping and moduli change in place. A payload is a further body, of negative mass where the file's
-    spindle is too heavy. A tool that gives way is a spring with 0.2 kg of the spindle's mass. A base that gives way is
-    a fixed frame ``foundation`` with a spring, between node 0 and what was bolted to it.
+    spindle is too heavy. A tool that gives way is a spring with a small part of the spindle's mass. A base that gives
+    way is a fixed frame ``foundation`` with a spring, between node 0 and what was bolted to it.
 
     Parameters
     ----------
     text
-        Content of the file.
+        Content of the file, of kind ``spatial`` or ``serial``. A serial one has no keys for payload, tool and base:
+        they stand in ``[update]`` alone and are applied on reading.
     robot
         The robot that it describes.
     update
         What was found.
+
+    Raises
+    ------
+    InputError
+        A file that was updated already, or whose tables are written in one line.
     """
     document = tomlkit.parse(text)
     if "update" in document:
-        del document["update"]
+        raise InputError(
+            "this file was updated already; update the file before it, with all measurements together: "
+            "what an update leaves open is not the belief that the next one begins with"
+        )
     parameters, x = update.parameters, update.x
+    serial = document["robot"]["kind"] == "serial"
     for one, value in zip(parameters, x, strict=True):
         if one.kind == "stiffness":
-            _scale_joint(document, one, float(np.exp(value)))
-        elif one.kind == "joint damping" and value:
+            _scale_joint(document, robot, one, float(np.exp(value)))
+        elif one.kind == "joint damping" and value and not serial:
             _damp_joint(document, robot, one, float(value))
         elif one.kind == "damping":
             _scale_damping(document, float(np.exp(value)))
+        elif one.kind == "inertia" and not serial:
+            row = _rows(document, "bodies")[one.axis]
+            row["inertia_kg_m2"] = [_short(float(moment) * float(np.exp(value))) for moment in row["inertia_kg_m2"]]
         elif one.kind == "links":
             _scale_links(document, float(np.exp(value)))
-    _add_masses(document, robot, parameters, x)
-    _add_tool(document, robot, parameters, x)
-    _add_base(document, parameters, x)
-    document["update"] = _table_of(update)
+    if not serial:
+        _add_masses(document, robot, parameters, x)
+        _add_tool(document, robot, parameters, x)
+        _add_base(document, parameters, x)
+    document["update"] = _table_of(update, serial)
     return tomlkit.dumps(document)
 
 
-def _table_of(update: RobotUpdate) -> Table:
+def _table_of(update: RobotUpdate, serial: bool) -> Table:
     table = tomlkit.table()
     table["source"] = f"{SOURCE}: {update.verdict}; {update.reason}"
     table["verdict"] = update.verdict
@@ -86,6 +100,7 @@ def _table_of(update: RobotUpdate) -> Table:
         entry.update({"name": one.name, "kind": one.kind, "unit": one.unit, "frame": one.frame, "group": one.group})
         entry.update({"axis": one.axis, "spread": one.spread, "value": float(value)})
         entry.update({"standard_error": float(error), "told": bool(told), "source": SOURCE})
+        entry["in_file"] = not serial or one.kind in ("stiffness", "damping")
         numbers.append(entry)
     table["numbers"] = numbers
     return table
@@ -100,10 +115,16 @@ def _rows(document: Any, key: str) -> AoT:
     return found
 
 
-def _scale_joint(document: Any, one: UpdateParameter, factor: float) -> None:
+def _scale_joint(document: Any, robot: SpatialRobot, one: UpdateParameter, factor: float) -> None:
+    """Scale a joint's stiffness; in a serial robot's file it stands in its own table, ``drive`` along the motion."""
+    motion = robot.mechanism.frames[robot.mechanism.index(one.frame)].motion
+    own = {("revolute", "turning"): "drive_nm_per_rad", ("prismatic", "axial"): "drive_n_per_m"}
     for row in _rows(document, "joints"):
-        if row["frame"] == one.frame and KEYS[one.group] in row:
-            row[KEYS[one.group]] = _short(float(row[KEYS[one.group]]) * factor)
+        table, key = row, KEYS[one.group]
+        if "stiffness" in row:
+            table, key = row["stiffness"], own.get((motion, one.group), key)
+        if row.get("frame", row.get("name")) == one.frame and key in table:
+            table[key] = _short(float(table[key]) * factor)
 
 
 def _damp_joint(document: Any, robot: SpatialRobot, one: UpdateParameter, value: float) -> None:
@@ -152,7 +173,7 @@ def _add_body(document: Any, robot: SpatialRobot, node: int, mass: float, place:
 
 
 def _add_tool(document: Any, robot: SpatialRobot, parameters: Sequence[UpdateParameter], x: Real) -> None:
-    own = [(one, value) for one, value in zip(parameters, x, strict=True) if one.kind == "tool"]
+    own = [(one, value) for one, value in zip(parameters, x, strict=True) if one.kind in ("tool", "sprung mass")]
     kept = tuple(one for one, _ in own)
     changed = changed_by(robot, kept, np.array([value for _, value in own]))
     spring, before = tool_spring(changed), tool_spring(robot)
@@ -169,7 +190,7 @@ def _add_tool(document: Any, robot: SpatialRobot, parameters: Sequence[UpdatePar
         place = place_of_node(robot, robot.tip) if body.node == robot.tip else np.zeros(3)
         what = "its mass, taken from the spindle" if body.mass < 0 else "the tool on its spring"
         row = tomlkit.table()
-        row.update({"node": body.node, "frame": body.frame, "mass_kg": body.mass})
+        row.update({"node": body.node, "frame": body.frame, "mass_kg": _short(body.mass)})
         row["centre_m"] = [float(value) for value in place]
         row["source"] = f"{SOURCE}: {what}"
         _rows(document, "bodies").append(row)

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from ...finite_elements import Section
 from ...kinematics import Frame, drive_direction
-from ...model_updating import end_bodies
 from ...spatial import (
     TOOL_MASS,
     ElasticJoint,
@@ -20,7 +19,7 @@ from ...spatial import (
     tool_spring,
     with_tool_spring,
 )
-from .update_parameter import FOUNDATION, GROUPS, UpdateParameter
+from .update_parameter import FOUNDATION, GROUPS, UpdateParameter, heaviest_end
 
 Real = NDArray[np.float64]
 
@@ -53,7 +52,8 @@ def changed_by(robot: SpatialRobot, parameters: Sequence[UpdateParameter], x: Re
     damping = None if found.damping_ratio is None else ratio * found.damping_ratio
     found = replace(found, rayleigh=(ratio * a, ratio * b), damping_ratio=damping)
     found = _with_masses(found, parameters, values)
-    found = _with_tool(found, _of_kind(parameters, values, "tool"))
+    mass = sprung_mass(_of_kind(parameters, values, "sprung mass").get(0, 0.0))
+    found = _with_tool(found, _of_kind(parameters, values, "tool"), mass)
     base = _of_kind(parameters, values, "base")
     return with_foundation(found, base.get(0, 0.0), base.get(1, 0.0))
 
@@ -130,9 +130,8 @@ def carrier_node(robot: SpatialRobot) -> int:
 
     The spindle's node where there is no such body.
     """
-    ends = [robot.bodies[i] for i in end_bodies(robot) if robot.bodies[i].mass > 0]
-    own = [body for body in ends if body.node != robot.tip or tool_spring(robot) is None]
-    return max(own, key=lambda body: body.mass).node if own else housing_node(robot)
+    heaviest = heaviest_end(robot)
+    return housing_node(robot) if heaviest is None else robot.bodies[heaviest].node
 
 
 def place_of_node(robot: SpatialRobot, node: int) -> Real:
@@ -157,6 +156,12 @@ def tool_node(robot: SpatialRobot) -> int:
 
 def _with_masses(robot: SpatialRobot, parameters: Sequence[UpdateParameter], x: Real) -> SpatialRobot:
     payload = _of_kind(parameters, x, "payload")
+    turned = _of_kind(parameters, x, "inertia")
+    bodies = tuple(
+        replace(body, inertia=body.inertia * np.exp(turned[i])) if i in turned else body
+        for i, body in enumerate(robot.bodies)
+    )
+    robot = replace(robot, bodies=bodies) if turned else robot
     added = []
     if payload.get(3, 0.0):
         place = np.array([payload.get(axis, 0.0) for axis in range(3)]) + payload_centre(robot)
@@ -172,7 +177,12 @@ def payload_centre(robot: SpatialRobot) -> Real:
     return np.array([0.0, 0.0, -0.25])
 
 
-def _with_tool(robot: SpatialRobot, added: dict[int, float]) -> SpatialRobot:
+def sprung_mass(further: float) -> float:
+    """Mass that moves on the spring of a tool that gives way, kg: a small tool's, and what further moves with it."""
+    return max(TOOL_MASS + further, 0.1 * TOOL_MASS)
+
+
+def _with_tool(robot: SpatialRobot, added: dict[int, float], mass: float) -> SpatialRobot:
     lateral, axial = (max(added.get(axis, 0.0), 0.0) for axis in range(2))
     spring = tool_spring(robot)
     if spring is not None:  # a compliance below zero makes the file's spring stiffer, down to a tenth of its own
@@ -183,8 +193,8 @@ def _with_tool(robot: SpatialRobot, added: dict[int, float]) -> SpatialRobot:
         return replace(robot, joints=joints)
     if max(lateral, axial) <= LEAST_COMPLIANCE:
         return robot
-    lighter = replace(robot, bodies=(*robot.bodies, point_mass(robot, -TOOL_MASS, np.zeros(3), robot.tip)))
-    return with_tool_spring(lighter, lateral, axial, TOOL_MASS)
+    lighter = replace(robot, bodies=(*robot.bodies, point_mass(robot, -mass, np.zeros(3), robot.tip)))
+    return with_tool_spring(lighter, lateral, axial, mass)
 
 
 def _of_kind(parameters: Sequence[UpdateParameter], x: Real, kind: str) -> dict[int, float]:

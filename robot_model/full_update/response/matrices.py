@@ -149,7 +149,7 @@ def _factor(robot: SpatialRobot, structure: Structure, one: UpdateParameter, bas
     if one.kind in ("payload", "tool mass"):
         node = tool_node(robot) if one.kind == "tool mass" else carrier_node(robot)
         return np.asarray(basis[6 * node : 6 * node + 6])
-    if one.kind == "body":
+    if one.kind in ("body", "inertia"):
         node = structure.bodies[one.axis].node
         return np.asarray(basis[6 * node : 6 * node + 6])
     if one.kind in ("stiffness", "joint damping", "base"):
@@ -162,9 +162,9 @@ def _factor(robot: SpatialRobot, structure: Structure, one: UpdateParameter, bas
 def _blocks(structure: Structure, parameters: Sequence[UpdateParameter]) -> dict[int, Real]:
     found = {}
     for i, one in enumerate(parameters):
-        if one.kind == "body":
+        if one.kind in ("body", "inertia"):
             body = structure.bodies[one.axis]
-            found[i] = mass_block(body.mass, body.centre)
+            found[i] = mass_block(body.mass if one.kind == "body" else 0.0, body.centre)
             found[i][3:, 3:] += body.inertia
     return found
 

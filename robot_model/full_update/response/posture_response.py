@@ -7,13 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, eigh
 
-from ...spatial import TOOL_MASS
-from .changed_structure import LEAST_COMPLIANCE
+from .changed_structure import LEAST_COMPLIANCE, sprung_mass
 from .matrices import PostureSystem, mass_block
 from .update_parameter import UpdateParameter
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+STEP = 1e-4
+"""Step of a difference over the mass on the tool's spring, kg."""
 
 COUPLED = 4.0
 """Modes up to so many times the band are coupled by damping; higher ones have their own share of it."""
@@ -159,11 +161,14 @@ class _Known:
         """Motion of tip and housing per force in the tool's spring, and that force per force at the tip."""
         lateral, axial = (_value(self.parameters, self.x, "tool", axis) for axis in (0, 1))
         compliance = self._tool(np.array([lateral, lateral, axial]))
-        square = (self.omega**2 * TOOL_MASS)[:, None, None]
+        square = (self.omega**2 * self._sprung_mass())[:, None, None]
         moved = self.observed_over(tuple(range(6)), (0, 1, 2))
         moved = moved @ np.linalg.inv(np.eye(3) + square * moved[:, :3])
         moved[:, :3] += compliance
         return moved, np.asarray(np.linalg.inv(np.eye(3) - square * moved[:, :3]))
+
+    def _sprung_mass(self) -> float:
+        return sprung_mass(_value(self.parameters, self.x, "sprung mass"))
 
     def _tool(self, compliance: Real) -> Real:
         """Compliance across and along the tool in the channels' axes, (3, 3)."""
@@ -172,15 +177,17 @@ class _Known:
     def _tool_slope(self, axis: int) -> Complex:
         unit = self._tool(np.array([1.0, 1.0, 0.0]) if axis == 0 else np.array([0.0, 0.0, 1.0]))
         moved, loaded = self._parts_with_tool()
-        change = moved @ loaded @ ((self.omega**2 * TOOL_MASS)[:, None, None] * unit) @ loaded
+        change = moved @ loaded @ ((self.omega**2 * self._sprung_mass())[:, None, None] * unit) @ loaded
         change[:, :3] += unit @ loaded
         return np.asarray(change)
 
     def slope(self, i: int, rows: tuple[int, ...], columns: tuple[int, ...]) -> Complex:
         """Derivative over one freed number."""
-        one = self.parameters[i]
+        one, size = self.parameters[i], (len(self.omega), len(rows), len(columns))
         if one.kind == "tool":
             return self._tool_slope(one.axis)[:, list(rows)][:, :, list(columns)]
+        if one.kind == "sprung mass":
+            return self._sprung_slope(rows, columns, size)
         left, right = self.solved[:, :, list(rows)], self.solved[:, :, list(columns)]
         if one.kind == "damping":
             return np.asarray(-1j * self.omega[:, None, None] * _quadratic(left, np.diag(self.base), right))
@@ -189,7 +196,7 @@ class _Known:
         a, b = factor @ left, factor @ right
         if one.kind == "joint damping":
             return np.asarray(-1j * self.omega[:, None, None] * self.system.damping_units[i] * _outer(a, b))
-        if one.kind in ("payload", "tool mass", "body"):
+        if one.kind in ("payload", "tool mass", "body", "inertia"):
             block = self._mass_slope(i)
             change = factor.T @ block @ factor
             direct = (self.omega**2)[:, None, None] * _outer(a, block @ b)
@@ -197,6 +204,20 @@ class _Known:
         weight = self._stiffness_slope(i)
         change = weight * factor.T @ factor
         return np.asarray(-weight * _outer(a, b) - self._damping_change(change, np.zeros_like(change), left, right))
+
+    def _sprung_slope(self, rows: tuple[int, ...], columns: tuple[int, ...], size: tuple[int, int, int]) -> Complex:
+        """Derivative over the mass that moves on the tool's spring instead of with the spindle."""
+        if not any(_value(self.parameters, self.x, "tool", axis) for axis in (0, 1)):
+            return np.zeros(size, dtype=complex)
+        place, before = self._place_of("sprung mass"), self.with_tool(rows, columns)
+        own = self.x[place]
+        self.x = self.x + STEP * np.eye(len(self.x))[place]
+        after = self.with_tool(rows, columns)
+        self.x = self.x - (self.x[place] - own) * np.eye(len(self.x))[place]
+        return np.asarray((after - before) / STEP)
+
+    def _place_of(self, kind: str) -> int:
+        return next(i for i, one in enumerate(self.parameters) if one.kind == kind)
 
     def _stiffness_slope(self, i: int) -> float:
         one, value = self.parameters[i], self.x[i]
@@ -206,7 +227,7 @@ class _Known:
 
     def _mass_slope(self, i: int) -> Real:
         one = self.parameters[i]
-        if one.kind == "body":
+        if one.kind in ("body", "inertia"):
             return np.asarray(np.exp(self.x[i]) * self.system.blocks[i])
         if one.kind == "tool mass":
             return mass_block(1.0, self.system.tool_arm)
@@ -267,7 +288,7 @@ def _assembled(system: PostureSystem, parameters: Sequence[UpdateParameter], x: 
     for i, (one, value, factor) in enumerate(zip(parameters, x, system.factors, strict=True)):
         if factor is None:
             continue
-        if one.kind == "body":
+        if one.kind in ("body", "inertia"):
             mass += np.expm1(value) * factor.T @ system.blocks[i] @ factor
         if one.kind in ("stiffness", "links"):
             stiffness += np.exp(value) * factor.T @ factor

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...kinematics import drive_direction
+from ...model_updating import end_bodies
 from ...spatial import SpatialRobot, tool_spring
 
 GROUPS = {"radial": (0, 1), "axial": (2,), "tilting": (3, 4), "turning": (5,)}
@@ -26,8 +27,8 @@ class UpdateParameter:
     name
         Name for people, and in the file: ``joint 3 stiffness``, ``payload mass``, ``base tilting compliance``.
     kind
-        ``stiffness``, ``joint damping``, ``damping``, ``links``, ``payload``, ``tool mass``, ``tool``, ``base`` or
-        ``body``.
+        ``stiffness``, ``joint damping``, ``damping``, ``links``, ``payload``, ``tool mass``, ``tool``,
+        ``sprung mass``, ``base``, ``inertia`` or ``body``.
     unit
         Unit of x; "" where x is a logarithm or a damping ratio.
     spread
@@ -49,7 +50,7 @@ class UpdateParameter:
     @property
     def logarithmic(self) -> bool:
         """Whether x is the logarithm of a factor on the file's number."""
-        return self.kind in ("stiffness", "links", "damping")
+        return self.kind in ("stiffness", "links", "damping", "inertia")
 
 
 def free_parameters(robot: SpatialRobot) -> tuple[UpdateParameter, ...]:
@@ -69,13 +70,27 @@ def free_parameters(robot: SpatialRobot) -> tuple[UpdateParameter, ...]:
         found.append(UpdateParameter("links", "links", "", 0.5))
     found.append(UpdateParameter("payload mass", "payload", "kg", 15.0, axis=3))
     found += [UpdateParameter(f"payload place {axis}", "payload", "m", 0.2, axis=i) for i, axis in enumerate("xyz")]
+    heaviest = heaviest_end(robot)
+    if heaviest is not None and robot.bodies[heaviest].inertia.any():
+        found.append(UpdateParameter("spindle inertia", "inertia", "", 0.3, axis=heaviest))
     found.append(UpdateParameter("tool mass", "tool mass", "kg", 2.0))
     found.append(UpdateParameter("tool lateral compliance", "tool", "m/N", 1.5e-7, axis=0))
     found.append(UpdateParameter("tool axial compliance", "tool", "m/N", 5e-8, axis=1))
+    if tool_spring(robot) is None:
+        found.append(UpdateParameter("mass on the tool's spring", "sprung mass", "kg", 0.2))
     if all(frame.name != FOUNDATION for frame in robot.mechanism.frames):
         found.append(UpdateParameter("base tilting compliance", "base", "rad/(N m)", 3e-8, axis=0))
         found.append(UpdateParameter("base radial compliance", "base", "m/N", 1e-8, axis=1))
     return tuple(found)
+
+
+def heaviest_end(robot: SpatialRobot) -> int | None:
+    """Index of the heaviest body after the last joint and before a tool's spring, the spindle; None: there is none."""
+    sprung = tool_spring(robot) is not None
+    ends = [
+        i for i in end_bodies(robot) if robot.bodies[i].mass > 0 and not (sprung and robot.bodies[i].node == robot.tip)
+    ]
+    return max(ends, key=lambda i: robot.bodies[i].mass, default=None)
 
 
 def unnamed_parameters(robot: SpatialRobot) -> tuple[UpdateParameter, ...]:

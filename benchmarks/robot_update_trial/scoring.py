@@ -1,0 +1,41 @@
+"""Scores of the trial: wrong names, coverage of intervals, error on the unseen posture, verdicts; by kind of case."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+HEAD = (
+    "| kind | cases | explained, partly, none, unexplained | right names of wrong numbers | wrong names | "
+    "95 % intervals that hold | unseen posture: filed, updated (times the noise) |\n|---|---|---|---|---|---|---|"
+)
+VERDICTS = ("explained", "partly explained", "none", "unexplained")
+
+
+def table_of(results: Sequence[dict[str, Any]]) -> str:
+    """Table in Markdown: a row for each kind, and one for all."""
+    kinds = list(dict.fromkeys(one["kind"] for one in results))
+    rows = [_row(kind, [one for one in results if one["kind"] == kind]) for kind in kinds]
+    own = [one for one in results if not one["foreign"]]
+    rows.append(_row("**all but foreign**", own))
+    rows.append(_row("**all**", results))
+    worse = [one["number"] for one in results if one["verdict"] == "explained" and _leaves_more(one)]
+    return "\n".join([HEAD, *rows, "", f"explained, but leaves more on the unseen posture: {worse or 'none'}", ""])
+
+
+def _row(kind: str, results: Sequence[dict[str, Any]]) -> str:
+    counts = ", ".join(str(sum(one["verdict"] == verdict for one in results)) for verdict in VERDICTS)
+    named = sum(len(one["named"]) for one in results)
+    wrong = sum(len(one["wrong_names"]) for one in results)
+    real = sum(sum("place" not in name for name in one["expected"]) for one in results)
+    told = [n for one in results for n in one["numbers"] if n["told"] and n["x"] != 0]
+    held = np.array([abs(n["x"] - n["expected"]) <= 1.96 * n["error"] for n in told])
+    unseen = np.array([[one["unseen"]["filed"], one["unseen"]["updated"]] for one in results])
+    coverage = f"{100 * held.mean():.1f} % of {len(held)}" if len(held) else "-"
+    errors = f"{np.median(unseen[:, 0]):.3g}, {np.median(unseen[:, 1]):.3g} (worst {unseen[:, 1].max():.3g})"
+    names = f"{named - wrong} of {real} | {wrong} of {named}"
+    return f"| {kind} | {len(results)} | {counts} | {names} | {coverage} | {errors} |"
+
+
+def _leaves_more(one: dict[str, Any]) -> bool:
+    return bool(one["unseen"]["updated"] > max(one["unseen"]["filed"], 1.2))

@@ -1,0 +1,57 @@
+"""Table ``[update]`` of a robot's file: what `robot update` changed, and what it left open."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..full_update import UpdateParameter, changed_by
+from ..spatial import SpatialRobot
+from ..uncertain_robot import RobotUncertainty
+from .robot_files import Table
+
+
+class Number(Table):
+    """A number that was freed; one that is not ``in_file`` has no key of its own there and is applied on reading."""
+
+    name: str
+    kind: str
+    unit: str = ""
+    frame: str = ""
+    group: str = ""
+    axis: int = 0
+    spread: float
+    value: float
+    standard_error: float = 0.0
+    told: bool = True
+    in_file: bool = True
+
+
+class UpdateTable(Table):
+    """Verdict, names, numbers and their covariance."""
+
+    verdict: str
+    named: list[str]
+    covariance: list[list[float]]
+    numbers: list[Number]
+
+
+def uncertainty_of(table: UpdateTable) -> RobotUncertainty:
+    """Numbers and covariance of an ``[update]`` table.
+
+    Raises
+    ------
+    InputError
+        A covariance of another size, or none.
+    """
+    values = np.array([row.value for row in table.numbers])
+    return RobotUncertainty(_parameters(table.numbers), values, np.array(table.covariance, ndmin=2))
+
+
+def with_late_numbers(robot: SpatialRobot, table: UpdateTable) -> SpatialRobot:
+    """The robot with the numbers that its file has no key for: a payload, a tool, a base that gives way."""
+    late = [row for row in table.numbers if not row.in_file]
+    values: NDArray[np.float64] = np.array([row.value for row in late])
+    return changed_by(robot, _parameters(late), values) if late else robot
+
+
+def _parameters(rows: list[Number]) -> tuple[UpdateParameter, ...]:
+    return tuple(UpdateParameter(r.name, r.kind, r.unit, r.spread, r.frame, r.group, r.axis) for r in rows)
