@@ -17,6 +17,9 @@ Complex = NDArray[np.complex128]
 HIGHEST = 1500.0
 """Modes up to here are integrated, Hz; higher ones follow at once."""
 
+STEADY = 250.0
+"""The same with a joint law, whose force lags by a step: higher modes would make it unstable, Hz."""
+
 ELEMENTS = 5
 """Elements of each link: the tested model has one."""
 
@@ -245,7 +248,8 @@ def recorded(
     Modes to HIGHEST are integrated exactly between samples, where the force is held (the force that is recorded is the
     held one, averaged over the step); higher ones follow at once. A cubic joint acts as a force of the step before.
     """
-    kept = np.flatnonzero(cell.squares < (2 * np.pi * HIGHEST) ** 2)
+    top = HIGHEST if cell.cubic is None else STEADY
+    kept = np.flatnonzero(cell.squares < (2 * np.pi * top) ** 2)
     fine, n = 8, round(seconds * rate)
     step = 1 / (rate * fine)
     low = cell.tip[:, kept]

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from foundation import InputError, writing_whole_file
 from modal_fit import write_modal_model
 from robot_model import (
     PostureResult,
+    SpatialRobot,
+    ToolPath,
     cell_structure_at,
     close_loops,
     compensate_path,
@@ -31,6 +34,7 @@ from ..provenance import add_comment, add_to_json, origin
 from ..tables import Table, show
 from .asked_loads import Loads, check_near, check_positive
 from .postures import Asked, mechanism_of, posture_of, spatial
+from .update_bands import deviation_sentence, with_errors
 
 Real = NDArray[np.float64]
 
@@ -96,7 +100,8 @@ def write_receptance(
             write_modal_model(temporary, model)
             add_to_json(temporary, provenance)
     else:
-        write_frf(out, model.frf(np.linspace(*band, lines)), provenance=json.dumps(provenance))
+        frf = with_errors(model.frf(np.linspace(*band, lines)), case, driven, axes)
+        write_frf(out, frf, provenance=json.dumps(provenance))
     _draw_receptance(result, np.linspace(*band, lines), drawn, origin("robot frf", [robot]))
     warn(result)
     typer.echo(f"wrote {out}: {len(model.poles)} modes from {model.natural_frequencies.min():.2f} Hz")
@@ -145,6 +150,7 @@ def write_compensation(
     nominal = read_tool_path(path)
     with bar("compensating"):
         result = compensate_path(case.robot, nominal, start, payload=loads.payload, weight=loads.weight)
+        left_open = deviation_sentence(case, partial(_deviations, nominal, start, loads))
     with writing_whole_file(out) as unfinished:
         write_compensated_path(unfinished, result)
         add_comment(unfinished, origin("robot compensate", [robot, path], {"payload_and_weight": loads}))
@@ -171,8 +177,14 @@ def write_compensation(
         f"weight of {own} a payload of {loads.payload.mass:g} kg: largest deflection {sag.max():.3f} mm, "
         f"changes by up to {change.max():.3f} mm from the first place; {counted[loads.weight]}"
     )
+    if left_open:
+        typer.echo(left_open)
     for warning in result.warnings:
         typer.echo(f"warning: {warning}", err=True)
+
+
+def _deviations(path: ToolPath, start: np.ndarray, loads: Loads, robot: SpatialRobot) -> np.ndarray:
+    return compensate_path(robot, path, start, payload=loads.payload, weight=loads.weight).deviations
 
 
 def say_doubts(doubts: Sequence[str]) -> None:

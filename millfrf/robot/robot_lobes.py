@@ -7,7 +7,7 @@ import numpy as np
 import typer
 
 from cutting import MillingProcess
-from figures import lobes_figure, save_figure
+from figures import LobesBand, lobes_figure, save_figure
 from foundation import TIP, InputError, writing_whole_file
 from modal_fit import ModalModel, Residuals
 from robot_model import SpatialCase, in_posture, read_robot
@@ -22,6 +22,7 @@ from .depth_maps import depth_over_redundancy, write_posture_map
 from .postures import Asked, cut_place, posture_of, spatial
 from .results import RPM, say_doubts
 from .settled_modes import settled_modes
+from .update_bands import band_of_lobes, write_band
 
 _TIME_PERIODIC = ("certified", "collocation", "semi-discretization")
 """Methods whose cost grows with the highest mode."""
@@ -67,10 +68,13 @@ def write_lobes_in_posture(
     doubts += check_depth(max_depth, process)
     doubts += check_speeds(speeds, process, lowest_frequency(result.known_model().natural_frequencies))
     model = at_the_tip(result.known_model())
+    filed = model
     told: tuple[str, ...] = ()
     if method in _TIME_PERIODIC:
         model, told = settled_modes(model, process, speed_axis(*speeds), max_depth)
     found = compute_lobes(model, process, speed_axis(*speeds), max_depth, method, bar)
+    band, doubt = band_of_lobes(filed, process, found, max_depth)
+    doubts += [doubt] if doubt else []
     found = replace(found, warnings=(*doubts, *result.warnings, *told, *found.warnings))
     coupling = _coupling(model, process, found, max_depth)
     asked_for: dict[str, object] = {"speeds_rpm": speeds, "depth_max_m": max_depth, "method": method, "links": links}
@@ -80,8 +84,11 @@ def write_lobes_in_posture(
         typer.echo(f"warning: {warning}", err=True)
     typer.echo(coupling)
     typer.echo(f"wrote {out}: {lobes_summary(found, max_depth)}")
+    if band is not None:
+        typer.echo(f"wrote {write_band(out, band)}: 95 % intervals from the update's covariance")
     if picture is not None:
-        save_figure(lobes_figure({found.method: found}), picture)
+        shown = None if band is None else LobesBand(band.spindle_speeds / RPM, band.low, band.high)
+        save_figure(lobes_figure({found.method: found}, band=shown), picture)
         typer.echo(f"wrote {picture}")
 
 

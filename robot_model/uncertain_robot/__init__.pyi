@@ -1,4 +1,4 @@
-from .bands import apart_from_higher, derived_errors, with_model_covariance
+from .bands import apart_from_higher, derived_errors, frf_with_errors, with_model_covariance
 from .document import updated_document
 from .draws import drawn_robots, principal_shifts, shifted_robot
 from .uncertainty import RobotUncertainty
@@ -8,6 +8,7 @@ __all__ = [
     "apart_from_higher",
     "derived_errors",
     "drawn_robots",
+    "frf_with_errors",
     "principal_shifts",
     "shifted_robot",
     "updated_document",

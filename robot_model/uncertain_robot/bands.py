@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
+from estimation import Frf, FrfCovariance
 from foundation import InputError
 from modal_fit import ModalModel, pack_parameters
 
@@ -33,6 +34,26 @@ def derived_errors(robot: SpatialRobot, uncertainty: RobotUncertainty, derived: 
         Function of a robot that gives an array.
     """
     return np.asarray(np.sqrt(np.sum(np.abs(_slopes(robot, uncertainty, derived)) ** 2, axis=0)))
+
+
+def frf_with_errors(frf: Frf, errors: Real) -> Frf:
+    """An FRF with the standard errors of its entries, as the product form that its file holds.
+
+    ``response[p] excitation[q]`` has the means of the variances over rows and over columns.
+
+    Parameters
+    ----------
+    frf
+        The FRF of the updated robot.
+    errors : (n_lines, n_responses, n_excitations)
+        Standard errors of its entries, in its unit.
+    """
+    variance = errors**2
+    rows, columns = variance.mean(axis=2), variance.mean(axis=1)
+    whole = np.maximum(variance.mean(axis=(1, 2)), 1e-300)[:, None]
+    response = rows[:, :, None] * np.eye(rows.shape[1], dtype=complex)
+    excitation = (columns / whole)[:, :, None] * np.eye(columns.shape[1], dtype=complex)
+    return replace(frf, covariance=FrfCovariance(response, excitation))
 
 
 def with_model_covariance(

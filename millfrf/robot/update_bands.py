@@ -1,0 +1,76 @@
+"""Bands that an updated robot's covariance gives: of FRFs, depth limits and deviations along a path."""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cutting import MillingProcess
+from estimation import Frf
+from foundation import InputError, writing_whole_file
+from modal_fit import ModalModel
+from robot_model import (
+    SpatialCase,
+    SpatialRobot,
+    close_loops,
+    derived_errors,
+    frf_with_errors,
+    modal_model_at,
+)
+from stability import LimitBand, StabilityLobes, limit_band
+
+Real = NDArray[np.float64]
+
+WIDE = 1.96
+"""Standard errors of half a 95 % interval."""
+
+
+def with_errors(frf: Frf, case: object, driven: Real, axes: Real | None) -> Frf:
+    """The FRF with the covariance that an update left; as it is where the file was never updated."""
+    if not isinstance(case, SpatialCase) or case.uncertainty is None:
+        return frf
+    q = close_loops(case.robot.mechanism, driven)
+
+    def values(robot: SpatialRobot) -> Real:
+        found = modal_model_at(robot, q, axes=axes).receptance(frf.frequencies)
+        return np.stack([found.real, found.imag])
+
+    errors = derived_errors(case.robot, case.uncertainty, values)
+    return frf_with_errors(frf, np.sqrt(np.sum(errors**2, axis=0)))
+
+
+def band_of_lobes(
+    model: ModalModel, process: MillingProcess, lobes: StabilityLobes, max_depth: float
+) -> tuple[LimitBand | None, str]:
+    """95 % interval of certified limits, and a sentence where there is none; both empty without a covariance."""
+    if model.covariance is None:
+        return None, ""
+    try:
+        return limit_band(model, process, lobes, 1.5 * max_depth), ""
+    except InputError as error:
+        return None, f"the update's covariance gives no band of these lobes: {error}"
+
+
+def write_band(out: Path, band: LimitBand) -> Path:
+    """Write the band beside the lobes: ``<lobes>_band.csv`` with speed (rpm), both ends (m) and how they were found."""
+    place = out.with_name(f"{out.stem}_band.csv")
+    with writing_whole_file(place) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(["spindle_speed_rpm", "depth_limit_low_m", "depth_limit_high_m", "basis"])
+        rpm = band.spindle_speeds * 30 / np.pi
+        for speed, low, high, basis in zip(rpm, band.low, band.high, band.basis, strict=True):
+            writer.writerow([f"{speed:.9g}", f"{low:.9g}", f"{high:.9g}", basis])
+    return place
+
+
+def deviation_sentence(case: SpatialCase, deviations: Callable[[SpatialRobot], Real]) -> str:
+    """How far the update leaves deviations (n, 6) open, in a sentence; empty where the file was never updated."""
+    if case.uncertainty is None:
+        return ""
+    errors = 1e3 * np.linalg.norm(derived_errors(case.robot, case.uncertainty, deviations)[:, :3], axis=1)
+    return (
+        f"the update leaves the deviation open by ±{WIDE * np.nanmedian(errors):.3g} mm in the median and "
+        f"±{WIDE * np.nanmax(errors):.3g} mm at most (95 %)"
+    )
