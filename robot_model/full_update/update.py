@@ -21,7 +21,7 @@ from .told_apart import OpenDirection, open_directions
 Real = NDArray[np.float64]
 
 NOISE = 1.2
-"""Error on what was left out, over the noise, up to which an update explains it."""
+"""Error on what was left out, over the expected one, up to which an update explains it."""
 
 HALF = 0.5
 """Share of the squared error beyond noise that an update may leave and still explain partly."""
@@ -158,11 +158,12 @@ def _verdict(held: Sequence[LeftOut], fitted: Real, named: bool) -> tuple[str, s
             "one modal model alone leaves nothing to check the update on; measure a second posture",
         )
     before, after = np.array([one.before for one in held]), np.array([one.after for one in held])
+    allowed = NOISE * np.array([one.expected for one in held])
     if before.max() <= NOISE and not named:
         return "none", "the robot's file predicts the measurements to their noise: nothing is wrong that they show"
     worse = [one.name for one in held if one.after > max(one.before, NOISE)]
     left, was = np.sum(np.maximum(after**2 - 1, 0)), np.sum(np.maximum(before**2 - 1, 0))
-    if after.max() <= NOISE and not worse:
+    if (after <= allowed).all() and not worse:
         return "explained", "the updated robot predicts every posture that was left out to the noise"
     if not worse and left <= HALF * was:
         return "partly explained", (
