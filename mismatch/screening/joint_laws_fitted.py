@@ -15,6 +15,7 @@ from ..physics import JointPhysics, answer_name
 from .joint_places import JointPlace, joint_places
 from .joint_screening import Screened, screen_joints
 from .joint_starts import begun_at, driven_by_what_was_seen, freed
+from .turned_signs import with_turned_signs
 from .whitened_residual import linear_floor
 
 
@@ -95,7 +96,7 @@ def joint_candidates(
     near = _as_good(driven, current, gained, settings)
     if strong:
         near += _missing_kinds(near, driven, lambda one: one.hypothesis.causes[-1])
-    simulated = in_processes([partial(_simulated, lines, current, one, sighted.places, most) for one in near])
+    simulated = in_processes([partial(_simulated, lines, current, one, sighted.places, settings) for one in near])
     return [one for one in simulated if one is not None]
 
 
@@ -139,10 +140,11 @@ def _missing_kinds(chosen: list[Any], ranked: list[Any], cause_of: Callable[[Any
 
 
 def _simulated(
-    lines: list[WindowedSpectrum], current: Fit, near: Fit, places: Sequence[JointPlace], most: float
+    lines: list[WindowedSpectrum], current: Fit, near: Fit, places: Sequence[JointPlace], settings: Settings
 ) -> Proposal[Fit] | None:
     """The law of a driven fit, now free to move as it makes the structure move; None if that runs away."""
     law, fitted, order = near.hypothesis.causes[-1].physics, freed(lines, near), list(places)
+    most = settings.verdict.most_of_response
     assert isinstance(law, JointPhysics)
     if np.isfinite(fitted.score) and gives_one_up(lines, fitted.hypothesis, most):
         for place in places[1:]:
@@ -150,6 +152,7 @@ def _simulated(
             if other is not None and other.score < fitted.score:
                 fitted, order = other, [place, *(one for one in places if one is not place)]
         fitted = following_all(lines, fitted, most)
+        fitted = with_turned_signs(lines, fitted, settings.evidence.least)
     if not np.isfinite(fitted.score):
         return None
     axis = fitted.hypothesis.causes[-1].axis

@@ -159,8 +159,7 @@ def scored(
     whole, tested = improved is not linear, recordings.tested
     evidence = 0.0
     if tested and whole and not runs_away:
-        mended = recordings.held_out(recordings.mended)
-        evidence = least_misfit(linear, mended) - least_misfit(improved, mended)
+        evidence = _evidence(recordings, linear, improved)
     against = "refitted" if whole and (faults or evidence > settings.gain) else "nominal"
     rival = rests[1] if against == "refitted" else rests[0]
     improvement = Improvement(
@@ -177,6 +176,13 @@ def scored(
     )
     everywhere = _everywhere(recordings, elsewhere, noises, faults, improvement)
     return HeldOut(improvement, linear, improved, everywhere, here.noise is not None)
+
+
+def _evidence(recordings: Recordings, linear: Hypothesis, improved: Hypothesis) -> float:
+    """Gain in misfit on everything held out: a refit that follows one level and gives the other up is no rival."""
+    parts = [recordings.held_out(recordings.mended), *recordings.held_out_elsewhere(recordings.mended).values()]
+    misfits = [sum(least_misfit(one, part) for part in parts) for one in (linear, improved)]
+    return float(misfits[0] - misfits[1]) if np.isfinite(misfits[1]) else -np.inf
 
 
 def _everywhere(
