@@ -18,6 +18,9 @@ from .joint_starts import begun_at, driven_by_what_was_seen, freed
 from .turned_signs import with_turned_signs
 from .whitened_residual import linear_floor
 
+NEARLY_AS_GOOD, MOST_FOLLOWED = 0.7, 3
+"""Share of the best place's gain after a few steps from which a law is followed on at a place, and how many are."""
+
 
 @dataclass(frozen=True)
 class SightedLaws:
@@ -147,12 +150,9 @@ def _simulated(
     most = settings.verdict.most_of_response
     assert isinstance(law, JointPhysics)
     if np.isfinite(fitted.score) and gives_one_up(lines, fitted.hypothesis, most):
-        for place in places[1:]:
-            other = begun_at(lines, current, law, place.axis)
-            if other is not None and other.score < fitted.score:
-                fitted, order = other, [place, *(one for one in places if one is not place)]
-        fitted = following_all(lines, fitted, most)
-        fitted = with_turned_signs(lines, fitted, settings.evidence.least)
+        at = [(fitted, places[0])] + [(begun_at(lines, current, law, one.axis), one) for one in places[1:]]
+        fitted, taken = _best_followed(lines, current, [(one, place) for one, place in at if one is not None], settings)
+        order = [taken, *(one for one in places if one is not taken)]
     if not np.isfinite(fitted.score):
         return None
     axis = fitted.hypothesis.causes[-1].axis
@@ -162,3 +162,19 @@ def _simulated(
     told = {} if alone else {"places": [one.told() for one in order]}
     location = {**location_of(axis, fitted.hypothesis.model), **told}
     return Proposal(answer_name(law), location, fitted, current.score - fitted.score)
+
+
+def _best_followed(
+    lines: list[WindowedSpectrum], current: Fit, begun: list[tuple[Fit, JointPlace]], settings: Settings
+) -> tuple[Fit, JointPlace]:
+    """The law at the place where it explains most once it follows all recordings, with either sign of each part.
+
+    After a few steps the places are nearly alike, and their order is chance: the best of them are followed on.
+    """
+    begun = sorted((one for one in begun if np.isfinite(one[0].score)), key=lambda one: one[0].score)
+    enough = NEARLY_AS_GOOD * (current.score - begun[0][0].score)
+    near = [one for one in begun if current.score - one[0].score >= enough][:MOST_FOLLOWED]
+    most, least = settings.verdict.most_of_response, settings.evidence.least
+    followed = [(following_all(lines, fitted, most), place) for fitted, place in near]
+    turned = [(with_turned_signs(lines, fitted, least), place) for fitted, place in followed]
+    return min(turned, key=lambda one: one[0].score)
