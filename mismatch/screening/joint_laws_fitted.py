@@ -173,7 +173,7 @@ def _best_followed(
     """
     begun = sorted((one for one in begun if np.isfinite(one[0].score)), key=lambda one: one[0].score)
     enough = NEARLY_AS_GOOD * (current.score - begun[0][0].score)
-    near = [one for one in begun if current.score - one[0].score >= enough][:MOST_FOLLOWED]
+    near = begun[:1] + [one for one in begun[1:MOST_FOLLOWED] if current.score - one[0].score >= enough]
     most, least = settings.verdict.most_of_response, settings.evidence.least
     followed = [(following_all(lines, fitted, most), place) for fitted, place in near]
     turned = [(with_turned_signs(lines, fitted, least), place) for fitted, place in followed]
