@@ -36,7 +36,9 @@ def with_turned_signs(lines: list[WindowedSpectrum], fitted: Fit, least: float) 
     """
     axis = fitted.hypothesis.causes[-1].axis
     while axis is not None and axis.scales is not None and len(axis.entries) > 1:
-        turned = [_turned(fitted.hypothesis, axis, mode) for mode in np.flatnonzero(abs(axis.entries) > SMALLEST_PART)]
+        turned = [
+            _turned(fitted.hypothesis, axis, int(mode)) for mode in np.flatnonzero(abs(axis.entries) > SMALLEST_PART)
+        ]
         begun = min((fit(lines, one, iterations=FEW_STEPS) for one in turned), key=lambda one: one.score)
         if not np.isfinite(begun.score):
             break
