@@ -14,8 +14,7 @@ from ..models import Cause, Fit, following_all, gives_one_up, location_of
 from ..physics import JointPhysics, answer_name
 from .joint_places import JointPlace, joint_places
 from .joint_screening import Screened, screen_joints
-from .joint_starts import begun_at, driven_by_what_was_seen, freed
-from .turned_signs import with_turned_signs
+from .joint_starts import begun_at, driven_by_what_was_seen, freed, with_turned_signs
 from .whitened_residual import linear_floor
 
 NEARLY_AS_GOOD, MOST_FOLLOWED = 0.7, 3

@@ -11,7 +11,7 @@ from mismatch import Hypothesis, LabError, ModelShape, band_of, fit, predict_lin
 from mismatch.joints import JointAxis, JointMotion, modal_scales
 from mismatch.models import Cause, Fit
 from mismatch.physics import JointPhysics, library
-from mismatch.screening.turned_signs import with_turned_signs
+from mismatch.screening.joint_starts import with_turned_signs
 from modal_fit import ModalModel
 
 TrialOf = Callable[[ModalModel, str, float, int], BandRecording]
