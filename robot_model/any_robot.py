@@ -25,7 +25,7 @@ from .spatial import (
     static_response,
     structure_at,
 )
-from .uncertain_robot import apart_from_higher, with_model_covariance
+from .uncertain_robot import below_new_modes, with_model_covariance
 
 Real = NDArray[np.float64]
 
@@ -141,7 +141,7 @@ def in_posture(
     modes = modes_at(robot, q)
     model = model_of_modes(modes, robot, axes=axes)
     if case.uncertainty is not None:
-        top = apart_from_higher(modes.frequencies)
+        top = below_new_modes(robot, case.uncertainty, lambda changed: modes_at(changed, q).frequencies)
         given = partial(modal_model_at, q=q, axes=axes, highest_frequency=top)
         model = with_model_covariance(robot, case.uncertainty, given)
     warnings = (*warnings, *damping_warnings(robot, modes))

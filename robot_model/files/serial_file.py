@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from foundation import InputError
 
 from ..kinematics import LARGEST_TRAVEL
-from ..serial_chains import RigidPart, SerialChain, SerialJoint, inertia_fault, place_of, spatial_robot, symmetric
+from ..serial_chains import BASE, RigidPart, SerialChain, SerialJoint, inertia_fault, place_of, spatial_robot, symmetric
 from ..spatial import check_tip
 from .robot_files import Table, read_as
 from .spatial_file import Damping, Pose, SpatialCase, named_postures, rayleigh_of, upwards
@@ -101,7 +101,7 @@ def _case(content: _File) -> SpatialCase:
     flange = _place(content.flange)
     joints = tuple(_joint(row) for row in content.joints)
     parts = [_part(row, row.name, row.joint, np.eye(4)) for row in content.bodies]
-    if content.spindle is not None:
+    if content.spindle is not None and any(row.joint != BASE for row in content.bodies):
         parts.append(_part(content.spindle, "spindle", joints[-1].name, flange))
     chain = SerialChain(joints, tuple(parts), _place(content.base), flange, _place(content.tool))
     built = spatial_robot(
@@ -134,8 +134,10 @@ def _assumed(content: _File) -> tuple[str, ...]:
         found.append(f"mass and inertia of {', '.join(bodies)} are assumed, not known")
     if content.damping is not None and "assumed" in content.damping.source:
         found.append("damping is assumed, not known: depth limits are proportional to it")
-    if not content.bodies:
-        found.append("the file gives no [[bodies]]: modes, FRFs and lobes hold only the spindle's mass, if any")
+    if not any(row.joint != BASE for row in content.bodies):
+        found.append(
+            "the file gives no [[bodies]] that move: it has statics, not modes; a spindle alone is no robot's mass"
+        )
     return tuple(found)
 
 

@@ -18,7 +18,7 @@ from ..spatial import ElasticJoint, Link, LumpedBody, SpatialRobot, check_tip
 from ..uncertain_robot import RobotUncertainty
 from .drive_table import DriveKeys, drive_of
 from .robot_files import Table, read_as
-from .update_table import UpdateTable, uncertainty_of
+from .update_table import UpdateTable, left_open, uncertainty_of
 
 
 class _Head(Table):
@@ -191,7 +191,8 @@ def _case(content: _File) -> SpatialCase:
     poses = named_postures(content.poses, spatial.mechanism)
     _check_masses(content.bodies)
     uncertainty = None if content.update is None else uncertainty_of(content.update)
-    return SpatialCase(content.robot.name, spatial, poses, content.robot.repeatability_m, uncertainty=uncertainty)
+    assumed = () if content.update is None else left_open(content.update)
+    return SpatialCase(content.robot.name, spatial, poses, content.robot.repeatability_m, assumed, uncertainty)
 
 
 def _check_masses(rows: list[_Body]) -> None:

@@ -46,6 +46,17 @@ def uncertainty_of(table: UpdateTable) -> RobotUncertainty:
     return RobotUncertainty(_parameters(table.numbers), values, np.array(table.covariance, ndmin=2))
 
 
+def left_open(table: UpdateTable) -> tuple[str, ...]:
+    """A sentence for joint stiffnesses that the measurements of an update did not tell; empty where there are none."""
+    rows = [row.name.removesuffix(" stiffness") for row in table.numbers if row.kind == "stiffness" and not row.told]
+    if not rows:
+        return ()
+    return (
+        f"the update's measurements do not tell the stiffness of {', '.join(dict.fromkeys(rows))}: it is the file's "
+        "own, and only as good as that",
+    )
+
+
 def with_late_numbers(robot: SpatialRobot, table: UpdateTable) -> SpatialRobot:
     """The robot with the numbers that its file has no key for: a payload, a tool, a base that gives way."""
     late = [row for row in table.numbers if not row.in_file]

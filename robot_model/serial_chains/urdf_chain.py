@@ -66,6 +66,9 @@ def read_urdf(path: str | os.PathLike[str], tip: str | None = None) -> ReadChain
         joints.append(_serial_joint(joint, inside))
         before = joint.name
     parts = [part for name in tree.links if (part := _part(tree.links[name], *placed[name])) is not None]
+    endless = [joint.name for joint in moving if joint.type != "continuous" and not np.isfinite(_limits(joint)).all()]
+    if endless:
+        notes.append(f"the URDF gives no limits of {', '.join(endless)}: no posture is beyond them")
     base, flange = np.eye(4), placed[last][1]
     notes += _mass_notes(tree, placed, {part.name for part in parts})
     return ReadChain(last, SerialChain(tuple(joints), tuple(parts), base, flange), tuple(notes))

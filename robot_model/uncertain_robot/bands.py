@@ -1,6 +1,7 @@
 """Bands of whatever a robot gives: its uncertain numbers, carried on by first order."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,12 @@ Real = NDArray[np.float64]
 
 STEP = 0.05
 """Step of the differences, in standard deviations."""
+
+_STEPS = (STEP, STEP / 10, STEP / 100)
+"""Steps that are tried in turn: a damping that nobody measured may fall below zero within the first."""
+
+_APART = 0.99
+"""Ratio of a mode's frequency to that of the next above it, at which a limit between both is told apart."""
 
 
 def derived_errors(robot: SpatialRobot, uncertainty: RobotUncertainty, derived: Callable[[SpatialRobot], Real]) -> Real:
@@ -106,19 +113,72 @@ def apart_from_higher(frequencies: Real) -> float:
     return float(np.sqrt(part[at] * part[at + 1]))
 
 
-def _slopes(robot: SpatialRobot, uncertainty: RobotUncertainty, derived: Callable[[SpatialRobot], Real]) -> Real:
-    """Change by one standard deviation along each principal direction, (n_directions, ...)."""
-    return np.array(
-        [
-            (derived(shifted_robot(robot, uncertainty, STEP * shift)) - derived(_back(robot, uncertainty, shift)))
-            / (2 * STEP)
-            for shift in principal_shifts(uncertainty)
-        ]
+def below_new_modes(
+    robot: SpatialRobot, uncertainty: RobotUncertainty, frequencies: Callable[[SpatialRobot], Real]
+) -> float:
+    """Frequency below which a small change of the uncertain numbers adds no mode and takes none away, Hz.
+
+    A tool or a base that is rigid in the file, and gives way by a small change, has modes that the file has not. Where
+    they lie among the robot's own, the largest number of modes is kept that all changes leave apart from the rest.
+
+    Parameters
+    ----------
+    frequencies
+        Function of a robot that gives its natural frequencies in a posture, Hz, rising.
+
+    Raises
+    ------
+    InputError
+        No mode is apart from those that a change adds.
+    """
+    own = frequencies(robot)
+    top = apart_from_higher(own)
+    shifts = [sign * STEP * shift for shift in principal_shifts(uncertainty) for sign in (1, -1)]
+    found = [own, *(frequencies(shifted_robot(robot, uncertainty, shift)) for shift in shifts)]
+    counts = {int(np.sum(part < top)) for part in found}
+    if len(counts) == 1:
+        return top
+    for kept in range(min(counts), 0, -1):
+        lower = max(float(part[kept - 1]) for part in found)
+        upper = min(float(part[kept]) if len(part) > kept else np.inf for part in found)
+        if lower < _APART * upper:
+            return float(np.sqrt(lower * upper))
+    raise InputError(
+        "a small change of the numbers in [update] adds modes below this robot's first: measure the base's and the "
+        "tool's compliance, or take [update] out of the file and do without bands"
     )
 
 
-def _back(robot: SpatialRobot, uncertainty: RobotUncertainty, shift: Real) -> SpatialRobot:
-    return shifted_robot(robot, uncertainty, -STEP * shift)
+def _slopes(robot: SpatialRobot, uncertainty: RobotUncertainty, derived: Callable[[SpatialRobot], Real]) -> Real:
+    """Change by one standard deviation along each principal direction, (n_directions, ...)."""
+    return np.array([_slope(robot, uncertainty, derived, shift) for shift in principal_shifts(uncertainty)])
+
+
+def _slope(
+    robot: SpatialRobot, uncertainty: RobotUncertainty, derived: Callable[[SpatialRobot], Real], shift: Real
+) -> Real:
+    """Central difference; with smaller steps where the first leaves no robot: a damping below zero, another structure.
+
+    Raises
+    ------
+    InputError
+        The smallest step leaves no robot either.
+    """
+    for step in _STEPS[:-1]:
+        with suppress(InputError):
+            return _difference(robot, uncertainty, derived, shift, step)
+    return _difference(robot, uncertainty, derived, shift, _STEPS[-1])
+
+
+def _difference(
+    robot: SpatialRobot,
+    uncertainty: RobotUncertainty,
+    derived: Callable[[SpatialRobot], Real],
+    shift: Real,
+    step: float,
+) -> Real:
+    ahead, behind = (derived(shifted_robot(robot, uncertainty, sign * step * shift)) for sign in (1, -1))
+    return np.asarray((ahead - behind) / (2 * step))
 
 
 def _aligned(model: ModalModel, wanted: ModalModel) -> ModalModel:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError, writing_whole_file
+from foundation import InputError, MillfrfError, writing_whole_file
 from robot_model import (
     ReadChain,
     SerialChain,
@@ -27,13 +27,16 @@ from robot_model import (
 
 from ...options import check_output
 from ...provenance import sha256
-from .spread_mass import cylinder, mass_doubts, with_total_mass
+from .spread_mass import cylinder, doubted_sources, mass_doubts, with_total_mass
 
 Real = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 _DAMPING = 0.03
 """Assumed damping ratio: between the 1 and 10 % that are measured on milling robots."""
+
+_USUAL = {"revolute": (1e3, 1e8), "prismatic": (1e5, 1e10)}
+"""Joint stiffness outside of which a unit is doubted, N m/rad and N/m: wide of every range that is assumed."""
 
 _MASS_TO_PAYLOAD = 5.0
 """Moving mass over rated payload of industrial robots, roughly."""
@@ -81,6 +84,9 @@ def write_new_robot(path: Path, out: Path, asked: Asked) -> list[str]:
         unfinished.rename(named)
         try:
             summary = _checked(named)
+        except MillfrfError as error:  # the unfinished file goes: a reader knows the one that he gave
+            said = str(error).replace(f"{named}: ", f"{path}, as {out} would have it: ")
+            raise InputError(said) from error
         finally:
             named.rename(unfinished)
     return [
@@ -114,7 +120,8 @@ def _told(path: Path, read: ReadChain, chain: SerialChain, asked: Asked) -> tupl
     """Sources of all numbers, and what should be said of them."""
     origin = f"{path.name} (SHA-256 {sha256(path)[:16]})" + (f"; {asked.source}" if asked.source else "")
     notes = [note for note in read.notes if asked.total_mass is None or "no masses" not in note]
-    doubts = [*notes, *mass_doubts(chain)]
+    of_masses = mass_doubts(chain)
+    doubts = [*notes, *of_masses]
     stiffness, doubt = _stiffness(chain, asked)
     doubts += [doubt] if doubt else []
     spindle, said = _spindle(asked)
@@ -124,6 +131,8 @@ def _told(path: Path, read: ReadChain, chain: SerialChain, asked: Asked) -> tupl
     bodies = {}
     if asked.total_mass is not None:
         bodies = {part.name: f"assumed: {asked.total_mass:g} kg spread over the bodies" for part in chain.parts}
+    elif of_masses:
+        bodies = doubted_sources(chain, of_masses, path.name)
     tool = "given on the command line"
     if asked.tool[0] is None:
         tool = "assumed: no --tool was given, the tip is at the flange"
@@ -164,8 +173,9 @@ def _stiffness(chain: SerialChain, asked: Asked) -> tuple[list[tuple[float, str]
         for value in values:
             if not 1.0 <= value <= 1e12:
                 raise InputError(f"--joint-stiffness {value:g}: give N m/rad (N/m of prismatic joints), 1 to 1e12")
+        doubt = _stiffness_doubt(chain, values)
         source = asked.stiffness_source or "given on the command line; say here how it was measured"
-        return [(value, source) for value in values], None
+        return [(value, source) for value in values], doubt
     payload, why = asked.rated_payload, "rated payload given"
     if payload is None:
         mass = sum(part.mass for part in chain.parts if part.joint != "base")
@@ -182,9 +192,28 @@ def _stiffness(chain: SerialChain, asked: Asked) -> tuple[list[tuple[float, str]
         for middle, span in typical(joints, entry)
     ]
     return found, (
-        f"joint stiffness is not known and was assumed ({why}, class up to {entry.payload:g} kg): every result will "
+        f"joint stiffness is not known and was assumed ({why}, {_class_words(entry.payload)}): every result will "
         "say so until --joint-stiffness or measured values replace it"
     )
+
+
+def _stiffness_doubt(chain: SerialChain, values: list[float]) -> str | None:
+    """A sentence on joint stiffnesses that no robot has, which a slip of the unit makes."""
+    odd = [
+        f"{joint.name} {value:g}"
+        for joint, value in zip(chain.joints, values, strict=True)
+        if not _USUAL[joint.motion][0] <= value <= _USUAL[joint.motion][1]
+    ]
+    if not odd:
+        return None
+    return (
+        f"--joint-stiffness: {', '.join(odd)} is far from what robots have (1e3 to 1e8 N m/rad; 1e5 to 1e10 N/m): "
+        "is the unit right? kN m/rad times 1000, N m/arcmin times 3438, N/um times 1e6"
+    )
+
+
+def _class_words(payload: float) -> str:
+    return f"class up to {payload:g} kg" if np.isfinite(payload) else "class of the heaviest robots"
 
 
 def _spindle(asked: Asked) -> tuple[tuple[float, Real, Real, str] | None, list[str]]:

@@ -76,3 +76,16 @@ def mass_doubts(chain: SerialChain) -> list[str]:
                 "not fit its size: look at its inertia"
             )
     return found
+
+
+def doubted_sources(chain: SerialChain, doubts: Sequence[str], origin: str) -> dict[str, str]:
+    """Sources of moving bodies whose masses are doubted, marked as assumed so that every result names them.
+
+    A doubt that begins with ``body NAME:`` is of that body, any other of all of them.
+    """
+    found = {}
+    for part in chain.parts:
+        own = [doubt for doubt in doubts if doubt.startswith(f"body {part.name}:") or not doubt.startswith("body ")]
+        if own and part.joint != BASE:
+            found[part.name] = f"{origin}; assumed to be right, though doubted: {own[0]}"
+    return found
