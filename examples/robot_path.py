@@ -75,7 +75,7 @@ def along(path: CutPath, turns: np.ndarray, table: np.ndarray) -> PathOptimum:
         return optimised(cut, path, free, Loading(wrenches, "all"), wanted, start, pool)
 
 
-def main(points: int = 20, picture: Path | None = None) -> dict[str, float]:
+def main(points: int = 6, picture: Path | None = None) -> dict[str, float]:
     """Print the tables; returns the smallest depth limit along the path for each use of the redundancies, m."""
     print("depth limit (mm) over", ", ".join(f"{angle:.0f}" for angle in np.degrees(ANGLES)), "degrees")
     for robot in ("kuka_kr90_r3100", "kuka_kr90_angled"):
@@ -101,4 +101,4 @@ def main(points: int = 20, picture: Path | None = None) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 20, Path(sys.argv[2]) if len(sys.argv) > 2 else None)
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 6, Path(sys.argv[2]) if len(sys.argv) > 2 else None)

@@ -54,6 +54,8 @@ class PathJob:
         Processes that evaluate; None: this one.
     memory
         Certified values by point and posture.
+    screening_frequency : Hz
+        Modes up to here are screened with; certified values have those of ``cut``.
     """
 
     cut: PathCut
@@ -62,6 +64,7 @@ class PathJob:
     wanted: Wanted
     pool: Executor | None
     memory: Memory
+    screening_frequency: float
 
     def state(self, free: Redundancy, postures: list[Posture]) -> PathState:
         """Certify one posture a point."""
@@ -108,11 +111,11 @@ class Found:
 def searched(job: PathJob, free: Sequence[Redundancy], postures: Sequence[PointPostures]) -> Found:
     """Screen, search, and certify every fourth point until the search keeps what it promises there.
 
-    Screening takes straight edges at equal pitch, which have the same mean force; what is certified has the whole
-    process.
+    Screening takes straight edges at equal pitch, which have the same mean force, and perhaps fewer modes; what is
+    certified has the whole process.
     """
     process = replace(job.cut.process, helix_angle=0.0, pitch_angles=(), process_damping=0.0)
-    plain = replace(job.cut, process=process)
+    plain = replace(job.cut, process=process, highest_frequency=job.screening_frequency)
     values, count = screened(plain, job.path, free, postures, job.loading, job.pool)
     which = [distinct(one) for one in postures]
     reference = values[0].weight.mean(axis=0) if job.loading.weight == "change" else np.zeros(6)

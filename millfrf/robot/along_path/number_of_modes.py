@@ -54,7 +54,7 @@ def kept_modes(cut: PathCut, samples: Sequence[Request], pool: Executor | None =
     """
     frequencies = [modes_at(cut.robot, one.q).frequencies for one in samples]
     size = min(len(one) for one in frequencies)
-    steps = [1.0001 * max(float(one[count - 1]) for one in frequencies) for count in _COUNTS if count < size]
+    steps = [_above(frequencies, count) for count in _COUNTS if count < size]
     steps += [np.inf] if size <= _COUNTS[-1] else []
     all_of_them = 1.0001 * max(float(one[-1]) for one in frequencies)
     most = _MOST_TURNS * cut.process.teeth * cut.speed / (2 * np.pi)
@@ -71,6 +71,22 @@ def change_with_more(cut: PathCut, reference: float, samples: Sequence[Request],
     """Largest relative change of the limits at some postures if modes up to ``reference`` (Hz) are kept."""
     few, many = (_limits(one, samples, pool) for one in (cut, replace(cut, highest_frequency=reference)))
     return float(np.abs(few / many - 1).max())
+
+
+def _above(frequencies: Sequence[Real], count: int) -> float:
+    """Frequency below which ``count`` modes lie at every posture: in the middle of the gap above them, where one is.
+
+    Just above the highest of them it would cut off the same mode at a posture that was not sampled.
+
+    Examples
+    --------
+    >>> round(_above([np.array([10.0, 100.0, 400.0]), np.array([11.0, 96.0, 420.0])], 2))
+    200
+    >>> round(_above([np.array([10.0, 100.0, 120.0]), np.array([11.0, 130.0, 150.0])], 2))
+    130
+    """
+    below = max(float(one[count - 1]) for one in frequencies)
+    return max(1.0001 * below, float(np.sqrt(below * min(float(one[count]) for one in frequencies))))
 
 
 def _limits(cut: PathCut, samples: Sequence[Request], pool: Executor | None) -> Real:

@@ -22,6 +22,9 @@ Real = NDArray[np.float64]
 _WORSE = 0.01
 """Share of the objective that may be given up for a smooth sequence."""
 
+_SCREENED = 0.05
+"""Change of a limit by missing modes up to which postures are still screened without them."""
+
 _ENLARGED = 3
 """Times that the number of modes is chosen: again, where the chosen postures need more than the sampled ones."""
 
@@ -77,10 +80,13 @@ def optimised(
     """
     postures = path_postures(cut.robot, path, free, start[cut.robot.mechanism.active])
     _refuse_unreached(postures)
-    samples = _samples(path, free, postures, loading)
+    samples, change, screening = _samples(path, free, postures, loading), np.inf, np.inf
     for turn in range(_ENLARGED):
         kept = kept_modes(cut, samples, pool)
-        job = PathJob(replace(cut, highest_frequency=kept.highest_frequency), path, loading, wanted, pool, {})
+        if change > _SCREENED:
+            screening = kept.highest_frequency
+        certified = replace(cut, highest_frequency=kept.highest_frequency)
+        job = PathJob(certified, path, loading, wanted, pool, {}, screening)
         found = _chosen(job, free, postures, start, kept)
         critical = [one for state in (found.before, found.after) for one in _critical(job, free, state)]
         change = change_with_more(job.cut, kept.reference, critical, pool)

@@ -31,8 +31,8 @@ def finer_postures(
     reach = max(job.wanted.joint_step, 1.5 * max(steps))
     robot, finer, found = job.cut.robot, [], []
     for place, (q, tool, table) in zip(job.path.places, chosen, strict=True):
-        turned = np.unique(np.clip(table + steps[1] * _OFFSETS, free.table.min(), free.table.max()))
-        here = replace(free, tool=np.unique(tool + steps[0] * _OFFSETS), table=turned)
+        angles = (_in_range(tool + steps[0] * _OFFSETS, free.tool), _in_range(table + steps[1] * _OFFSETS, free.table))
+        here = replace(free, tool=np.unique(angles[0]), table=np.unique(angles[1]))
         every = point_postures(robot, place, here, [q[robot.mechanism.active]])
         near = np.abs(every.q - q).max(axis=1) < reach if len(every) else np.zeros(0, dtype=bool)
         finer.append(here)
@@ -46,7 +46,7 @@ def smoothed(job: PathJob, free: Redundancy, chosen: list[Posture]) -> list[Post
     for axis, column in ((free.tool, 1), (free.table, 2)):
         half = 0.5 * float(np.diff(axis)[0]) if len(axis) > 1 else 0.0
         given = np.unwrap(np.array([posture[column] for posture in chosen], dtype=float))
-        angles.append(np.clip(whittaker(given), given - half, given + half))
+        angles.append(_in_range(np.clip(whittaker(given), given - half, given + half), axis))
     found: list[Posture] = []
     robot = job.cut.robot
     for k, place in enumerate(job.path.places):
@@ -62,6 +62,20 @@ def smoothed(job: PathJob, free: Redundancy, chosen: list[Posture]) -> list[Post
             return None
         found.append((q, tool, table))
     return found
+
+
+def _in_range(angles: Real, axis: Real) -> Real:
+    """Angles inside the range that was sampled; all of them where the samples close the full circle.
+
+    Examples
+    --------
+    >>> np.degrees(_in_range(np.radians([-100.0, -70.0]), np.radians([-90.0, -60.0, -30.0]))).round()
+    array([-90., -70.])
+    """
+    step = float(np.diff(axis)[0]) if len(axis) > 1 else 0.0
+    if step and np.ptp(axis) + step > 2 * np.pi - 1e-9:
+        return angles
+    return np.asarray(np.clip(angles, axis.min(), axis.max()))
 
 
 def whittaker(values: Real, weight: float = 30.0) -> Real:

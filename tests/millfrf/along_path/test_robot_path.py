@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from milling_of_a_path import CUT
 
+from cutting import force_harmonics, read_cutting_process
 from millfrf.__main__ import run
+from robot_model import Payload, read_spatial_robot, tool_deflection, tool_down
 
 
 @pytest.fixture
@@ -40,6 +42,7 @@ def test_depth_grows_and_the_folder_holds_all(inputs: Path) -> None:
     joints = np.array([[float(row[f"q{i + 1}"]) for i in range(6)] for row in rows])
     assert np.abs(np.diff(joints, axis=0)).max() <= 15
     assert min(float(row["limit_margin_deg"]) for row in rows) >= 5
+    assert all(-120 <= float(row["tool_turn_deg"]) <= 0 for row in rows)
     assert (inputs / "out" / "path.png").stat().st_size > 10_000
     corrected = table(inputs / "out" / "compensated.csv")
     moved = [float(row["x_m"]) - float(given["x_m"]) for row, given in zip(corrected, rows, strict=True)]
@@ -55,9 +58,10 @@ def test_a_spindle_in_line_with_the_last_joint_gains_nothing_and_stays(inputs: P
 
 
 def test_deviation_and_both_choose_what_they_say(inputs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(command("kuka_kr90_angled", "--optimise", "deviation", "--out", "stiff.csv")) == 0
-    assert run(command("kuka_kr90_angled", "--optimise", "depth", "--out", "deep.csv")) == 0
-    assert run(command("kuka_kr90_angled", "--optimise", "both", "--out", "both.csv")) == 0
+    few = ("--turns", "-120", "0", "3")
+    assert run(command("kuka_kr90_angled", *few, "--optimise", "deviation", "--out", "stiff.csv")) == 0
+    assert run(command("kuka_kr90_angled", *few, "--optimise", "depth", "--out", "deep.csv")) == 0
+    assert run(command("kuka_kr90_angled", *few, "--optimise", "both", "--out", "both.csv")) == 0
     assert "front:" in capsys.readouterr().out
     worst = {}
     for name in ("stiff", "deep", "both"):
@@ -67,6 +71,47 @@ def test_deviation_and_both_choose_what_they_say(inputs: Path, capsys: pytest.Ca
     assert worst["stiff"][0] <= 1.001 * min(size for size, _ in worst.values())
     assert worst["deep"][1] >= 0.97 * max(depth for _, depth in worst.values())
     assert worst["stiff"][0] <= 1.001 * worst["both"][0] <= 1.002 * worst["deep"][0]
+
+
+def test_a_table_adds_to_the_turn_about_the_tool(inputs: Path) -> None:
+    """Its axis runs along this path: tips stay, tool axes turn about x by what the table says, depth doubles."""
+    more = ("--turns", "-90", "-60", "2", "--table", "-30", "0", "2")
+    assert run(command("kuka_kr90_angled", *more, "--out", "out")) == 0
+    rows = table(inputs / "out" / "path.csv")
+    turned = np.radians([float(row["table_turn_deg"]) for row in rows])
+    assert np.degrees(turned).min() >= -30
+    assert np.degrees(turned).max() < -10
+    assert np.abs(np.diff(np.degrees(turned))).max() <= 10
+    for row, angle, x in zip(rows, turned, np.linspace(1.5, 1.6, 3), strict=True):
+        assert [float(row[name]) for name in ("x_m", "y_m", "z_m")] == pytest.approx([x, 0.1, 0.7], abs=1e-9)
+        axis = [float(row[name]) for name in "ijk"]
+        assert axis == pytest.approx([0, -np.sin(angle), np.cos(angle)], abs=1e-8)
+    least = [min(float(row[name]) for row in rows) for name in ("depth_limit_m", "before_depth_limit_m")]
+    assert least[0] > 1.8 * least[1]
+    corrected = table(inputs / "out" / "compensated.csv")
+    moved = [
+        [float(one[n]) - float(row[n]) for n in ("x_m", "y_m", "z_m")] for one, row in zip(corrected, rows, strict=True)
+    ]
+    assert 1e-4 < np.linalg.norm(moved, axis=1).max() < 2e-3
+
+
+def test_weight_counts_from_the_first_point_where_the_change_is_asked(inputs: Path) -> None:
+    """Deviation against the compliance of each posture: cut, and weight without its part at the first point."""
+    more = ("--turns", "0", "0", "1", "--weight", "change", "--payload", "20", "--out", "change.csv")
+    assert run(command("kuka_kr90_angled", *more)) == 0
+    robot, moved, sags, axes = read_spatial_robot("kuka_kr90_angled").robot, [], [], tool_down([1.5, 0.1, 0.7]).axes
+    wrench = np.zeros(6)
+    wrench[:3] = 0.002 * axes @ force_harmonics(read_cutting_process(inputs / "cut.toml"), 0)[0].real
+    rows = table(inputs / "change.csv")
+    for row in rows:
+        q = np.radians([float(row[f"q{i + 1}"]) for i in range(6)])
+        cut, weight = tool_deflection(robot, q, wrench, Payload(20.0))
+        moved.append(cut[:3])
+        sags.append(weight[:3])
+    assert np.linalg.norm(sags[-1] - sags[0]) > 3e-5
+    told = [[float(row[f"deviation_{a}_m"]) for a in ("along", "across", "axial")] for row in rows]
+    expected = np.array(moved) + np.array(sags) - sags[0]
+    assert told == pytest.approx(expected @ axes, abs=1e-9)
 
 
 @pytest.mark.parametrize(
