@@ -10,7 +10,7 @@ from .misfit import Problem, misfit_of, sums_at
 
 Real = NDArray[np.float64]
 
-MOST_EXPECTED = 1.5
+MOST_EXPECTED = 1.2
 """Error over the noise that is granted at most for what an update left open."""
 
 BLOCKS = 8
@@ -29,7 +29,7 @@ class LeftOut:
         Error of the robot as its file has it, and as updated without this measurement.
     expected
         Error that a right robot would show: the noise, what the update left open in this posture, and the least that
-        modes are off; at most half more than the noise.
+        modes are off; at most a fifth more than the noise.
     x : (n_parameters,)
         Numbers of that update.
     """
