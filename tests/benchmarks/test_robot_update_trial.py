@@ -1,0 +1,46 @@
+"""Updates of a robot by recordings of a cell that shares no code with the robot model: two of the trial's cases."""
+
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are no installed package
+
+from benchmarks.robot_update_trial.cases import KINDS, draw_case
+from benchmarks.robot_update_trial.run_trial import run_case
+
+SEED = 11
+WITHIN = 1.2
+"""Error on the posture that was never given, over the noise, up to which an update may say that it explains."""
+
+
+def _run(kind: str, folder: Path) -> dict[str, Any]:
+    number = KINDS.index(kind)
+    return run_case(draw_case(number, SEED), number, SEED, folder)
+
+
+def test_joints_of_an_independent_cell_are_named_and_predict_another_posture(tmp_path: Path) -> None:
+    found = _run("stiffness", tmp_path)
+    assert found["verdict"] == "explained"
+    assert found["wrong_names"] == []
+    assert set(found["named"]) == set(found["expected"])
+    assert found["unseen"]["updated"] < WITHIN < 5 < found["unseen"]["filed"]
+    for one in found["numbers"]:
+        if one["told"] and one["name"].endswith("stiffness"):
+            assert one["x"] == pytest.approx(one["expected"], abs=4 * one["error"])
+
+
+def test_a_right_file_is_left_as_it_is(tmp_path: Path) -> None:
+    found = _run("nothing wrong", tmp_path)
+    assert found["verdict"] == "none"
+    assert found["named"] == []
+    assert found["unseen"]["updated"] < WITHIN
+
+
+@pytest.mark.slow
+def test_a_heavier_body_is_no_number_of_the_update(tmp_path: Path) -> None:
+    found = _run("foreign: heavier body", tmp_path)
+    assert found["wrong_names"] == []
+    assert found["verdict"] != "explained" or found["unseen"]["updated"] < WITHIN
