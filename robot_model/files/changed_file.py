@@ -1,4 +1,4 @@
-"""A robot's file with some numbers changed: the user's comments, order and spelling stay."""
+"""A robot's file with some numbers changed: the user's comments, order and spelling stay in files of kind `spatial`."""
 
 import os
 from collections.abc import Mapping
@@ -10,6 +10,7 @@ from tomlkit.exceptions import NonExistentKey
 from foundation import InputError
 
 from .numbered_text import numbered_robot_text
+from .robot_files import robot_text
 
 Place = tuple[str | int, ...]
 """Where a value stands: ``("joints", 2, "turning_nm_per_rad")``, tables counted from 0."""
@@ -38,6 +39,8 @@ def changed_robot_text(robot: str | os.PathLike[str], changes: Mapping[Place, An
     >>> text.splitlines()[0].startswith("#"), "mass_kg = 43.0" in text
     (True, True)
     """
+    if not changes:
+        return robot_text(robot)
     document = tomlkit.parse(numbered_robot_text(robot))
     for place, value in changes.items():
         table: Any = document

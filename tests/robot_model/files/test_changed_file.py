@@ -4,6 +4,7 @@ import difflib
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from foundation import FileFormatError, InputError
@@ -15,6 +16,18 @@ FOLDER = Path(__file__).resolve().parents[3] / "robot_model" / "robots"
 @pytest.mark.parametrize("name", robot_names())
 def test_nothing_changes_where_nothing_is_asked(name: str) -> None:
     assert changed_robot_text(name, {}) == (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def test_a_serial_robot_whose_numbers_change_is_written_out_as_the_same_robot(tmp_path: Path) -> None:
+    place = ("joints", 0, "turning_nm_per_rad")
+    first = read_spatial_robot("staubli_rx160").robot
+    own = tmp_path / "own.toml"
+    own.write_text(changed_robot_text("staubli_rx160", {place: 2.5e6}), encoding="utf-8")
+    again = read_spatial_robot(own).robot
+    assert again.joints[0].stiffness[5] == 2.5e6
+    for one, other in zip(first.joints[1:], again.joints[1:], strict=True):
+        np.testing.assert_allclose(one.stiffness, other.stiffness, rtol=1e-8)
+    assert sum(b.mass for b in again.bodies) == pytest.approx(sum(b.mass for b in first.bodies), rel=1e-9)
 
 
 def test_only_the_lines_that_are_asked_change(tmp_path: Path) -> None:
