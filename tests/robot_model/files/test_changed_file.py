@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from foundation import FileFormatError, InputError
-from robot_model import changed_robot_text, read_spatial_robot, robot_names
+from robot_model import SpatialCase, changed_robot_text, read_robot, read_spatial_robot, robot_names
 
 FOLDER = Path(__file__).resolve().parents[3] / "robot_model" / "robots"
 
@@ -20,7 +20,9 @@ def test_nothing_changes_where_nothing_is_asked(name: str) -> None:
 
 def test_a_serial_robot_whose_numbers_change_is_written_out_as_the_same_robot(tmp_path: Path) -> None:
     place = ("joints", 0, "turning_nm_per_rad")
-    first = read_spatial_robot("staubli_rx160").robot
+    case = read_robot("staubli_rx160")
+    assert isinstance(case, SpatialCase)
+    first = case.robot
     own = tmp_path / "own.toml"
     own.write_text(changed_robot_text("staubli_rx160", {place: 2.5e6}), encoding="utf-8")
     again = read_spatial_robot(own).robot
