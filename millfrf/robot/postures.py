@@ -13,6 +13,7 @@ from robot_model import (
     PlanarCase,
     SpatialCase,
     SpatialRobot,
+    ToolPath,
     close_loops,
     driven_values,
     has_spherical_wrist,
@@ -117,6 +118,22 @@ def solve_place(robot: SpatialRobot, place: CutPlace, start: Real) -> Real:
     """
     target = np.eye(4)
     target[:3, :3], target[:3, 3] = place.attitude, place.position
+    return _solve(robot, target, start)
+
+
+def start_of_path(robot: SpatialRobot, path: ToolPath, start: Real) -> Real:
+    """Driven joint values at a path's first place, within the limits; ``start`` itself where there are none."""
+    from scipy.spatial.transform import Rotation
+
+    target = np.eye(4)
+    target[:3, :3], target[:3, 3] = Rotation.from_rotvec(path.attitudes[0]).as_matrix(), path.positions[0]
+    try:
+        return _solve(robot, target, start)
+    except InputError:
+        return start
+
+
+def _solve(robot: SpatialRobot, target: Real, start: Real) -> Real:
     if robot.mechanism.closures:
         q = inverse_kinematics(robot.mechanism, target, start)
         return np.asarray(q[robot.mechanism.active])

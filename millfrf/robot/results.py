@@ -33,7 +33,7 @@ from ..progress import bar
 from ..provenance import add_comment, add_to_json, origin
 from ..tables import Table, show
 from .asked_loads import Loads, check_near, check_positive
-from .postures import Asked, mechanism_of, posture_of, spatial
+from .postures import Asked, mechanism_of, posture_of, spatial, start_of_path
 from .update_bands import deviation_sentence, with_errors
 
 Real = NDArray[np.float64]
@@ -102,7 +102,8 @@ def write_receptance(
     else:
         frf = with_errors(model.frf(np.linspace(*band, lines)), case, driven, axes)
         write_frf(out, frf, provenance=json.dumps(provenance))
-    _draw_receptance(result, np.linspace(*band, lines), drawn, origin("robot frf", [robot]))
+    told = origin("robot frf", [robot], {"posture": provenance["posture"]})
+    _draw_receptance(result, np.linspace(*band, lines), drawn, told)
     warn(result)
     typer.echo(f"wrote {out}: {len(model.poles)} modes from {model.natural_frequencies.min():.2f} Hz")
 
@@ -148,6 +149,8 @@ def write_compensation(
     start = posture_of(case, asked)[0]
     close_loops(case.robot.mechanism, start)
     nominal = read_tool_path(path)
+    if asked.pose is None and asked.joints is None:  # the file's first posture may be on a branch beyond the limits
+        start = start_of_path(case.robot, nominal, start)
     with bar("compensating"):
         result = compensate_path(case.robot, nominal, start, payload=loads.payload, weight=loads.weight)
         left_open = deviation_sentence(case, partial(_deviations, nominal, start, loads))

@@ -1,6 +1,6 @@
 """Lobes of a robot's posture, and depth limits over its redundancy, from the command line."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ from cutting import MillingProcess
 from figures import LobesBand, lobes_figure, save_figure
 from foundation import TIP, InputError, writing_whole_file
 from modal_fit import ModalModel, Residuals
-from robot_model import SpatialCase, in_posture, read_robot
+from robot_model import SpatialCase, in_posture, read_robot, shown_values
 from stability import StabilityLobes, judge_mode_coupling, with_residual_flexibility, write_lobes
 
 from ..chain import compute_lobes, lobes_summary, speed_axis
@@ -19,7 +19,7 @@ from ..options import check_output
 from ..progress import bar
 from ..provenance import add_comment, made, origin
 from .depth_maps import depth_over_redundancy, write_posture_map
-from .postures import Asked, cut_place, posture_of, spatial
+from .postures import Asked, cut_place, mechanism_of, posture_of, spatial
 from .results import RPM, say_doubts
 from .settled_modes import settled_modes
 from .update_bands import band_of_lobes, write_band
@@ -78,6 +78,7 @@ def write_lobes_in_posture(
     found = replace(found, warnings=(*doubts, *result.warnings, *told, *found.warnings))
     coupling = _coupling(model, process, found, max_depth)
     asked_for: dict[str, object] = {"speeds_rpm": speeds, "depth_max_m": max_depth, "method": method, "links": links}
+    asked_for["posture"] = shown_values(mechanism_of(case), driven)
     asked_for["mode_coupling"] = coupling
     write_lobes(out, found, provenance=made("robot lobes", [robot, cutting], asked_for))
     for warning in found.warnings:
@@ -140,7 +141,8 @@ def write_map_over_redundancy(
     best = found.best()
     with writing_whole_file(out) as unfinished:
         write_posture_map(unfinished, found, doubts, _sliding(case))
-        add_comment(unfinished, origin("robot lobes", [robot, cutting], {"speed_rpm": speed, "depth_max_m": max_depth}))
+        asked_for = {"speed_rpm": speed, "depth_max_m": max_depth, "place": asdict(asked)}
+        add_comment(unfinished, origin("robot lobes", [robot, cutting], asked_for))
     typer.echo(
         f"wrote {out}: {found.reached.sum()} of {len(axis)} angles reached; best {1e3 * found.values[best]:.3g} mm at "
         f"{np.degrees(axis[best]):.1f} deg, worst {1e3 * np.nanmin(found.values):.3g} mm"

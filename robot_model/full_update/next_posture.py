@@ -100,7 +100,10 @@ def _information(robot: SpatialRobot, problem: Problem, found: Belief, driven: R
         return None
     frequencies = np.linspace(first.frequencies[0], first.frequencies[-1], LINES)
     system = posture_system(robot, problem.parameters, q, first.axes, first.sensor)
-    values = receptance_of(system, problem.parameters, found.x, frequencies, first.rows, first.columns)
+    try:
+        values = receptance_of(system, problem.parameters, found.x, frequencies, first.rows, first.columns)
+    except np.linalg.LinAlgError:  # what was found takes more mass away than moves in this posture
+        return None
     p, c = len(first.rows), len(first.columns)
     noise = _relative_noise(first) * np.sqrt(np.mean(np.abs(values) ** 2, axis=(1, 2)))
     left = np.eye(p, dtype=complex) / noise[:, None, None]

@@ -66,7 +66,9 @@ def modes_at(robot: SpatialRobot, q: Real) -> StructureModes:
     try:
         squares, vectors = eigh(stiffness, mass)
     except np.linalg.LinAlgError as error:
-        raise InputError("the mass matrix is singular: a node has no mass; add a body, or make a beam") from error
+        raise InputError(
+            "the mass matrix is singular: a node has no mass; add [[bodies]] to the robot's file"
+        ) from error
     if squares[0] <= 0:
         raise InputError(f"the structure is not held: lowest omega^2 = {squares[0]:.3g}; check joints and links")
     shapes = (basis @ vectors).T.reshape(len(squares), -1, 6)

@@ -58,7 +58,7 @@ def show_stiffness(
     if sag.any():
         typer.echo(f"largest deflection under weight and {force:g} N together: {1e3 * together:.3f} mm")
     warn(result)
-    _draw(case, (driven, axes), result, force, drawn, origin("robot stiffness", [robot]))
+    _draw(case, (driven, axes), result, force, drawn, origin("robot stiffness", [robot], {"posture": posture}))
     if out is None:
         return
     found = {

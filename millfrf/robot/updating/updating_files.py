@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+import typer
+
 from foundation import InputError, MillfrfError, writing_whole_file
 from robot_model import numbered_robot_text, read_robot, update_robot, updated_document
 
@@ -15,6 +17,21 @@ from ..postures import spatial
 from .asking import Asking
 from .measured_files import read_measured
 from .update_words import as_json, summary
+
+
+def _check_readable(unfinished: Path, out: Path, lines: Sequence[str]) -> None:
+    """Read the file before it takes its name: numbers may fit what was measured and still be no robot."""
+    named = unfinished.with_suffix(".toml")  # a robot file is known by its suffix
+    unfinished.rename(named)
+    try:
+        read_robot(named)
+    except MillfrfError as error:
+        why = str(error).replace(f"{named}: ", "")
+        said = f"{out} was not written, for no robot has these numbers: {why}; are posture, axes and band right?"
+        typer.echo("\n".join(lines))  # an error is one line: what was found goes before it
+        raise MillfrfError(said) from error
+    finally:
+        named.rename(unfinished)
 
 
 def update_robot_file(robot: str, paths: Sequence[Path], out: Path, report: Path | None, asking: Asking) -> list[str]:
@@ -44,9 +61,10 @@ def update_robot_file(robot: str, paths: Sequence[Path], out: Path, report: Path
         add_to_json(report, made)
         lines.append(f"wrote {report}")
     if found.verdict == "unexplained":
-        raise MillfrfError("\n".join([*lines, f"{out} was not written: no update of these numbers holds elsewhere"]))
+        typer.echo("\n".join(lines))
+        raise MillfrfError(f"{out} was not written: no update of these numbers holds elsewhere")
     with writing_whole_file(out) as temporary:
         temporary.write_text(updated_document(numbered_robot_text(robot), case.robot, found), encoding="utf-8")
         add_comment(temporary, made)
-    read_robot(out)
+        _check_readable(temporary, out, lines)
     return [*lines, f"wrote {out}: the robot's file with {len(found.parameters)} numbers updated and their covariance"]
