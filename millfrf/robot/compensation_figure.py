@@ -39,6 +39,7 @@ def compensation_figure(nominal: ToolPath, result: CompensatedPath) -> Figure:
     lower.plot(way, left, color=COLOURS[0])
     lower.set_ylabel("Left by the\nsame model (µm)")
     lower.set_ylim(bottom=0)
+    lower.yaxis.set_major_formatter("{x:g}")  # a factor above the axis would stand on the panel's letter
     lower.set_xlabel("Way along the path (mm)")
     lower.set_xlim(0, max(float(way[-1]), 1e-9))
     for number, axes in enumerate((upper, lower)):

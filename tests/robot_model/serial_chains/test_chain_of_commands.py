@@ -2,9 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from millfrf.__main__ import DONE, run
+from millfrf.robot.compensation_figure import compensation_figure
+from robot_model import CompensatedPath, ToolPath
 
 ROBOT = "staubli_rx160"
 CUT = """[cutting]
@@ -50,3 +53,12 @@ def test_an_update_with_the_wrong_posture_leaves_no_file(tmp_path: Path, capsys:
     assert "does not foresee" not in said.out + said.err
     assert not out.exists()
     assert [path.name for path in tmp_path.iterdir()] == ["frf.h5"]
+
+
+def test_tiny_remainders_leave_no_factor_on_the_panels_letter() -> None:
+    positions = np.array([[0.8, 0.1, 0.6], [0.9, 0.1, 0.6]])
+    path = ToolPath(positions, np.zeros((2, 3)), np.zeros((2, 6)))
+    left = np.full((2, 6), 3e-12)
+    drawn = compensation_figure(path, CompensatedPath(path, left, left, left, np.zeros((2, 6))))
+    drawn.canvas.draw()
+    assert drawn.axes[1].yaxis.get_offset_text().get_text() == ""
