@@ -158,3 +158,19 @@ def test_a_path_is_not_written_over(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_the_robots_that_come_along_are_without_fault() -> None:
     for path in FOLDER.glob("*.toml"):
         assert read_robot(path) is not None
+
+
+@pytest.mark.parametrize("name", ["frf.h5", "model.json"])
+def test_a_diagnosis_of_frfs_or_models_is_led_to_the_update(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    given = tmp_path / name
+    assert run(["robot", "frf", KUKA, "--out", str(given)]) == 0
+    capsys.readouterr()
+    words = ["robot", "diagnose", KUKA, str(given), "--pose", "0,-10,100,0,90,0", "--out", str(tmp_path / "out")]
+    assert run(words) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert name in said
+    assert "millfrf robot update" in said
+    assert said.count("\n") == 1
+    assert not (tmp_path / "out").exists()

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from h5py import is_hdf5
 from numpy.typing import NDArray
 
 from foundation import InputError, writing_whole_folder
@@ -12,6 +13,7 @@ from mismatch import LabError, PosedRecording, diagnose_robot, posed_channels, r
 from modal_fit import write_modal_model
 from robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot, tool_down
 
+from ...file_kinds import FRF, MODEL, kind_of
 from ...gate import RECORD_AGAIN, check_channels
 from ...options import check_band
 from ...progress import bar
@@ -52,6 +54,7 @@ def diagnose_robot_files(robot: str, paths: Sequence[Path], out: Path, asking: A
     refuse_file(out)
     case = spatial(read_robot(robot))
     _refuse_unlike(paths, asking)
+    _refuse_what_an_update_takes(paths)
     doubts = _doubts(paths, asking.stream)
     recordings = _recordings(case, paths, asking)
     with bar("diagnosing"):
@@ -88,6 +91,17 @@ def _doubts(paths: Sequence[Path], stream: str | None) -> list[str]:
         for path in paths
         for doubt in check_channels([path], posed_channels, stream, progress=bar, remedy=RECORD_AGAIN)
     ]
+
+
+def _refuse_what_an_update_takes(paths: Sequence[Path]) -> None:
+    for path in paths:
+        if path.suffix == ".json" or (path.is_file() and is_hdf5(path)):
+            kind = kind_of(path)
+            if kind in (FRF, MODEL):
+                raise InputError(
+                    f"{path} is of the kind {kind}; this command reads recordings; 'millfrf robot update' takes FRFs "
+                    "and modal models, says which numbers of the robot's file are wrong, and writes them"
+                )
 
 
 def _refuse_unlike(paths: Sequence[Path], asking: Asking) -> None:
