@@ -1,7 +1,7 @@
-"""Bands that an updated robot's covariance gives: of FRFs, depth limits and deviations along a path."""
+"""Bands that an updated robot's covariance gives: of FRFs, depth limits, frequencies and deviations."""
 
 import csv
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from robot_model import (
     derived_errors,
     frf_with_errors,
     modal_model_at,
+    modes_at,
 )
 from stability import LimitBand, StabilityLobes, limit_band
 
@@ -63,6 +64,31 @@ def write_band(out: Path, band: LimitBand) -> Path:
         for speed, low, high, basis in zip(rpm, band.low, band.high, band.basis, strict=True):
             writer.writerow([f"{speed:.9g}", f"{low:.9g}", f"{high:.9g}", basis])
     return place
+
+
+def frequency_errors(case: SpatialCase, postures: Sequence[Real | None]) -> Real | None:
+    """Standard errors of the lowest natural frequency in postures, (n,), Hz; None where the file was never updated.
+
+    NaN where there is no posture.
+    """
+    if case.uncertainty is None:
+        return None
+    reached = [q for q in postures if q is not None]
+
+    def lowest(robot: SpatialRobot) -> Real:
+        return np.array([modes_at(robot, q).frequencies[0] for q in reached])
+
+    errors = np.full(len(postures), np.nan)
+    errors[[q is not None for q in postures]] = derived_errors(case.robot, case.uncertainty, lowest)
+    return errors
+
+
+def frequency_sentence(errors: Real) -> str:
+    """How far the update leaves the lowest frequency open, in a sentence."""
+    return (
+        f"the update leaves the lowest frequency open by ±{WIDE * np.nanmedian(errors):.2g} Hz in the median and "
+        f"±{WIDE * np.nanmax(errors):.2g} Hz at most (95 %)"
+    )
 
 
 def deviation_sentence(case: SpatialCase, deviations: Callable[[SpatialRobot], Real]) -> str:

@@ -21,6 +21,7 @@ from ..along_path import PathCut, PostureValues, Request, kept_modes, values_of
 from ..asked_loads import check_axis, check_degrees, check_places, check_positive
 from ..postures import spatial
 from ..results import say_doubts
+from ..update_bands import frequency_errors, frequency_sentence
 from .posture_maps import depth_over_places
 
 Real = NDArray[np.float64]
@@ -73,12 +74,15 @@ def write_workspace_map(
         from ..picture import draw_workspace
 
         draw_workspace(picture, places, (area.x[2], area.y[2]), lowest, limits)
+    errors = frequency_errors(case, postures) if out is not None else None
     if out is not None:
         asked = {"area": area, "speed_rpm": speed, "depth_max_m": max_depth}
         with writing_whole_file(out) as unfinished:
-            _write(unfinished, case.robot, (places, postures), lowest, values, max_depth, doubts)
+            _write(unfinished, case.robot, (places, postures), (lowest, errors), values, max_depth, doubts)
             add_comment(unfinished, origin("robot map", [robot, *([] if cutting is None else [cutting])], asked))
     _tell(lowest, limits, values, [one for one in (picture, out) if one is not None])
+    if errors is not None:
+        typer.echo(frequency_sentence(errors))
     say_doubts(doubts)
 
 
@@ -161,13 +165,15 @@ def _write(
     out: Path,
     robot: SpatialRobot,
     held: tuple[Sequence[CutPlace], Sequence[Real | None]],
-    lowest: Real,
+    frequencies: tuple[Real, Real | None],
     values: PostureValues | None,
     max_depth: float,
     doubts: Sequence[str],
 ) -> None:
     """One row a place; empty cells where it is not reached, or where a limit is not known."""
+    lowest, errors = frequencies
     names = ["x_m", "y_m", "z_m", "reached", "lowest_frequency_hz"]
+    names += ["lowest_frequency_error_hz"] if errors is not None else []
     names += ["depth_limit_m", "status", "bifurcation", "chatter_frequency_hz"] if values is not None else []
     n_joints = int(robot.mechanism.active.sum())
     names += [f"q{i + 1}" for i in range(n_joints)]
@@ -177,6 +183,7 @@ def _write(
         writer.writerow(names)
         for i, (place, q) in enumerate(zip(*held, strict=True)):
             cells: list[object] = [*place.position, "no" if q is None else "yes", lowest[i]]
+            cells += [errors[i]] if errors is not None else []
             if values is not None:
                 depth = np.minimum(values.depth[i], max_depth)
                 cells += [depth, values.status[i], values.kind[i], values.frequency[i]]

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from millfrf.robot.update_bands import frequency_errors
 from robot_model import (
     RobotUncertainty,
     SpatialCase,
@@ -69,3 +70,16 @@ def test_a_stiffness_that_no_measurement_told_stays_a_doubt(tmp_path: Path) -> N
     warnings = in_posture(case, next(iter(case.poses.values()))).warnings
     assert [line for line in warnings if "do not tell the stiffness of joint joint_6" in line]
     assert not [line for line in warnings if "joint_5" in line]
+
+
+def test_errors_in_a_map_are_the_scatter_of_drawn_robots() -> None:
+    case, posture = updated()
+    assert case.uncertainty is not None
+    other = posture + np.radians([10.0, 5.0, -10.0, 0.0, 10.0, 0.0])
+    found = frequency_errors(case, [posture, None, other])
+    assert found is not None
+    assert np.isnan(found[1])
+    robots = drawn_robots(case.robot, case.uncertainty, 300, seed=4)
+    drawn = [[modes_at(robot, q).frequencies[0] for q in (posture, other)] for robot in robots]
+    assert found[[0, 2]] == pytest.approx(np.std(drawn, axis=0), rel=0.2)
+    assert frequency_errors(replace(case, uncertainty=None), [posture]) is None
