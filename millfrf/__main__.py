@@ -66,7 +66,7 @@ def run(arguments: Sequence[str]) -> int:
 def _say_in_one_line(usual: Callable[..., None], message: object, category: type[Warning], *where: Any) -> None:
     """Print what was removed as a note; other warnings go their usual way."""
     if issubclass(category, LeftoverRemoved):
-        print(f"note: {message}", file=sys.stderr)
+        print(f"note: {printable(str(message))}", file=sys.stderr)
     else:
         usual(message, category, *where)
 

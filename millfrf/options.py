@@ -8,6 +8,8 @@ import typer
 
 from foundation import InputError
 
+from .terminal import say
+
 if TYPE_CHECKING:  # the commands start without loading the room of FRFs
     from estimation import Frf
 
@@ -90,7 +92,7 @@ def check_output(path: Path, suffixes: Sequence[str], inputs: Sequence[Path] = (
 def echo_warnings(warnings: Iterable[str]) -> None:
     """Print each warning as one line on standard error."""
     for warning in warnings:
-        typer.echo(f"warning: {warning}", err=True)
+        say(f"warning: {warning}")
 
 
 def size_of(frf: "Frf") -> str:

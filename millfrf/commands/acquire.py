@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from ..terminal import say
+
 
 def acquire(
     session: Annotated[Path, typer.Argument(metavar="SESSION.toml", help="What is wired where, and for how long.")],
@@ -36,15 +38,15 @@ def acquire(
             raise InputError(f"{out} exists; choose another name or remove it first")
     opened = open_session(session)
     for stream in opened.source.streams:
-        typer.echo(f"stream {stream.name}: {len(stream.channels)} channels at {stream.sample_rate:.9g} Hz")
+        say(f"stream {stream.name}: {len(stream.channels)} channels at {stream.sample_rate:.9g} Hz")
     for notice in getattr(opened.source, "notices", ()):
-        typer.echo(f"note: {notice}")
+        say(f"note: {notice}")
     if out is None:
         _check(opened.source, seconds)
     elif live:
         from ..chain import acquire_live
 
-        tally = acquire_live(opened, out, address=live_address, port=live_port, at_once=at_once, say=_say)
+        tally = acquire_live(opened, out, address=live_address, port=live_port, at_once=at_once, say=say)
         _report(tally, out)
     else:
         _record(opened, out)
@@ -62,13 +64,13 @@ def _check(source: object, seconds: float) -> None:
     found = preflight(heard.streams, heard.doubts)
     show(found.table())
     for tap in found.taps:
-        typer.echo(f"tap: {tap.acceleration.name} {1e6 * tap.delay:+.0f} us after {tap.force.name}")
+        say(f"tap: {tap.acceleration.name} {1e6 * tap.delay:+.0f} us after {tap.force.name}")
     concerns = found.concerns()
     for line in concerns:
-        typer.echo(f"concern: {line}")
+        say(f"concern: {line}")
     if concerns:
         raise MillfrfError(f"pre-flight: {len(concerns)} concerns about {len(found.checks)} channels; see above")
-    typer.echo("pre-flight: nothing wrong")
+    say("pre-flight: nothing wrong")
 
 
 def _record(opened: object, out: Path) -> None:
@@ -81,22 +83,17 @@ def _record(opened: object, out: Path) -> None:
     _report(tally, out)
 
 
-def _say(line: str) -> None:
-    """Print at once, also into a pipe: somebody waits for the address."""
-    print(line, flush=True)
-
-
 def _report(tally: object, out: Path) -> None:
     from ..chain import Tally
     from ..gate import doubts_of_rate
 
     if not isinstance(tally, Tally):
-        typer.echo("stopped before Start; nothing was recorded")
+        say("stopped before Start; nothing was recorded")
         return
-    typer.echo(tally.summary())
+    say(tally.summary())
     story = tally.device_story()
     for line in (*story.losses, *story.notices):
-        typer.echo(f"device: {line}")
-    typer.echo(f"wrote {out}")
+        say(f"device: {line}")
+    say(f"wrote {out}")
     for doubt in doubts_of_rate(out):
-        typer.echo(f"warning: {doubt}")
+        say(f"warning: {doubt}")

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import Output, check_output, echo_warnings
+from ..terminal import say
 
 
 def calibrate(
@@ -25,4 +26,4 @@ def calibrate(
     write_calibration(out, result, [model, tip, sensor])
     echo_warnings(result.warnings)
     show(mode_table(result.model))
-    typer.echo(f"wrote {out}")
+    say(f"wrote {out}")

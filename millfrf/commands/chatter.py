@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import Stream, check_output, names
+from ..terminal import say
 
 
 def chatter(
@@ -63,17 +64,17 @@ def chatter(
     doubts += doubts_of_cuts(recordings, process, options, bar)
     cuts = judge_recordings(recordings, options, bar)
     for doubt in doubts:
-        typer.echo(f"warning: {doubt}", err=True)
+        say(f"warning: {doubt}")
     show(verdict_table(cuts))
     if any(cut.verdict.foreign for cut in cuts):
         show(tone_table(cuts))
     for cut in cuts:
-        typer.echo(f"{cut.name}: {cut.verdict.kind}: {cut.verdict.reason}")
+        say(f"{cut.name}: {cut.verdict.kind}: {cut.verdict.reason}")
         for doubt in cut.doubts:
-            typer.echo(f"warning: {doubt}", err=True)
+            say(f"warning: {doubt}")
     if out is not None:
         told = [*doubts, *(doubt for cut in cuts for doubt in cut.doubts)]
         inputs = [*recordings, cutting, *([] if model is None else [model])]
         asked = {"speed_rpm": speed, "responses": list(options.responses), "stream": stream}
         write_cuts(out, keep_spectra(recordings, cuts, options, bar), of_chatter(inputs, asked, told))
-        typer.echo(f"wrote {out}")
+        say(f"wrote {out}")

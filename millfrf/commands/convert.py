@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import check_output
+from ..terminal import say
 
 
 def convert(
@@ -40,7 +41,7 @@ def convert(
             raise InputError(f"{sources[0]} needs --map MAP.toml with recording, dbc and signals")
         with bar(f"adding {sources[0].name}") as update:
             origin = made("convert", [sources[0], mapping])
-            typer.echo(f"wrote {add_can_log(sources[0], target, mapping, update, origin)}")
+            say(f"wrote {add_can_log(sources[0], target, mapping, update, origin)}")
         return
     if is_frf_conversion(sources, mapping):
         check_output(target, FRF_SUFFIXES, sources)
@@ -49,8 +50,8 @@ def convert(
     with bar(f"converting {sources[0].name}") as update:
         written, told = convert_files(sources, target, mapping, update, span)
     for text in told.inferred:
-        typer.echo(f"note: {text}")
+        say(f"note: {text}")
     for text in told.doubts:
-        typer.echo(f"warning: {text}", err=True)
+        say(f"warning: {text}")
     for path in written:
-        typer.echo(f"wrote {path}")
+        say(f"wrote {path}")

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from ..terminal import say
+
 
 def demo(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for all results.")] = Path("millfrf-demo"),
@@ -25,7 +27,7 @@ def demo(
     result = run_demo(DemoOptions(out, noise, 0 if seed is None else seed), bar, typer.echo)
     for table in comparison_tables(result):
         show(table)
-    typer.echo(f"report: {result.report.resolve()}")
+    say(f"report: {result.report.resolve()}")
 
 
 def _concealed(out: Path, noise: float, seed: int | None) -> None:
@@ -35,4 +37,4 @@ def _concealed(out: Path, noise: float, seed: int | None) -> None:
 
     result = run_concealed(ConcealOptions(out, noise, seed), bar, typer.echo)
     show(concealment_table(result))
-    typer.echo(f"the diagnosis: {(out / 'diagnosis').resolve()}; {result.seconds:.0f} s in all")
+    say(f"the diagnosis: {(out / 'diagnosis').resolve()}; {result.seconds:.0f} s in all")

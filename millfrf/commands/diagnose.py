@@ -8,6 +8,7 @@ import typer
 from foundation import InputError
 
 from ..options import check_band, check_shares
+from ..terminal import say
 
 
 def diagnose(
@@ -59,9 +60,9 @@ def diagnose(
         model = nominal_from_simulation(simulated, band, out, stream=stream, progress=bar)
     process, doubts = read_checked_cutting(cutting) if cutting is not None else (None, [])
     for doubt in doubts:
-        typer.echo(f"warning: {doubt}", err=True)
+        say(f"warning: {doubt}")
     settings = Settings(LabError(*lab_error))
     result = diagnose_files(model, recordings, out, settings, stream=stream, band=band, process=process, progress=bar)
     for line in result.summary:
-        typer.echo(line)
-    typer.echo(f"wrote {', '.join(str(path) for path in result.written)}")
+        say(line)
+    say(f"wrote {', '.join(str(path) for path in result.written)}")

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import Band, Output, Responding, Stream, check_band, check_output, echo_warnings, names, size_of
+from ..terminal import say
 
 
 def estimate(
@@ -64,4 +65,4 @@ def estimate(
     write_estimate(out, result, recordings)
     echo_warnings(result.warnings)
     frf = result.frf
-    typer.echo(f"wrote {out}: {size_of(frf)}, {frf.frequencies[0]:g} to {frf.frequencies[-1]:g} Hz")
+    say(f"wrote {out}: {size_of(frf)}, {frf.frequencies[0]:g} to {frf.frequencies[-1]:g} Hz")

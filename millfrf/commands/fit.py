@@ -8,6 +8,7 @@ import typer
 from foundation import InputError
 
 from ..options import Output, Stream, check_band, check_output, echo_warnings, names
+from ..terminal import say
 
 
 def fit(
@@ -83,7 +84,7 @@ def fit(
     if by_source is not None:
         show(by_source)
     if isinstance(result, ModalFit) and poles is not None:
-        typer.echo(picked_in_words(result, used))
-    typer.echo(f"wrote {out}")
+        say(picked_in_words(result, used))
+    say(f"wrote {out}")
     if isinstance(result, ModalFit) and candidates is not None:
-        typer.echo(f"wrote {candidates}: {write_candidates(candidates, result, files[0])} groups of poles to pick from")
+        say(f"wrote {candidates}: {write_candidates(candidates, result, files[0])} groups of poles to pick from")

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from ..terminal import say
+
 
 def inspect(
     file: Annotated[
@@ -21,12 +23,12 @@ def inspect(
     from ..terminal import printable
 
     findings = inspect_file(file, bar)
-    typer.echo(printable(f"{file.name}: {findings.summary}"))
+    say(printable(f"{file.name}: {findings.summary}"))
     for table in findings.tables:
         show(table)
     for note in findings.notes:
-        typer.echo(printable(note))
+        say(printable(note))
     for concern in findings.concerns:
-        typer.echo(printable(f"warning: {concern}"))
+        say(printable(f"warning: {concern}"))
     if not findings.concerns:
-        typer.echo("nothing looks wrong")
+        say("nothing looks wrong")

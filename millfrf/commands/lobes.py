@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import Output, check_output, echo_warnings
+from ..terminal import say
 
 
 def lobes(
@@ -41,6 +42,6 @@ def lobes(
     asked = {"speeds_rpm": speeds, "max_depth_m": max_depth, "method": method}
     write_lobes(out, result, provenance=of_lobes([dynamics, cutting], asked))
     echo_warnings(result.warnings)
-    typer.echo(f"wrote {out}: {lobes_summary(result, max_depth)}")
+    say(f"wrote {out}: {lobes_summary(result, max_depth)}")
     if kind_of(dynamics) == MODEL:
-        typer.echo(mode_coupling_line(read_modal_model(dynamics), read_cutting_process(cutting), max_depth))
+        say(mode_coupling_line(read_modal_model(dynamics), read_cutting_process(cutting), max_depth))

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from ..terminal import say
+
 
 def plan(
     session: Annotated[Path, typer.Argument(metavar="SESSION.toml", help="File with tables [cutting] and [plan].")],
@@ -15,6 +17,6 @@ def plan(
 
     found, doubts = plan_from_file(session)
     for doubt in doubts:
-        typer.echo(f"warning: {doubt}", err=True)
+        say(f"warning: {doubt}")
     for table in plan_tables(found):
         show(table)

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import Output, check_output, echo_warnings
+from ..terminal import say
 
 
 def predict(
@@ -23,5 +24,5 @@ def predict(
     write_prediction(out, found, model, recording)
     echo_warnings(found.warnings)
     for line in prediction_lines(found):
-        typer.echo(line)
-    typer.echo(f"wrote {out}")
+        say(line)
+    say(f"wrote {out}")

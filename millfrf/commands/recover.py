@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from ..terminal import say
+
 if TYPE_CHECKING:
     from acquisition import Recovered
 
@@ -31,8 +33,8 @@ def recover(
         origin = made("recover", [recording])
         back = recover_file(recording, out, progress=update, provenance=origin)
     for line in recovered_lines(back):
-        typer.echo(line)
-    typer.echo(f"wrote {back.path}")
+        say(line)
+    say(f"wrote {back.path}")
 
 
 def recovered_lines(back: "Recovered") -> list[str]:

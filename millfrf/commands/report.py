@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import Band, Output, check_band, check_output
+from ..terminal import say
 
 
 def report(
@@ -25,5 +26,5 @@ def report(
 
     check_output(out, (".html", ".htm"), files)
     for doubt in write_report(out, files, ReportOptions(title, check_band(band), reference), bar):
-        typer.echo(f"warning: {doubt}", err=True)
-    typer.echo(f"wrote {out}")
+        say(f"warning: {doubt}")
+    say(f"wrote {out}")

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import Band, Output, Responding, Stream, check_band, check_output, echo_warnings, names, size_of
+from ..terminal import say
 
 
 def tap(
@@ -75,4 +76,4 @@ def tap(
     frf, tau = result.frf, result.settings.time_constant
     window = "" if tau is None else f"; exponential window of {tau:.4g} s, whose damping the fit takes off"
     known = "no common band" if frf.band is None else f"band {frf.band[0]:.4g} to {frf.band[1]:.4g} Hz"
-    typer.echo(f"wrote {out}: {size_of(frf)}, {known}, segments of {result.settings.duration:.4g} s{window}")
+    say(f"wrote {out}: {size_of(frf)}, {known}, segments of {result.settings.duration:.4g} s{window}")

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from ..terminal import say
+
 cut_app = typer.Typer(
     name="cut",
     help="The cutting process: measured forces against those that a cutting file computes.",
@@ -47,4 +49,4 @@ def diagnose(
 
     asking = Asking(depth, speed, model, coefficient_error, force_error, stream)
     for line in diagnose_cut_files(cutting, recordings, out, asking):
-        typer.echo(line, err=line.startswith("warning: "))
+        say(line)

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from ..terminal import say
+
 Triple = tuple[float, float, float]
 
 
@@ -78,4 +80,4 @@ def new_robot(
         source,
     )
     for line in write_new_robot(robot, out, asked):
-        typer.echo(line, err=line.startswith("warning: "))
+        say(line)

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import typer
 
 from foundation import InputError, MillfrfError, writing_whole_file
 from robot_model import (
@@ -28,6 +27,7 @@ from ..options import check_output
 from ..progress import bar
 from ..provenance import add_comment, origin
 from ..tables import Table, show
+from ..terminal import say
 from .asked_loads import check_positive
 from .identified_file import identified_values
 from .postures import spatial
@@ -66,7 +66,7 @@ def write_identified(robot: str, table: Path, out: Path, error: float, links: bo
     doubts = [*_radians(case, measured), *_doubts(found, held, error), *_forgotten(case)]
     _show_held_out(held, error)
     for doubt in doubts:
-        typer.echo(f"warning: {doubt}", err=True)
+        say(f"warning: {doubt}")
     if held is not None:
         _refuse_what_does_not_hold(held, error)
     text = changed_robot_text(robot, identified_values(robot, table.name, parameters, found, float(np.log(prior))))
@@ -74,7 +74,7 @@ def write_identified(robot: str, table: Path, out: Path, error: float, links: bo
         unfinished.write_text(text, encoding="utf-8")
         add_comment(unfinished, origin("robot identify", [robot, table], {"error_m": error, "prior": prior}))
         read_robot(unfinished)  # refuses what the checks of robot files refuse, before the file has its name
-    typer.echo(f"wrote {out}: {found.identifiable.sum()} of {len(parameters)} numbers are fixed by the data")
+    say(f"wrote {out}: {found.identifiable.sum()} of {len(parameters)} numbers are fixed by the data")
 
 
 def _show_found(case: SpatialCase, parameters: Sequence[ElasticParameter], found: Identification) -> None:
@@ -87,17 +87,17 @@ def _show_found(case: SpatialCase, parameters: Sequence[ElasticParameter], found
     title = "Stiffnesses (N/m, N m/rad; links N m^2 and N)"
     show(Table(title, ("number", "file", "found", "standard error (%)"), tuple(rows)))
     for line in found.unidentifiable[:5]:
-        typer.echo(f"not told apart: {line}")
+        say(f"not told apart: {line}")
     if len(found.unidentifiable) > 5:
-        typer.echo(f"and {len(found.unidentifiable) - 5} more combinations like these")
+        say(f"and {len(found.unidentifiable) - 5} more combinations like these")
 
 
 def _show_held_out(held: HeldOut | None, error: float) -> None:
     if held is None:
-        typer.echo("fewer than 10 postures: none is held out, so what the numbers predict elsewhere is not known")
+        say("fewer than 10 postures: none is held out, so what the numbers predict elsewhere is not known")
         return
     before, after, size = (1e3 * lengths for lengths in (held.before, held.after, held.deflections))
-    typer.echo(
+    say(
         f"{held.postures} postures held out, deflections {size.mean():.3f} mm on average: the file's numbers miss "
         f"{before.mean():.4f} mm (largest {before.max():.4f}), those found {after.mean():.4f} mm (largest "
         f"{after.max():.4f}), {held.times(error):.2g} times the stated error"

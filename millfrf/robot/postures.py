@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
 
 from foundation import InputError
@@ -26,6 +25,7 @@ from robot_model import (
     unit_doubts,
 )
 
+from ..terminal import say
 from .asked_loads import check_degrees, check_places
 
 Real = NDArray[np.float64]
@@ -94,7 +94,7 @@ def _typed(case: PlanarCase | SpatialCase, text: str) -> Real:
     mechanism = mechanism_of(case)
     values = driven_values(mechanism, typed)
     for doubt in unit_doubts(mechanism, typed):
-        typer.echo(f"warning: {doubt}", err=True)
+        say(f"warning: {doubt}")
     return values
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
 
 from estimation import write_frf
@@ -32,6 +31,7 @@ from ..options import check_band, check_output
 from ..progress import bar
 from ..provenance import add_comment, add_to_json, origin
 from ..tables import Table, show
+from ..terminal import say
 from .asked_loads import Loads, check_near, check_positive
 from .postures import Asked, mechanism_of, posture_of, spatial, start_of_path
 from .update_bands import deviation_sentence, with_errors
@@ -61,7 +61,7 @@ def show_modes(robot: str, asked: Asked, count: int, picture: Path | None, links
         from .picture import draw_modes
 
         draw_modes(picture, spatial(case), driven)
-        typer.echo(f"wrote {picture}")
+        say(f"wrote {picture}")
 
 
 def write_receptance(
@@ -105,7 +105,7 @@ def write_receptance(
     told = origin("robot frf", [robot], {"posture": provenance["posture"]})
     _draw_receptance(result, np.linspace(*band, lines), drawn, told)
     warn(result)
-    typer.echo(f"wrote {out}: {len(model.poles)} modes from {model.natural_frequencies.min():.2f} Hz")
+    say(f"wrote {out}: {len(model.poles)} modes from {model.natural_frequencies.min():.2f} Hz")
 
 
 def check_drawn(drawn: tuple[Path | None, Path | None], out: Path | None = None) -> None:
@@ -131,10 +131,10 @@ def _draw_receptance(
     frf = result.known_model().frf(frequencies)
     if picture is not None:
         save_figure(receptance_figure(frf, result.frequencies), picture)
-        typer.echo(f"wrote {picture}")
+        say(f"wrote {picture}")
     if table is not None:
         write_receptance_table(table, frf, result.warnings, stated)
-        typer.echo(f"wrote {table}")
+        say(f"wrote {table}")
 
 
 def write_compensation(
@@ -161,12 +161,12 @@ def write_compensation(
         from .compensation_figure import draw_compensation
 
         draw_compensation(picture, nominal, result)
-        typer.echo(f"wrote {picture}")
+        say(f"wrote {picture}")
     before, after, sag = (
         1e3 * np.linalg.norm(moved[:, :3], axis=1) for moved in (result.deviations, result.left, result.weight)
     )
     change = 1e3 * np.linalg.norm((result.weight - result.weight[0])[:, :3], axis=1)
-    typer.echo(
+    say(
         f"wrote {out}: predicted deviation mean {before.mean():.3f} mm, largest {before.max():.3f} mm; "
         f"after correction {1e3 * after.max():.2g} um by the same model"
     )
@@ -176,14 +176,14 @@ def write_compensation(
         "none": "none of it is corrected (--weight none)",
     }
     own = "the robot and" if case.robot.bodies else "the robot unknown (its file gives no bodies); of"
-    typer.echo(
+    say(
         f"weight of {own} a payload of {loads.payload.mass:g} kg: largest deflection {sag.max():.3f} mm, "
         f"changes by up to {change.max():.3f} mm from the first place; {counted[loads.weight]}"
     )
     if left_open:
-        typer.echo(left_open)
+        say(left_open)
     for warning in result.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+        say(f"warning: {warning}")
 
 
 def _deviations(path: ToolPath, start: np.ndarray, loads: Loads, robot: SpatialRobot) -> np.ndarray:
@@ -193,10 +193,10 @@ def _deviations(path: ToolPath, start: np.ndarray, loads: Loads, robot: SpatialR
 def say_doubts(doubts: Sequence[str]) -> None:
     """Print doubts as warnings."""
     for doubt in doubts:
-        typer.echo(f"warning: {doubt}", err=True)
+        say(f"warning: {doubt}")
 
 
 def warn(result: PostureResult) -> None:
     """Print a posture's warnings."""
     for warning in result.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+        say(f"warning: {warning}")

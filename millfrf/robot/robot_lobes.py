@@ -4,7 +4,6 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
-import typer
 
 from cutting import MillingProcess
 from figures import LobesBand, lobes_figure, save_figure
@@ -18,6 +17,7 @@ from ..gate import check_depth, check_speed, check_speeds, lowest_frequency, rea
 from ..options import check_output
 from ..progress import bar
 from ..provenance import add_comment, made, origin
+from ..terminal import say
 from .depth_maps import depth_over_redundancy, write_posture_map
 from .postures import Asked, cut_place, mechanism_of, posture_of, spatial
 from .results import RPM, say_doubts
@@ -82,15 +82,15 @@ def write_lobes_in_posture(
     asked_for["mode_coupling"] = coupling
     write_lobes(out, found, provenance=made("robot lobes", [robot, cutting], asked_for))
     for warning in found.warnings:
-        typer.echo(f"warning: {warning}", err=True)
-    typer.echo(coupling)
-    typer.echo(f"wrote {out}: {lobes_summary(found, max_depth)}")
+        say(f"warning: {warning}")
+    say(coupling)
+    say(f"wrote {out}: {lobes_summary(found, max_depth)}")
     if band is not None:
-        typer.echo(f"wrote {write_band(out, band)}: 95 % intervals from the update's covariance")
+        say(f"wrote {write_band(out, band)}: 95 % intervals from the update's covariance")
     if picture is not None:
         shown = None if band is None else LobesBand(band.spindle_speeds / RPM, band.low, band.high)
         save_figure(lobes_figure({found.method: found}, band=shown), picture)
-        typer.echo(f"wrote {picture}")
+        say(f"wrote {picture}")
 
 
 def _sliding(case: SpatialCase) -> list[bool]:
@@ -143,16 +143,16 @@ def write_map_over_redundancy(
         write_posture_map(unfinished, found, doubts, _sliding(case))
         asked_for = {"speed_rpm": speed, "depth_max_m": max_depth, "place": asdict(asked)}
         add_comment(unfinished, origin("robot lobes", [robot, cutting], asked_for))
-    typer.echo(
+    say(
         f"wrote {out}: {found.reached.sum()} of {len(axis)} angles reached; best {1e3 * found.values[best]:.3g} mm at "
         f"{np.degrees(axis[best]):.1f} deg, worst {1e3 * np.nanmin(found.values):.3g} mm"
     )
     if depth is not None:
         stable = found.reached & (found.values > depth)
-        typer.echo(f"a cut of {1e3 * depth:g} mm is stable at {stable.sum()} of {found.reached.sum()} angles")
+        say(f"a cut of {1e3 * depth:g} mm is stable at {stable.sum()} of {found.reached.sum()} angles")
     if picture is not None:
         from .posture_figure import draw_posture_map
 
         what = "the robot about the tool" if asked.redundancy == "tool" else "tool and table about the feed"
         draw_posture_map(picture, found, max_depth, depth, what)
-        typer.echo(f"wrote {picture}")
+        say(f"wrote {picture}")

@@ -9,6 +9,7 @@ import pytest
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from millfrf.__main__ import run
 from millfrf.tables import Table, show
+from millfrf.terminal import say
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = ("acc x [g]", "[/]", "[red]x", "[link=http://a.example]y", ":bomb:", "z\x1b[2Jz")
@@ -63,6 +64,7 @@ def test_no_command_stumbles_over_such_names(recording: Path, capsys: pytest.Cap
     said = capsys.readouterr()
     assert "does not foresee" not in said.err
     assert "[red]e.h5" in said.out
+    assert "\x1b" not in said.out + said.err
 
 
 def _replayed(recording: Path) -> str:
@@ -101,3 +103,25 @@ def test_nothing_else_in_the_program_prints_through_rich() -> None:
         if re.search(r"^\s*(from|import) rich\b", file.read_text(encoding="utf-8"), re.MULTILINE)
     ]
     assert users == ["millfrf/terminal/rich_output.py"]
+
+
+def test_every_line_of_an_answer_passes_the_terminal() -> None:
+    """`typer.echo` and `print` would carry a channel's control characters to the screen."""
+    root = ROOT / "millfrf"
+    allowed = {"terminal/saying.py", "__main__.py", "hidden_packages.py"}
+    past = [
+        f"{path.relative_to(root)}:{number}"
+        for path in sorted(root.rglob("*.py"))
+        if path.relative_to(root).as_posix() not in allowed
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if re.match(r"\s*(typer\.echo|print|click\.echo)\(", line)
+    ]
+    assert not past, f"print with millfrf.terminal.say: {past}"
+
+
+def test_a_warning_goes_to_standard_error_without_control_characters(capsys: pytest.CaptureFixture[str]) -> None:
+    say("warning: ax\x1b[2J is dead")
+    say("wrote b\r.h5")
+    shown = capsys.readouterr()
+    assert shown.err == "warning: ax\ufffd[2J is dead\n"
+    assert shown.out == "wrote b\ufffd.h5\n"

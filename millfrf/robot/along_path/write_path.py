@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -29,6 +28,7 @@ from ...options import check_output
 from ...progress import bar
 from ...provenance import add_comment, origin
 from ...result_folder import refuse_file
+from ...terminal import say
 from ..asked_loads import Loads, check_positive
 from ..postures import Asked, posture_of, spatial
 from ..results import RPM, say_doubts
@@ -82,7 +82,7 @@ def write_optimised_path(
         found = optimised(cut, path, asked.redundancy(path), loading, asked.wanted(), first, pool)
     warnings += doubts(found, path)
     for line in summary(found, asked.wanted(), max_depth, depth):
-        typer.echo(line)
+        say(line)
     told = origin(
         "robot path", [robot, path_file, cutting], {"rpm": rpm, "depth_m": depth, "asked": asked, "loads": loads}
     )
@@ -98,8 +98,8 @@ def write_optimised_path(
             write_compensated_path(unfinished, corrected)
             add_comment(unfinished, told)
         left = 1e3 * np.linalg.norm(corrected.left[:, :3], axis=1).max()
-        typer.echo(f"compensated path: {1e3 * left:.2g} um are left by the same model")
-        typer.echo(f"wrote path.csv, path.png and compensated.csv in {out}")
+        say(f"compensated path: {1e3 * left:.2g} um are left by the same model")
+        say(f"wrote path.csv, path.png and compensated.csv in {out}")
     say_doubts(warnings)
 
 

@@ -4,6 +4,8 @@ from typing import Annotated
 
 import typer
 
+from ...terminal import say
+
 
 def list_robots(
     robot: Annotated[str | None, typer.Argument(metavar="[ROBOT]", help="Show what this one assumes.")] = None,
@@ -13,9 +15,9 @@ def list_robots(
 
     if robot is None:
         for name in robot_names():
-            typer.echo(f"{name}: {len(assumptions(name))} assumed tables")
+            say(f"{name}: {len(assumptions(name))} assumed tables")
         return
     case = read_robot(robot)
-    typer.echo(f"postures: {', '.join(case.poses) or 'none'}; {len(named_posture(case, None))} driven joints")
+    say(f"postures: {', '.join(case.poses) or 'none'}; {len(named_posture(case, None))} driven joints")
     for line in assumptions(robot):
-        typer.echo(line)
+        say(line)

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from ...terminal import say
 from .options import At, Feed, Joints, Pose, Redundancy, Robot, Turn
 
 
@@ -24,4 +25,4 @@ def show(
     from ..shown import show_robot
 
     for line in show_robot(robot, Asked(pose, joints, at, feed, turn, redundancy), out, browser):
-        typer.echo(line, err=line.startswith("warning: "))
+        say(line)

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from ...terminal import say
+
 
 def update(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file (.toml), or a name.")],
@@ -40,4 +42,4 @@ def update(
 
     asking = Asking(tuple(pose or ()), feed, band, sensor, stream)
     for line in update_robot_file(robot, files, out, report, asking):
-        typer.echo(line, err=line.startswith("warning: "))
+        say(line)

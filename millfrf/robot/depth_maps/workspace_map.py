@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
 
 from foundation import InputError, warning_lines, writing_whole_file
@@ -17,6 +16,7 @@ from ...gate import check_depth, check_speed, read_checked_cutting
 from ...options import check_output
 from ...progress import bar
 from ...provenance import add_comment, origin
+from ...terminal import say
 from ..along_path import PathCut, PostureValues, Request, kept_modes, values_of
 from ..asked_loads import check_axis, check_degrees, check_places, check_positive
 from ..postures import spatial
@@ -82,7 +82,7 @@ def write_workspace_map(
             add_comment(unfinished, origin("robot map", [robot, *([] if cutting is None else [cutting])], asked))
     _tell(lowest, limits, values, [one for one in (picture, out) if one is not None])
     if errors is not None:
-        typer.echo(frequency_sentence(errors))
+        say(frequency_sentence(errors))
     say_doubts(doubts)
 
 
@@ -149,16 +149,16 @@ def _check(
 
 
 def _tell(lowest: Real, limits: Real, values: PostureValues | None, written: Sequence[Path]) -> None:
-    typer.echo(f"lowest frequency {np.nanmin(lowest):.2f} to {np.nanmax(lowest):.2f} Hz")
+    say(f"lowest frequency {np.nanmin(lowest):.2f} to {np.nanmax(lowest):.2f} Hz")
     if values is not None:
         kinds = sorted(set(values.status) - {"not reached"})
         counts = ", ".join(f"{values.status.count(kind)} {kind}" for kind in kinds)
-        typer.echo(
+        say(
             f"depth limit {1e3 * np.nanmin(limits):.2f} to {1e3 * np.nanmax(limits):.2f} mm, time-periodic solution "
             f"checked by Floquet multipliers: {counts}"
         )
     names = " and ".join(str(one) for one in written)
-    typer.echo(f"wrote {names}: {np.isfinite(lowest).sum()} of {len(lowest)} places reached")
+    say(f"wrote {names}: {np.isfinite(lowest).sum()} of {len(lowest)} places reached")
 
 
 def _write(

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ...options import check_shares
+from ...terminal import say
 
 
 def diagnose(
@@ -47,4 +48,4 @@ def diagnose(
     check_shares("--model-error", model_error, (0.01, 0.15, 0.05))
     asking = Asking(tuple(pose or ()), feed, band, sensor, payload_at, rigid_links, LabError(*model_error), stream)
     for line in diagnose_robot_files(robot, recordings, out, asking):
-        typer.echo(line, err=line.startswith("warning: "))
+        say(line)

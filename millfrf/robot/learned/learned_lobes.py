@@ -5,7 +5,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import typer
 
 from foundation import InputError, warning_lines, writing_whole_file
 from stability import StabilityLobes, write_lobes
@@ -15,6 +14,7 @@ from ...gate import check_depth, check_speeds, lowest_frequency, read_checked_cu
 from ...options import check_output
 from ...progress import bar
 from ...provenance import add_comment, made, origin
+from ...terminal import say
 from ..postures import Asked
 from .band_figure import draw_depth_band
 from .depth_band import SAMPLES, DepthBand, depth_band
@@ -69,16 +69,16 @@ def write_learned_lobes(
         _write_band(temporary, band, lobes)
         add_comment(temporary, origin("robot lobes", [robot, learned, cutting], options))
     for warning in lobes.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+        say(f"warning: {warning}")
     lowest = int(np.argmin(band.low))
-    typer.echo(f"wrote {out}: {lobes_summary(lobes, max_depth)}")
-    typer.echo(
+    say(f"wrote {out}: {lobes_summary(lobes, max_depth)}")
+    say(
         f"wrote {beside}: at {axis[lowest] / RPM:.0f} rpm the limit lies between {1e3 * band.low[lowest]:.3g} and "
         f"{1e3 * band.high[lowest]:.3g} mm (95 %)"
     )
     if picture is not None:
         draw_depth_band(picture, band, lobes)
-        typer.echo(f"wrote {picture}")
+        say(f"wrote {picture}")
 
 
 def _write_band(path: Path, band: DepthBand, lobes: StabilityLobes) -> None:

@@ -5,7 +5,6 @@ import json
 from pathlib import Path
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
 
 from estimation import write_frf
@@ -17,6 +16,7 @@ from ...options import check_band, check_output
 from ...progress import bar
 from ...provenance import add_comment, add_to_json, origin
 from ...tables import Table, show
+from ...terminal import say
 from ..asked_loads import check_positive
 from ..postures import Asked, posture_of, spatial
 
@@ -69,9 +69,9 @@ def write_learned_receptance(
             add_comment(temporary, provenance)
     show(_table(found, posture))
     for warning in found.warnings:
-        typer.echo(f"warning: {warning}", err=True)
+        say(f"warning: {warning}")
     told = {".json": "with covariance", ".h5": "the middle alone; .csv has its band", ".csv": "with its 95 % band"}
-    typer.echo(f"wrote {out}: {len(found.model.poles)} modes, {told[out.suffix]}")
+    say(f"wrote {out}: {len(found.model.poles)} modes, {told[out.suffix]}")
 
 
 def _table(found: PredictedPosture, posture: str) -> Table:

@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
 
 from foundation import InputError, writing_whole_file
@@ -27,6 +26,7 @@ from ...options import check_output
 from ...progress import bar
 from ...provenance import add_to_json, origin
 from ...tables import Table, show
+from ...terminal import say
 from ..asked_loads import check_degrees
 from ..postures import Asked, posture_of, spatial
 from .posture_choice import WorkArea, show_next_postures
@@ -87,8 +87,8 @@ def learn_from_files(robot: str, models: Sequence[Path], asking: LearningFrom, o
     _show(case, learned)
     _tell_left_out(left_out)
     for name, frequency in learned.unpaired:
-        typer.echo(f"warning: {name}: the mode at {frequency:.2f} Hz is near none of the model's; left out", err=True)
-    typer.echo(f"wrote {out}: {len(measured)} postures, {sum(len(one) for one in learned.pairs)} modes")
+        say(f"warning: {name}: the mode at {frequency:.2f} Hz is near none of the model's; left out")
+    say(f"wrote {out}: {len(measured)} postures, {sum(len(one) for one in learned.pairs)} modes")
     if asking.next_postures is not None:
         show_next_postures(case, learned, asking.next_postures, asking.area)
     return learned
@@ -111,20 +111,19 @@ def axes_of(feed: float | None) -> Real:
 def _tell_left_out(left_out: Sequence[LeftOutPosture]) -> None:
     """Say whether bands hold postures that were left out in turn, and warn of one that the others contradict."""
     if not left_out:
-        typer.echo("warning: two postures say nothing of whether bands hold; measure three or more", err=True)
+        say("warning: two postures say nothing of whether bands hold; measure three or more")
         return
     held = np.vstack([one.held for one in left_out])
     errors = np.sqrt(np.mean(np.vstack([one.errors for one in left_out]) ** 2, axis=0))
-    typer.echo(
+    say(
         f"each posture left out in turn: frequencies {100 * errors[0]:.2g} % off, damping {100 * errors[1]:.2g} %; "
         f"95 % bands hold {held[:, 0].sum()} and {held[:, 1].sum()} of {len(held)}"
     )
     for one in left_out:
         if len(one.held) and one.held[:, 0].mean() < WRONG:
-            typer.echo(
+            say(
                 f"warning: {one.name}: {int((~one.held[:, 0]).sum())} of {len(one.held)} frequencies lie outside of "
-                "what the other postures say; is it the posture that --pose states?",
-                err=True,
+                "what the other postures say; is it the posture that --pose states?"
             )
 
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
@@ -12,6 +11,7 @@ from robot_model import LearnedPostures, SpatialCase, choose_postures, named_pos
 
 from ...progress import bar
 from ...tables import Table, show
+from ...terminal import say
 from ..asked_loads import check_axis, check_places
 from ..postures import solve_place
 
@@ -54,7 +54,7 @@ def show_next_postures(case: SpatialCase, learned: LearnedPostures, count: int, 
     columns = ("", "posture", "error before (%)", "error after (%)")
     show(Table("Measure next: standard error of the lowest modes' peaks over the area", columns, rows))
     if area is None:
-        typer.echo("area: the measured joints' range and a tenth beyond it; --x, --y and --z ask for another")
+        say("area: the measured joints' range and a tenth beyond it; --x, --y and --z ask for another")
 
 
 def _in_joint_range(learned: LearnedPostures) -> Real:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
 
 from cutting import Drill, DrillingLoad, drilling_load, fitted_to_catalogue
@@ -34,6 +33,7 @@ from robot_model import (
 from ...options import check_output
 from ...provenance import add_comment, origin
 from ...tables import Table, show
+from ...terminal import say
 from ..asked_loads import Loads, check_axis, check_places, check_positive
 from ..postures import spatial
 from ..results import say_doubts
@@ -164,8 +164,8 @@ def show_deviation(
         raise InputError("no hole of the area is reached; move --x, --y or --z")
     holes = _Holes(case, area, accuracy, loads, found, load)
     weight = holes.weight()
-    typer.echo(f"thrust {load.thrust:.0f} N, torque {load.torque:.2f} N m")
-    typer.echo(f"{found.reached.sum()} of {len(places)} holes reached; the branch changes at {found.switches.sum()}")
+    say(f"thrust {load.thrust:.0f} N, torque {load.torque:.2f} N m")
+    say(f"{found.reached.sum()} of {len(places)} holes reached; the branch changes at {found.switches.sum()}")
     _show_sizes("deviation under thrust", found.deviations)
     if case.robot.bodies:
         _show_sizes("deflection under weight", found.weight)
@@ -177,18 +177,18 @@ def show_deviation(
     _show_position(holes, weight, needed)
     warnings = holes.warnings(int(np.nanargmax(needed)))
     for warning in warnings:
-        typer.echo(f"warning: {warning}", err=True)
+        say(f"warning: {warning}")
     if out is not None:
         with writing_whole_file(out) as unfinished:
             _write_deviations(unfinished, found, needed, warnings)
             add_comment(unfinished, origin("robot deviation", [robot], {"area": area, "accuracy": accuracy}))
-        typer.echo(f"wrote {out}")
+        say(f"wrote {out}")
     if picture is not None:
         from ..picture import draw_deviation
 
         unknown = holes.budget(int(np.nanargmax(needed))).unknown
         draw_deviation(picture, found, (area.x[2], area.y[2]), needed, "at least " if unknown else "")
-        typer.echo(f"wrote {picture}")
+        say(f"wrote {picture}")
 
 
 def _radial(thrust: Real, weight: Real) -> tuple[Real, Real]:
@@ -215,7 +215,7 @@ def _check(area: DrillingArea, accuracy: Accuracy) -> None:
 
 def _show_sizes(what: str, deviations: Real) -> None:
     sizes = 1e3 * np.linalg.norm(deviations, axis=1)
-    typer.echo(f"{what}: mean {np.nanmean(sizes):.3f} mm, largest {np.nanmax(sizes):.3f} mm")
+    say(f"{what}: mean {np.nanmean(sizes):.3f} mm, largest {np.nanmax(sizes):.3f} mm")
 
 
 def _show_position(holes: _Holes, weight: Real, needed: Real) -> None:
@@ -225,13 +225,13 @@ def _show_position(holes: _Holes, weight: Real, needed: Real) -> None:
     _show_budget(holes, worst, budget)
     thrust, resting = holes.found.deviations[worst], weight[worst]
     entry, full = (float(one[0]) for one in _radial(thrust[None], resting[None]))
-    typer.echo(
+    say(
         f"systematic there: {1e3 * max(entry, full):.3f} mm across the drill, the larger of entry (weight alone, "
         f"{1e3 * entry:.3f}) and full thrust ({1e3 * full:.3f}); along it (depth) "
         f"{1e3 * abs(resting[2]):.3f} mm at entry, {1e3 * abs(thrust[2] + resting[2]):.3f} mm under full thrust"
     )
     least = "at least " if budget.unknown else ""
-    typer.echo(
+    say(
         f"position tolerance needed (ISO 1101, diameter of the zone = 2 (systematic + U)): {least}"
         f"{1e3 * needed[worst]:.3f} mm there, {least}{1e3 * np.nanmin(needed):.3f} mm at the best hole; "
         "an IT grade of ISO 286 is of a size, not of a position"
@@ -240,7 +240,7 @@ def _show_position(holes: _Holes, weight: Real, needed: Real) -> None:
         allowed = holes.accuracy.allowed
         verdicts = [position_verdict(float(value), allowed, budget.unknown) for value in needed[~np.isnan(needed)]]
         counts = ", ".join(f"{word} at {verdicts.count(word)}" for word in ("holds", "does not hold", "cannot tell"))
-        typer.echo(f"position tolerance of {1e3 * allowed:g} mm, {len(verdicts)} holes: {counts}")
+        say(f"position tolerance of {1e3 * allowed:g} mm, {len(verdicts)} holes: {counts}")
 
 
 def _show_budget(holes: _Holes, worst: int, budget: UncertaintyBudget) -> None:

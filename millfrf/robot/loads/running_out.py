@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
 
 from cutting import Drill, SettledDrill, bending_stiffness, fitted_to_catalogue, settled_drill
 from foundation import InputError
 from robot_model import DeviationMap, SpatialRobot, orbit_radius, process_deviation, tool_down
 
+from ...terminal import say
 from ..asked_loads import check_positive
 
 LONGEST = 1.0
@@ -52,18 +52,18 @@ def show_running_out(robot: SpatialRobot, diameter: float, feed: float, found: D
         return
     settled = _worst(Drill(diameter), feed, asked.runout, asked.overhang)
     force, parts = settled.force, process_deviation(settled, asked.runout)
-    typer.echo(
+    say(
         f"runout of {1e6 * asked.runout:g} um: up to {force.size:.1f} N across the drill turn at "
         f"{asked.speed / (2 * np.pi):.1f} Hz and bend it by {1e6 * parts.bending:.1f} um (carbide, "
         f"{1e3 * asked.overhang:g} mm): its tip runs {1e6 * parts.tip:.1f} um off its axis"
     )
     if not robot.bodies:
-        typer.echo("the robot's file gives no masses: how far the robot follows this force cannot be told")
+        say("the robot's file gives no masses: how far the robot follows this force cannot be told")
         return
     orbits = _orbits(robot, found, force.size, asked.speed)
     widest = int(np.nanargmax(orbits))
     x, y, _ = found.positions[widest]
-    typer.echo(
+    say(
         f"the robot follows by {1e6 * orbits[widest]:.1f} um at x = {x:.2f} m, y = {y:.2f} m: holes are wider by up to "
         f"{2e6 * (parts.tip + orbits[widest]):.0f} um; what turns with the spindle moves no hole's axis"
     )

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import typer
 from numpy.typing import NDArray
 
 from figures import save_figure
@@ -15,6 +14,7 @@ from robot_model import PlanarCase, PostureResult, SpatialCase, in_posture, read
 from ...options import check_output
 from ...provenance import origin
 from ...tables import Table, show
+from ...terminal import say
 from ..asked_loads import Loads, check_positive
 from ..postures import Asked, mechanism_of, posture_of
 from ..results import check_drawn, warn
@@ -50,13 +50,13 @@ def show_stiffness(
     values, directions = np.linalg.eigh(compliance)
     for value, direction in zip(values[::-1], directions.T[::-1], strict=True):
         parts = ", ".join(f"{names[i][1:]} {d:+.2f}" for i, d in zip(moving, direction, strict=True))
-        typer.echo(f"{1e-6 / value:8.3f} N/um along ({parts})")
-    typer.echo(f"largest deflection under {force:g} N: {1e3 * force * values[-1]:.3f} mm")
+        say(f"{1e-6 / value:8.3f} N/um along ({parts})")
+    say(f"largest deflection under {force:g} N: {1e3 * force * values[-1]:.3f} mm")
     parts_of_sag = _sags(case, driven, axes, result, loads)
     sag = _show_sags(parts_of_sag, [names[i] for i in moving], len(names))
     together = largest_together(sag[moving], force * compliance)
     if sag.any():
-        typer.echo(f"largest deflection under weight and {force:g} N together: {1e3 * together:.3f} mm")
+        say(f"largest deflection under weight and {force:g} N together: {1e3 * together:.3f} mm")
     warn(result)
     _draw(case, (driven, axes), result, force, drawn, origin("robot stiffness", [robot], {"posture": posture}))
     if out is None:
@@ -86,10 +86,10 @@ def _draw(
         softest = directions[:, -1] if axes is None else axes @ directions[:, -1]
         shares = joint_shares(case, driven, softest)
         save_figure(compliance_figure(result, force, shares, float(values[-1])), picture)
-        typer.echo(f"wrote {picture}")
+        say(f"wrote {picture}")
     if table is not None:
         write_compliance_table(table, result, stated)
-        typer.echo(f"wrote {table}")
+        say(f"wrote {table}")
 
 
 def _sags(
@@ -109,7 +109,7 @@ def _show_sags(parts: list[tuple[str, Real]], names: list[str], size: int) -> Re
     """Print them; return their sum."""
     for what, moved in parts:
         cells = ", ".join(f"{name[1:]} {1e3 * value:+.3f}" for name, value in zip(names, moved, strict=False))
-        typer.echo(f"deflection under {what}: {1e3 * np.linalg.norm(moved[: len(names)]):.3f} mm ({cells})")
+        say(f"deflection under {what}: {1e3 * np.linalg.norm(moved[: len(names)]):.3f} mm ({cells})")
     return np.sum([moved for _, moved in parts], axis=0) if parts else np.zeros(size)
 
 
@@ -128,4 +128,4 @@ def _write(out: Path, robot: str, posture: str, result: PostureResult, force: fl
     }
     with writing_whole_file(out) as temporary:
         temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
-    typer.echo(f"wrote {out}")
+    say(f"wrote {out}")

@@ -5,14 +5,13 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-import typer
-
 from foundation import InputError, MillfrfError, writing_whole_file
 from robot_model import numbered_robot_text, read_robot, update_robot, updated_document
 
 from ...options import check_output
 from ...progress import bar
 from ...provenance import add_comment, add_to_json, origin
+from ...terminal import say
 from ..postures import spatial
 from .asking import Asking
 from .measured_files import read_measured
@@ -28,7 +27,7 @@ def _check_readable(unfinished: Path, out: Path, lines: Sequence[str]) -> None:
     except MillfrfError as error:
         why = str(error).replace(f"{named}: ", "")
         said = f"{out} was not written, for no robot has these numbers: {why}; are posture, axes and band right?"
-        typer.echo("\n".join(lines))  # an error is one line: what was found goes before it
+        say("\n".join(lines))  # an error is one line: what was found goes before it
         raise MillfrfError(said) from error
     finally:
         named.rename(unfinished)
@@ -61,7 +60,7 @@ def update_robot_file(robot: str, paths: Sequence[Path], out: Path, report: Path
         add_to_json(report, made)
         lines.append(f"wrote {report}")
     if found.verdict == "unexplained":
-        typer.echo("\n".join(lines))
+        say("\n".join(lines))
         raise MillfrfError(f"{out} was not written: no update of these numbers holds elsewhere")
     with writing_whole_file(out) as temporary:
         temporary.write_text(updated_document(numbered_robot_text(robot), case.robot, found), encoding="utf-8")
