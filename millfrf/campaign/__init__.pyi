@@ -1,3 +1,4 @@
 from .graph import Task, key_of
+from .results import MeasuredSet, write_summary
 
-__all__ = ["Task", "key_of"]
+__all__ = ["MeasuredSet", "Task", "key_of", "write_summary"]
