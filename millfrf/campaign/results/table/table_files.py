@@ -7,7 +7,7 @@ from typing import Any
 
 from foundation import optional_library, warning_lines, writing_whole_file
 
-from .mode_rows import Cell
+from .rows_of_modes import Cell
 
 PURPOSE, EXTRA = "the table of a campaign", "cluster"
 
