@@ -18,6 +18,7 @@ from .laboratory import (
     hammer_sensors,
     housing_accelerometers,
     milling_sensors,
+    setup_text,
     tip_accelerometers,
 )
 from .milling_cell import MillingCell
@@ -54,6 +55,7 @@ __all__ = [
     "posture_robot",
     "select",
     "settle",
+    "setup_text",
     "table_one_model",
     "tip_accelerometers",
     "tip_model",

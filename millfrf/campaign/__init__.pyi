@@ -1,4 +1,5 @@
 from .graph import Task, key_of
 from .results import MeasuredSet, write_summary
+from .simulated import SimulatedCampaign, make_campaign
 
-__all__ = ["MeasuredSet", "Task", "key_of", "write_summary"]
+__all__ = ["MeasuredSet", "SimulatedCampaign", "Task", "key_of", "make_campaign", "write_summary"]

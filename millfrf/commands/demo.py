@@ -1,4 +1,4 @@
-"""`millfrf demo`: the whole chain on the simulated cell; `--conceal`: a blind diagnosis there."""
+"""`millfrf demo`: the whole chain on the simulated cell; `--conceal`: a blind diagnosis; `--campaign`: recordings."""
 
 from pathlib import Path
 from typing import Annotated
@@ -15,8 +15,16 @@ def demo(
     conceal: Annotated[
         bool, typer.Option("--conceal", help="Hide one effect, drawn and sealed; diagnose; open the seal.")
     ] = False,
+    campaign: Annotated[
+        bool, typer.Option("--campaign", help="Make a campaign's recordings, with things hidden in them.")
+    ] = False,
+    recordings: Annotated[int, typer.Option("--recordings", help="Of --campaign: recordings in all.")] = 200,
+    poses: Annotated[int, typer.Option("--poses", help="Of --campaign: poses of the robot.")] = 20,
 ) -> None:
     """Mill, record, estimate, fit, calibrate, draw the lobes and report, without hardware, in about a minute."""
+    if campaign:
+        _campaign(out, recordings, poses, 0 if seed is None else seed)
+        return
     if conceal:
         _concealed(out, noise, seed)
         return
@@ -38,3 +46,11 @@ def _concealed(out: Path, noise: float, seed: int | None) -> None:
     result = run_concealed(ConcealOptions(out, noise, seed), bar, typer.echo)
     show(concealment_table(result))
     say(f"the diagnosis: {(out / 'diagnosis').resolve()}; {result.seconds:.0f} s in all")
+
+
+def _campaign(out: Path, recordings: int, poses: int, seed: int) -> None:
+    from ..campaign import SimulatedCampaign, make_campaign
+    from ..progress import bar
+
+    make_campaign(SimulatedCampaign(out, recordings, poses, seed), bar)
+    say(f"wrote {out}: {recordings} recordings; run it: millfrf campaign {out / 'campaign.toml'}")

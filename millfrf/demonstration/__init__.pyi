@@ -8,6 +8,7 @@ from .whole_chain import (
     SWEEP_SECONDS,
     DemoOptions,
     comparison_tables,
+    cutting_text,
     run_demo,
 )
 
@@ -21,6 +22,7 @@ __all__ = [
     "DemoOptions",
     "comparison_tables",
     "concealment_table",
+    "cutting_text",
     "run_concealed",
     "run_demo",
 ]

@@ -2,12 +2,15 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from cutting import MillingProcess
 
+Plain = str | float | bool | Sequence[float]
+"""What a set-up may say of one thing: a word, a number, yes or no, or a row of numbers."""
 
-def setup_text(tables: Mapping[str, Mapping[str, str | float | bool]]) -> str:
+
+def setup_text(tables: Mapping[str, Mapping[str, Plain]]) -> str:
     """TOML text of tables of plain values.
 
     Examples
@@ -49,9 +52,11 @@ def _degrees(angle: float) -> float:
     return round(math.degrees(angle), 9)
 
 
-def _toml_value(value: str | float | bool) -> str:
+def _toml_value(value: Plain) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, Sequence):
+        return f"[{', '.join(_toml_value(part) for part in value)}]"
     return repr(int(value)) if isinstance(value, int) else repr(float(value))

@@ -1,0 +1,143 @@
+"""One recording of the simulated campaign: cell, notes, file."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquisition import RecordingWriter
+from cutting import MillingProcess
+from replay_data import ConstantSpeed, LinearSweep, MillingCell, Sensor, dynamometer, housing_accelerometers, setup_text
+
+from .faults import clipped_sensors, spoil
+from .hidden import HiddenDrift
+from .schedule import IMMERSIONS, LEVEL_TEST, PlannedRecording, pose_name
+from .true_robot import TrueRobot
+
+Real = NDArray[np.float64]
+
+RPM = math.pi / 30
+
+CUTTER = MillingProcess(
+    teeth=2,
+    diameter=20e-3,
+    edge_angle=math.pi / 2,
+    ktc=600e6,
+    krc=0.3,
+    kac=0.25,
+    start_angle=math.pi / 2,
+    exit_angle=math.pi,
+    feed_per_tooth=0.1e-3,
+    runout=10e-6,
+)
+"""A two-fluted 20 mm end mill in aluminium, down-milling at half immersion."""
+
+TOOL = "end mill, 20 mm, 2 flutes"
+
+DEPTH = 0.5e-3
+"""m, of the sweeps: well below the limits."""
+
+SWEEP_RPM = (450.0, 690.0)
+"""The teeth pass at 15 to 23 Hz, and four harmonics reach 92 Hz."""
+
+SLOT_RPM = 3300.0
+
+SECONDS, SAMPLE_RATE, OVERSAMPLING = 16.0, 512.0, 8
+"""Six modes lie below 95 Hz, and the fit keeps records up to 1.6 of its band: 512 Hz is enough for both. 16 s, with the
+noise below, give frequencies to about 0.1 %."""
+
+POROUS_SECONDS = 64.0
+"""One recording must do there for three."""
+
+FORCE_NOISE, ACCELERATION_NOISE = 0.05, 0.3
+"""Noise as shares of each signal: servo drives, coolant and neighbours are heard in a workshop."""
+
+SENSORS = dynamometer(FORCE_NOISE) + housing_accelerometers(ACCELERATION_NOISE, full_scale=49.0)
+"""Accelerometers of 5 g, as are taken for slow and small vibration."""
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """What the recordings of a campaign share.
+
+    Parameters
+    ----------
+    true
+        Robot as it is.
+    robot
+        Name of the robot's file, for the notes.
+    postures : (n_poses, n_driven), rad
+        Postures of the poses.
+    drift
+        Drift that is hidden.
+    """
+
+    true: TrueRobot
+    robot: str
+    postures: Real
+    drift: HiddenDrift
+
+
+def write_recording(laboratory: Laboratory, planned: PlannedRecording, folder: Path) -> None:
+    """Mill, write the recording into a folder, and spoil it where that is planned."""
+    stated = cell = _cell(laboratory, planned)
+    if planned.fault == "clipped":
+        cell = _cell(laboratory, planned, clipped_sensors(cell))
+    path = folder / f"{planned.name}.h5"
+    with RecordingWriter(
+        path, stated.streams, title=cell.title, setup=cell.setup, recorded_at=planned.recorded_at
+    ) as writer:
+        cell.open()
+        while (block := cell.read()) is not None:
+            writer.append(block.stream, block.samples, block.first_sample)
+            writer.append_clock_pair(block.stream, block.first_sample + len(block.samples), block.host_time)
+        cell.close()
+    spoil(path, planned.fault, cell)
+
+
+def _cell(laboratory: Laboratory, planned: PlannedRecording, sensors: Sequence[Sensor] = SENSORS) -> MillingCell:
+    structure = laboratory.true.structure(laboratory.postures[planned.pose], laboratory.drift.condition(planned))
+    porous = planned.immersion == LEVEL_TEST
+    start, leave = (0.0, 1.0) if porous else IMMERSIONS[planned.immersion]
+    sweep = LinearSweep(SWEEP_RPM[0] * RPM, SWEEP_RPM[1] * RPM, SECONDS)
+    slot = ConstantSpeed(SLOT_RPM * RPM)
+    cell = MillingCell(
+        structure,
+        replace(CUTTER, start_angle=start * math.pi, exit_angle=leave * math.pi),
+        DEPTH * planned.level,
+        slot if porous else sweep,
+        POROUS_SECONDS if porous else SECONDS,
+        sample_rate=SAMPLE_RATE,
+        material="porous" if porous else "homogeneous",
+        sensors=sensors,
+        seed=planned.seed,
+        oversampling=OVERSAMPLING,
+    )
+    cell.title = f"{pose_name(planned.pose)}, {planned.immersion}, session {planned.session}"
+    cell.setup = f"{_notes(laboratory, planned)}\n{cell.setup}"
+    return cell
+
+
+def _notes(laboratory: Laboratory, planned: PlannedRecording) -> str:
+    """What the laboratory writes down of robot, tool and conditions."""
+    n_poses = len(laboratory.postures)
+    stated = (planned.pose + n_poses // 2) % n_poses if planned.fault == "wrong posture" else planned.pose
+    return setup_text(
+        {
+            "robot": {
+                "name": laboratory.robot,
+                "pose": pose_name(planned.pose),
+                "posture_deg": [round(float(angle), 3) for angle in np.degrees(laboratory.postures[stated])],
+            },
+            "tool": {"name": TOOL},
+            "conditions": {
+                "session": planned.session,
+                "temperature_c": planned.temperature,
+                "level": planned.level,
+                "immersion": planned.immersion,
+            },
+        }
+    )
