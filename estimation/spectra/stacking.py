@@ -8,6 +8,7 @@ import numpy as np
 from foundation import InputError
 
 from .spectral_matrix import CrossSpectra
+from .windows import effective_averages
 
 
 def check_stackable(tests: Sequence[CrossSpectra]) -> None:
@@ -62,3 +63,19 @@ def sum_tests(tests: Sequence[CrossSpectra]) -> CrossSpectra:
         n_tests=sum(test.n_tests for test in tests),
         n_excluded=sum(test.n_excluded for test in tests),
     )
+
+
+def join_parts(parts: Sequence[CrossSpectra]) -> CrossSpectra:
+    """Put spectra of consecutive parts of one recording together: the spectra of the whole, to rounding.
+
+    Means over segments are weighted by their number, so that ``S = sum_k n_k S_k / sum_k n_k``. The overlap of
+    segments across a seam counts as it does elsewhere.
+
+    Raises
+    ------
+    InputError
+        Parts that :func:`check_stackable` refuses.
+    """
+    total = sum_tests(parts)
+    averages = effective_averages(total.settings, total.n_segments)
+    return replace(total, effective_averages=averages, n_tests=parts[0].n_tests)

@@ -13,8 +13,16 @@ from .model_and_recordings import check_model_and_recordings
 from .models import check_model, fit_doubts, stored_doubts
 from .plans import check_demand, check_duration
 from .reciprocity import check_model_reciprocity, check_reciprocity, plainly_different, shown_pairs
-from .recordings import RECORD_AGAIN, check_channels, check_recordings, doubts_of_rate
-from .sample_rates import check_sample_rates, gain_of
+from .recordings import (
+    RECORD_AGAIN,
+    JudgedRecording,
+    check_channels,
+    check_recordings,
+    doubts_of_rate,
+    join_judged,
+    judge_recording,
+)
+from .sample_rates import Gain, check_sample_rates, gain_of
 from .scales import check_scales
 from .signals import ChannelLevel, level_table, look
 from .spindle import check_depth, check_speed, check_speeds, lowest_frequency, rigid_directions
@@ -25,7 +33,9 @@ __all__ = [
     "LONGEST",
     "RECORD_AGAIN",
     "ChannelLevel",
+    "Gain",
     "Given",
+    "JudgedRecording",
     "Segmentation",
     "check_band_of_lobes",
     "check_band_recordings",
@@ -61,6 +71,8 @@ __all__ = [
     "driven_lines",
     "fit_doubts",
     "gain_of",
+    "join_judged",
+    "judge_recording",
     "level_table",
     "look",
     "lowest_frequency",

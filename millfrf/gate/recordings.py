@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from acquisition import Recording, Stream
@@ -32,6 +33,26 @@ NAME_OTHERS = "name the other channels with --excitation and --response"
 
 RECORD_AGAIN = "record again, without the channel if that axis is not measured"
 """Where they cannot."""
+
+
+@dataclass(frozen=True)
+class JudgedRecording:
+    """What the gate saw in one recording of a job; :func:`join_judged` weighs all of them together.
+
+    Parameters
+    ----------
+    file
+        Name of the file.
+    doubts
+        Doubts about it.
+    idle, alive
+        Names of excitations that are zero throughout, and of those that are not.
+    """
+
+    file: str
+    doubts: tuple[str, ...]
+    idle: tuple[str, ...]
+    alive: tuple[str, ...]
 
 
 def check_recordings(
@@ -78,11 +99,63 @@ def check_recordings(
         segments would spoil them.
     """
 
+    check_several(paths)
+    judged = [
+        judge_recording(
+            path,
+            stream=stream,
+            excitations=excitations,
+            responses=responses,
+            excluding=excluding,
+            segments=segments,
+            progress=progress,
+            remedy=remedy,
+        )
+        for path in paths
+    ]
+    return join_judged(judged, remedy)
+
+
+def judge_recording(
+    path: str | os.PathLike[str],
+    *,
+    stream: str | None = None,
+    excitations: Sequence[str] = (),
+    responses: Sequence[str] = (),
+    excluding: bool = False,
+    segments: Segmentation | None = None,
+    progress: Progress = silent,
+    remedy: str = NAME_OTHERS,
+) -> JudgedRecording:
+    """Judge one recording of a job by itself, as :func:`check_recordings` does.
+
+    Raises
+    ------
+    InputError
+        As :func:`check_recordings`; excitations that rest in this file are not refused, another file may drive them.
+    """
+
     def chosen(source: Stream) -> tuple[Sequence[str], Sequence[str]]:
         exciting, responding = choose_channels(source, excitations or None, responses or None)
         return [channel.name for channel in exciting], [channel.name for channel in responding]
 
-    return check_channels(paths, chosen, stream, excluding, progress, segments, remedy)
+    return _judged(path, chosen, stream, excluding, progress, segments, remedy)
+
+
+def join_judged(judged: Sequence[JudgedRecording], remedy: str = NAME_OTHERS) -> list[str]:
+    """Doubts about recordings of one job that were judged one by one.
+
+    Raises
+    ------
+    InputError
+        An excitation that is dead in every file.
+    """
+    alive = {name for one in judged for name in one.alive}
+    silent_in = {name: one.file for one in judged for name in one.idle}
+    for name, file in silent_in.items():
+        if name not in alive:
+            raise InputError(_dead(file, name, "every sample is 0", remedy))
+    return [f"{one.file}: {doubt}" for one in judged for doubt in one.doubts]
 
 
 def check_channels(
@@ -102,28 +175,34 @@ def check_channels(
         As :func:`check_recordings`.
     """
     check_several(paths)
-    doubts, silent_in, alive = [], {}, set()
-    for path in paths:
-        with Recording(path) as recording:
-            source = recording.stream(stream)
-            exciting, responding = chosen(source)
-            gaps = check_clock_of(recording, source.name)
-            seen = _look(source, [*exciting, *responding], progress)
-            idle = [level.channel.name for level in seen.levels[: len(exciting)] if level.n_samples and not level.peak]
-            silent_in.update({name: Path(path).name for name in idle})
-            alive |= set(exciting) - set(idle)
-            found = _check_stream(source, seen, set(idle), excluding, remedy)
-            found += gaps
-            if segments is not None:
-                refuse_taps(source, seen.levels[: len(exciting)], segments)
-            if recording.complete is False:
-                how = f" ({recording.ending})" if recording.ending else ""
-                found.append(f"the recording was not closed in order{how}: its end may be missing")
-        doubts += [f"{Path(path).name}: {doubt}" for doubt in found]
-    for name, file in silent_in.items():
-        if name not in alive:
-            raise InputError(_dead(file, name, "every sample is 0", remedy))
-    return doubts
+    judged = [_judged(path, chosen, stream, excluding, progress, segments, remedy) for path in paths]
+    return join_judged(judged, remedy)
+
+
+def _judged(
+    path: str | os.PathLike[str],
+    chosen: Callable[[Stream], tuple[Sequence[str], Sequence[str]]],
+    stream: str | None,
+    excluding: bool,
+    progress: Progress,
+    segments: Segmentation | None,
+    remedy: str,
+) -> JudgedRecording:
+    with Recording(path) as recording:
+        source = recording.stream(stream)
+        exciting, responding = chosen(source)
+        gaps = check_clock_of(recording, source.name)
+        seen = _look(source, [*exciting, *responding], progress)
+        idle = [level.channel.name for level in seen.levels[: len(exciting)] if level.n_samples and not level.peak]
+        found = _check_stream(source, seen, set(idle), excluding, remedy)
+        found += gaps
+        if segments is not None:
+            refuse_taps(source, seen.levels[: len(exciting)], segments)
+        if recording.complete is False:
+            how = f" ({recording.ending})" if recording.ending else ""
+            found.append(f"the recording was not closed in order{how}: its end may be missing")
+    alive = tuple(name for name in exciting if name not in idle)
+    return JudgedRecording(Path(path).name, tuple(found), tuple(idle), alive)
 
 
 def doubts_of_rate(path: str | os.PathLike[str]) -> list[str]:

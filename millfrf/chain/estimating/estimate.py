@@ -2,18 +2,16 @@
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 
-from acquisition import Recording
 from estimation import (
     CrossSpectra,
     Frf,
     correct_high_pass,
-    cross_spectra,
     h1,
     h1_side_by_side,
     h2,
@@ -21,7 +19,6 @@ from estimation import (
     input_independence,
     instrumental_variable,
     known_band,
-    settings_for,
     spectra_for_judging,
     sum_tests,
     write_frf,
@@ -29,43 +26,22 @@ from estimation import (
 from foundation import InputError
 
 from ...gate import (
+    Gain,
     Segmentation,
     check_inputs,
     check_local_frf,
     check_recordings,
     check_sample_rates,
     driven_lines,
-    gain_of,
 )
 from ...progress import Progress, silent
 from ...provenance import sources, versions
 from .estimate_options import INSTRUMENTAL, LOCAL, TITLES, Estimate, EstimateOptions, check_options
-from .instruments import channels_with_instruments, only_inputs
+from .instruments import only_inputs
 from .local_estimate import band_recordings, local_frf
+from .spectra_of_recordings import gain_of_test, lines_of, spectra_of_tests, with_instruments, without_instruments
 
 SPECTRAL: dict[str, Callable[[CrossSpectra], Frf]] = {"h1": h1, "h2": h2, "hv": hv}
-
-
-def spectra_of_tests(
-    paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, progress: Progress = silent
-) -> tuple[CrossSpectra, ...]:
-    """Spectra of each recording on the lines that are wanted.
-
-    Raises
-    ------
-    InputError
-        A file that cannot be used, or sample rates that differ.
-    """
-    if not paths:
-        raise InputError("no recording given; name at least one")
-    rates = [_sample_rate(path, options.stream) for path in paths]
-    for path, rate in zip(paths, rates, strict=True):
-        if rate != rates[0]:
-            raise InputError(
-                f"{Path(path).name} was sampled at {rate:g} Hz, {Path(paths[0]).name} at {rates[0]:g} Hz; "
-                "stack tests of one sample rate"
-            )
-    return tuple(_spectra(path, options, progress) for path in paths)
 
 
 def estimate_recordings(
@@ -82,11 +58,9 @@ def estimate_recordings(
     check_options(options)
     if options.estimator == LOCAL:
         return _local_estimate(paths, options, progress)
-    forces, taken = options.excitations, options
-    if options.estimator == INSTRUMENTAL and paths:
-        names = (options.excitations, options.responses)
-        forces, responses = channels_with_instruments(paths[0], options.stream, names, options.instruments)
-        taken = replace(options, excitations=(*forces, *options.instruments), responses=responses)
+    if not paths:
+        raise InputError("no recording given; name at least one")
+    taken = with_instruments(paths[0], options)
     doubts = check_recordings(
         paths,
         stream=taken.stream,
@@ -97,20 +71,46 @@ def estimate_recordings(
         progress=progress,
     )
     tests = spectra_of_tests(paths, taken, progress)
+    gains = [gain_of_test(test, Path(path).name, options) for test, path in zip(tests, paths, strict=True)]
+    return estimate_of_spectra(tests, gains, doubts, options)
+
+
+def estimate_of_spectra(
+    tests: Sequence[CrossSpectra], gains: Sequence[Gain], doubts: Sequence[str], options: EstimateOptions
+) -> Estimate:
+    """FRF from spectra of tests, or from sums of such spectra.
+
+    Parameters
+    ----------
+    tests
+        Spectra with the channels of :func:`with_instruments`; side by side each must be of one test.
+    gains
+        Gain of each test, see :func:`gain_of_test`.
+    doubts
+        Doubts about the recordings.
+    options
+        How tests are stacked, and the estimator.
+
+    Raises
+    ------
+    InputError
+        Tests that cannot be stacked, or inputs that are dependent wherever they have power.
+    """
     total = sum_tests(tests)
+    kept = tuple(without_instruments(test, options) for test in tests)
+    found = [*doubts, *check_sample_rates(gains)]
     if options.estimator == INSTRUMENTAL:
-        tests = tuple(only_inputs(test, forces) for test in tests)
-        doubts += [*_rate_doubts(paths, tests), *check_inputs(only_inputs(total, options.instruments))]
+        found += check_inputs(only_inputs(total, options.instruments))
         frf = instrumental_variable(total, options.instruments)
     else:
-        doubts += [*_rate_doubts(paths, tests), *check_inputs(total)]
-        frf = SPECTRAL[options.estimator](total) if options.stack == "sum" else h1_side_by_side(tests)
+        found += check_inputs(total)
+        frf = SPECTRAL[options.estimator](total) if options.stack == "sum" else h1_side_by_side(kept)
     if total.n_excluded:
-        doubts.append(
+        found.append(
             f"{total.n_excluded} of {total.n_excluded + total.n_segments} segments hold overload, clipping or dropped "
             "samples and were left out"
         )
-    return _finished(frf, tests, doubts, options)
+    return _finished(frf, kept, found, options)
 
 
 def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, progress: Progress) -> Estimate:
@@ -122,14 +122,10 @@ def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOp
     )
     found = band_recordings(paths, names, options.stream, options.band[1], progress)
     tests = tuple(lines_of(test, options.band) for test in spectra_for_judging(found))
-    doubts += [*_rate_doubts(paths, tests), *check_inputs(sum_tests(tests))]
+    gains = [gain_of_test(test, Path(path).name, options) for test, path in zip(tests, paths, strict=True)]
+    doubts += [*check_sample_rates(gains), *check_inputs(sum_tests(tests))]
     frf = local_frf(found, options.band, progress)
     return _finished(frf, tests, [*doubts, *check_local_frf(frf, len(found))], options)
-
-
-def _rate_doubts(paths: Sequence[str | os.PathLike[str]], tests: Sequence[CrossSpectra]) -> list[str]:
-    gains = [gain_of(test, Path(path).name, test.sample_rate) for test, path in zip(tests, paths, strict=True)]
-    return check_sample_rates(gains)
 
 
 def _finished(frf: Frf, tests: tuple[CrossSpectra, ...], doubts: Sequence[str], options: EstimateOptions) -> Estimate:
@@ -145,14 +141,27 @@ def write_estimate(
     path: str | os.PathLike[str],
     estimate: Estimate,
     recordings: Sequence[str | os.PathLike[str]],
+    stated: Sequence[Mapping[str, str]] | None = None,
 ) -> None:
-    """Write the FRF with its provenance: recordings, settings, averages, warnings, versions."""
+    """Write the FRF with its provenance: recordings, settings, averages, warnings, versions.
+
+    Parameters
+    ----------
+    path
+        File to write.
+    estimate
+        FRF with what it was made from.
+    recordings
+        Recordings it was made from.
+    stated
+        Name and SHA-256 of each, where they are known; None: the files are read.
+    """
     first, options = estimate.tests[0], estimate.options
     length = first.settings.segment_length / first.sample_rate
     judged_by = {"segment": length} if options.estimator == LOCAL else {}  # it has no segments of its own
     provenance = {
         "step": "estimate",
-        "sources": sources(recordings),
+        "sources": sources(recordings) if stated is None else list(stated),
         "options": asdict(options) | judged_by,
         "settings": asdict(first.settings),
         "sample_rate_hz": first.sample_rate,
@@ -167,49 +176,3 @@ def write_estimate(
     count = f"{len(recordings)} recording{'s' if len(recordings) != 1 else ''}"
     title = f"{TITLES.get(options.estimator, options.estimator.upper())} of {count}"
     write_frf(path, estimate.frf, title=title, provenance=json.dumps(provenance))
-
-
-def _sample_rate(path: str | os.PathLike[str], stream: str | None) -> float:
-    with Recording(path) as recording:
-        return recording.stream(stream).sample_rate
-
-
-def _spectra(path: str | os.PathLike[str], options: EstimateOptions, progress: Progress) -> CrossSpectra:
-    with Recording(path) as recording:
-        source = recording.stream(options.stream)
-        settings = settings_for(source.sample_rate, options.segment, overlap=options.overlap, window=options.window)
-        with progress(f"spectra of {Path(path).name}", source.n_samples) as update:
-            spectra = cross_spectra(
-                recording,
-                settings,
-                stream=options.stream,
-                excitations=options.excitations or None,
-                responses=options.responses or None,
-                exclude_unusable=options.exclude,
-                progress=update,
-            )
-    return spectra if options.band is None else lines_of(spectra, options.band)
-
-
-def lines_of(spectra: CrossSpectra, band: tuple[float, float]) -> CrossSpectra:
-    """The lines of spectra inside a band (Hz).
-
-    Raises
-    ------
-    InputError
-        None lies inside.
-    """
-    low, high = band
-    f = spectra.frequencies
-    inside = (f >= low) & (f <= high)
-    if not inside.any():
-        raise InputError(
-            f"no line lies between {low:g} and {high:g} Hz (the spectra have 0 to {f[-1]:g} Hz); widen --band"
-        )
-    return replace(
-        spectra,
-        frequencies=f[inside],
-        input_spectra=spectra.input_spectra[inside],
-        cross_spectra=spectra.cross_spectra[inside],
-        output_spectra=spectra.output_spectra[inside],
-    )
