@@ -1,5 +1,5 @@
 from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom
-from .errors import DiskFull, FileFormatError, InputError, MillfrfError, MillfrfWarning
+from .errors import DiskFull, FileFormatError, InputError, MillfrfError, MillfrfWarning, TooLarge
 from .memory import allowed_bytes, require_memory
 from .noted_table import WARNING, apart, warning_lines
 from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library, same_values
@@ -7,7 +7,7 @@ from .table_mistakes import mistake_in_words, shown
 from .toml_tables import checked_toml
 from .units import SI_UNITS, si_factor, unit_factor
 from .valid_band import Band, checked_band, shared_band
-from .whole_files import LeftoverRemoved, is_disk_full, writing_whole_file, writing_whole_folder
+from .whole_files import LeftoverRemoved, is_disk_full, remove_leftovers, writing_whole_file, writing_whole_folder
 
 __all__ = [
     "HOUSING",
@@ -24,6 +24,7 @@ __all__ = [
     "MillfrfWarning",
     "Result",
     "Summary",
+    "TooLarge",
     "allowed_bytes",
     "apart",
     "checked_band",
@@ -35,6 +36,7 @@ __all__ = [
     "listed",
     "mistake_in_words",
     "optional_library",
+    "remove_leftovers",
     "require_memory",
     "same_values",
     "shared_band",

@@ -13,6 +13,10 @@ class FileFormatError(InputError):
     """A file is not what it should be: wrong kind, wrong version, damaged, or lacking a field."""
 
 
+class TooLarge(InputError):
+    """A job would take more memory than is allowed; elsewhere, or with another allowance, it may be done."""
+
+
 class DiskFull(MillfrfError):
     """The disk or quota is full; of a recording, what was acknowledged before is kept; of other files, the old ones."""
 

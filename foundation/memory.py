@@ -2,7 +2,7 @@
 
 import os
 
-from .errors import InputError
+from .errors import InputError, TooLarge
 
 VARIABLE = "MILLFRF_MEMORY_GB"
 _USUAL_GB = 0.7
@@ -41,7 +41,7 @@ def require_memory(needed: float, subject: str, remedy: str) -> None:
 
     Raises
     ------
-    InputError
+    TooLarge
         It needs more.
 
     Examples
@@ -50,11 +50,11 @@ def require_memory(needed: float, subject: str, remedy: str) -> None:
     >>> require_memory(8e9, "big.h5", "take less")
     Traceback (most recent call last):
     ...
-    foundation.errors.InputError: big.h5: this takes about 8 GB of memory, 0.7 GB are allowed; take less, or set ...
+    foundation.errors.TooLarge: big.h5: this takes about 8 GB of memory, 0.7 GB are allowed; take less, or set ...
     """
     allowed = allowed_bytes()
     if needed > allowed:
-        raise InputError(
+        raise TooLarge(
             f"{subject}: this takes about {needed / 1e9:.2g} GB of memory, {allowed / 1e9:g} GB are allowed; {remedy}, "
             f"or set {VARIABLE}={needed / 1e9 + 1:.0f}"
         )

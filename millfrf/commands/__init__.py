@@ -2,6 +2,7 @@
 
 from .acquire import acquire
 from .calibrate import calibrate
+from .campaign import campaign
 from .chatter import chatter
 from .convert import convert
 from .demo import demo
@@ -31,6 +32,7 @@ COMMANDS = (
     chatter,
     predict,
     diagnose,
+    campaign,
     report,
 )
 """In the order in which `--help` lists them."""

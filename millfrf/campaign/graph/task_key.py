@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from .task import Task
@@ -39,3 +39,23 @@ def key_of(task: Task, digests: Sequence[str], keys_of_needs: Sequence[str], pro
         "program": program,
     }
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def keys_of(tasks: Mapping[str, Task], digests: Mapping[str, str], program: str) -> dict[str, str | None]:
+    """Key of every task; None where the content of a file that it hangs on is not known yet.
+
+    Parameters
+    ----------
+    tasks
+        Tasks by identity, each after those that it needs.
+    digests
+        SHA-256 by path of the file; empty: not known.
+    program
+        Digest of the program and of the libraries that compute.
+    """
+    keys: dict[str, str | None] = {}
+    for identity, task in tasks.items():
+        of_files, of_needs = [digests[path] for path in task.files], [keys[need] for need in task.needs]
+        known = all(of_files) and all(of_needs)
+        keys[identity] = key_of(task, of_files, [key for key in of_needs if key], program) if known else None
+    return keys

@@ -59,8 +59,10 @@ class LearningFrom:
     area: WorkArea | None = None
 
 
-def learn_from_files(robot: str, models: Sequence[Path], asking: LearningFrom, out: Path) -> LearnedPostures:
-    """Learn, write the file, print the table of postures.
+def learn_from_files(
+    robot: str, models: Sequence[Path], asking: LearningFrom, out: Path, names: Sequence[str] | None = None
+) -> LearnedPostures:
+    """Learn, write the file, print the table of postures; ``names`` of the postures are else those of the files.
 
     Raises
     ------
@@ -75,8 +77,8 @@ def learn_from_files(robot: str, models: Sequence[Path], asking: LearningFrom, o
             f"{len(asking.poses)} postures for {len(models)} modal models; give --pose once for each, in the same order"
         )
     measured = [
-        measured_modes(path.stem, driven_of(case, pose), read_modal_model(path), axes)
-        for path, pose in zip(models, asking.poses, strict=True)
+        measured_modes(name, driven_of(case, pose), read_modal_model(path), axes)
+        for name, path, pose in zip(names or [path.stem for path in models], models, asking.poses, strict=True)
     ]
     with bar("learning"):
         learned = learn_postures(case.robot, measured)

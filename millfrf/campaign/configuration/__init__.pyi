@@ -1,0 +1,22 @@
+from .campaign_tables import JOBS, CampaignFile, EstimateTable
+from .file_look import FileLook, hash_all, keep, look_at_other, place_below, read_kept
+from .found_recordings import FoundRecording, find_recordings
+from .labels import Labels, filled_in, labels_in, shown_value
+
+__all__ = [
+    "JOBS",
+    "CampaignFile",
+    "EstimateTable",
+    "FileLook",
+    "FoundRecording",
+    "Labels",
+    "filled_in",
+    "find_recordings",
+    "hash_all",
+    "keep",
+    "labels_in",
+    "look_at_other",
+    "place_below",
+    "read_kept",
+    "shown_value",
+]

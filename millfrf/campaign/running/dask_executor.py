@@ -1,0 +1,173 @@
+"""The executor on Dask: worker processes of this machine, or those of a scheduler by its address."""
+
+import logging
+import queue
+import tempfile
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from foundation import InputError, MillfrfError
+
+from .one_task import FAILED, Ended, Order, run_task
+from .worker_checks import check_workers
+
+CONNECT_SECONDS = 15.0
+"""How long a scheduler, and then its first worker, is waited for."""
+
+SETTINGS = {"distributed.scheduler.allowed-failures": 3}
+"""Dask's settings: a task whose worker has died four times is given up."""
+
+
+class OnDask:
+    """Submits orders to a Dask client; results and arrays stay in files, only :class:`Ended` comes back."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self._ended: queue.Queue[Any] = queue.Queue()
+        self._running: dict[Any, str] = {}
+        self._number = 0
+
+    @property
+    def n_workers(self) -> int:
+        """Number of workers that are there now."""
+        return max(1, len(self._client.scheduler_info(n_workers=-1)["workers"]))
+
+    def submit(self, order: Order) -> None:
+        """Take an order."""
+        self._number += 1
+        kind = order.identity.partition(":")[0]
+        future = self._client.submit(run_task, order, key=f"{kind}-{order.key[:16]}-{self._number}", pure=False)
+        self._running[future] = order.identity
+        future.add_done_callback(self._ended.put)
+
+    def next_ended(self, seconds: float) -> Ended | None:
+        """How the next task ended.
+
+        Raises
+        ------
+        MillfrfError
+            The scheduler is gone.
+        """
+        try:
+            future = self._ended.get(timeout=seconds)
+        except queue.Empty:
+            if self._client.status not in ("running", "connecting"):
+                raise MillfrfError(GONE) from None
+            return None
+        identity = self._running.pop(future)
+        if future.status == "finished":
+            found: Ended = future.result()
+            return found
+        if future.status == "error":
+            error = future.exception()
+            died = type(error).__name__ == "KilledWorker"
+            reason = "its worker died four times while it ran" if died else f"{type(error).__name__}: {error}"
+            return Ended(identity, FAILED, " ".join(reason.split())[:300], 0.0)
+        raise MillfrfError(GONE)
+
+    def close(self) -> None:
+        """Give up what has not begun."""
+        self._client.cancel(list(self._running), force=True)
+
+
+GONE = "the scheduler is gone; results so far are kept: start it, and run the same command again"
+
+
+@contextmanager
+def dask_executor(address: str | None, workers: int, out: Path, probe: Path) -> Iterator[OnDask]:
+    """An executor on a scheduler by its address, or on a cluster of worker processes that is made here.
+
+    Parameters
+    ----------
+    address
+        Address of a scheduler such as ``tcp://10.0.0.5:8786``; None: a cluster on this machine.
+    workers
+        Number of worker processes of that cluster.
+    out
+        Folder of results, which all workers must see.
+    probe
+        A file of the campaign that all workers must see.
+
+    Raises
+    ------
+    InputError
+        Dask is missing, no scheduler answers, or workers that cannot be used.
+    """
+    dask, distributed = _library()
+    with (
+        tempfile.TemporaryDirectory(prefix="millfrf-dask-") as scratch,
+        dask.config.set({**SETTINGS, "temporary-directory": scratch}),
+        _silent(),
+    ):
+        cluster = None if address is not None else _cluster(distributed, workers, scratch)
+        try:
+            client = _client(distributed, address if cluster is None else cluster)
+            try:
+                check_workers(client, out, probe, address)
+                executor = OnDask(client)
+                try:
+                    yield executor
+                finally:
+                    executor.close()
+            finally:
+                client.close(timeout=5)
+        finally:
+            if cluster is not None:
+                cluster.close(timeout=10)
+
+
+def _library() -> tuple[Any, Any]:
+    try:
+        import dask
+        import distributed
+    except ImportError as error:
+        raise InputError(
+            "several workers need Dask, which is not installed: pip install 'millfrf[cluster]', or give --workers 0"
+        ) from error
+    return dask, distributed
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Keep Dask's own words off the terminal."""
+    logger = logging.getLogger("distributed")
+    before = logger.level
+    logger.setLevel(logging.CRITICAL)
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", module=r"distributed\..*")
+            yield
+    finally:
+        logger.setLevel(before)
+
+
+def _cluster(distributed: Any, workers: int, scratch: str) -> Any:
+    return distributed.LocalCluster(
+        n_workers=workers,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address=None,
+        memory_limit=0,  # what a job may take is judged before it starts
+        local_directory=scratch,
+        silence_logs=logging.CRITICAL,
+    )
+
+
+def _client(distributed: Any, where: Any) -> Any:
+    """A client of a scheduler.
+
+    Raises
+    ------
+    InputError
+        Nobody answers there.
+    """
+    try:
+        return distributed.Client(where, timeout=CONNECT_SECONDS, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise InputError(
+            f"no scheduler answers at {where} within {CONNECT_SECONDS:g} s; check the address and start one with "
+            "'dask scheduler'"
+        ) from error

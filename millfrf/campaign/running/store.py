@@ -1,0 +1,80 @@
+"""The store of results: a folder for each key, which appears whole or not at all and never changes."""
+
+import json
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from foundation import writing_whole_folder
+
+from ..jobs import Outcome
+
+RESULTS, OUTCOME, FORMAT = "results", "outcome.json", "millfrf.campaign_outcome"
+_LENGTH = 24
+
+
+def folder_of(out: Path, kind: str, key: str) -> Path:
+    """Folder of a result; the first two letters of the key make folders of few entries."""
+    return out / RESULTS / kind / key[:2] / key[:_LENGTH]
+
+
+def read_outcome(out: Path, identity: str, key: str) -> Outcome | None:
+    """What became of a task; None where it has not been run, or files of its result are missing."""
+    folder = folder_of(out, identity.partition(":")[0], key)
+    try:
+        stored = json.loads((folder / OUTCOME).read_text(encoding="utf-8"))
+        whole = stored["key"] == key and all((folder / name).stat().st_size == n for name, n in stored["files"].items())
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None
+    if not whole:
+        return None
+    return Outcome(identity, stored["status"] == "done", folder, stored["reason"], tuple(stored["warnings"]))
+
+
+def store_outcome(out: Path, identity: str, key: str, job: Callable[[Path], tuple[str, list[str]]]) -> Outcome:
+    """Do a job in an unfinished folder and give it its place, with what became of it.
+
+    Parameters
+    ----------
+    out
+        Folder of results.
+    identity, key
+        Kind and name of the task, and the key of its result.
+    job
+        Function that writes its files into a folder and returns the reason of a refusal (empty: none) and doubts.
+    """
+    kind = identity.partition(":")[0]
+    folder = folder_of(out, kind, key)
+    try:
+        with writing_whole_folder(folder) as unfinished:
+            reason, warnings = job(unfinished)
+            files = {path.relative_to(unfinished).as_posix(): path.stat().st_size for path in _files(unfinished)}
+            content: dict[str, Any] = {
+                "format": FORMAT,
+                "kind": kind,
+                "key": key,
+                "status": "refused" if reason else "done",
+                "reason": reason,
+                "warnings": warnings,
+                "files": files,
+            }
+            (unfinished / OUTCOME).write_text(json.dumps(content, indent=1), encoding="utf-8")
+    except OSError:
+        with suppress(OSError):
+            found = read_outcome(out, identity, key)
+            if found is not None:  # another worker, which was taken for dead, was faster
+                return found
+        raise
+    return Outcome(identity, not reason, folder, reason, tuple(warnings))
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.rglob("*") if path.is_file())
+
+
+def forget(out: Path, identity: str, key: str) -> None:
+    """Take a result out of the store, so that its task is run again."""
+    folder = folder_of(out, identity.partition(":")[0], key)
+    with suppress(OSError):
+        (folder / OUTCOME).unlink()

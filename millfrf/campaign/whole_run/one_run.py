@@ -1,0 +1,59 @@
+"""One run at a time in a folder of results: a lock that ends with the process, and what dead runs left removed."""
+
+import os
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+
+from foundation import InputError, LeftoverRemoved, remove_leftovers
+
+from ..running import RESULTS
+
+_fcntl: ModuleType | None
+try:
+    import fcntl as _fcntl
+except ImportError:  # Windows
+    _fcntl = None
+
+LOCK = ".running"
+
+
+@contextmanager
+def only_run(out: Path) -> Iterator[None]:
+    """Hold the folder of results for this run, made if need be.
+
+    Raises
+    ------
+    InputError
+        Another run works there, or the folder cannot be made or written to.
+    """
+    if out.exists() and not out.is_dir():
+        raise InputError(f"{out} is a file; name a folder with --out")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(out / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError as error:
+        raise InputError(f"cannot write into {out}: {error.strerror}; choose another --out") from error
+    try:
+        if _fcntl is not None:
+            try:
+                _fcntl.flock(descriptor, _fcntl.LOCK_EX | _fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                raise InputError(f"another run works in {out}; wait for it, or choose another --out") from error
+            except OSError:  # a disk without locks
+                pass
+        _remove_unfinished(out)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _remove_unfinished(out: Path) -> None:
+    """Remove what killed workers left unfinished in the store; those of living ones stay."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LeftoverRemoved)
+        for folder in (out, *(out / RESULTS).glob("*/*")):
+            if folder.is_dir():
+                remove_leftovers(folder)
