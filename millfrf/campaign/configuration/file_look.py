@@ -65,7 +65,7 @@ def look_at_recordings(
     base
         Folder of the campaign.
     progress
-        Shows progress.
+        Shows progress, such as ``millfrf.progress.bar``.
     """
     found = {}
     with progress("looking at recordings", len(paths)) as update:

@@ -51,7 +51,7 @@ def find_recordings(
     Parameters
     ----------
     file
-        The campaign.
+        Campaign as its file states it.
     base
         Folder of its file, from which names of files are told.
     out
@@ -59,7 +59,7 @@ def find_recordings(
     kept
         What earlier runs have seen.
     progress
-        Shows progress.
+        Shows progress, such as ``millfrf.progress.bar``.
 
     Raises
     ------

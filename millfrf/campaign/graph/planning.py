@@ -45,11 +45,11 @@ def plan_campaign(
     Parameters
     ----------
     file
-        The campaign.
+        Campaign as its file states it.
     base
         Folder of its file.
     recordings
-        All recordings.
+        Recordings of the campaign, labelled.
     robot
         Name of a robot that ships, or the path of its file; None: none is stated.
     pose_of

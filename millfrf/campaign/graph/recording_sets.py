@@ -45,7 +45,7 @@ def grouped(recordings: Sequence[FoundRecording], by: Sequence[str]) -> tuple[li
     Parameters
     ----------
     recordings
-        All recordings.
+        Recordings of the campaign, labelled.
     by
         Labels that must be equal; none: each recording is a set of its own.
 

@@ -1,11 +1,11 @@
-from .dask_executor import dask_executor
 from .executors import Executor, InThisProcess
+from .on_dask import dask_executor
 from .one_task import DONE, FAILED, FULL, REFUSED, Ended, Order, log_of, run_task
-from .program_digest import program_digest
 from .progress_lines import ProgressLines, shown_time
 from .rates import Rates, measured_rates, note_time
-from .run_tasks import State, left_to_run, run_tasks
+from .same_program import program_digest
 from .store import RESULTS, folder_of, forget, read_outcome
+from .task_loop import State, left_to_run, run_tasks
 
 __all__ = [
     "DONE",

@@ -19,7 +19,7 @@ from threadpoolctl import threadpool_limits
 from foundation import DiskFull, MillfrfError, TooLarge, is_disk_full
 
 from ..jobs import JOB_OF, Outcome, Work
-from .program_digest import program_digest
+from .same_program import program_digest
 from .store import read_outcome, store_outcome
 
 DONE, REFUSED, FAILED, FULL = "done", "refused", "failed", "disk full"

@@ -7,7 +7,7 @@ from typing import Any
 
 from foundation import InputError
 
-from .program_digest import program_digest
+from .same_program import program_digest
 
 FIRST_WORKER_SECONDS = 30.0
 """How long the first worker is waited for."""

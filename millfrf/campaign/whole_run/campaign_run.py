@@ -62,7 +62,7 @@ class RunSummary:
     Parameters
     ----------
     opened
-        The campaign.
+        Campaign that was opened: files, tasks, keys.
     state
         What became of its tasks.
     ran

@@ -34,9 +34,9 @@ class OpenedCampaign:
     base, out
         Folder of the file, and that of results.
     recordings
-        Its recordings.
+        Recordings that were found, by name.
     plan
-        Its tasks.
+        Tasks, and the sets of recordings.
     looks
         Size, time of change and hash of each file, by path.
     keys
@@ -90,7 +90,7 @@ def open_campaign(path: Path, out: Path, progress: Progress, *, hashing: bool) -
     out
         Folder of results.
     progress
-        Shows progress.
+        Shows progress, such as ``millfrf.progress.bar``.
     hashing
         Whether content that is not known yet is hashed; else keys that hang on it are left open.
 

@@ -19,7 +19,7 @@ def report_task(opened: OpenedCampaign, state: State, lines: list[str]) -> Task:
     Parameters
     ----------
     opened
-        The campaign.
+        Campaign that was opened: files, tasks, keys.
     state
         What became of the other tasks.
     lines

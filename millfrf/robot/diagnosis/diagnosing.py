@@ -18,7 +18,6 @@ from ...gate import RECORD_AGAIN, check_channels
 from ...options import check_band
 from ...progress import bar
 from ...provenance import add_to_json, origin
-from ...report import write_robot_report
 from ...result_folder import refuse_file
 from ..postures import Asked, posture_of, spatial
 from .diagnosis_words import summary
@@ -51,6 +50,8 @@ def diagnose_robot_files(robot: str, paths: Sequence[Path], out: Path, asking: A
     InputError
         Files that cannot be used together, or a folder that cannot be made.
     """
+    from ...report import write_robot_report  # the report asks this room for its words
+
     refuse_file(out)
     case = spatial(read_robot(robot))
     _refuse_unlike(paths, asking)
