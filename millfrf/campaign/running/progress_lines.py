@@ -63,7 +63,8 @@ class ProgressLines:
         if sys.stderr.isatty():
             self._move(workers)
         else:
-            print(printable(self.line(workers)), file=sys.stderr, flush=True)
+            sys.stderr.write(f"{printable(self.line(workers))}\n")
+            sys.stderr.flush()
 
     def _move(self, workers: int) -> None:
         if self._bar is None:
