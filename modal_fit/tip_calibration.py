@@ -11,12 +11,13 @@ from foundation import InputError, MillfrfError, Result, Summary, counted, share
 
 from .models import ModalModel, Residuals, derived_covariance, fit_summary, modal_assurance
 from .polyreference import ModalFit, fit_polyreference
+from .sensor_to_tip import as_real, carried, sensor_to_tip
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Complex = NDArray[np.complex128]
-_POOR = 0.3  # relative standard error above which a ratio is replaced
+_POOR = 0.3  # relative standard error of the sensor's motion above which a ratio to it says nothing
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -28,9 +29,11 @@ class TipCalibration(Result):
     model
         Calibrated model, with the tip's degrees of freedom as responses.
     ratios : (n_modes, n_directions), complex
-        Ratio phi_tip / phi_sensor by which each mode's right vector was multiplied.
+        Ratio of each mode's right vector at the tip to that at the sensor: phi_tip / phi_sensor of the hammer test,
+        but where the sensor hardly moves.
     ratio_errors : (n_modes, n_directions)
-        Standard errors of the ratios (circular), NaN where the hammer FRFs came without covariance.
+        Standard errors of the ratios (circular), NaN where the hammer FRFs came without covariance, or where the sensor
+        hardly moves.
     hammer_modes : (n_modes,), int
         Index of the hammer mode that served each in-process mode.
     hammer_fit
@@ -98,22 +101,26 @@ def calibrate_to_tip(
         ) from error
     n = len(tip.responses)
     chosen, warnings = _matched(model, fit.model, n)
-    ratios, errors, replaced = _ratios(fit.model, chosen, n)
-    for r, direction in replaced:
-        warnings.append(
-            f"mode {r + 1} ({natural[r]:.2f} Hz) hardly moves {sensor.responses[direction]}: "
-            "the ratio of the whole shape is used"
-        )
-    covariance = _covariance(model, fit.model, chosen, ratios)
+    tip_side, sensor_side = fit.model.right[chosen, :n], fit.model.right[chosen, n:]
+    replaced = _badly_seen(fit.model, chosen, n)
+    right = carried(sensor_to_tip(tip_side, sensor_side, replaced), model.right)
+    ratios = right / np.where(np.abs(model.right) > 0, model.right, 1e-300)
+    warnings += [
+        f"mode {r + 1} ({natural[r]:.2f} Hz) hardly moves {sensor.responses[direction]}: the motion of the tip there "
+        "is that of the hammer test, scaled by the whole shape"
+        for r, direction in np.argwhere(replaced)
+    ]
+    covariance = _covariance(model, fit.model, chosen, replaced)
     residuals = None if model.residuals is None else _scaled(model.residuals, model, ratios)
     calibrated = replace(
         model,
-        right=model.right * ratios,
+        right=right,
         responses=tip.responses,
         residuals=residuals,
         covariance=covariance,
         band=shared_band(model.band, shared_band(tip.band, sensor.band)),
     )
+    errors = _ratio_errors(fit.model, chosen, replaced)
     return TipCalibration(calibrated, ratios, errors, chosen, fit, tuple(warnings))
 
 
@@ -182,24 +189,30 @@ def _matched(model: ModalModel, hammer: ModalModel, n: int) -> tuple[NDArray[np.
     return chosen, warnings
 
 
-def _ratios(
-    hammer: ModalModel, chosen: NDArray[np.int64], n: int
-) -> tuple[Complex, NDArray[np.float64], list[tuple[int, int]]]:
-    """phi_T / phi_S, standard errors, and the entries that were replaced by the whole shape's ratio."""
-    tip, sensor = hammer.right[chosen, :n], hammer.right[chosen, n:]
-    safe = np.where(np.abs(sensor) > 0, sensor, 1e-300)
-    ratios = tip / safe
+def _badly_seen(hammer: ModalModel, chosen: NDArray[np.int64], n: int) -> NDArray[np.bool_]:
+    """Sensor directions in which a mode hardly moves: the error of its share in the shape is over 30 % of it."""
+    shapes = hammer.right[chosen, n:]
+    unit = shapes / np.linalg.norm(shapes, axis=1, keepdims=True)
+
+    def share(m: ModalModel) -> NDArray[np.float64]:
+        own = m.right[chosen, n:]
+        return _real(own / np.sum(unit.conj() * own, axis=1)[:, None])
+
+    spread = derived_covariance(hammer, share)
+    if spread is None:
+        return np.zeros(shapes.shape, dtype=bool)
+    errors = np.sqrt(np.diag(spread).reshape(2, *shapes.shape).sum(axis=0) / 2)
+    return np.asarray(errors > _POOR * np.abs(unit))
+
+
+def _ratio_errors(hammer: ModalModel, chosen: NDArray[np.int64], replaced: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """Standard errors of phi_T / phi_S; NaN where the ratio was not used, or where they are not known."""
+    n = replaced.shape[1]
     spread = derived_covariance(hammer, lambda m: _real(m.right[chosen, :n] / m.right[chosen, n:]))
-    errors = np.full(ratios.shape, np.nan)
-    if spread is not None:
-        variance = np.diag(spread).reshape(2, *ratios.shape)
-        errors = np.sqrt(variance.sum(axis=0) / 2)
-    replaced = []
-    whole = np.sum(sensor.conj() * tip, axis=1) / np.sum(np.abs(sensor) ** 2, axis=1)
-    for r, direction in np.argwhere(errors > _POOR * np.abs(ratios)):
-        ratios[r, direction] = whole[r]
-        replaced.append((int(r), int(direction)))
-    return ratios, errors, replaced
+    if spread is None:
+        return np.full(replaced.shape, np.nan)
+    variance = np.diag(spread).reshape(2, *replaced.shape)
+    return np.where(replaced, np.nan, np.sqrt(variance.sum(axis=0) / 2))
 
 
 def _real(values: Complex) -> NDArray[np.float64]:
@@ -215,26 +228,21 @@ def _scaled(residuals: Residuals, model: ModalModel, ratios: Complex) -> Residua
 
 
 def _covariance(
-    model: ModalModel, hammer: ModalModel, chosen: NDArray[np.int64], ratios: Complex
+    model: ModalModel, hammer: ModalModel, chosen: NDArray[np.int64], replaced: NDArray[np.bool_]
 ) -> NDArray[np.float64] | None:
-    """Carry the in-process covariance through the ratios and add the ratios' own: the measurements are independent."""
+    """Carry the in-process covariance to the tip and add the hammer test's own: the measurements are independent."""
     if model.covariance is None:
         return None
-    n_modes, n = model.right.shape
-    start = 2 * n_modes
-    size = model.right.size
+    n = replaced.shape[1]
+    start = 2 * len(model.poles)
     through = np.eye(len(model.covariance))
-    block = slice(start, start + 2 * size)
-    through[block, block] = _multiplication(ratios.ravel())
+    block = slice(start, start + 2 * model.right.size)
+    through[block, block] = as_real(sensor_to_tip(hammer.right[chosen, :n], hammer.right[chosen, n:], replaced))
     covariance = through @ model.covariance @ through.T
-    spread = derived_covariance(hammer, lambda m: _real(m.right[chosen, :n] / m.right[chosen, n:]))
+    spread = derived_covariance(
+        hammer,
+        lambda m: _real(carried(sensor_to_tip(m.right[chosen, :n], m.right[chosen, n:], replaced), model.right)),
+    )
     if spread is not None:
-        lever = _multiplication(model.right.ravel())
-        covariance[block, block] += lever @ spread @ lever.T
+        covariance[block, block] += spread
     return np.asarray(covariance)
-
-
-def _multiplication(factors: Complex) -> NDArray[np.float64]:
-    """Real matrix that multiplies a packed (real parts, imaginary parts) vector by complex factors."""
-    real, imaginary = np.diag(factors.real), np.diag(factors.imag)
-    return np.block([[real, -imaginary], [imaginary, real]])
