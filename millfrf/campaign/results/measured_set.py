@@ -7,6 +7,9 @@ from pathlib import Path
 POSE, POSTURE = "pose", "posture_deg"
 """Labels with a meaning of their own: the name of the pose, and its joint angles."""
 
+NOT_STATED = "not stated"
+"""Pose of sets that state neither pose nor posture: they are taken to be in one."""
+
 
 @dataclass(frozen=True)
 class MeasuredSet:
@@ -50,10 +53,10 @@ class MeasuredSet:
 
     @property
     def pose(self) -> str:
-        """Name of the pose; of a set without that label its joint angles, or the set's own name."""
+        """Name of the pose; of a set without that label its joint values, or ``NOT_STATED``."""
         named = self.labels.get(POSE)
         if named is not None:
             return str(named)
         if self.posture is not None:
             return "(" + ", ".join(f"{value:.4g}" for value in self.posture) + ")"
-        return self.name
+        return NOT_STATED
