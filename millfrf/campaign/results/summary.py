@@ -1,14 +1,72 @@
 """`write_summary`: the table of modes and the report of a campaign, from the results of its sets."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...provenance import origin
-from ...report import ResultsPage, write_results_page
-from .measured_set import MeasuredSet
-from .page import failure_section, set_section
-from .read_set import read_set
+from ...report import ResultsPage, Section, write_results_page
+from .drift import Drifts, Labels, Outliers, Series, drifts_and_outliers, labels_of, series_of
+from .identity import IdentifiedModes, identify_modes
+from .measured_set import NOT_STATED, MeasuredSet
+from .page import (
+    all_failures,
+    drift_section,
+    error_bar_sentences,
+    failure_section,
+    map_section,
+    outlier_section,
+    set_section,
+    trend_pictures,
+    verdict_sentences,
+)
+from .pictures import map_plane, tip_positions
+from .read_set import SetResults, read_set
 from .table import mode_rows, write_mode_tables
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a campaign found, before it is written.
+
+    Parameters
+    ----------
+    sets
+        Sets as read, by name.
+    modes
+        Which modes are the same.
+    labels, series
+        Labels as regressors, and each quantity through the sets of each pose.
+    drifts, outliers
+        What drifts, and what stands off.
+    """
+
+    sets: tuple[SetResults, ...]
+    modes: IdentifiedModes
+    labels: Labels
+    series: tuple[Series, ...]
+    drifts: Drifts
+    outliers: Outliers
+
+
+def findings_of(sets: Sequence[MeasuredSet]) -> Findings:
+    """Read the sets, find which modes are the same, what drifts and what stands off.
+
+    Parameters
+    ----------
+    sets
+        Sets with their results, in any order.
+    """
+    found = tuple(read_set(one) for one in sorted(sets, key=lambda one: one.name))
+    modes = identify_modes(found)
+    labels = labels_of([one.measured for one in found])
+    series = tuple(series_of(found, modes))
+    return Findings(found, modes, labels, series, *drifts_and_outliers(series, labels))
 
 
 def write_summary(
@@ -19,8 +77,8 @@ def write_summary(
     robot: str | None,
     learned: Path | None,
     failures: Sequence[str],
-) -> None:
-    """Write ``modes.csv``, ``modes.parquet`` and ``report.html`` into a folder; equal input gives equal bytes.
+) -> tuple[str, ...]:
+    """Write ``modes.csv``, ``modes.parquet``, ``report.html`` and its maps as PNG; equal input gives equal bytes.
 
     Parameters
     ----------
@@ -29,7 +87,7 @@ def write_summary(
     title
         Title of the campaign.
     sets
-        Sets with their results, in the order of the table.
+        Sets with their results, in any order.
     robot
         Name of a robot that ships, or its file; None: no robot, so no places of the tool.
     learned
@@ -37,17 +95,57 @@ def write_summary(
     failures
         One line for each recording or step that failed, whichever set it belongs to.
 
+    Returns
+    -------
+    tuple of str
+        Sentences of the verdict, as they stand at the top of the report.
+
     Raises
     ------
     InputError
         pandas or pyarrow are missing, or the folder cannot be written to.
     """
-    found = [read_set(one) for one in sorted(sets, key=lambda one: one.name)]
+    found = findings_of(sets)
+    places, lost = tip_positions(robot, found.sets)
+    failed = all_failures(found.sets, [*failures, *([lost] if lost else [])])
     inputs = [path for one in sets for path in (one.model, one.lobes, one.diagnosis) if path is not None]
-    made = origin("campaign summary", sorted(inputs), {"title": title, "robot": robot})
-    write_mode_tables(folder, mode_rows(found, {}, {}), made, ())
-    modes = sum(0 if one.model is None else len(one.model.poles) for one in found)
-    without = sum(one.model is None for one in found)
-    verdict = (f"{len(found)} sets, {modes} modes; {without} sets without a modal model.",)
-    page = ResultsPage("Report of a campaign", title, "", verdict)
-    write_results_page(folder / "report.html", page, [set_section(found), failure_section(found, failures)])
+    made = origin("campaign report", sorted(inputs), {"title": title, "robot": robot})
+    doubts = _doubts(found)
+    write_mode_tables(folder, mode_rows(found.sets, found.modes.names, places), made, doubts)
+    sections: list[Section] = [
+        drift_section(found.drifts, found.sets, trend_pictures(folder, found.drifts)),
+        outlier_section(found.outliers, found.sets, ()),
+        _maps(folder, found, places),
+        set_section(found.sets),
+        failure_section(failed),
+    ]
+    verdict = verdict_sentences(found.sets, found.drifts, found.outliers, failed)
+    page = ResultsPage("Report of a campaign", title, _size(found), tuple(verdict), tuple(doubts))
+    write_results_page(folder / "report.html", page, sections)
+    return tuple(verdict)
+
+
+def _maps(folder: Path, found: Findings, places: dict[str, Real]) -> Section:
+    poses = len({one.measured.pose for one in found.sets if one.model is not None})
+    return map_section(folder, found.series, found.modes, map_plane(found.sets, places), poses)
+
+
+def _doubts(found: Findings) -> list[str]:
+    """What to know before trusting the table and the report."""
+    told = [*error_bar_sentences(found.outliers), *found.labels.notes]
+    unsure = sum(1 for name in found.modes.names.values() if name.doubt)
+    if unsure:
+        told.append(
+            f"Of {unsure} of {len(found.modes.names)} modes it cannot be told for certain which mode of another set or "
+            "pose they are; modes.csv says why (mode_doubt)."
+        )
+    if any(one.measured.pose == NOT_STATED for one in found.sets):
+        told.append("Sets that state neither pose nor posture are taken to be in one pose.")
+    return told
+
+
+def _size(found: Findings) -> str:
+    recordings = sum(len(one.measured.recordings) for one in found.sets)
+    poses = len({one.measured.pose for one in found.sets})
+    modes = sum(0 if one.model is None else len(one.model.poles) for one in found.sets)
+    return f"{recordings} recordings, {len(found.sets)} sets, {poses} poses, {modes} modes"

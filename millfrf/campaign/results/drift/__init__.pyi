@@ -1,3 +1,4 @@
+from .in_turn import drifts_and_outliers
 from .judged import Drift, Drifts, find_drifts
 from .labels import TIME, Labels, labels_of
 from .outliers import Deviation, Outliers, find_outliers
@@ -20,6 +21,7 @@ __all__ = [
     "PooledTrend",
     "Series",
     "Trend",
+    "drifts_and_outliers",
     "find_drifts",
     "find_outliers",
     "labels_of",

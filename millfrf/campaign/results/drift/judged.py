@@ -107,7 +107,7 @@ def find_drifts(series: Sequence[Series], labels: Labels) -> Drifts:
     trends = [one for label in sorted(labels.numbers) for one in trends_over(series, labels, label)]
     trends = [one for one in trends if np.isfinite(one.error)]
     pooled = [found for group in _by_mode(trends) if (found := pool(group)) is not None]
-    probabilities = np.array([one.p_value for one in (*trends, *pooled)])
+    probabilities = np.array([one.p_value for one in trends] + [one.p_value for one in pooled])
     adjusted = false_discovery_control(probabilities) if len(probabilities) else probabilities
     named = adjusted <= FALSE_ALARMS
     best: dict[tuple[str, int, str], tuple[Trend, float]] = {}

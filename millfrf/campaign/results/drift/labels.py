@@ -115,7 +115,11 @@ def _in_order_of_time(numbers: Mapping[str, Real], poses: NDArray[np.str_]) -> s
         return ""
     for name in sorted(numbers):
         column = numbers[name]
-        if name != TIME and _counts(column) and all(_rises(column, numbers[TIME], poses == p) for p in np.unique(poses)):
+        if (
+            name != TIME
+            and _counts(column)
+            and all(_rises(column, numbers[TIME], poses == p) for p in np.unique(poses))
+        ):
             return name
     return ""
 

@@ -10,8 +10,8 @@ from scipy.stats import t as student
 
 from .judged import FALSE_ALARMS, Drifts
 from .labels import Labels
-from .series import QUANTITIES, Series
 from .moderated import CommonVariance
+from .series import QUANTITIES, Series
 from .trends import common_variance, design_of, grouped
 from .weighted_fit import ErrorBarCheck, Problem, check_error_bars, shared_scatter, variances, weighted_fit
 
@@ -77,7 +77,8 @@ class Outliers:
 def find_outliers(series: Sequence[Series], labels: Labels, drifts: Drifts) -> Outliers:
     """Test every value against the others of its series, and name those that are more than chance among so many.
 
-    Studentised deleted residuals (Belsley, Kuh & Welsch 1980, section 2.1) of a regression on groups and on what drifts.
+    Studentised deleted residuals (Belsley, Kuh & Welsch 1980, section 2.1) of a regression on groups and on what
+    drifts.
 
     Parameters
     ----------

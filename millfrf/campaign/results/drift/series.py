@@ -72,8 +72,8 @@ def _of_mode(sets: Sequence[SetResults], mode: ModeOfPose, number: dict[str, int
         assert model is not None
         values[k] = model.natural_frequencies[index], model.damping_ratios[index]
         errors[k] = [part[index] for part in sets[row].errors]
-    usable = (values > 0).all(axis=1)
-    rows = tuple(row for row, good in zip(rows, usable, strict=True) if good)
+    usable = np.asarray((values > 0).all(axis=1))
+    rows = tuple(rows[k] for k in np.flatnonzero(usable))
     logs, relative = np.log(values[usable]), np.nan_to_num(errors[usable] / values[usable])
     return [
         Series(mode.pose, mode.number, mode.frequency, quantity, rows, logs[:, k], relative[:, k])

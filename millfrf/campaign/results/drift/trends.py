@@ -18,7 +18,7 @@ ENOUGH = 8
 """Degrees of freedom from which the series of one mode have a scatter of their own; below, all modes share one."""
 
 FEWEST, LEAST_POSES = 4, 4
-"""Degrees of freedom below which trends do not tell the scatter, and poses of a mode from which their differences do."""
+"""Degrees of freedom below which trends do not tell the scatter, and poses of a mode whose differences then do."""
 
 LEAST_VARIATION = 1e-3
 """Share of a label's variance that its groups and the constant must leave, so that a trend over it is defined."""

@@ -41,7 +41,7 @@ class Problem:
     @property
     def freedom(self) -> int:
         """Number of values less number of columns."""
-        return len(self.logs) - self.design.shape[1]
+        return len(self.logs) - int(self.design.shape[1])
 
 
 @dataclass(frozen=True)

@@ -64,9 +64,7 @@ def families(
     return [sorted(group) for group in grouped.values()], doubts
 
 
-def _distances(
-    poses: Sequence[Sequence[SeenMode]], postures: Sequence[tuple[float, ...] | None]
-) -> tuple[Real, Real]:
+def _distances(poses: Sequence[Sequence[SeenMode]], postures: Sequence[tuple[float, ...] | None]) -> tuple[Real, Real]:
     """How far poses are from each other, never zero, and the scale of frequency between each two."""
     n = len(poses)
     distance, scales = np.zeros((n, n)), np.full((n, n), UNKNOWN_SCALE)

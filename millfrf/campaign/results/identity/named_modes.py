@@ -112,5 +112,3 @@ def _mode(pose: _Pose, i: int, number: int, doubt: str, names: dict[tuple[str, i
         names[name, index] = ModeName(number, pair.likeness, pair.doubt or doubt)
         doubted += [name] if pair.doubt else []
     return ModeOfPose(pose.name, number, float(np.exp(pose.means[i].log_frequency)), members, tuple(doubted))
-
-

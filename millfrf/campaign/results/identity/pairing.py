@@ -85,7 +85,6 @@ def pair_modes(first: Sequence[SeenMode], second: Sequence[SeenMode], frequency_
 
 def _least(distance: Real) -> tuple[float, list[tuple[int, int]]]:
     """Least total of pairs, and of ``ALONE`` for every two modes without a partner."""
-    n, m = distance.shape
     gain = np.minimum(distance, ALONE) - ALONE
     rows, columns = linear_sum_assignment(gain)
     kept = [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if distance[i, j] < ALONE]

@@ -21,17 +21,15 @@ def all_failures(sets: Sequence[SetResults], failures: Sequence[str]) -> tuple[t
     return tuple(dict.fromkeys([("", line) for line in failures] + own))
 
 
-def failure_section(sets: Sequence[SetResults], failures: Sequence[str]) -> Section:
-    """Table of what failed; empty where nothing did.
+def failure_section(failed: Sequence[tuple[str, str]]) -> Section:
+    """Table of what failed, or the sentence that nothing did.
 
     Parameters
     ----------
-    sets
-        Sets of the campaign, as read.
-    failures
-        Failures that the campaign lists, one line each.
+    failed
+        Name of the set (empty: of the campaign) and reason of each failure.
     """
-    rows = tuple((name or "campaign", line) for name, line in all_failures(sets, failures))
-    if not rows:
+    if not failed:
         return Section("Failures", ("Nothing failed.",))
+    rows = tuple((name or "campaign", line) for name, line in failed)
     return Section("Failures", (), (Table("What failed, and why", ("set", "reason"), rows),))

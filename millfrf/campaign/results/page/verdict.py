@@ -1,0 +1,47 @@
+"""The verdict at the top of the report: drifts, sets that stand off, failures, in this order."""
+
+from collections.abc import Sequence
+
+from ..drift import Drifts, Outliers
+from ..read_set import SetResults
+from .drifts import deviations_by_set
+from .trend_words import deviation_words, drift_words, pooled_words
+
+MOST = 8
+"""Sentences of each kind that stand in the verdict; the sections have all."""
+
+
+def verdict_sentences(
+    sets: Sequence[SetResults], drifts: Drifts, outliers: Outliers, failed: Sequence[tuple[str, str]]
+) -> list[str]:
+    """Say what a reader wants first.
+
+    Parameters
+    ----------
+    sets
+        Sets of the campaign, as read.
+    drifts, outliers
+        What drifts, and what stands off.
+    failed
+        Name of the set (empty: of the campaign) and reason of each failure.
+    """
+    usable = sum(one.model is not None for one in sets)
+    told = [f"{usable} of {len(sets)} sets have a modal model."]
+    found = [drift_words(one, sets) for one in drifts.drifts] + [pooled_words(one) for one in drifts.pooled]
+    told += _cut("Drift: ", found) or [
+        "No drift was found." if drifts.count else "Nothing can be said of drift: no pose was measured twice."
+    ]
+    told += _cut("Stands off: ", [deviation_words(group, sets) for group in deviations_by_set(outliers)]) or [
+        "No set stands off the others of its pose."
+        if outliers.count
+        else "Nothing can be said of outlying sets: no pose has enough of them."
+    ]
+    told += _cut("Failed: ", [f"{name}: {line}" if name else line for name, line in failed]) or ["Nothing failed."]
+    return told
+
+
+def _cut(start: str, sentences: Sequence[str]) -> list[str]:
+    """The first sentences, and how many more there are."""
+    shown = [f"{start}{sentence}" for sentence in sentences[:MOST]]
+    more = len(sentences) - len(shown)
+    return [*shown, *([f"... and {more} more below."] if more else [])]
