@@ -1,7 +1,7 @@
 from .across_poses import families
 from .named_modes import IdentifiedModes, ModeOfPose, identify_modes
+from .one_mode import SeenMode, seen_modes
 from .pairing import Pairing, pair_modes
-from .seen_modes import SeenMode, seen_modes
 from .within_pose import tracks_of_pose
 
 __all__ = [

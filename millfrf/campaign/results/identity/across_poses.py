@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import minimum_spanning_tree
 
+from .one_mode import SeenMode
 from .pairing import ALONE, Pairing, pair_modes
-from .seen_modes import SeenMode
 
 Real = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 from ..read_set import SetResults
 from ..table import ModeName
 from .across_poses import families
-from .seen_modes import SeenMode, mean_mode, seen_modes
+from .one_mode import SeenMode, mean_mode, seen_modes
 from .within_pose import Track, tracks_of_pose
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from .seen_modes import SeenMode, likeness
+from .one_mode import SeenMode, likeness
 
 Real = NDArray[np.float64]
 

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from .one_mode import SeenMode, mean_mode
 from .pairing import Pairing, pair_modes
-from .seen_modes import SeenMode, mean_mode
 
 FREQUENCY_SCALE = 0.03
 """Difference of the logarithms of frequency in one posture that weighs one: drift and scatter are a few per cent."""

@@ -1,8 +1,8 @@
+from .drift_pictures import trend_pictures
 from .drifts import deviations_by_set, drift_section, error_bar_sentences, outlier_section
 from .failures import all_failures, failure_section
 from .maps import map_section
 from .sets import set_section
-from .trend_pictures import trend_pictures
 from .trend_words import deviation_words, drift_words, label_words, mode_words, pooled_words
 from .verdict import verdict_sentences
 

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 
 from figures import house_style, new_figure
 
-from .map_plane import MapPlane
+from .places import MapPlane
 
 SHADES = "cividis"
 """Rises in lightness from end to end, and looks the same to the colour blind."""
