@@ -79,7 +79,7 @@ def drift_words(drift: Drift, sets: Sequence[SetResults]) -> str:
     Parameters
     ----------
     drift
-        The drift.
+        Trend that is more than chance, with its rivals.
     sets
         Sets of the campaign, for names and dates.
     """
