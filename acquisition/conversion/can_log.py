@@ -24,7 +24,17 @@ _STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class LogSignal(BaseModel):
-    """A signal to keep; see `CanSignal`."""
+    """A signal to keep; see `CanSignal`.
+
+    Parameters
+    ----------
+    signal
+        Name in the DBC file: ``Speed``, or ``Message.Speed`` where several messages have a signal of that name.
+    series
+        Name of the event series in the recording; empty: the same.
+    factor
+        Factor to SI units.
+    """
 
     model_config = _STRICT
     signal: Annotated[str, Field(min_length=1)]

@@ -16,7 +16,15 @@ _STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class NameChange(BaseModel):
-    """A further file's name: the input's name with one part replaced."""
+    """A further file's name: the input's name with one part replaced.
+
+    Parameters
+    ----------
+    replace
+        Part of the input's name.
+    by
+        What stands there in the further file's name.
+    """
 
     model_config = _STRICT
     replace: Annotated[str, Field(min_length=1)]
@@ -113,7 +121,19 @@ class ChannelMapping(BaseModel):
 
 
 class CsvOptions(BaseModel):
-    """How a CSV file of another program is written."""
+    """How a CSV file of another program is written.
+
+    Parameters
+    ----------
+    delimiter
+        Character between columns; None: seen from the file.
+    decimal
+        Character of decimals, ``.`` or ``,``.
+    skip_lines
+        Number of lines before the headings.
+    encoding
+        Encoding of the text.
+    """
 
     model_config = _STRICT
     delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = None
@@ -140,6 +160,22 @@ class Mapping(BaseModel):
         Axes whose entries follow one another in time, slowest first.
     split
         Axis whose entries become one recording each: ``rec.h5`` becomes ``rec-1.h5``, ``rec-2.h5`` ...
+    title, setup
+        Title of the recording, and its set-up as TOML text (tool, cut, pose).
+    recorded_at
+        Time of the recording, ISO 8601 with zone, such as ``2026-03-02T09:30:00Z``.
+    stream
+        Name of the sample clock in the recording.
+    time
+        Array or column of times, evenly spaced; instead of ``sample_rate``.
+    time_unit
+        Unit of these times.
+    start_time : s
+        Time of the first sample.
+    dtype
+        Type of the stored samples; None: float32 where it holds the input's digits.
+    csv
+        How a CSV file is written, where it cannot be seen.
     """
 
     model_config = _STRICT

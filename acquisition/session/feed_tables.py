@@ -26,7 +26,17 @@ Baud = Annotated[int, Field(ge=50, le=10_000_000)]
 
 
 class SignalTable(BaseModel):
-    """One signal of a DBC file; see `CanSignal`."""
+    """One signal of a DBC file; see `CanSignal`.
+
+    Parameters
+    ----------
+    signal
+        Name in the DBC file: ``Speed``, or ``Message.Speed`` where several messages have a signal of that name.
+    series
+        Name of the event series in the recording; empty: the same.
+    factor
+        Factor to SI units, or to rpm where the name of the series says so.
+    """
 
     model_config = STRICT
     signal: Name
@@ -35,7 +45,17 @@ class SignalTable(BaseModel):
 
 
 class RsiSignalTable(BaseModel):
-    """One value of a KUKA controller's packets; see `RsiSignal`."""
+    """One value of a KUKA controller's packets; see `RsiSignal`.
+
+    Parameters
+    ----------
+    signal
+        Element and attribute of the controller's packet, such as ``AIPos.A1``.
+    series
+        Name of the event series in the recording.
+    factor
+        Factor to SI units.
+    """
 
     model_config = STRICT
     signal: Annotated[str, Field(pattern=r"^\w+\.\w+$")]
@@ -44,7 +64,21 @@ class RsiSignalTable(BaseModel):
 
 
 class CanTable(BaseModel):
-    """A CAN bus; see `CanFeed`. ``dbc`` is looked for beside the session file."""
+    """A CAN bus; see `CanFeed`. ``dbc`` is looked for beside the session file.
+
+    Parameters
+    ----------
+    interface, channel
+        Interface and channel in the words of python-can: ``socketcan`` and ``can0``; ``pcan`` and ``PCAN_USBBUS1``.
+    dbc
+        DBC file of the bus, from the folder of the session file.
+    signals
+        Signals to keep.
+    silence_s : s
+        Time without a wanted message after which the bus counts as lost.
+    options
+        Further arguments of the interface, such as ``bitrate``.
+    """
 
     model_config = STRICT
     interface: Name
@@ -62,7 +96,25 @@ class CanTable(BaseModel):
 
 
 class TachometerTable(BaseModel):
-    """An instrument that sends a number a line; see `TachometerFeed`."""
+    """An instrument that sends a number a line; see `TachometerFeed`.
+
+    Parameters
+    ----------
+    port
+        Serial line, ``COM3`` or ``/dev/ttyUSB0``.
+    baud : bit/s
+        Speed of the line.
+    series
+        Name of the event series in the recording.
+    pattern
+        Regular expression whose first group is the number; None: the first number of the line.
+    factor
+        Factor by which the number is multiplied.
+    period_s : s
+        Time between two lines where the instrument keeps it exactly; None: the times of arrival count.
+    silence_s : s
+        Time without a line after which the instrument counts as lost.
+    """
 
     model_config = STRICT
     port: Name
@@ -89,7 +141,21 @@ class TachometerTable(BaseModel):
 
 
 class RegisterTable(BaseModel):
-    """One register; see `Register`."""
+    """One register; see `Register`.
+
+    Parameters
+    ----------
+    address
+        Address of the register, counted from 0.
+    series
+        Name of the event series in the recording.
+    factor
+        Factor by which the integer is multiplied.
+    signed
+        Whether the integer is in two's complement.
+    input_register
+        Whether it is read with function 4 instead of 3.
+    """
 
     model_config = STRICT
     address: Annotated[int, Field(ge=0, le=65535)]
@@ -100,7 +166,31 @@ class RegisterTable(BaseModel):
 
 
 class ModbusTable(BaseModel):
-    """A drive; see `ModbusFeed`. On a serial line it has ``port`` and ``baud``, on a network ``host``."""
+    """A drive; see `ModbusFeed`. On a serial line it has ``port`` and ``baud``, on a network ``host``.
+
+    Parameters
+    ----------
+    port
+        Serial line of the drive; or instead ``host``.
+    baud : bit/s
+        Speed of the serial line.
+    parity
+        Parity of the serial line, as the drive is set.
+    stop_bits
+        Number of stop bits of the serial line.
+    host
+        Network address of the drive or gateway.
+    tcp_port
+        Its TCP port.
+    slave
+        Address of the drive.
+    registers
+        Registers to read.
+    interval_s : s
+        Time between two rounds.
+    timeout_s : s
+        Time to wait for an answer; after five in a row without one the drive counts as lost.
+    """
 
     model_config = STRICT
     port: str = ""
@@ -133,7 +223,25 @@ class ModbusTable(BaseModel):
 
 
 class RsiTable(BaseModel):
-    """A KUKA robot; see `RsiFeed`. Without ``signals``: joint angles, position and motor currents."""
+    """A KUKA robot; see `RsiFeed`. Without ``signals``: joint angles, position and motor currents.
+
+    Parameters
+    ----------
+    address
+        Network address of this computer in the robot's network.
+    port
+        UDP port that the controller sends to.
+    robot
+        Network address of the controller; others are not heard. Empty: any.
+    signals
+        Values to keep; empty: joint angles, position and motor currents.
+    cycle_ms : ms
+        Time between two packets; None: the packets tell.
+    silence_s : s
+        Time without a packet after which the controller counts as lost.
+    sentype
+        Name that the controller's configuration expects in the answers (SENTYPE).
+    """
 
     model_config = STRICT
     address: Name
@@ -160,7 +268,17 @@ class RsiTable(BaseModel):
 
 
 class CommandTable(BaseModel):
-    """One command; see `Command`."""
+    """One command; see `Command`.
+
+    Parameters
+    ----------
+    send
+        Text to send; ``{fx}`` stands for the range of channel fx.
+    expect
+        Regular expression that the answer must match; empty: no answer is awaited.
+    wait_s : s
+        Time to wait for the answer, or after a command without one.
+    """
 
     model_config = STRICT
     send: Name
@@ -173,7 +291,25 @@ class CommandTable(BaseModel):
 
 
 class AmplifierTable(BaseModel):
-    """A charge amplifier; see `Amplifier`. Channels name it by ``name``, or by its port where it has none."""
+    """A charge amplifier; see `Amplifier`. Channels name it by ``name``, or by its port where it has none.
+
+    Parameters
+    ----------
+    name
+        Name by which channels refer to it; empty: its port.
+    port
+        Serial line of the amplifier.
+    baud : bit/s
+        Speed of the line.
+    ending
+        Characters at the end of each command.
+    on_open, on_close
+        Commands when the recording begins and ends.
+    check
+        Questions with the answers that must come.
+    check_every_s : s
+        Time between two rounds of questions.
+    """
 
     model_config = STRICT
     name: str = ""

@@ -14,7 +14,35 @@ FREQUENCIES_A_SAMPLE_RATE = 2.56
 
 
 class NiDevice(BaseModel):
-    """`[device]` with ``driver = "ni"``; clocks and trigger as in `NiClocks`, empty: as DAQmx chooses."""
+    """`[device]` with ``driver = "ni"``; clocks and trigger as in `NiClocks`, empty: as DAQmx chooses.
+
+    Parameters
+    ----------
+    driver
+        ``ni``: a device of National Instruments through DAQmx.
+    sample_rate_hz : Hz
+        Samples a second of every channel; at least 2.56 times the upper end of ``band_hz``.
+    block_s : s
+        Duration of a block that is read and written at once.
+    buffer_s : s
+        Duration that the driver's buffer holds while the disk is slow.
+    timeout_s : s
+        Time without samples after which the device counts as lost.
+    sample_clock
+        Terminal of an external sample clock, such as ``/cDAQ1/PFI0``; empty: the device's own.
+    reference_clock
+        Terminal of a reference clock that several chassis share, such as ``/PXI1Slot2/PXI_Clk10``.
+    reference_clock_hz : Hz
+        Rate of that clock; None: DAQmx knows it.
+    sync_pulse
+        Terminal of the pulse that aligns the converters of several devices.
+    start_trigger
+        Terminal whose edge starts the samples; empty: at once.
+    start_edge
+        Edge that counts.
+    trigger_timeout_s : s
+        Time to wait for that edge.
+    """
 
     model_config = STRICT
     driver: Literal["ni"]
@@ -44,7 +72,17 @@ class NiDevice(BaseModel):
 
 
 class ReplayDevice(BaseModel):
-    """`[device]` with ``driver = "replay"``: a recording instead of a device, ``speed`` times as fast as it was."""
+    """`[device]` with ``driver = "replay"``: a recording instead of a device, ``speed`` times as fast as it was.
+
+    Parameters
+    ----------
+    driver
+        ``replay``: a recording instead of a device.
+    file
+        Recording, from the folder of the session file.
+    speed
+        Factor over real time.
+    """
 
     model_config = STRICT
     driver: Literal["replay"]
@@ -68,6 +106,8 @@ class SimulatedDevice(BaseModel):
         Noise of every sensor as a share of its signal, and the seed of it.
     speed
         Factor over real time.
+    driver
+        ``simulated``: the simulated cell.
     """
 
     model_config = STRICT

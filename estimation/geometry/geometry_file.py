@@ -22,7 +22,21 @@ Vector = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 
 
 class _Table(BaseModel):
-    """The file: places by node, local axes of those that have their own, lines between nodes."""
+    """The file: places by node, local axes of those that have their own, lines between nodes.
+
+    Parameters
+    ----------
+    format, format_version
+        What the file is; may be left out.
+    unit
+        Unit of the places: ``m``, ``mm``, ``in``.
+    nodes
+        Place of each node, ``name = [x, y, z]``.
+    axes
+        Directions of a node's own x, y and z in the axes of the whole, where they differ.
+    lines
+        Chains of nodes that are drawn as lines.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     format: str = FORMAT

@@ -60,7 +60,19 @@ Label = Annotated[str, AfterValidator(lambda label: expanded((label,))[0])]
 
 
 class FrfParts(BaseModel):
-    """Places of the numbers: complex ``values``, or ``real`` and ``imaginary``, or ``magnitude`` and ``phase``."""
+    """Places of the numbers: complex ``values``, or ``real`` and ``imaginary``, or ``magnitude`` and ``phase``.
+
+    Parameters
+    ----------
+    values
+        Complex numbers of the FRF.
+    real, imaginary
+        Its real and imaginary part, instead.
+    magnitude, phase
+        Its magnitude and phase, instead.
+    coherence
+        Coherence, where there is one.
+    """
 
     model_config = _STRICT
     values: Place | PlaceList | None = None
@@ -152,6 +164,10 @@ class FrfTable(FrfParts):
         Time constant of an exponential window on force and response, whose damping is still in the FRF.
     title
         Title of the FRF file that is written.
+    frequency_unit
+        Unit of the frequencies; None: the heading or Hz.
+    frequency_step_hz, frequency_start_hz : Hz
+        Distance of evenly spaced lines, and frequency of the first.
     """
 
     quantity: Literal["receptance", "mobility", "accelerance", "transfer"] | None = None
@@ -184,7 +200,19 @@ class FrfTable(FrfParts):
 
 
 class TextOptions(BaseModel):
-    """How a text file is written, where it cannot be seen."""
+    """How a text file is written, where it cannot be seen.
+
+    Parameters
+    ----------
+    delimiter
+        Character between columns; None: seen from the file.
+    decimal
+        Character of decimals; None: seen from the file.
+    skip_lines
+        Number of lines before the headings.
+    encoding
+        Encoding of the text; None: seen from the file.
+    """
 
     model_config = _STRICT
     delimiter: Annotated[str, Field(min_length=1, max_length=1)] | None = None
@@ -194,7 +222,17 @@ class TextOptions(BaseModel):
 
 
 class FrfMapping(BaseModel):
-    """The whole mapping file: ``[frf]``, ``[[entries]]`` where FRFs lie apart, ``[csv]`` for texts."""
+    """The whole mapping file: ``[frf]``, ``[[entries]]`` where FRFs lie apart, ``[csv]`` for texts.
+
+    Parameters
+    ----------
+    frf
+        What holds for all FRFs, the table ``[frf]``.
+    entries
+        FRFs that lie apart, ``[[entries]]``.
+    csv
+        How a text file is written, the table ``[csv]``.
+    """
 
     model_config = _STRICT
     frf: FrfTable = FrfTable()

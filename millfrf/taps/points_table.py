@@ -57,7 +57,13 @@ class PointRow(BaseModel):
 
 
 class PointsTable(BaseModel):
-    """All rows of a table."""
+    """The table of points: a row a recording, or a part of one.
+
+    Parameters
+    ----------
+    recording
+        Rows, ``[[recording]]``.
+    """
 
     model_config = _STRICT
     recording: Annotated[tuple[PointRow, ...], Field(min_length=1)]

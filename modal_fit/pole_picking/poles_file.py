@@ -20,7 +20,17 @@ _STRICT = ConfigDict(extra="forbid", frozen=True)
 
 
 class PickedPole(BaseModel):
-    """One pole: by frequency and damping ratio, or by the number of a group."""
+    """One pole: by frequency and damping ratio, or by the number of a group.
+
+    Parameters
+    ----------
+    frequency_hz : Hz
+        Natural frequency ``|pole| / 2 pi``.
+    damping_ratio
+        Damping ratio as a ratio, not per cent; 0 to 0.5.
+    group
+        Number of an offered group, instead of the two.
+    """
 
     model_config = _STRICT
     frequency_hz: Annotated[float, Field(gt=0, allow_inf_nan=False)] | None = None
@@ -38,7 +48,23 @@ class PickedPole(BaseModel):
 
 
 class OfferedGroup(BaseModel):
-    """One group that a picker offers."""
+    """One group that a picker offers.
+
+    Parameters
+    ----------
+    group
+        Number of the group, from 1.
+    frequency_hz : Hz
+        Natural frequency of the group's pole.
+    damping_ratio
+        Damping ratio of the group's pole.
+    n_orders
+        Number of model orders in which it appears.
+    taken
+        Whether the automatic choice takes it.
+    reason
+        Why the automatic choice does not take it.
+    """
 
     model_config = ConfigDict(extra="allow", frozen=True)
     group: Annotated[int, Field(ge=1)]
@@ -55,7 +81,21 @@ class OfferedGroup(BaseModel):
 
 
 class PolesFile(BaseModel):
-    """The whole file; what a picker needs beside (``band_hz``, ``stabilisation``, ``provenance``) is passed over."""
+    """The whole file; what a picker needs beside (``band_hz``, ``stabilisation``, ``provenance``) is passed over.
+
+    Parameters
+    ----------
+    format, format_version
+        What the file is; may be left out in a file written by hand.
+    poles
+        Chosen poles, ``[[poles]]``.
+    groups
+        Offered groups, where the file holds them itself.
+    candidates
+        File of candidates beside this one, whose groups are meant.
+    band_hz, stabilisation, provenance
+        What a picker needs beside; passed over here.
+    """
 
     model_config = _STRICT
     format: Literal["millfrf.poles"] = "millfrf.poles"

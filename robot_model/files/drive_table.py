@@ -10,7 +10,19 @@ from .robot_files import Table
 
 
 class DriveKeys(Table):
-    """Optional keys of a ``[[joints]]`` table: the first two and one gain, or none of them."""
+    """Optional keys of a ``[[joints]]`` table: the first two and one gain, or none of them.
+
+    Parameters
+    ----------
+    motor_inertia_kg_m2 : kg m^2
+        Inertia of what turns with the motor.
+    gear_ratio
+        Turns of the motor over those of the joint; rad/m for a prismatic joint.
+    position_gain_nm_per_rad : N m/rad
+        Static stiffness with which the controller holds the motor of a revolute joint, on the side of the joint.
+    position_gain_n_per_m : N/m
+        The same for a prismatic joint.
+    """
 
     motor_inertia_kg_m2: float | None = Field(None, gt=0, le=1)
     gear_ratio: float | None = Field(None, ge=1)

@@ -16,17 +16,56 @@ from .robot_files import Table, read_as
 
 
 class _Head(Table):
+    """The table ``[robot]``.
+
+    Parameters
+    ----------
+    name
+        Name of the robot.
+    kind
+        ``serial``, ``spatial`` or ``planar``: which tables the file has.
+    """
+
     name: str
     kind: str
 
 
 class _Section(Table):
+    """The table ``[links.section]``: stiffness of a beam's section.
+
+    Parameters
+    ----------
+    axial_n : N
+        Young's modulus times area, E A.
+    bending_nm2 : N m^2
+        Young's modulus times second moment of area, E I.
+    shear_n : N
+        Shear modulus times effective area, k G A.
+    """
+
     axial_n: float = Field(gt=0)
     bending_nm2: float = Field(gt=0)
     shear_n: float = Field(gt=0)
 
 
 class _Link(Table):
+    """A row ``[[links]]``: a link with the joint before it.
+
+    Parameters
+    ----------
+    length_m : m
+        Length of the link.
+    mass_kg : kg
+        Mass of the link, spread evenly.
+    joint_stiffness_nm_per_rad : N m/rad
+        Torsional stiffness of the joint before it.
+    damping_ratio
+        Damping ratio of the mode of this number where links are rigid; its double is the loss factor of link and
+        joint where they are flexible.
+    section
+        Section of the beam.
+    """
+
     length_m: float = Field(gt=0)
     mass_kg: float = Field(gt=0)
     joint_stiffness_nm_per_rad: float = Field(gt=0)
@@ -35,6 +74,18 @@ class _Link(Table):
 
 
 class _Pose(Table):
+    """A row ``[[poses]]``.
+
+    Parameters
+    ----------
+    name
+        Name of the posture.
+    angles_deg : deg
+        Joint angles, each from the link before.
+    measured_first_mode_hz, predicted_first_mode_hz : Hz
+        Lowest natural frequency as published, where it is.
+    """
+
     name: str
     angles_deg: list[float]
     measured_first_mode_hz: float | None = None
@@ -42,6 +93,18 @@ class _Pose(Table):
 
 
 class _File(BaseModel):
+    """A robot file of kind ``planar``.
+
+    Parameters
+    ----------
+    robot
+        The robot as a whole.
+    links
+        Links from the base to the tip.
+    poses
+        Named postures; the first is the default.
+    """
+
     model_config = ConfigDict(extra="forbid")
 
     robot: _Head

@@ -16,7 +16,13 @@ Schema = TypeVar("Schema", bound=BaseModel)
 
 
 class Table(BaseModel):
-    """A table of a robot file: unknown keys and infinite values are refused, and it says where it comes from."""
+    """A table of a robot file: unknown keys and infinite values are refused, and it says where it comes from.
+
+    Parameters
+    ----------
+    source
+        Where the numbers of the table come from, or ``assumed: reason``, which every result then names.
+    """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 

@@ -22,6 +22,22 @@ Inertia = Vector | tuple[float, float, float, float, float, float]
 
 
 class _Head(Table):
+    """The table ``[robot]``.
+
+    Parameters
+    ----------
+    name
+        Name of the robot.
+    kind
+        ``serial``, ``spatial`` or ``planar``: which tables the file has.
+    gravity_m_per_s2 : m/s^2
+        Gravity as a stiffness of the structure; 0: left out.
+    up
+        Axis of the base against the weight: ``[0, 0, 1]`` stands on the floor, ``[0, 0, -1]`` hangs from a ceiling.
+    repeatability_m : m
+        Pose repeatability after ISO 9283 (RP).
+    """
+
     name: str
     kind: str
     gravity_m_per_s2: float = Field(0.0, ge=0, le=30)
@@ -30,12 +46,36 @@ class _Head(Table):
 
 
 class _Place(Table):
+    """A place in the axes of the body before.
+
+    Parameters
+    ----------
+    at_m : m
+        Place in the axes of the body before.
+    turned_deg : deg
+        Turns about the fixed x, y and z axes of the body before, one after the other.
+    """
+
     at_m: Vector = (0.0, 0.0, 0.0)
     turned_deg: Vector = (0.0, 0.0, 0.0)
 
 
 class _Stiffness(Table):
-    """``drive``: along the joint's own motion; the rest gives way across it."""
+    """``drive``: along the joint's own motion; the rest gives way across it.
+
+    Parameters
+    ----------
+    drive_nm_per_rad : N m/rad
+        Stiffness about the axis of a revolute joint; needed there.
+    drive_n_per_m : N/m
+        Stiffness along the axis of a prismatic joint; needed there.
+    radial_n_per_m, axial_n_per_m : N/m
+        Stiffness of the bearing across and along the joint's axis; left out: rigid.
+    tilting_nm_per_rad : N m/rad
+        Stiffness of the bearing against tilting of the axis; left out: rigid.
+    turning_nm_per_rad : N m/rad
+        Stiffness of a prismatic joint against turning about its axis; left out: rigid.
+    """
 
     drive_nm_per_rad: float | None = Field(None, gt=0)
     drive_n_per_m: float | None = Field(None, gt=0)
@@ -46,6 +86,24 @@ class _Stiffness(Table):
 
 
 class _Joint(_Place):
+    """A row ``[[joints]]``, from the base to the tip.
+
+    Parameters
+    ----------
+    name
+        Name of the joint.
+    motion
+        ``revolute`` or ``prismatic``.
+    axis
+        Direction of the axis in the joint's own axes.
+    limits_deg : deg
+        Least and largest angle of a revolute joint.
+    limits_m : m
+        Least and largest travel of a prismatic joint.
+    stiffness
+        Stiffness of gear and bearing.
+    """
+
     name: str
     motion: str = "revolute"
     axis: Vector = (0.0, 0.0, 1.0)
@@ -55,17 +113,65 @@ class _Joint(_Place):
 
 
 class _Mass(Table):
+    """A rigid body: mass, centre, inertia.
+
+    Parameters
+    ----------
+    mass_kg : kg
+        Mass.
+    centre_m : m
+        Centre of mass.
+    inertia_kg_m2 : kg m^2
+        Inertia about the centre: ``xx yy zz``, or ``xx yy zz xy xz yz``.
+    """
+
     mass_kg: float = Field(gt=0)
     centre_m: Vector = (0.0, 0.0, 0.0)
     inertia_kg_m2: Inertia = (0.0, 0.0, 0.0)
 
 
 class _Body(_Mass):
+    """A row ``[[bodies]]``: a rigid body that moves behind a joint, in its axes.
+
+    Parameters
+    ----------
+    name
+        Name of the body.
+    joint
+        Joint behind which it moves; ``base``: it stands still.
+    """
+
     name: str
     joint: str
 
 
 class _File(BaseModel):
+    """A robot file of kind ``serial``.
+
+    Parameters
+    ----------
+    robot
+        The robot as a whole.
+    base
+        Place of the first joint's base in the cell.
+    joints
+        Joints from the base to the tip.
+    bodies
+        Rigid bodies; without masses a robot has statics only.
+    flange
+        Flange in the axes of the last body.
+    tool
+        Tip of the tool in the axes of the flange, z along the tool.
+    spindle
+        Mass of spindle and tool, in the axes of the flange.
+    damping
+        Damping of the structure.
+    poses
+        Named postures; the first is the default.
+    update
+        What ``millfrf robot update`` changed and left open; written by it.
+    """
+
     model_config = ConfigDict(extra="forbid")
 
     robot: _Head

@@ -22,6 +22,26 @@ from .update_table import UpdateTable, left_open, uncertainty_of
 
 
 class _Head(Table):
+    """The table ``[robot]``.
+
+    Parameters
+    ----------
+    name
+        Name of the robot.
+    kind
+        ``serial``, ``spatial`` or ``planar``: which tables the file has.
+    gravity_m_per_s2 : m/s^2
+        Gravity as a stiffness of the structure; 0: left out.
+    up
+        Axis of the base against the weight: ``[0, 0, 1]`` stands on the floor, ``[0, 0, -1]`` hangs from a ceiling.
+    repeatability_m : m
+        Pose repeatability after ISO 9283 (RP).
+    tip_node
+        Node of the tool's tip; it stands at the origin of ``tool_frame``.
+    tool_frame
+        Frame of the tool, z along it.
+    """
+
     name: str
     kind: str
     tip_node: int
@@ -32,6 +52,28 @@ class _Head(Table):
 
 
 class _Frame(Table):
+    """A row ``[[frames]]``, after Khalil and Kleinfinger.
+
+    Parameters
+    ----------
+    name
+        Name of the frame.
+    antecedent
+        Frame before it; ``0`` is the base.
+    motion
+        ``revolute``, ``prismatic`` or ``fixed``.
+    active
+        False: the joint follows from a closed loop.
+    gamma_deg, alpha_deg, theta_deg : deg
+        Angles gamma, alpha and theta; theta is the zero of a revolute joint.
+    b_m, d_m, r_m : m
+        Lengths b, d and r; r is the zero of a prismatic joint.
+    limits_deg : deg
+        Least and largest angle.
+    limits_m : m
+        Least and largest travel.
+    """
+
     name: str
     antecedent: str
     motion: str = "revolute"
@@ -47,6 +89,26 @@ class _Frame(Table):
 
 
 class _Joint(DriveKeys):
+    """A row ``[[joints]]``: springs and dampers between two nodes, in the axes of a frame.
+
+    Parameters
+    ----------
+    frame
+        Frame whose z is the axis of the joint.
+    nodes
+        Node before and node after the joint.
+    radial_n_per_m, axial_n_per_m : N/m
+        Stiffness of the bearing across and along the joint's axis; left out: rigid.
+    tilting_nm_per_rad : N m/rad
+        Stiffness of the bearing against tilting of the axis; left out: rigid.
+    turning_nm_per_rad : N m/rad
+        Stiffness about the axis: the gear of a revolute joint.
+    damping_nms_per_rad : N m s/rad
+        Viscous damping about the axis.
+    damping_ns_per_m : N s/m
+        Viscous damping along the axis.
+    """
+
     frame: str
     nodes: tuple[int, int]
     radial_n_per_m: float | None = Field(None, gt=0)
@@ -58,6 +120,20 @@ class _Joint(DriveKeys):
 
 
 class _Tube(Table):
+    """The table ``[links.tube]``: a round hollow beam.
+
+    Parameters
+    ----------
+    outer_m, inner_m : m
+        Outer and inner diameter.
+    young_pa, shear_pa : Pa
+        Young's and shear modulus.
+    density_kg_per_m3 : kg/m^3
+        Density.
+    theory
+        ``timoshenko`` or ``euler-bernoulli``.
+    """
+
     outer_m: float
     inner_m: float = 0.0
     young_pa: float = Field(gt=0)
@@ -67,6 +143,22 @@ class _Tube(Table):
 
 
 class _Link(Table):
+    """A row ``[[links]]``: a beam or a rigid link between two nodes.
+
+    Parameters
+    ----------
+    nodes
+        Its two nodes.
+    tube
+        Section and material of a beam; left out: rigid.
+    elements
+        Number of finite elements of the beam.
+    frame
+        Frame whose axes, turned by ``angles_deg``, are those of the section.
+    angles_deg : deg
+        Turns about x, y and z.
+    """
+
     nodes: tuple[int, int]
     tube: _Tube | None = None
     elements: int = Field(1, ge=1)
@@ -75,12 +167,40 @@ class _Link(Table):
 
 
 class _Point(Table):
+    """A row ``[[points]]``: a node at no joint.
+
+    Parameters
+    ----------
+    node
+        Number of the node; node 0 is clamped.
+    frame
+        Frame with which it moves.
+    at_m : m
+        Its place in that frame.
+    """
+
     node: int
     frame: str
     at_m: tuple[float, float, float]
 
 
 class _Body(Table):
+    """A row ``[[bodies]]``: a rigid body at a node.
+
+    Parameters
+    ----------
+    node
+        Node that carries it.
+    frame
+        Frame in whose axes centre and inertia are told.
+    mass_kg : kg
+        Mass.
+    centre_m : m
+        Centre of mass.
+    inertia_kg_m2 : kg m^2
+        Inertia about the centre: ``xx yy zz``, or ``xx yy zz xy xz yz``.
+    """
+
     node: int
     frame: str
     mass_kg: float
@@ -89,7 +209,17 @@ class _Body(Table):
 
 
 class Damping(Table):
-    """Either two ratios at two frequencies (Rayleigh), or one ratio for all modes."""
+    """Either two ratios at two frequencies (Rayleigh), or one ratio for all modes.
+
+    Parameters
+    ----------
+    frequencies_hz : Hz
+        Two frequencies at which the ``ratios`` hold (Rayleigh).
+    ratios
+        Damping ratios there.
+    ratio
+        One damping ratio for all modes, instead.
+    """
 
     frequencies_hz: tuple[float, float] | None = None
     ratios: tuple[float, float] | None = None
@@ -97,11 +227,29 @@ class Damping(Table):
 
 
 class _Closure(Table):
+    """A row ``[[closures]]``: where a loop was cut.
+
+    Parameters
+    ----------
+    frames
+        Two frames that coincide.
+    """
+
     frames: tuple[str, str]
 
 
 class Pose(Table):
-    """A posture: ``driven`` in degrees, of prismatic joints in metres; ``driven_deg`` is its older name."""
+    """A posture: ``driven`` in degrees, of prismatic joints in metres; ``driven_deg`` is its older name.
+
+    Parameters
+    ----------
+    name
+        Name of the posture.
+    driven : deg; prismatic joints m
+        Values of the driven joints in the order of the frames.
+    driven_deg
+        Older name of ``driven``.
+    """
 
     name: str
     driven: list[float] | None = None
@@ -109,6 +257,32 @@ class Pose(Table):
 
 
 class _File(BaseModel):
+    """A robot file of kind ``spatial``.
+
+    Parameters
+    ----------
+    robot
+        The robot as a whole.
+    frames
+        Kinematics, frame by frame.
+    closures
+        Where loops were cut.
+    joints
+        Springs and dampers of the joints.
+    links
+        Beams and rigid links between nodes.
+    points
+        Nodes at no joint.
+    bodies
+        Rigid bodies; without them a robot has statics only.
+    damping
+        Damping of the structure.
+    poses
+        Named postures; the first is the default.
+    update
+        What ``millfrf robot update`` changed and left open; written by it.
+    """
+
     model_config = ConfigDict(extra="forbid")
 
     robot: _Head

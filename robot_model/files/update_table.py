@@ -10,7 +10,29 @@ from .robot_files import Table
 
 
 class Number(Table):
-    """A number that was freed; one that is not ``in_file`` has no key of its own there and is applied on reading."""
+    """A number that was freed; one that is not ``in_file`` has no key of its own there and is applied on reading.
+
+    Parameters
+    ----------
+    name
+        Name of the number.
+    kind
+        What it is: ``stiffness``, ``damping``, a payload's mass and so on.
+    unit
+        Its unit.
+    frame, group, axis
+        Where it acts: frame, group of links, axis.
+    spread
+        Standard deviation before the measurements.
+    value
+        Change that was found, in the same scale.
+    standard_error
+        Its standard error.
+    told
+        Whether the measurements tell it.
+    in_file
+        Whether the file has a key of its own for it.
+    """
 
     name: str
     kind: str
@@ -26,7 +48,19 @@ class Number(Table):
 
 
 class UpdateTable(Table):
-    """Verdict, names, numbers and their covariance."""
+    """Verdict, names, numbers and their covariance.
+
+    Parameters
+    ----------
+    verdict
+        Verdict of the update.
+    named
+        Numbers that are surely wrong in the file before.
+    covariance
+        Covariance of the numbers, row by row.
+    numbers
+        Numbers that were freed, ``[[update.numbers]]``.
+    """
 
     verdict: str
     named: list[str]

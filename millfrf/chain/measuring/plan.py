@@ -18,7 +18,23 @@ RPM = math.pi / 30
 
 
 class _Plan(BaseModel):
-    """Keys of the table ``[plan]``, units in their names."""
+    """The table ``[plan]``: what sweeps of the spindle speed shall measure.
+
+    Parameters
+    ----------
+    band_hz : Hz
+        Lowest and highest frequency in which the FRF is wanted.
+    depth_m : m
+        Axial depth of the cuts.
+    resolution_hz : Hz
+        Distance of spectral lines: a third of the narrowest mode's half-power width is enough.
+    acceleration_noise : m/s^2/sqrt(Hz)
+        Spectral density of the accelerometer's noise, from its data sheet.
+    frf_error_m_per_n : m/N
+        Standard deviation of the receptance that is wanted.
+    immersion_widths_deg : deg
+        Widths of the immersions to choose from.
+    """
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
