@@ -1,5 +1,5 @@
 from .compilation import compiled
-from .cutting_file import process_from_table, read_cutting_process
+from .cutting_file import CuttingTable, process_from_table, read_cutting_process
 from .cutting_writer import write_cutting_process
 from .directional import (
     average_directional_matrix,
@@ -28,6 +28,7 @@ from .transverse_force import (
 
 __all__ = [
     "IMMERSIONS",
+    "CuttingTable",
     "Drill",
     "DrillingLoad",
     "MillingProcess",

@@ -18,7 +18,7 @@ Number = Annotated[float, Strict()]
 """No text, and no true or false, is taken for a number."""
 
 
-class _Cutting(BaseModel):
+class CuttingTable(BaseModel):
     """The table ``[cutting]``: cutter, engagement and force coefficients.
 
     Parameters
@@ -57,8 +57,10 @@ class _Cutting(BaseModel):
     process_damping_n_per_m : N/m
         Coefficient of process damping: the flank takes ``C v_n / V`` per metre of edge; 0: none, which is on the safe
         side.
-    ktc_std_pa, krc_std, kac_std : Pa for the first
-        Standard errors of the coefficients; they go into the bands of the limits. 0: not known.
+    ktc_std_pa : Pa
+        Standard error of ``ktc_pa``; it goes into the bands of the limits. 0: not known.
+    krc_std, kac_std
+        Standard errors of ``krc`` and ``kac``, likewise.
     """
 
     model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
@@ -129,13 +131,13 @@ def process_from_table(table: Mapping[str, Any], name: str) -> MillingProcess:
         A key unknown, missing or of the wrong type.
     """
     try:
-        cutting = _Cutting.model_validate(table)
+        cutting = CuttingTable.model_validate(table)
     except ValidationError as error:
-        raise FileFormatError(f"{name}: cutting.{mistake_in_words(error, _Cutting)}") from error
+        raise FileFormatError(f"{name}: cutting.{mistake_in_words(error, CuttingTable)}") from error
     return _process(cutting, name)
 
 
-def _process(cutting: _Cutting, path: object) -> MillingProcess:
+def _process(cutting: CuttingTable, path: object) -> MillingProcess:
     try:
         start, leave = _engagement(cutting)
         return MillingProcess(
@@ -163,7 +165,7 @@ def _process(cutting: _Cutting, path: object) -> MillingProcess:
         raise type(error)(f"{path}: {error}") from error
 
 
-def _engagement(cutting: _Cutting) -> tuple[float, float]:
+def _engagement(cutting: CuttingTable) -> tuple[float, float]:
     """Start and exit angle, rad, from the two angles or from immersion and radial depth."""
     angles = (cutting.start_angle_deg, cutting.exit_angle_deg)
     if cutting.immersion is not None:

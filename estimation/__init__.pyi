@@ -43,7 +43,7 @@ from .frf_matrix import (
     write_frf,
     write_frf_uff,
 )
-from .geometry import Geometry, import_geometry, is_geometry_table, read_geometry, write_geometry
+from .geometry import Geometry, GeometryTable, import_geometry, is_geometry_table, read_geometry, write_geometry
 from .hammer import (
     Decay,
     Disagreement,
@@ -149,6 +149,7 @@ __all__ = [
     "FrfCovariance",
     "FrfMapping",
     "Geometry",
+    "GeometryTable",
     "Homogeneity",
     "ImportedFrf",
     "InputIndependence",

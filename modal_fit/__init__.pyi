@@ -28,6 +28,7 @@ from .models import (
 )
 from .pole_picking import (
     CandidateGroup,
+    PolesFile,
     candidate_groups,
     fit_picked_poles,
     read_picked_poles,
@@ -57,6 +58,7 @@ __all__ = [
     "ModeShapes",
     "MultivariateModeIndicator",
     "PoleGroup",
+    "PolesFile",
     "Residuals",
     "StabilisationChart",
     "SubspaceFit",

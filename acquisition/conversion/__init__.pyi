@@ -1,7 +1,7 @@
 from .array_file import ArrayFile, open_arrays
-from .can_log import SUFFIXES, add_can_log
+from .can_log import SUFFIXES, LogMapping, add_can_log
 from .convert_file import convert
-from .mapping import ArrayMapping, ChannelMapping, CsvOptions, Mapping, load_mapping
+from .mapping import ArrayMapping, ChannelMapping, CsvOptions, RecordingMapping, load_mapping
 from .uff import UffLines, read_uff_lines, read_uff_sets
 
 __all__ = [
@@ -10,7 +10,8 @@ __all__ = [
     "ArrayMapping",
     "ChannelMapping",
     "CsvOptions",
-    "Mapping",
+    "LogMapping",
+    "RecordingMapping",
     "UffLines",
     "add_can_log",
     "convert",

@@ -39,6 +39,8 @@ class ArrayFile:
         Headings of the columns of its only table.
     sample_rate : Hz
         Sample rate, where the file states it.
+    units
+        Units of those columns, where a row below the headings tells them.
     """
 
     def __init__(
@@ -47,11 +49,13 @@ class ArrayFile:
         fields: Mapping[str, Any],
         headings: tuple[str, ...] = (),
         sample_rate: float | None = None,
+        units: tuple[str, ...] = (),
     ) -> None:
         self.path = path
         self.fields = fields
         self.headings = headings
         self.sample_rate = sample_rate
+        self.units = units
 
     def array(self, name: str | None) -> NDArray[np.floating]:
         """The array of that name; None asks for the only one.
@@ -85,7 +89,7 @@ def open_arrays(path: Path, **csv_options: Any) -> ArrayFile:
     suffix = path.suffix.lower()
     if suffix in (".csv", ".txt"):
         table = read_csv(path, **csv_options)
-        return ArrayFile(path, {"table": table.values}, table.headings)
+        return ArrayFile(path, {"table": table.values}, table.headings, units=table.units)
     readers: dict[str, Callable[[Path], dict[str, Any]]] = {
         ".npy": _npy,
         ".npz": _npz,

@@ -12,7 +12,7 @@ from foundation import FileFormatError, InputError
 from ..sources import StreamDescription
 from .array_file import ArrayFile, open_arrays
 from .content import ArraySamples, Content
-from .mapping import ArrayMapping, ChannelMapping, Mapping
+from .mapping import ArrayMapping, ChannelMapping, RecordingMapping
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 _UNEVEN = 0.01
@@ -39,7 +39,7 @@ class _Ordered:
         return self.values[experiment, ..., number].reshape(-1)
 
 
-def contents(input_path: Path, mapping: Mapping) -> Iterator[Content]:
+def contents(input_path: Path, mapping: RecordingMapping) -> Iterator[Content]:
     """One content for every entry of the split axis, or just one.
 
     Raises
@@ -65,7 +65,9 @@ def contents(input_path: Path, mapping: Mapping) -> Iterator[Content]:
         yield Content((ArraySamples(described, samples),), title, mapping.setup, mapping.recorded_at)
 
 
-def _found(key: str | None, input_path: Path, mapping: Mapping, files: dict[Path, ArrayFile]) -> tuple[ArrayFile, str]:
+def _found(
+    key: str | None, input_path: Path, mapping: RecordingMapping, files: dict[Path, ArrayFile]
+) -> tuple[ArrayFile, str]:
     """The file of an array and the array's name in it."""
     listed = mapping.arrays.get(key or "", ArrayMapping())
     path = _path(listed, input_path)
@@ -89,7 +91,7 @@ def _path(listed: ArrayMapping, input_path: Path) -> Path:
     return input_path.with_name(input_path.name.replace(change.replace, change.by, 1))
 
 
-def _ordered(key: str | None, input_path: Path, mapping: Mapping, files: dict[Path, ArrayFile]) -> _Ordered:
+def _ordered(key: str | None, input_path: Path, mapping: RecordingMapping, files: dict[Path, ArrayFile]) -> _Ordered:
     file, name = _found(key, input_path, mapping, files)
     values = file.array(name or None)
     listed = mapping.arrays.get(key or "", ArrayMapping())
@@ -138,8 +140,10 @@ def _require_equal_lengths(arrays: dict[str | None, _Ordered]) -> None:
         raise FileFormatError(f"arrays of unequal lengths ({found}); cut them to one length")
 
 
-def _clock(input_path: Path, mapping: Mapping, files: dict[Path, ArrayFile]) -> tuple[float, float]:
+def _clock(input_path: Path, mapping: RecordingMapping, files: dict[Path, ArrayFile]) -> tuple[float, float]:
     """Sample rate in Hz and time of the first sample in s."""
+    if isinstance(mapping.sample_rate, str):
+        return _stored_rate(mapping.sample_rate, input_path, mapping, files), mapping.start_time
     if mapping.sample_rate is not None:
         return mapping.sample_rate, mapping.start_time
     if mapping.time is None:
@@ -169,6 +173,16 @@ def _clock(input_path: Path, mapping: Mapping, files: dict[Path, ArrayFile]) -> 
             f"{step:.6g} s on average; resample the data or give sample_rate"
         )
     return float(_tidy(1 / step)), float(times[0] + mapping.start_time)
+
+
+def _stored_rate(name: str, input_path: Path, mapping: RecordingMapping, files: dict[Path, ArrayFile]) -> float:
+    """Sample rate that stands in the file under a name."""
+    file, found = _found(name, input_path, mapping, files)
+    values = file.array(found or name).reshape(-1)
+    if len(values) != 1 or not (np.isfinite(values[0]) and values[0] > 0):
+        shown = f"{len(values)} numbers" if len(values) != 1 else f"{values[0]:g}"
+        raise FileFormatError(f"sample_rate = {name!r}: {file.path.name} holds {shown} there; name one rate in Hz")
+    return float(values[0])
 
 
 def _tidy(rate: float) -> float:

@@ -37,7 +37,7 @@ def convert(
     output_path
         File to write; with ``split`` in the mapping ``rec.h5`` becomes ``rec-1.h5``, ``rec-2.h5`` ...
     mapping_path
-        TOML file that says which array or column is which channel, see :class:`Mapping`.
+        TOML file that says which array or column is which channel, see :class:`RecordingMapping`.
     progress
         Called with the number of samples written so far in the file at hand.
     span : s

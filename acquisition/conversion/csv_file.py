@@ -21,16 +21,17 @@ from .flat_fields import event_texts
 
 @dataclass(frozen=True)
 class CsvTable:
-    """Columns of numbers with their headings (empty where the file has none); values (n_rows, n_columns)."""
+    """Columns of numbers with their headings and units (empty where the file has none); values (n_rows, n_columns)."""
 
     headings: tuple[str, ...]
     values: NDArray[np.float64]
+    units: tuple[str, ...] = ()
 
 
 def read_csv(
     path: Path, *, delimiter: str | None = None, decimal: str = ".", skip_lines: int = 0, encoding: str = "utf-8-sig"
 ) -> CsvTable:
-    """Read a table of numbers; lines that begin with ``#`` are comments.
+    """Read a table of numbers; lines that begin with ``#`` are comments, a row without numbers below headings is units.
 
     Parameters
     ----------
@@ -52,12 +53,16 @@ def read_csv(
     if not rows:
         raise FileFormatError(f"{path} holds no rows of numbers; check the file and skip_lines")
     chosen = delimiter or max(",;\t", key=rows[0][1].count)
-    headings: tuple[str, ...] = ()
-    first = next(csv.reader([rows[0][1]], delimiter=chosen))
-    if not all(_is_number(field, decimal) for field in first):
-        headings = tuple(field.strip() for field in first)
+    heads: list[tuple[str, ...]] = []
+    while rows and len(heads) < 2:
+        fields = tuple(field.strip() for field in next(csv.reader([rows[0][1]], delimiter=chosen)))
+        numeric = [_is_number(field, decimal) for field in fields]
+        if all(numeric) or (heads and (any(numeric) or len(fields) != len(heads[0]))):
+            break
+        heads.append(fields)
         rows = rows[1:]
-    return CsvTable(headings, _parse(rows, chosen, decimal, path))
+    headings, units = (*heads, (), ())[:2]
+    return CsvTable(headings, _parse(rows, chosen, decimal, path), units)
 
 
 def read_text(path: Path, encoding: str = "utf-8-sig") -> str:

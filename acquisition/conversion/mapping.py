@@ -1,4 +1,4 @@
-"""`Mapping`: which array or column of a file is which channel; a TOML file checked where it enters."""
+"""`RecordingMapping`: which array or column of a file is which channel; a TOML file checked where it enters."""
 
 import os
 from collections import Counter
@@ -37,11 +37,11 @@ class ArrayMapping(BaseModel):
     Parameters
     ----------
     file
-        A file beside the input, or ``{replace, by}`` applied to the input's name; None: the input itself.
+        A file beside the input, or ``{replace, by}`` applied to the input's name; left out: the input itself.
     name
-        Name of the array inside its file; None: the mapping's own key where the file has it, else the only array.
+        Name of the array inside its file; left out: the mapping's own key where the file has it, else the only array.
     axes
-        One name an axis, ``sample`` among them, ``channel`` where there are several columns; None: the mapping's.
+        One name an axis, ``sample`` among them, ``channel`` where there are several columns; left out: the mapping's.
     """
 
     model_config = _STRICT
@@ -57,13 +57,29 @@ class ChannelMapping(BaseModel):
 
     Parameters
     ----------
-    name, quantity, unit, node, direction, high_pass_hz, sensor, input_delay_s
-        Fields of the same names in a recording's `Channel`, but ``unit`` is the file's own: ``kN``, ``g``, ``um``.
+    name
+        Name of the channel in the recording.
+    quantity
+        What it measures: ``force``, ``acceleration``, ``velocity``, ``displacement``, ``moment``, ``angle``,
+        ``angular_velocity``, ``voltage``, ``temperature`` or ``dimensionless``.
+    unit
+        Unit of the stored numbers after ``sensitivity``: ``kN``, ``g``, ``um``; the recording holds SI units.
+    node
+        Point of the machine where the sensor sits: ``TCP`` is the tool's tip, ``HOUSING`` the spindle's housing, others
+        are free.
+    direction
+        Axis and sense in which the sensor counts positive, such as ``+X`` or ``-Z``.
+    high_pass_hz : Hz
+        Corner of the sensor's or amplifier's high-pass, of first order; its effect is taken out of FRFs.
+    sensor
+        Type and serial number, for the reader.
+    input_delay_s : s
+        Time by which the input lags behind the others; it is taken out.
     array
-        Key of ``[arrays.KEY]`` or name of an array in the input; None where there is only one.
+        Key of ``[arrays.KEY]`` or name of an array in the input; left out where there is only one.
     column
-        Column along the ``channel`` axis: a number counted from 1, or a heading of the table. None where there is one
-        column.
+        Column along the ``channel`` axis: a number counted from 1, or a heading of the table. Left out where there
+        is one column.
     full_scale
         Largest magnitude the input holds, in ``unit``.
     sensitivity
@@ -126,7 +142,7 @@ class CsvOptions(BaseModel):
     Parameters
     ----------
     delimiter
-        Character between columns; None: seen from the file.
+        Character between columns; left out: seen from the file.
     decimal
         Character of decimals, ``.`` or ``,``.
     skip_lines
@@ -142,20 +158,20 @@ class CsvOptions(BaseModel):
     encoding: str = "utf-8-sig"
 
 
-class Mapping(BaseModel):
+class RecordingMapping(BaseModel):
     """The whole mapping file.
 
     Parameters
     ----------
     channels
         One a column of the recording, in this order.
-    sample_rate
-        Hz; or instead ``time``, the evenly spaced array or column of times, in ``time_unit``; neither where the file
-        states its own (WAV, UFF).
+    sample_rate : Hz
+        Samples a second, or the name of the array that holds this one number; or instead ``time``; neither where the
+        file states its own (WAV, UFF).
     arrays
         Arrays by key, for those not simply found by name in the input.
     axes
-        Axes of every array that does not name its own; None: ``sample, channel``.
+        Axes of every array that does not name its own; left out: ``sample, channel``.
     join
         Axes whose entries follow one another in time, slowest first.
     split
@@ -173,7 +189,7 @@ class Mapping(BaseModel):
     start_time : s
         Time of the first sample.
     dtype
-        Type of the stored samples; None: float32 where it holds the input's digits.
+        Type of the stored samples; left out: float32 where it holds the input's digits.
     csv
         How a CSV file is written, where it cannot be seen.
     """
@@ -184,7 +200,7 @@ class Mapping(BaseModel):
     setup: str = ""
     recorded_at: str = ""
     stream: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")] = "main"
-    sample_rate: Annotated[float, Field(gt=0)] | None = None
+    sample_rate: float | str | None = None
     time: str | None = None
     time_unit: Literal["s", "ms", "us"] = "s"
     start_time: float = 0.0
@@ -196,10 +212,12 @@ class Mapping(BaseModel):
     csv: CsvOptions = CsvOptions()
 
     @model_validator(mode="after")
-    def _consistent(self) -> "Mapping":
+    def _consistent(self) -> "RecordingMapping":
         twice = [name for name, count in Counter(channel.name for channel in self.channels).items() if count > 1]
         if twice:
             raise ValueError(f"channel {', '.join(twice)} appears twice; give unique names")
+        if isinstance(self.sample_rate, float) and self.sample_rate <= 0:
+            raise ValueError(f"sample_rate must be above 0, not {self.sample_rate:g}")
         if self.sample_rate is not None and self.time is not None:
             raise ValueError("give either sample_rate (Hz) or time (name of the array or column of times), one of them")
         for key, axes in [("axes", self.axes), *((f"arrays.{k}.axes", a.axes) for k, a in self.arrays.items())]:
@@ -216,7 +234,7 @@ class Mapping(BaseModel):
             raise ValueError(f"{key}: axis {', '.join(sorted(loose))} is neither in join nor split; put it into one")
 
 
-def load_mapping(path: str | os.PathLike[str]) -> Mapping:
+def load_mapping(path: str | os.PathLike[str]) -> RecordingMapping:
     """Read a mapping file.
 
     Raises
@@ -224,4 +242,4 @@ def load_mapping(path: str | os.PathLike[str]) -> Mapping:
     InputError
         No such file, no TOML, or a key that is unknown, missing or out of range; one line with file, key and value.
     """
-    return checked_toml(Path(path), Mapping, "mapping")
+    return checked_toml(Path(path), RecordingMapping, "mapping")

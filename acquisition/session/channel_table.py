@@ -19,22 +19,34 @@ class ChannelTable(BaseModel):
 
     Parameters
     ----------
-    name, quantity, node, direction, high_pass_hz, sensor
-        Fields of the same names in a recording's `Channel`.
+    name
+        Name of the channel in the recording.
+    quantity
+        What it measures: ``force``, ``acceleration``, ``velocity``, ``displacement``, ``moment``, ``angle``,
+        ``angular_velocity``, ``voltage``, ``temperature`` or ``dimensionless``.
+    node
+        Point of the machine where the sensor sits: ``TCP`` is the tool's tip, ``HOUSING`` the spindle's housing, others
+        are free.
+    direction
+        Axis and sense in which the sensor counts positive, such as ``+X`` or ``-Z``.
+    high_pass_hz : Hz
+        Corner of the sensor's or amplifier's high-pass, of first order; its effect is taken out of FRFs.
+    sensor
+        Type and serial number, for the reader.
     unit
         Unit of the calibration sheet: ``N``, ``kN``, ``g``, ``m/s^2``, ``V``.
     terminal
         Name of the terminal, such as ``cDAQ1Mod1/ai0``.
-    mv_per_unit : mV per ``unit``
+    mv_per_unit : mV per unit
         Sensitivity of the sensor.
-    units_per_volt : ``unit`` per V
+    units_per_volt : unit per V
         Scale of a device with a voltage output, given instead of a sensitivity.
-    amplifier_range : ``unit``, or pC where ``pc_per_unit`` is given
+    amplifier_range : unit, or pC with pc_per_unit
         Range of a charge amplifier, given instead of a sensitivity: at it the output is ``amplifier_volts``. It scales
         the samples and is told to the amplifier, so that the two cannot differ.
     amplifier_volts : V
         Output of the amplifier at its range.
-    pc_per_unit : pC per ``unit``
+    pc_per_unit : pC per unit
         Sensitivity of a piezoelectric sensor, where the amplifier's range is a charge.
     amplifier
         Name of the `[[amplifier]]` that is told the range; empty: it is set by hand.

@@ -107,11 +107,11 @@ class TachometerTable(BaseModel):
     series
         Name of the event series in the recording.
     pattern
-        Regular expression whose first group is the number; None: the first number of the line.
+        Regular expression whose first group is the number; left out: the first number of the line.
     factor
         Factor by which the number is multiplied.
     period_s : s
-        Time between two lines where the instrument keeps it exactly; None: the times of arrival count.
+        Time between two lines where the instrument keeps it exactly; left out: the times of arrival count.
     silence_s : s
         Time without a line after which the instrument counts as lost.
     """
@@ -236,7 +236,7 @@ class RsiTable(BaseModel):
     signals
         Values to keep; empty: joint angles, position and motor currents.
     cycle_ms : ms
-        Time between two packets; None: the packets tell.
+        Time between two packets; left out: the packets tell.
     silence_s : s
         Time without a packet after which the controller counts as lost.
     sentype

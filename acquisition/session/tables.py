@@ -33,7 +33,7 @@ class NiDevice(BaseModel):
     reference_clock
         Terminal of a reference clock that several chassis share, such as ``/PXI1Slot2/PXI_Clk10``.
     reference_clock_hz : Hz
-        Rate of that clock; None: DAQmx knows it.
+        Rate of that clock; left out: DAQmx knows it.
     sync_pulse
         Terminal of the pulse that aligns the converters of several devices.
     start_trigger
@@ -97,9 +97,11 @@ class SimulatedDevice(BaseModel):
     ----------
     sample_rate_hz : Hz
         Samples a second of every channel.
-    sweep_rpm, sweep_s : rpm and s
-        First and last spindle speed of a sweep and its duration, back and forth as long as it is recorded; None: those
-        of the plan, else of the demonstration.
+    sweep_rpm : rpm
+        First and last spindle speed of a sweep, back and forth as long as it is recorded; left out: those of the plan,
+        else of the demonstration.
+    sweep_s : s
+        Duration of a sweep; left out: as planned.
     spindle_speed_rpm : rpm
         A steady speed instead of a sweep.
     noise, seed
@@ -127,7 +129,7 @@ class LiveTable(BaseModel):
     Parameters
     ----------
     segment_s : s
-        Length of a segment of the spectra; None: two periods of the resolution of `[plan]`, else 1 s.
+        Length of a segment of the spectra; left out: two periods of the resolution of `[plan]`, else 1 s.
     tests
         Recordings beside the one to write that are stacked with it, a pattern of names; "" for none.
     frf_error
@@ -155,7 +157,7 @@ class Session(BaseModel):
     title
         Title of the recording.
     duration_s : s
-        Duration of the recording; None: until stopped.
+        Duration of the recording; left out: until stopped.
     band_hz : Hz
         Lowest and highest frequency that matter; the sample rate is held against them.
     tool, cut, pose, cutting, plan

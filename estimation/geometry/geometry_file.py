@@ -21,7 +21,7 @@ FORMAT = "millfrf.geometry"
 Vector = Annotated[tuple[float, ...], Field(min_length=3, max_length=3)]
 
 
-class _Table(BaseModel):
+class GeometryTable(BaseModel):
     """The file: places by node, local axes of those that have their own, lines between nodes.
 
     Parameters
@@ -122,7 +122,7 @@ def _read_toml(path: Path) -> Geometry:
     if not is_geometry_table(content):
         raise FileFormatError(f"{path} is no geometry; it needs a table [nodes] with a position for each name")
     try:
-        table = _Table.model_validate(content)
+        table = GeometryTable.model_validate(content)
         factor = si_factor("displacement", table.unit)
         unknown = [name for name in table.axes if name not in table.nodes]
         if unknown:
@@ -131,6 +131,6 @@ def _read_toml(path: Path) -> Geometry:
         axes = [table.axes.get(name, np.eye(3)) for name in table.nodes] if table.axes else None
         return Geometry(tuple(table.nodes), positions, None if axes is None else np.array(axes), table.lines)
     except ValidationError as error:
-        raise FileFormatError(f"{path}: {mistake_in_words(error, _Table)}") from error
+        raise FileFormatError(f"{path}: {mistake_in_words(error, GeometryTable)}") from error
     except InputError as error:
         raise FileFormatError(f"{path}: {error}") from error

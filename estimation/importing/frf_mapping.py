@@ -117,11 +117,11 @@ class EntryMapping(FrfParts):
         Degrees of freedom, ``node:direction``. One of them may be left out where parts are lists: they run along the
         ``responses`` or ``excitations`` under ``[frf]``.
     file
-        Name of the file that holds the FRF; None: the only one.
+        Name of the file that holds the FRF; left out: the only one.
     record
         Place of the data set in a UFF file, counted from 1.
     averages
-        Number of averages; None: the number under ``[frf]``.
+        Number of averages; left out: the number under ``[frf]``.
     values, real, imaginary, magnitude, phase, coherence
         Arrays or columns that hold its numbers; if none is given, those under ``[frf]`` hold.
     """
@@ -165,7 +165,7 @@ class FrfTable(FrfParts):
     title
         Title of the FRF file that is written.
     frequency_unit
-        Unit of the frequencies; None: the heading or Hz.
+        Unit of the frequencies; left out: the heading or Hz.
     frequency_step_hz, frequency_start_hz : Hz
         Distance of evenly spaced lines, and frequency of the first.
     """
@@ -205,13 +205,13 @@ class TextOptions(BaseModel):
     Parameters
     ----------
     delimiter
-        Character between columns; None: seen from the file.
+        Character between columns; left out: seen from the file.
     decimal
-        Character of decimals; None: seen from the file.
+        Character of decimals; left out: seen from the file.
     skip_lines
         Number of lines before the headings.
     encoding
-        Encoding of the text; None: seen from the file.
+        Encoding of the text; left out: seen from the file.
     """
 
     model_config = _STRICT

@@ -48,6 +48,7 @@ from .fitting import (
 )
 from .measuring import (
     OpenedSession,
+    PlanTable,
     Tally,
     acquire,
     acquire_live,
@@ -73,6 +74,7 @@ __all__ = [
     "FitOptions",
     "KeptCut",
     "OpenedSession",
+    "PlanTable",
     "Predicted",
     "Tally",
     "acquire",

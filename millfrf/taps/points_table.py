@@ -25,8 +25,8 @@ class PointRow(BaseModel):
         Name of the recording, without its folder.
     hit
         Point and direction of the hammer, ``node:direction``; empty: as the file says.
-    from_s, to_s
-        Times between which this point was hit, on the recording's axis, s; None: from the beginning, to the end.
+    from_s, to_s : s
+        Times between which this point was hit, on the recording's axis, s; left out: from the beginning, to the end.
     channels
         ``node:direction`` of channels that stood elsewhere than the file says, by name.
     """

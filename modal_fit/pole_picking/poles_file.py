@@ -93,7 +93,9 @@ class PolesFile(BaseModel):
         Offered groups, where the file holds them itself.
     candidates
         File of candidates beside this one, whose groups are meant.
-    band_hz, stabilisation, provenance
+    band_hz : Hz
+        Band of the fit that offered them; passed over here.
+    stabilisation, provenance
         What a picker needs beside; passed over here.
     """
 

@@ -92,7 +92,7 @@ class _Pose(Table):
     predicted_first_mode_hz: float | None = None
 
 
-class _File(BaseModel):
+class PlanarFile(BaseModel):
     """A robot file of kind ``planar``.
 
     Parameters
@@ -149,7 +149,7 @@ def read_planar_robot(robot: str | os.PathLike[str]) -> PlanarCase:
     FileFormatError
         Not a planar robot, or a key unknown, missing or of the wrong type.
     """
-    content = read_as(_File, robot, "planar")
+    content = read_as(PlanarFile, robot, "planar")
     links = content.links
     sections = tuple(
         Section(

@@ -118,7 +118,7 @@ class _Mass(Table):
     Parameters
     ----------
     mass_kg : kg
-        Mass.
+        Mass of the body.
     centre_m : m
         Centre of mass.
     inertia_kg_m2 : kg m^2
@@ -145,7 +145,7 @@ class _Body(_Mass):
     joint: str
 
 
-class _File(BaseModel):
+class SerialFile(BaseModel):
     """A robot file of kind ``serial``.
 
     Parameters
@@ -196,14 +196,14 @@ def read_serial_robot(robot: str | os.PathLike[str]) -> SpatialCase:
     FileFormatError
         Not a serial robot, or a key unknown, missing or of the wrong type.
     """
-    content = read_as(_File, robot, "serial")
+    content = read_as(SerialFile, robot, "serial")
     try:
         return _case(content)
     except InputError as error:
         raise InputError(f"{robot}: {error}") from error
 
 
-def _case(content: _File) -> SpatialCase:
+def _case(content: SerialFile) -> SpatialCase:
     flange = _place(content.flange)
     joints = tuple(_joint(row) for row in content.joints)
     parts = [_part(row, row.name, row.joint, np.eye(4)) for row in content.bodies]
@@ -225,7 +225,7 @@ def _case(content: _File) -> SpatialCase:
     return SpatialCase(content.robot.name, built, poses, content.robot.repeatability_m, _assumed(content), uncertainty)
 
 
-def _assumed(content: _File) -> tuple[str, ...]:
+def _assumed(content: SerialFile) -> tuple[str, ...]:
     """One sentence for what was assumed and decides results: stiffness, masses, damping."""
     joints = [row.name for row in content.joints if "assumed" in row.stiffness.source]
     bodies = [row.name for row in content.bodies if "assumed" in row.source]

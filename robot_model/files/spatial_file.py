@@ -129,7 +129,7 @@ class _Tube(Table):
     young_pa, shear_pa : Pa
         Young's and shear modulus.
     density_kg_per_m3 : kg/m^3
-        Density.
+        Density of the material.
     theory
         ``timoshenko`` or ``euler-bernoulli``.
     """
@@ -194,7 +194,7 @@ class _Body(Table):
     frame
         Frame in whose axes centre and inertia are told.
     mass_kg : kg
-        Mass.
+        Mass of the body.
     centre_m : m
         Centre of mass.
     inertia_kg_m2 : kg m^2
@@ -247,7 +247,7 @@ class Pose(Table):
         Name of the posture.
     driven : deg; prismatic joints m
         Values of the driven joints in the order of the frames.
-    driven_deg
+    driven_deg : deg
         Older name of ``driven``.
     """
 
@@ -256,7 +256,7 @@ class Pose(Table):
     driven_deg: list[float] | None = None
 
 
-class _File(BaseModel):
+class SpatialFile(BaseModel):
     """A robot file of kind ``spatial``.
 
     Parameters
@@ -335,14 +335,14 @@ def read_spatial_robot(robot: str | os.PathLike[str]) -> SpatialCase:
     FileFormatError
         Not a robot in space, or a key unknown, missing or of the wrong type.
     """
-    content = read_as(_File, robot, "spatial")
+    content = read_as(SpatialFile, robot, "spatial")
     try:
         return _case(content)
     except InputError as error:
         raise InputError(f"{robot}: {error}") from error
 
 
-def _case(content: _File) -> SpatialCase:
+def _case(content: SpatialFile) -> SpatialCase:
     nodes = [row.node for row in content.points]
     for node in nodes:
         if nodes.count(node) > 1:

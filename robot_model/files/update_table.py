@@ -19,7 +19,7 @@ class Number(Table):
     kind
         What it is: ``stiffness``, ``damping``, a payload's mass and so on.
     unit
-        Its unit.
+        Unit of the number.
     frame, group, axis
         Where it acts: frame, group of links, axis.
     spread

@@ -1,10 +1,11 @@
 from .live_session import acquire_live
-from .plan import plan_from_file, plan_tables
+from .plan import PlanTable, plan_from_file, plan_tables
 from .record_session import OpenedSession, Tally, acquire, open_session
 from .signal_check import listen, preflight
 
 __all__ = [
     "OpenedSession",
+    "PlanTable",
     "Tally",
     "acquire",
     "acquire_live",

@@ -17,7 +17,7 @@ from ...tables import Table
 RPM = math.pi / 30
 
 
-class _Plan(BaseModel):
+class PlanTable(BaseModel):
     """The table ``[plan]``: what sweeps of the spindle speed shall measure.
 
     Parameters
@@ -66,11 +66,11 @@ def plan_from_file(path: str | os.PathLike[str]) -> tuple[SweepPlan, list[str]]:
     cutter, doubts = read_checked_cutting(path)
     table = tomllib.loads(Path(path).read_text(encoding="utf-8")).get("plan")
     if not isinstance(table, dict):
-        raise FileFormatError(f"{path} has no table [plan]; add one with {', '.join(_Plan.model_fields)}")
+        raise FileFormatError(f"{path} has no table [plan]; add one with {', '.join(PlanTable.model_fields)}")
     try:
-        asked = _Plan.model_validate(table)
+        asked = PlanTable.model_validate(table)
     except ValidationError as error:
-        raise FileFormatError(f"{path}: [plan] {mistake_in_words(error, _Plan)}") from error
+        raise FileFormatError(f"{path}: [plan] {mistake_in_words(error, PlanTable)}") from error
     density = asked.acceleration_noise
     doubts += check_demand(asked.band_hz, asked.depth_m, density, asked.immersion_widths_deg, cutter)
     noise = density / (2 * math.pi * max(asked.band_hz[0], 1e-9)) ** 2

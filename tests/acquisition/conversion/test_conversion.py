@@ -231,3 +231,51 @@ def test_a_matlab_file_with_row_vectors(shared_data: Path, tmp_path: Path) -> No
     convert(shared_data / "silverbox" / "SNLS80mV.mat", tmp_path / "s.h5", tmp_path / "map.toml")
     with Recording(tmp_path / "s.h5") as recording:
         assert recording.stream().n_samples == 131072
+
+
+TABLE_MAPPING = """
+sample_rate = 50.0
+[[channels]]
+name = "f"
+column = "Fx"
+quantity = "force"
+unit = "kN"
+[[channels]]
+name = "a"
+column = "ax"
+quantity = "acceleration"
+unit = "g"
+"""
+
+
+def test_a_row_of_units_below_the_headings_is_no_row_of_numbers(tmp_path: Path) -> None:
+    (tmp_path / "in.csv").write_text("Fx,ax\nkN,g\n0.5,1\n0.25,-1\n")
+    (tmp_path / "map.toml").write_text(TABLE_MAPPING)
+    convert(tmp_path / "in.csv", tmp_path / "out.h5", tmp_path / "map.toml")
+    with Recording(tmp_path / "out.h5") as recording:
+        np.testing.assert_allclose(recording.stream().read(), [[500.0, 9.80665], [250.0, -9.80665]])
+
+
+@pytest.mark.parametrize("second", ["kN,1", "kN", "0.5,bad"])
+def test_a_row_that_is_partly_numbers_is_not_taken_for_units(tmp_path: Path, second: str) -> None:
+    (tmp_path / "in.csv").write_text(f"Fx,ax\n{second}\n0.25,-1\n")
+    (tmp_path / "map.toml").write_text(TABLE_MAPPING)
+    with pytest.raises(FileFormatError, match="line 2"):
+        convert(tmp_path / "in.csv", tmp_path / "out.h5", tmp_path / "map.toml")
+
+
+def test_the_sample_rate_may_stand_in_the_file(tmp_path: Path) -> None:
+    mapping = MAPPING.replace("sample_rate = 100.0", 'sample_rate = "Fs"')
+    (tmp_path / "map.toml").write_text(mapping)
+    fields = {"force": np.arange(5.0), "acc": np.arange(5.0)}
+    savemat(tmp_path / "in.mat", {**fields, "Fs": 2048})
+    convert(tmp_path / "in.mat", tmp_path / "out.h5", tmp_path / "map.toml")
+    with Recording(tmp_path / "out.h5") as recording:
+        assert recording.stream().sample_rate == 2048.0
+    for stored, said in ((np.ones(3), "holds 3 numbers"), (-1.0, "holds -1"), (np.nan, "holds nan")):
+        savemat(tmp_path / "in.mat", {**fields, "Fs": stored})
+        with pytest.raises(FileFormatError, match=said):
+            convert(tmp_path / "in.mat", tmp_path / "again.h5", tmp_path / "map.toml")
+    savemat(tmp_path / "in.mat", fields)
+    with pytest.raises(FileFormatError, match="no array 'Fs'; it has force, acc"):
+        convert(tmp_path / "in.mat", tmp_path / "again.h5", tmp_path / "map.toml")

@@ -1,0 +1,45 @@
+"""`cut_text`, `session_text`: templates of files that nothing but the user fills in."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from ...toml_files import DescribedTable, TomlFile, described_tables, toml_files
+from .template import FILL_IN, Row, template
+
+
+def cut_text(teeth: int | None, diameter: float | None, *, plan: bool) -> str:
+    """Text of a cutting file; ``diameter`` in m. With ``plan`` it has the table of a plan, too."""
+    given: dict[str, Any] = {}
+    if teeth is not None:
+        given["teeth"] = teeth
+    if diameter is not None:
+        given["diameter_m"] = diameter
+    tables = [*described_tables(_kind("cut")), *(described_tables(_kind("plan")) if plan else ())]
+    rows: dict[str, Sequence[Row]] = {"[cutting]": [given], "[plan]": [{}]}
+    title = (
+        f"A cut: cutter, engagement, force coefficients. Marked {FILL_IN}: what must be given.\n"
+        "The engagement is start_angle_deg and exit_angle_deg, or immersion (with radial_depth_m)."
+    )
+    return template(title, tables, rows)
+
+
+def session_text(driver: str, n_channels: int) -> str:
+    """Text of a session file for a device: ``ni``, ``replay`` or ``simulated``."""
+    kind = _kind("session")
+    tables = [table for table in described_tables(kind) if table.heading != "[device]" or _drives(table, driver)]
+    rows: dict[str, Sequence[Row]] = {"": [{}], "[device]": [{"driver": driver}]}
+    if driver == "ni":
+        rows["[[channels]]"] = [{} for _ in range(n_channels)]
+    title = (
+        f"A session for: millfrf acquire THIS.toml --out REC.h5. Marked {FILL_IN}: what must be given.\n"
+        "Tables that stand as comments are not used; take the # away where the rig has such a device."
+    )
+    return template(title, tables, rows)
+
+
+def _kind(name: str) -> TomlFile:
+    return next(file for file in toml_files() if file.name == name)
+
+
+def _drives(table: DescribedTable, driver: str) -> bool:
+    return any(key.name == "driver" and key.kind == f"`{driver}`" for key in table.keys)

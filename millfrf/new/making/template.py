@@ -1,0 +1,106 @@
+"""`template`: a TOML file with a comment above each key; what only the user knows is left out and marked."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import groupby
+from typing import Any
+
+import tomlkit
+
+from ...toml_files import DescribedKey, DescribedTable
+
+FILL_IN = "FILL IN"
+"""Mark of a key that must be given and that nothing tells; the command that reads the file names it as missing."""
+
+_WIDTH = 110
+
+Row = Mapping[str, Any]
+
+
+def template(title: str, tables: Sequence[DescribedTable], rows: Mapping[str, Sequence[Row]]) -> str:
+    """Text of a commented TOML file.
+
+    Parameters
+    ----------
+    title
+        First lines of the file, without the ``#``.
+    tables
+        Tables in their order; one that is not in ``rows`` is written as a comment as a whole.
+    rows
+        Values by heading (`[arrays.H]` for a table `[arrays.NAME]`), a row a table; keys without a value stand there as
+        comments. Only the first row of several explains its keys.
+    """
+    parts = [*(f"# {line}" for line in title.splitlines()), ""]
+    for table in tables:
+        given = [(heading, row) for heading in rows if _is_of(heading, table) for row in rows[heading]]
+        if not given and table.heading:
+            parts += ["", *(_hidden(table))]
+        for number, (heading, row) in enumerate(given):
+            parts += ["", *_table(replace(table, heading=heading), row, explained=number == 0)]
+    return "\n".join(parts) + "\n"
+
+
+def _is_of(heading: str, table: DescribedTable) -> bool:
+    """Whether a heading is that of a table; `NAME` in the table's stands for any name."""
+    return re.fullmatch(re.escape(table.heading).replace("NAME", r"(\"[^\"]+\"|[^.\[\]]+)"), heading) is not None
+
+
+def _table(table: DescribedTable, row: Row, *, explained: bool) -> Iterator[str]:
+    if table.heading:
+        yield table.heading
+    for text, keys in groupby(_plain_keys(table), key=lambda key: key.text):
+        together = tuple(keys)
+        if explained:
+            yield from _wrapped(_explanation(text, together, given=all(key.name in row for key in together)))
+        shown = [key for key in together if explained or key.name in row or key.default is None]
+        yield from (_line(key, row, marked=not explained) for key in shown)
+        if explained:
+            yield ""
+
+
+def _hidden(table: DescribedTable) -> Iterator[str]:
+    yield from _wrapped(table.text)
+    yield f"# {table.heading}"
+    for text, keys in groupby(_plain_keys(table), key=lambda key: key.text):
+        together = tuple(keys)
+        yield from _wrapped(_explanation(text, together, given=True), "#     ")
+        yield from (_line(key, {}, marked=False) for key in together)
+
+
+def _plain_keys(table: DescribedTable) -> Iterator[DescribedKey]:
+    """Keys that hold no table: tables have headings of their own."""
+    return (key for key in table.keys if key.kind not in ("table", "list of tables"))
+
+
+def _explanation(text: str, keys: Sequence[DescribedKey], *, given: bool) -> str:
+    first = keys[0]
+    needed = f" -- {FILL_IN}" if first.default is None and not given else ""
+    unit = f", {first.unit}" if first.unit else ""
+    return f"{text} ({first.kind}{unit}){needed}".replace("`", "")
+
+
+def _line(key: DescribedKey, row: Row, *, marked: bool) -> str:
+    """Key and value; as a comment where there is none."""
+    if key.name in row:
+        return f"{key.name} = {tomlkit.item(row[key.name]).as_string()}"
+    mark = f"    # {FILL_IN}" if marked and key.default is None else ""
+    return f"# {key.name} = {'' if key.default is None else _default(key)}".rstrip() + mark
+
+
+def _default(key: DescribedKey) -> str:
+    """The default as TOML writes it; nothing where there is none."""
+    if not key.default:
+        return ""
+    plain = key.kind.startswith(("number", "whole", "list", "true"))
+    return key.default if plain else tomlkit.item(key.default).as_string()
+
+
+def _wrapped(text: str, mark: str = "# ") -> Iterator[str]:
+    line = ""
+    for word in text.split():
+        if len(line) + len(word) > _WIDTH:
+            yield f"{mark}{line}"
+            line = ""
+        line = f"{line} {word}".strip()
+    yield f"{mark}{line}"

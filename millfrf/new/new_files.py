@@ -1,0 +1,72 @@
+"""`millfrf new cut`, `new session` and `new schemas`: commented files to begin with, and schemas for editors."""
+
+import json
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..terminal import say
+
+Out = Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace a file that is there.")]
+
+
+class Driver(StrEnum):
+    """Device that samples."""
+
+    NI = "ni"
+    REPLAY = "replay"
+    SIMULATED = "simulated"
+
+
+def new_cut(
+    out: Out,
+    teeth: Annotated[int | None, typer.Option("--teeth", metavar="N", help="Number of cutting edges.")] = None,
+    diameter: Annotated[
+        float | None, typer.Option("--diameter", metavar="M", help="Diameter of the cutter, m.")
+    ] = None,
+    plan: Annotated[bool, typer.Option("--plan", help="Add the table of a plan of speed sweeps.")] = False,
+    force: Force = False,
+) -> None:
+    """Write a commented cutting file; what only you know is left out, and lobes name it as missing."""
+    from .making import cut_text
+    from .writing_new import write_new
+
+    write_new(out, cut_text(teeth, diameter, plan=plan), force=force)
+    say(f"wrote {out}; fill in what is marked FILL IN, then: millfrf lobes MODEL.json --cutting {out} ...")
+
+
+def new_session(
+    out: Out,
+    driver: Annotated[Driver, typer.Option("--driver", help="Device that samples.")] = Driver.NI,
+    channels: Annotated[
+        int, typer.Option("--channels", metavar="N", min=1, max=256, help="Number of inputs to describe.")
+    ] = 6,
+    force: Force = False,
+) -> None:
+    """Write a commented session file for `millfrf acquire`."""
+    from .making import session_text
+    from .writing_new import write_new
+
+    write_new(out, session_text(driver.value, channels), force=force)
+    say(f"wrote {out}; fill in what is marked FILL IN, then: millfrf acquire {out} --check")
+
+
+def new_schemas(
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the schemas.")],
+) -> None:
+    """Write a JSON schema of each TOML file, for editors that complete and check keys."""
+    from foundation import writing_whole_file
+
+    from ..result_folder import refuse_file
+    from ..toml_files import json_schema, toml_files
+
+    refuse_file(out)
+    out.mkdir(parents=True, exist_ok=True)
+    for file in toml_files():
+        path = out / f"{file.name}.schema.json"
+        with writing_whole_file(path) as temporary:
+            temporary.write_text(json.dumps(json_schema(file), indent=2) + "\n", encoding="utf-8")
+    say(f"wrote {len(toml_files())} schemas into {out}; first line of a TOML file: #:schema PATH.schema.json")

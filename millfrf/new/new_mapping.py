@@ -1,0 +1,25 @@
+"""`millfrf new mapping`: the mapping that `millfrf convert` needs, filled in from a file."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..terminal import say
+
+
+def new_mapping(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Recording of another program: .mat .csv .npz ...")],
+    out: Annotated[Path, typer.Option("--out", metavar="MAP.toml", help="Mapping to write.")],
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+) -> None:
+    """Write a commented mapping with the columns, units and sample rate that a file tells."""
+    from .making import mapping_for
+    from .writing_new import write_new
+
+    made = mapping_for(file)
+    write_new(out, made.text, force=force)
+    say(f"wrote {out}: {made.n_channels} channels; quantities and places are guessed from names, check them")
+    if made.n_open:
+        say(f"{made.n_open} places are open, each marked FILL IN; millfrf convert names what is missing")
+    say(f"then: millfrf convert {file} recording.h5 --map {out}")

@@ -1,0 +1,59 @@
+"""`toml_files`: which TOML files there are, what each is for, and the schema that checks it."""
+
+from dataclasses import dataclass
+
+from pydantic import BaseModel
+
+
+@dataclass(frozen=True)
+class TomlFile:
+    """One kind of TOML file.
+
+    Parameters
+    ----------
+    name
+        Short name of the kind, such as ``cut``.
+    title
+        What such a file says, a few words.
+    schema
+        Model class that checks the file, or the one table of it that counts.
+    table
+        Name of that table, such as ``cutting``; empty: the whole file.
+    read_by
+        Commands that read it.
+    """
+
+    name: str
+    title: str
+    schema: type[BaseModel]
+    table: str
+    read_by: tuple[str, ...]
+
+
+def toml_files() -> tuple[TomlFile, ...]:
+    """All kinds of TOML files that commands read, in the order in which a lab meets them."""
+    from acquisition import LogMapping, RecordingMapping, Session
+    from cutting import CuttingTable
+    from estimation import FrfMapping, GeometryTable
+    from modal_fit import PolesFile
+    from robot_model import PlanarFile, SerialFile, SpatialFile
+
+    from ..chain import PlanTable
+    from ..taps import PointsTable
+
+    cuts = ("lobes", "chatter", "plan", "report", "cut diagnose", "robot lobes", "robot path")
+    robots = ("robot modes", "robot frf", "robot lobes", "robot map", "robot update", "robot path")
+    return (
+        TomlFile("mapping", "which array or column of a file is which channel", RecordingMapping, "", ("convert",)),
+        TomlFile("frf-mapping", "where another program's file holds FRFs", FrfMapping, "", ("convert",)),
+        TomlFile("can-mapping", "which signals of a CAN log go into a recording", LogMapping, "", ("convert",)),
+        TomlFile("cut", "cutter, engagement and force coefficients", CuttingTable, "cutting", cuts),
+        TomlFile("plan", "what sweeps of the spindle speed shall measure", PlanTable, "plan", ("plan",)),
+        TomlFile("session", "what is recorded, from which devices", Session, "", ("acquire",)),
+        TomlFile("points", "which point was hit in which recording", PointsTable, "", ("tap",)),
+        TomlFile("geometry", "where the nodes are, and which lines join them", GeometryTable, "", ("report",)),
+        TomlFile("poles", "poles that are chosen by hand", PolesFile, "", ("fit",)),
+        TomlFile("robot-serial", "a robot joint by joint, as `new robot` writes it", SerialFile, "", robots),
+        TomlFile("robot-spatial", "a robot with closed loops, beams and own nodes", SpatialFile, "", robots),
+        TomlFile("robot-planar", "a robot that moves in a plane", PlanarFile, "", robots),
+    )
