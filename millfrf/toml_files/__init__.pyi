@@ -1,6 +1,6 @@
-from .described_tables import DescribedKey, DescribedTable, described_tables
 from .json_schemas import json_schema
 from .known_files import TomlFile, toml_files
+from .table_keys import DescribedKey, DescribedTable, described_tables
 
 __all__ = [
     "DescribedKey",
