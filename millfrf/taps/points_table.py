@@ -62,7 +62,7 @@ class PointsTable(BaseModel):
     Parameters
     ----------
     recording
-        Rows, ``[[recording]]``.
+        Rows of the table, ``[[recording]]``, one for each recording or part of one.
     """
 
     model_config = _STRICT
