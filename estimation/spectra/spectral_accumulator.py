@@ -124,14 +124,16 @@ class SpectralAccumulator:
             return
         windowed = _detrended(segments, self.settings.detrend)
         windowed *= self._window
-        lines = fft.rfft(windowed, axis=2, overwrite_x=True, workers=_WORKERS)
-        step = max(1, _PRODUCT_BYTES // (16 * len(lines) ** 2))
+        step = max(1, _PRODUCT_BYTES // (16 * len(windowed) ** 2))
 
         def add_products(start: int) -> None:
-            part = np.ascontiguousarray(lines[:, :, start : start + step].transpose(2, 0, 1))
+            part = np.empty((min(step, len(self._sum) - start), *windowed.shape[:2]), dtype=complex)
+            for row, channel in enumerate(lines):
+                part[:, row] = channel[:, start : start + step].T
             self._sum[start : start + step] += part @ part.conj().transpose(0, 2, 1)
 
-        with ThreadPoolExecutor(_WORKERS) as pool:  # numpy lets go of the interpreter inside the products
+        with ThreadPoolExecutor(_WORKERS) as pool:  # transforms and products let go of the interpreter
+            lines = list(pool.map(_transformed, windowed))
             list(pool.map(add_products, range(0, len(self._sum), step)))
 
     def result(self) -> CrossSpectra:
@@ -218,6 +220,15 @@ def take_out_delays(
     turned = np.exp(2j * np.pi * frequencies[:, None] * (delays - delays.min()))
     for row in range(len(channels)):  # row by row: no second array of this size
         spectra[:, row, :] *= turned[:, row, None] * turned.conj()
+
+
+def _transformed(segments: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Transform of one channel's segments, in this thread.
+
+    scipy's own threads are not asked (``workers``): they end before each fork of the process, and where that meets
+    their beginning, the fork waits for ever.
+    """
+    return np.asarray(fft.rfft(segments, axis=1, overwrite_x=True))
 
 
 def _detrended(segments: NDArray[np.float64], kind: str) -> NDArray[np.float64]:
