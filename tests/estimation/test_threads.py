@@ -24,7 +24,7 @@ print(len(os.listdir("/proc/self/task")))
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="counts threads as Linux lists them")
 def test_no_thread_is_left_when_spectra_are_made() -> None:
-    one_thread = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+    one_thread = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], env=os.environ | one_thread, capture_output=True, text=True, check=True
     )
