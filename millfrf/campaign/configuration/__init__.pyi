@@ -2,6 +2,7 @@ from .campaign_tables import JOBS, CampaignFile, EstimateTable
 from .file_look import FileLook, hash_all, keep, look_at_other, place_below, read_kept
 from .found_recordings import FoundRecording, find_recordings
 from .labels import Labels, filled_in, labels_in, shown_value
+from .stated_postures import agree, without_wrong_postures
 
 __all__ = [
     "JOBS",
@@ -10,6 +11,7 @@ __all__ = [
     "FileLook",
     "FoundRecording",
     "Labels",
+    "agree",
     "filled_in",
     "find_recordings",
     "hash_all",
@@ -19,4 +21,5 @@ __all__ = [
     "place_below",
     "read_kept",
     "shown_value",
+    "without_wrong_postures",
 ]

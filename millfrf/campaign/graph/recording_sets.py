@@ -6,7 +6,7 @@ from statistics import fmean
 
 from foundation import InputError
 
-from ..configuration import FoundRecording, shown_value
+from ..configuration import FoundRecording, agree, shown_value
 
 Value = str | float
 
@@ -109,5 +109,12 @@ def _set_of(name: str, members: Sequence[FoundRecording]) -> RecordingSet:
             shared[label] = numbers[0] if len(set(numbers)) == 1 else fmean(numbers)
         elif len(set(values)) == 1 and isinstance(values[0], str):
             shared[label] = values[0]
-    postures = {one.labels.posture_deg for one in sound}
-    return RecordingSet(name, tuple(members), shared, postures.pop() if len(postures) == 1 else None)
+    return RecordingSet(name, tuple(members), shared, _one_posture([one.labels.posture_deg for one in sound]))
+
+
+def _one_posture(stated: Sequence[tuple[float, ...] | None]) -> tuple[float, ...] | None:
+    """The first of postures that agree; None where one is missing or another."""
+    first = stated[0]
+    if first is None or not all(one is not None and agree(first, one) for one in stated):
+        return None
+    return first

@@ -17,6 +17,7 @@ from ..configuration import (
     look_at_other,
     place_below,
     read_kept,
+    without_wrong_postures,
 )
 from ..graph import Plan, Task, keys_of, plan_campaign
 from ..running import Order, program_digest
@@ -102,7 +103,7 @@ def open_campaign(path: Path, out: Path, progress: Progress, *, hashing: bool) -
     file = checked_toml(path, CampaignFile, "campaign")
     base = path.parent.resolve()
     kept = read_kept(out)
-    recordings = tuple(find_recordings(file, base, out, kept, progress))
+    recordings = tuple(without_wrong_postures(find_recordings(file, base, out, kept, progress)))
     robot = _robot(file, base)
     postures = PostureReader(robot)
     plan = plan_campaign(file, base, recordings, robot, postures.typed)

@@ -1,0 +1,40 @@
+"""Recordings whose notes are those of another pose."""
+
+from pathlib import Path
+
+from millfrf.campaign.configuration import FoundRecording, Labels, without_wrong_postures
+from millfrf.campaign.configuration.file_look import FileLook
+from millfrf.campaign.graph.recording_sets import grouped
+
+RIGHT, NEAR, WRONG = (10.0, -20.0), (10.02, -20.03), (35.0, 5.0)
+
+
+def _recordings(*postures: tuple[float, ...] | None, pose: str = "P1") -> list[FoundRecording]:
+    return [
+        FoundRecording(f"{pose}_{k}", Path(f"{pose}_{k}.h5"), Labels({"pose": pose}, q), FileLook(1, 1), None)
+        for k, q in enumerate(postures)
+    ]
+
+
+def test_the_one_that_contradicts_the_others_of_its_pose_has_a_fault_that_names_both_postures() -> None:
+    found = without_wrong_postures(_recordings(RIGHT, WRONG, NEAR))
+    assert [bool(one.fault) for one in found] == [False, True, False]
+    assert "P1_1.h5: it states posture_deg = [35, 5]" in found[1].fault
+    assert "[10, -20]" in found[1].fault
+
+
+def test_nobody_can_tell_which_of_two_is_right() -> None:
+    found = without_wrong_postures(_recordings(RIGHT, WRONG))
+    assert all("cannot be told" in one.fault for one in found)
+
+
+def test_postures_that_agree_or_are_of_other_poses_or_missing_are_no_fault() -> None:
+    mixed = _recordings(RIGHT, NEAR, None) + _recordings(WRONG, pose="P2")
+    assert not any(one.fault for one in without_wrong_postures(mixed))
+
+
+def test_a_set_has_the_posture_on_which_its_recordings_agree() -> None:
+    (one,), _ = grouped(_recordings(RIGHT, NEAR), ["pose"])
+    assert one.posture_deg == RIGHT
+    (other,), _ = grouped(_recordings(RIGHT, WRONG), ["pose"])
+    assert other.posture_deg is None
