@@ -1,9 +1,9 @@
 """A simulated campaign through everything: workers killed, the run killed, what is hidden found, and the same bytes.
 
-Run it: `python benchmarks/campaign_trial.py FOLDER [POSES] [SEED] [WORKERS] [JOBS]`, for example `/tmp/trial 20 0 4`.
-It makes the campaign, runs it undisturbed on two workers, then on WORKERS with one killed in mid-run, then kills a
-whole run and resumes it. It prints what was found of what is concealed, and the files that differ: none should.
-JOBS names tables of campaign.toml that are left out, separated by commas (`diagnose` takes most of the time).
+Run it: `python benchmarks/campaign_trial.py FOLDER [POSES] [SEED] [WORKERS] [EACH] [JOBS]`, such as `trial 20 0 4 10`.
+It makes a campaign of EACH recordings a pose, runs it undisturbed on two workers, then on WORKERS with one killed in
+mid-run, then kills a whole run and resumes it. It prints what was found of what is concealed, and how many files
+differ: none should. JOBS names tables of campaign.toml that are left out, separated by commas.
 """
 
 import json
@@ -52,7 +52,7 @@ def wait_for(run: subprocess.Popen[bytes], out: Path, count: int) -> bool:
 def workers_of(run: subprocess.Popen[bytes]) -> list[psutil.Process]:
     """Worker processes of a run: those of its descendants that compute."""
     children = psutil.Process(run.pid).children(recursive=True)
-    return [one for one in children if "tracker" not in " ".join(one.cmdline())]
+    return [one for one in children if "resource_tracker" not in " ".join(one.cmdline())]
 
 
 def files_of(out: Path) -> dict[str, bytes]:
@@ -115,13 +115,13 @@ def _page(out: Path) -> Path:
     return out / "summary" / "report.html"
 
 
-def main(folder: str, poses: int = 20, seed: int = 0, workers: int = 4, left_out: str = "") -> None:
+def main(folder: str, poses: int = 20, seed: int = 0, workers: int = 4, each: int = 10, left_out: str = "") -> None:
     """Run the trial."""
     base = Path(folder)
     base.mkdir(parents=True, exist_ok=True)
     made = base / "campaign"
     if not made.is_dir():
-        asked = ["--recordings", str(10 * poses), "--poses", str(poses), "--seed", str(seed)]
+        asked = ["--recordings", str(each * poses), "--poses", str(poses), "--seed", str(seed)]
         command = [sys.executable, "-m", "millfrf", "demo", "--campaign", "--out", str(made), *asked]
         subprocess.run(command, env=_environment(), check=True)
     campaign = made / "trial.toml"
@@ -139,4 +139,4 @@ def main(folder: str, poses: int = 20, seed: int = 0, workers: int = 4, left_out
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], *(int(word) for word in sys.argv[2:5]), *sys.argv[5:6])
+    main(sys.argv[1], *(int(word) for word in sys.argv[2:6]), *sys.argv[6:7])

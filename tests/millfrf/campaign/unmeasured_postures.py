@@ -96,7 +96,7 @@ def compared(learned: LearnedPostures, q: Real, truth: ModalModel, process: Mill
     return rows
 
 
-def trial(seed: int, poses: int, new: int, left_out: int, sessions: int) -> dict[str, list[Row]]:
+def trial(seed: int, poses: int, new: int, left_out: int, sessions: int, limits: bool = True) -> dict[str, list[Row]]:
     """One campaign: rows of new postures, and of measured postures each left out with all its sets."""
     folder = Path(os.environ.get("MILLFRF_TRIALS", tempfile.gettempdir())) / f"campaign_postures_{seed}_{poses}"
     options = SimulatedCampaign(folder, 10 * poses, poses, seed)
@@ -116,7 +116,7 @@ def trial(seed: int, poses: int, new: int, left_out: int, sessions: int) -> dict
     fresh = spread_postures(case.robot.mechanism, named_posture(case, "ready"), new, np.random.default_rng([seed, 99]))
     found: dict[str, list[Row]] = {"new": [], "left out": []}
     for q in fresh:
-        found["new"] += compared(learned, q, tip_model(laboratory.true.structure(q, mean)), process)
+        found["new"] += compared(learned, q, tip_model(laboratory.true.structure(q, mean)), process if limits else None)
     for pose in range(min(left_out, poses)):
         rest: list[MeasuredModes] = [modes for other, modes in measured if other != pose]
         truth = tip_model(laboratory.true.structure(laboratory.postures[pose], mean))
