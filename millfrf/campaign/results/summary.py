@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from foundation import InputError, writing_whole_file
+
 from ...provenance import origin
 from ...report import ResultsPage, Section, write_results_page
 from .drift import Drifts, Labels, Outliers, Series, drifts_and_outliers, labels_of, series_of
@@ -24,6 +26,7 @@ from .page import (
     verdict_sentences,
 )
 from .pictures import map_plane, tip_positions
+from .postures import FILE, PostureCoverage, contradiction_words, coverage_of, posture_section
 from .read_set import SetResults, read_set
 from .table import mode_rows, write_mode_tables
 
@@ -107,22 +110,41 @@ def write_summary(
     """
     found = findings_of(sets)
     places, lost = tip_positions(robot, found.sets)
-    failed = all_failures(found.sets, [*failures, *([lost] if lost else [])])
+    coverage, refused = _coverage(folder, robot, learned, found.sets)
+    failed = all_failures(found.sets, [*failures, *(line for line in (lost, refused) if line)])
     inputs = [path for one in sets for path in (one.model, one.lobes, one.diagnosis) if path is not None]
+    inputs += [] if learned is None else [learned]
     made = origin("campaign report", sorted(inputs), {"title": title, "robot": robot})
     doubts = _doubts(found)
     write_mode_tables(folder, mode_rows(found.sets, found.modes.names, places), made, doubts)
+    contradicted = [] if coverage is None else [contradiction_words(one) for one in coverage.contradictions]
     sections: list[Section] = [
         drift_section(found.drifts, found.sets, trend_pictures(folder, found.drifts)),
-        outlier_section(found.outliers, found.sets, ()),
+        outlier_section(found.outliers, found.sets, contradicted),
         _maps(folder, found, places),
-        set_section(found.sets),
+        *([] if coverage is None or robot is None else [posture_section(folder, coverage, Path(robot).name)]),
         failure_section(failed),
+        set_section(found.sets),
     ]
-    verdict = verdict_sentences(found.sets, found.drifts, found.outliers, failed)
+    verdict = verdict_sentences(found.sets, found.drifts, found.outliers, contradicted, failed)
     page = ResultsPage("Report of a campaign", title, _size(found), tuple(verdict), tuple(doubts))
     write_results_page(folder / "report.html", page, sections)
     return tuple(verdict)
+
+
+def _coverage(
+    folder: Path, robot: str | None, learned: Path | None, sets: Sequence[SetResults]
+) -> tuple[PostureCoverage | None, str]:
+    """The posture model at left-out poses, its file beside the report; or one line that says why there is none."""
+    if robot is None or learned is None:
+        return None, ""
+    try:
+        coverage = coverage_of(robot, learned, {one.name: one.measured.pose for one in sets})
+    except InputError as error:
+        return None, f"posture model: {error}"
+    with writing_whole_file(folder / FILE) as temporary:
+        temporary.write_bytes(learned.read_bytes())
+    return coverage, ""
 
 
 def _maps(folder: Path, found: Findings, places: dict[str, Real]) -> Section:

@@ -4,9 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ....report import Section
+from ....report import Fold, Section
 from ....tables import Table
 from ..read_set import LowestLimit, SetResults
+
+MOST_OPEN = 30
+"""Sets up to which their table is open from the start."""
 
 
 def set_section(sets: Sequence[SetResults]) -> Section:
@@ -17,19 +20,20 @@ def set_section(sets: Sequence[SetResults]) -> Section:
     sets
         Sets of the campaign, as read.
     """
-    columns = ("set", "recordings", "natural frequencies (Hz)", "lowest depth limit (mm)", "verdict", "doubts")
+    columns = ("set", "natural frequencies (Hz)", "recordings", "lowest depth limit (mm)", "verdict", "doubts")
     rows = tuple(
         (
             one.name,
-            str(len(one.measured.recordings)),
             "none" if one.model is None else ", ".join(f"{f:.2f}" for f in one.model.natural_frequencies),
+            str(len(one.measured.recordings)),
             _limit(one.limit),
             one.verdict or "-",
             str(len(one.doubts)),
         )
         for one in sets
     )
-    return Section("Sets", (), (Table("Sets and their results; modes.csv has all numbers and doubts", columns, rows),))
+    table = Table("Sets and their results; modes.csv has all numbers and doubts", columns, rows)
+    return Section("Sets", folds=(Fold(f"All {len(sets)} sets", (table,), opened=len(sets) <= MOST_OPEN),))
 
 
 def _limit(limit: LowestLimit | None) -> str:

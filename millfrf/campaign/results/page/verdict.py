@@ -12,7 +12,11 @@ MOST = 8
 
 
 def verdict_sentences(
-    sets: Sequence[SetResults], drifts: Drifts, outliers: Outliers, failed: Sequence[tuple[str, str]]
+    sets: Sequence[SetResults],
+    drifts: Drifts,
+    outliers: Outliers,
+    more: Sequence[str],
+    failed: Sequence[tuple[str, str]],
 ) -> list[str]:
     """Say what a reader wants first.
 
@@ -22,6 +26,8 @@ def verdict_sentences(
         Sets of the campaign, as read.
     drifts, outliers
         What drifts, and what stands off.
+    more
+        Further sentences on what stands off, such as poses that the posture model contradicts.
     failed
         Name of the set (empty: of the campaign) and reason of each failure.
     """
@@ -31,7 +37,8 @@ def verdict_sentences(
     told += _cut("Drift: ", found) or [
         "No drift was found." if drifts.count else "Nothing can be said of drift: no pose was measured twice."
     ]
-    told += _cut("Stands off: ", [deviation_words(group, sets) for group in deviations_by_set(outliers)]) or [
+    off = [deviation_words(group, sets) for group in deviations_by_set(outliers)]
+    told += _cut("Stands off: ", [*off, *more]) or [
         "No set stands off the others of its pose."
         if outliers.count
         else "Nothing can be said of outlying sets: no pose has enough of them."
