@@ -105,6 +105,14 @@ class CommonVariance:
             found[group] = found[group] + one
         return found
 
+    @cached_property
+    def _elsewhere(self) -> dict[int, Real]:
+        """Logarithm of the prior of the common degrees of freedom, and of what the other groups say of them."""
+        prior = -0.5 * (np.log10(FREEDOM / USUAL_FREEDOM) / DECADES) ** 2
+        said = {group: np.asarray(logsumexp(one, axis=0)) for group, one in self._sums.items()}
+        total = np.sum(list(said.values()), axis=0)
+        return {group: prior + total - one for group, one in said.items()}
+
     def moderated(self, number: int, misfit: float, freedom: float) -> Moderated:
         """Variance factor of one series from all others, and from a misfit of its own.
 
@@ -119,9 +127,7 @@ class CommonVariance:
         """
         group = self.groups[number]
         own = self._sums[group] - self._single[number] + self._likelihood(misfit, freedom, group)
-        others = [logsumexp(one, axis=0) for name, one in self._sums.items() if name != group]
-        prior = -0.5 * (np.log10(FREEDOM / USUAL_FREEDOM) / DECADES) ** 2
-        weights = own + np.sum(others, axis=0) + prior
+        weights = own + self._elsewhere[group]
         weights = np.exp(weights - weights.max())
         factors = (FREEDOM * FACTORS[:, None] * self._centres[group] + misfit) / (FREEDOM + freedom)
         kept = (weights > 1e-9).ravel()

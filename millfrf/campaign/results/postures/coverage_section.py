@@ -78,8 +78,9 @@ def _command(coverage: PostureCoverage, robot: str) -> str:
     joints = ",".join(f"{value:.4g}" for value in coverage.middle)
     return (
         "Lobes with their band at a pose that was not measured (here the middle of the measured ones; --at X Y Z asks "
-        f"for the place of a vertical tool), in the folder of this report: millfrf robot lobes {robot} --learned {FILE} "
-        f"--joints {joints} --cutting CUT.toml --speeds LO HI N --max-depth M --out lobes.csv"
+        "for the place of a vertical tool), in the folder of this report: "
+        f"millfrf robot lobes {robot} --learned {FILE} --joints {joints} --cutting CUT.toml "
+        "--speeds LO HI N --max-depth M --out lobes.csv"
     )
 
 
