@@ -16,8 +16,9 @@ from .weighted_fit import Problem, weighted_fit
 
 Real = NDArray[np.float64]
 
-FALSE_ALARMS = 0.05
-"""Expected share of false ones among the drifts that are named; without any drift, the chance of naming one."""
+FALSE_ALARMS = 0.025
+"""Expected share of false ones among the drifts that are named; without any drift, the chance of naming one. It is half
+of what is promised (5 %), because scatter that differs much between poses raises it."""
 
 SUSPECT = 0.0027
 """Probability of a single trend from which it is worth another measurement: three standard errors."""

@@ -14,7 +14,7 @@ Real = NDArray[np.float64]
 FREEDOM = np.logspace(0, 3, 19)
 """Degrees of freedom that the common variance may be worth: few where series differ, many where they are alike."""
 
-USUAL_FREEDOM, DECADES = 12.0, 0.65
+USUAL_FREEDOM, DECADES = 6.0, 0.65
 """Prior of them: median, and standard deviation in powers of ten. A handful of series cannot tell them."""
 
 FACTORS = np.exp(np.linspace(-3.5, 3.5, 57))
@@ -57,7 +57,8 @@ class Moderated:
         ratio
             Value over its standard error where the variance factor is one.
         """
-        return float(self.weights @ (2 * student.sf(abs(ratio) / np.sqrt(self.factors), self.freedoms)))
+        parts = 2 * student.sf(abs(ratio) / np.sqrt(self.factors), self.freedoms)
+        return min(1.0, float(self.weights @ parts))
 
 
 @dataclass(frozen=True)

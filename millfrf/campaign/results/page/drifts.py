@@ -35,8 +35,8 @@ def drift_section(drifts: Drifts, sets: Sequence[SetResults], pictures: Sequence
     sentences = [
         f"{drifts.count} trends were looked at: frequency and damping of each mode and the lowest depth limit, in each "
         "pose and over all poses, with each label of numbers. Named is what is more than chance among so many: without "
-        "any drift, one campaign in twenty names one (false discovery rate 5 %). ± is the 95 % interval, scatter "
-        "between repeats included."
+        "any drift, at most one campaign in twenty names one (false discovery rate below 5 %). ± is the 95 % interval, "
+        "scatter between repeats included."
     ]
     sentences += [drift_words(one, sets) for one in drifts.drifts] + [pooled_words(one) for one in drifts.pooled]
     if not drifts.drifts and not drifts.pooled:

@@ -1,0 +1,40 @@
+"""Labels: numbers, text that spells numbers, groups, and which of them count time."""
+
+from millfrf.campaign.results import MeasuredSet
+from millfrf.campaign.results.drift import TIME, labels_of
+
+
+def _set(pose: str, recorded_at: float | None, **labels: str | float) -> MeasuredSet:
+    return MeasuredSet(
+        f"{pose}{labels}{recorded_at}", {"pose": pose, **labels}, None, recorded_at, (), None, None, None, ()
+    )
+
+
+def test_text_that_spells_numbers_is_a_number() -> None:
+    found = labels_of([_set("P1", None, session="1"), _set("P1", None, session="2")])
+    assert found.numbers["session"].tolist() == [1.0, 2.0]
+
+
+def test_a_session_that_rises_with_time_stands_for_time() -> None:
+    sets = [_set(pose, 1e9 + 86400.0 * k, session=float(k)) for pose in ("P1", "P2") for k in range(3)]
+    found = labels_of(sets)
+    assert TIME not in found.numbers
+    assert "session" in found.numbers
+    assert any("session rises with the time" in note for note in found.notes)
+
+
+def test_a_level_that_happens_to_vary_does_not_stand_for_time() -> None:
+    sets = [_set("P1", 1e9 + 86400.0 * k, level=float(v)) for k, v in enumerate((3, 1, 2))]
+    assert set(labels_of(sets).numbers) == {TIME, "level"}
+
+
+def test_a_label_that_is_one_in_every_pose_cannot_be_looked_at() -> None:
+    sets = [_set(pose, None, height=height) for pose, height in (("P1", 1.0), ("P1", 1.0), ("P2", 2.0))]
+    assert not labels_of(sets).numbers
+
+
+def test_remarks_are_no_groups() -> None:
+    sets = [_set("P1", None, remark=f"note {k}", tool="A" if k % 2 else "B") for k in range(8)]
+    found = labels_of(sets)
+    assert set(found.texts) == {"tool"}
+    assert any("remark" in note for note in found.notes)
