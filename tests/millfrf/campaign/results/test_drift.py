@@ -216,7 +216,7 @@ def test_two_sets_a_pose_are_judged_by_how_the_other_poses_differ() -> None:
     found, alarms = 0, 0
     for seed in range(10):
         made = Simulated(seed, sessions=2, repeats=1, poses=12, modes=3)
-        drifts = find_drifts(made.series({(3, 1): -0.015 * made.session}), made.labels("session"))
+        drifts = find_drifts(made.series({(3, 1): -0.02 * made.session}), made.labels("session"))
         found += _firm(drifts) == [("P03", 1)]
         made = Simulated(seed, sessions=2, repeats=1, poses=12, modes=3)
         quiet = find_drifts(made.series(), made.labels("session"))
