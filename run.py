@@ -12,7 +12,8 @@ from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parent
 ENVIRONMENT = Path(os.environ.get("MILLFRF_VENV", PROJECT / ".venv"))
-USAGE = "usage: python3 run.py demo [--out DIR ...] | test [PYTEST OPTIONS] | lint"
+USAGE = "usage: python3 run.py demo [--out DIR ...] | test [PYTEST OPTIONS] | docs [SPHINX OPTIONS] | lint"
+SITE = PROJECT / "docs" / "_build" / "html"
 
 
 def program(name: str) -> str:
@@ -30,16 +31,27 @@ def install(extras: str) -> None:
     subprocess.run([*command, "--editable", f"{PROJECT}{extras}"], check=True)
 
 
+def build_site(options: list[str]) -> int:
+    """Build the site from the pages, the docstrings and the command line; a warning is a failure."""
+    command = [program("python"), "-m", "sphinx", "-q", "-W", "--keep-going", "-j", "2", "-b", "html", *options]
+    code = subprocess.run([*command, "docs", str(SITE)], cwd=PROJECT).returncode
+    if code == 0:
+        print(f"open {SITE / 'index.html'}")
+    return code
+
+
 def run(arguments: list[str]) -> int:
     """Install what the job needs and do it; returns the exit code."""
-    if not arguments or arguments[0] not in ("demo", "test", "lint"):
+    if not arguments or arguments[0] not in ("demo", "test", "docs", "lint"):
         print(USAGE)
         return 2
     job, *rest = arguments
     if job == "demo":
         install("")
         return subprocess.run([program("millfrf"), "demo", *rest]).returncode
-    install("[test,lint]" if job == "lint" else "[test]")
+    install({"lint": "[test,lint]", "docs": "[docs]"}.get(job, "[test]"))
+    if job == "docs":
+        return build_site(rest)
     if job == "test":
         selection = [] if "-m" in rest else ["-m", "not slow"]
         command = [program("python"), "-m", "pytest", "-n", "2", *selection, *rest]

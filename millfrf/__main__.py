@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
@@ -19,8 +19,9 @@ from .cut import cut_app
 from .new import new_app
 from .number_lists import options_of_several, with_lists_apart
 from .robot import robot_app
-from .terminal import printable
+from .terminal import printable, say
 from .usage_words import usage_in_words
+from .version import __version__
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 INTERRUPTED = 130
@@ -34,6 +35,25 @@ app = typer.Typer(
     no_args_is_help=False,
     rich_markup_mode=None,
 )
+
+
+def _show_version(asked: bool) -> None:
+    """Print name and version, and end."""
+    if asked:
+        say(f"millfrf {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _program(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=_show_version, help="Show the version and end.")
+    ] = False,
+) -> None:
+    """FRFs of machining robots measured while they mill, their modal fit and stability lobes."""
+    del version
+
+
 for _function in COMMANDS:
     app.command()(_function)
 app.add_typer(robot_app)

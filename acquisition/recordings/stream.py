@@ -80,7 +80,7 @@ class Stream:
         return self._samples.has_checksums
 
     def salvaged(self, file_size: int) -> Iterator[NDArray[np.floating] | DamagedRows]:
-        """All rows in order, part by part; damaged ones are named instead (:meth:`CheckedSamples.salvaged`)."""
+        """All rows in order, part by part; damaged ones are named instead (``CheckedSamples.salvaged``)."""
         with reporting_damage(self.path):
             yield from self._samples.salvaged(file_size)
 

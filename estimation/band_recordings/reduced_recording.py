@@ -64,7 +64,7 @@ class BandRecording:
 
     @cached_property
     def at_rest(self) -> bool:
-        """Whether nothing moved before the first force: see :func:`starts_at_rest`."""
+        """Whether nothing moved before the first force: see ``starts_at_rest``."""
         return starts_at_rest(self.force, self.response, self.rate)
 
     @property

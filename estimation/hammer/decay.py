@@ -79,7 +79,7 @@ def answer_decay(found: Sequence[FoundTaps], settings: TapSettings) -> Decay:
 
 
 def window_for(left: float, settings: TapSettings) -> float | None:
-    """Time constant (s) with which ``left`` falls to :data:`WINDOWED` at the segment's end; None where none is needed.
+    """Time constant (s) with which ``left`` falls to ``WINDOWED`` at the segment's end; None where none is needed.
 
     Examples
     --------

@@ -22,7 +22,7 @@ def exponential_window(n_samples: int, sample_rate: float, time_constant: float)
     exact, at another place of the Laplace plane, where every pole seems to lie ``1/tau`` further to the left. Nothing
     that is done to the values line by line brings them back to ``i w``: that would be to undo the window, with the
     truncation it was there to prevent. So an FRF carries the time constant
-    (:attr:`estimation.Frf.exponential_time_constant`), and the fit, which knows the poles, takes ``1/tau`` from their
+    (``exponential_time_constant``), and the fit, which knows the poles, takes ``1/tau`` from their
     damping (:func:`without_added_damping`).
 
     Raises

@@ -45,7 +45,7 @@ def sum_tests(tests: Sequence[CrossSpectra]) -> CrossSpectra:
     Raises
     ------
     InputError
-        Tests that :func:`check_stackable` refuses.
+        Tests that ``check_stackable`` refuses.
     """
     check_stackable(tests)
     n_segments = sum(test.n_segments for test in tests)
@@ -74,7 +74,7 @@ def join_parts(parts: Sequence[CrossSpectra]) -> CrossSpectra:
     Raises
     ------
     InputError
-        Parts that :func:`check_stackable` refuses.
+        Parts that ``check_stackable`` refuses.
     """
     total = sum_tests(parts)
     averages = effective_averages(total.settings, total.n_segments)

@@ -24,7 +24,7 @@ def settings_for(
     Raises
     ------
     InputError
-        A duration shorter than 8 samples, or settings that :func:`check_settings` refuses.
+        A duration shorter than 8 samples, or settings that ``check_settings`` refuses.
     """
     length = 2 * round(segment_seconds * sample_rate / 2) if np.isfinite(segment_seconds) else 0
     if length < 8:

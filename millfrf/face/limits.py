@@ -47,7 +47,7 @@ def lobes(
     max_depth
         Largest depth that is looked at, m; None: one diameter of the cutter.
     method
-        ``certified`` or a solver by its name, one of :data:`millfrf.chain.LOBE_METHODS`.
+        ``certified`` or a solver by its name, one of ``LOBE_METHODS``.
     progress
         Shows progress, such as ``millfrf.progress.bar``.
 

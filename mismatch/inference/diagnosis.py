@@ -181,7 +181,7 @@ class Diagnosis(Result, Generic[Details]):
 
     @property
     def leftover(self) -> float:
-        """Share of the final residual that is no noise: :attr:`Remainder.share` of ``after``."""
+        """Share of the final residual that is no noise: ``Remainder.share`` of ``after``."""
         return self.after.share
 
     def plot(self, axes: "Axes | None" = None) -> "Axes":

@@ -66,7 +66,7 @@ def located(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> dict[str,
 
 
 def significant_cells(content: Mapping[str, Any], shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """Return a mask (n_recordings, n_bands, n_responses) of the cells that :func:`located` named."""
+    """Return a mask (n_recordings, n_bands, n_responses) of the cells that ``located`` named."""
     mask = np.zeros(shape, dtype=bool)
     for cell in content["cells"]:
         mask[tuple(cell)] = True

@@ -22,7 +22,7 @@ LEAST_LINES = 12
 
 @dataclass(frozen=True)
 class ResidualMap:
-    """Mean of |residual|² over noise variance in cells; 1 where only noise is left.
+    """Mean of ``|residual|^2`` over noise variance in cells; 1 where only noise is left.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ class Fit:
     misfit
         Misfit ``2 sum ln det V + r^H V^-1 r``, summed over lines and recordings.
     deviation
-        Square |u|^2 of the deviation from the nominal model in lab errors, as far as it is believed.
+        Square ``|u|^2`` of the deviation from the nominal model in lab errors, as far as it is believed.
     score
         ``misfit + deviation + n_cause_numbers ln N``: Bayes' information criterion with the lab's belief as prior.
     covariance : (size, size)

@@ -21,7 +21,7 @@ class ModelShape:
     """Parameters u of a modal model, all zero at the nominal one, in units of :class:`LabError`.
 
     Order, mode by mode: ln frequency, ln damping ratio, Re right, Im right, Re left, Im left. Behind them, where the
-    nominal model states its band, what modes outside it leave inside (:class:`OutsideBand`).
+    nominal model states its band, what modes outside it leave inside (``OutsideBand``).
 
     Parameters
     ----------

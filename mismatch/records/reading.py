@@ -20,7 +20,7 @@ KEPT = 6.0
 
 
 def band_of(model: ModalModel, rate: float) -> tuple[float, float]:
-    """Return the band (Hz) in which a model and a recording are compared: both edges of :func:`compared_band`.
+    """Return the band (Hz) in which a model and a recording are compared: both edges of ``compared_band``.
 
     Parameters
     ----------

@@ -98,12 +98,12 @@ class ModalModel(Result):
 
     @property
     def natural_frequencies(self) -> NDArray[np.float64]:
-        """Undamped natural frequencies |pole| / 2 pi, Hz, shape (n_modes,)."""
+        """Undamped natural frequencies ``|pole| / 2 pi``, Hz, shape (n_modes,)."""
         return np.abs(self.poles) / (2 * np.pi)
 
     @property
     def damping_ratios(self) -> NDArray[np.float64]:
-        """zeta = -Re(pole) / |pole|, shape (n_modes,)."""
+        """``zeta = -Re(pole) / |pole|``, shape (n_modes,)."""
         return -self.poles.real / np.abs(self.poles)
 
     def receptance(self, frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -145,7 +145,7 @@ class ModalModel(Result):
     def standard_errors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
         """Standard errors of natural frequencies (Hz) and damping ratios, each (n_modes,); None where none is known.
 
-        Its :class:`ModeErrors` are taken where the model has them, else its covariance, which holds the noise alone:
+        Its ``ModeErrors`` are taken where the model has them, else its covariance, which holds the noise alone:
         ``f = |p| / 2 pi`` and ``zeta = -Re p / |p|`` are linearised at each pole ``p``.
         """
         if self.errors is not None:

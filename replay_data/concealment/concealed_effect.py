@@ -23,7 +23,7 @@ class ConcealedEffect:
     Parameters
     ----------
     name
-        One of :data:`EFFECTS`.
+        One of ``EFFECTS``.
     direction
         Unit vector at the tip along which a joint's effect acts; None for other effects.
     parameters
@@ -96,7 +96,7 @@ def draw_effect(name: str, generator: np.random.Generator, scale: JointScale) ->
 
 
 def draw_name(generator: np.random.Generator) -> str:
-    """Draw the effect itself: all of :data:`EFFECTS` are equally likely."""
+    """Draw the effect itself: all of ``EFFECTS`` are equally likely."""
     return str(generator.choice(list(EFFECTS)))
 
 

@@ -49,7 +49,7 @@ def read_deflections(path: str | os.PathLike[str], mechanism: Mechanism) -> tupl
     Parameters
     ----------
     path
-        CSV with the columns of :func:`deflection_columns` and, where they are known, ``mx_nm my_nm mz_nm``,
+        CSV with the columns of ``deflection_columns`` and, where they are known, ``mx_nm my_nm mz_nm``,
         ``target_x_m ...`` and ``pull_x_m ...``. Lines that begin with ``#`` are passed over.
     mechanism
         Mechanism of the robot that was measured.

@@ -41,7 +41,7 @@ class ElasticParameter(Protocol):
 
 @dataclass(frozen=True)
 class JointStiffness:
-    """Stiffness of one joint in one of :data:`GROUPS`, N/m or N m/rad; ``joint`` is its place in ``robot.joints``."""
+    """Stiffness of one joint in one of ``GROUPS``, N/m or N m/rad; ``joint`` is its place in ``robot.joints``."""
 
     joint: int
     group: str

@@ -86,7 +86,7 @@ class SpatialRobot:
     Raises
     ------
     InputError
-        Parts that do not fit together: see :func:`robot_model.spatial.robot_check.check_robot`.
+        Parts that do not fit together: see ``check_robot``.
     """
 
     mechanism: Mechanism

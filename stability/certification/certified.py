@@ -24,7 +24,7 @@ def certified_lobes(
 
     For a modal model, collocation gives the limits. Floquet multipliers verify each limit just below it (0.05 %), just
     above it, and on a ladder of depths beneath it; where there is no limit, up to ``max_depth``. Where they disagree
-    the limit is looked for again (:func:`second_look`). A limit that cannot be settled is a lower bound or unresolved,
+    the limit is looked for again (``second_look``). A limit that cannot be settled is a lower bound or unresolved,
     never infinite. With a helix, unequal pitch or process damping the multipliers find the limit, on a ladder in steps
     of 15 %. For an FRF, the multi-frequency solution gives limits with a stated error, ``not-verified``.
 

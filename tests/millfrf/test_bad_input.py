@@ -1,5 +1,6 @@
 """Bad input: one clear line on standard error, exit code 2, and no file left behind."""
 
+import importlib.metadata
 import json
 import shutil
 from collections.abc import Callable
@@ -235,3 +236,8 @@ def test_a_run_that_fails_on_good_input_has_exit_code_1(bench: Path, capsys: pyt
     assert run(["fit", *arguments]) == FAILED
     assert "no pole is stable" in capsys.readouterr().err
     assert not (bench / "out.json").exists()
+
+
+def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--version"]) == 0
+    assert capsys.readouterr().out == f"millfrf {importlib.metadata.version('millfrf')}\n"
