@@ -16,7 +16,7 @@ MOMENTS = ("mx_nm", "my_nm", "mz_nm")
 
 
 def read_tool_path(path: str | os.PathLike[str]) -> ToolPath:
-    """Read a path with the columns ``x_m ... fz_n`` and, optionally, ``mx_nm my_nm mz_nm``.
+    """Read a path: columns ``x_m`` to ``fz_n`` and, where there are moments, ``mx_nm my_nm mz_nm``.
 
     Lines that begin with ``#`` are passed over.
 
