@@ -92,7 +92,8 @@ def _parameter(name: str, hint: Any, given: Any) -> Parameter:
     default = None if given is inspect.Parameter.empty else _default(given)
     if isinstance(info, ArgumentInfo):
         return Parameter(info.metavar or name.upper(), "", default, info.help or "", True)
-    typed = ", ".join(info.param_decls or (f"--{name.replace('_', '-')}",))
+    declared = [one for one in (info.default, *(info.param_decls or ())) if isinstance(one, str) and one[:1] == "-"]
+    typed = ", ".join(declared or [f"--{name.replace('_', '-')}"])
     return Parameter(typed, "" if flag else info.metavar or _words(kind), default, info.help or "", False)
 
 
