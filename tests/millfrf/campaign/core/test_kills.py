@@ -1,0 +1,91 @@
+"""A worker or a whole run is killed by the system, without a word: what is resumed gives the same bytes."""
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import psutil
+import pytest
+
+PROGRAM = [sys.executable, "-m", "millfrf"]
+
+
+def contents(out: Path) -> dict[str, str]:
+    """Hash of every file of results and summary."""
+    files = [path for part in ("results", "summary") for path in (out / part).rglob("*") if path.is_file()]
+    return {path.relative_to(out).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def started(campaign: Path, out: Path, *words: str) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [*PROGRAM, "campaign", str(campaign), "--out", str(out), *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[4])},
+    )
+
+
+def wait_for_results(out: Path, number: int, run: subprocess.Popen[str]) -> None:
+    end = time.monotonic() + 120
+    while len(list(out.glob("results/*/*/*/outcome.json"))) < number:
+        assert run.poll() is None, run.communicate()
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def workers_of(run: subprocess.Popen[str]) -> list[psutil.Process]:
+    """Processes below the run that compute: those whose command line is that of a spawned process."""
+    below = psutil.Process(run.pid).children(recursive=True)
+    return [one for one in below if "spawn_main" in " ".join(one.cmdline())]
+
+
+@pytest.fixture(scope="module")
+def undisturbed(maker: Callable[[Path], Path], tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    folder = tmp_path_factory.mktemp("undisturbed")
+    run = started(maker(folder / "campaign"), folder / "out", "--workers", "0")
+    assert run.wait(timeout=120) == 0, run.communicate()
+    return contents(folder / "out")
+
+
+def test_a_run_that_was_killed_is_resumed_with_the_same_bytes(
+    maker: Callable[[Path], Path], undisturbed: dict[str, str], tmp_path: Path
+) -> None:
+    campaign, out = maker(tmp_path / "elsewhere"), tmp_path / "results of it"
+    killed = started(campaign, out, "--workers", "0")
+    wait_for_results(out, 12, killed)
+    killed.send_signal(signal.SIGKILL)
+    killed.wait()
+    there = len(list(out.glob("results/*/*/*/outcome.json")))
+    resumed = started(campaign, out, "--workers", "0")
+    said, fault = resumed.communicate(timeout=120)
+    assert resumed.returncode == 0, fault
+    assert f"{len([one for one in undisturbed if one.endswith('outcome.json')]) - there} tasks run now" in said
+    assert contents(out) == undisturbed
+
+
+@pytest.mark.slow
+def test_workers_and_then_the_run_are_killed(
+    maker: Callable[[Path], Path], undisturbed: dict[str, str], tmp_path: Path
+) -> None:
+    campaign, out = maker(tmp_path / "campaign"), tmp_path / "out"
+    run = started(campaign, out, "--workers", "2")
+    wait_for_results(out, 6, run)
+    workers_of(run)[0].send_signal(signal.SIGKILL)
+    wait_for_results(out, 15, run)
+    below = psutil.Process(run.pid).children(recursive=True)
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    gone, alive = psutil.wait_procs(below, timeout=20)
+    assert not alive, alive
+    del gone
+    resumed = started(campaign, out, "--workers", "2")
+    said, fault = resumed.communicate(timeout=300)
+    assert resumed.returncode == 0, fault
+    assert "0 left for the next run" in said
+    assert contents(out) == undisturbed
