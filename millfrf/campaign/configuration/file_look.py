@@ -115,7 +115,7 @@ def _look(path: Path, now: os.stat_result) -> FileLook:
             streams = tuple((name, one.n_samples, one.sample_rate) for name, one in recording.streams.items())
             return replace(known, setup=recording.setup, recorded_at=recording.recorded_at, streams=streams)
     except InputError as error:
-        return replace(known, fault=str(error))
+        return replace(known, fault=str(error).replace(f"{path.parent}{os.sep}", ""))
 
 
 def read_kept(folder: Path) -> dict[str, FileLook]:

@@ -63,7 +63,7 @@ def plan_campaign(
     planner = _Planner(file, base, robot, pose_of)
     _check_asked(planner)
     sets, lacking = grouped(recordings, file.sets.by)
-    left_out = [_lacking(one, file.sets.by) for one in lacking]
+    left_out = [_lacking(one, file.sets.by) for one in lacking if not one.fault]  # of faults the check tells
     asked = _checked_as(file)
     tasks = [check_task(one, asked) for one in lacking]
     last: dict[str, dict[str, str]] = {}
@@ -99,7 +99,7 @@ def _check_asked(planner: _Planner) -> None:
 
 def _lacking(one: FoundRecording, by: Sequence[str]) -> str:
     missing = [label for label in by if label not in one.labels.values]
-    return f"{one.path.name} belongs to no set: {one.fault or f'it has no label {missing[0]}'}"
+    return f"{one.path.name} belongs to no set: it has no label {missing[0]}"
 
 
 def _checked_as(file: CampaignFile) -> dict[str, Any]:
@@ -228,7 +228,9 @@ def _learning(
         return
     posed = [one for one in sets if planner.pose_of(one) is not None]
     left_out += [
-        f"set {one.name} is left out of the posture model: its posture is not known" for one in sets if one not in posed
+        f"set {one.name} is left out of the posture model: its posture is not known, or stated in two ways"
+        for one in sets
+        if one not in posed
     ]
     settings = {
         "feed_deg": table.feed_deg,

@@ -3,7 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 from estimation import count_segments, settings_for
@@ -100,8 +99,4 @@ def _sums(name: str, tests: Sequence[str], settings: dict[str, Any]) -> Iterator
 
 def check_task(recording: FoundRecording, asked: dict[str, Any]) -> Task:
     """The task that judges one recording by itself."""
-    return Task("check", recording.name, (str(recording.path),), (), {**asked, "fault": _without_folder(recording)})
-
-
-def _without_folder(recording: FoundRecording) -> str:
-    return recording.fault.replace(f"{Path(recording.path).parent}/", "")
+    return Task("check", recording.name, (str(recording.path),), (), {**asked, "fault": recording.fault})

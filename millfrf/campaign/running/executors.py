@@ -1,9 +1,10 @@
 """Where tasks run: `Executor` is what running asks for; here is that of this process, without Dask."""
 
 from collections import deque
+from dataclasses import replace
 from typing import Protocol
 
-from .one_task import Ended, Order, run_task
+from .one_task import FAILED, FOREIGN, Ended, Order, run_task
 
 
 class Executor(Protocol):
@@ -37,7 +38,10 @@ class InThisProcess:
     def next_ended(self, seconds: float) -> Ended | None:
         """Do the next task."""
         del seconds
-        return run_task(self._waiting.popleft()) if self._waiting else None
+        if not self._waiting:
+            return None
+        ended = run_task(self._waiting.popleft())
+        return replace(ended, status=FAILED) if ended.status == FOREIGN else ended
 
     def close(self) -> None:
         """Give up what has not begun."""

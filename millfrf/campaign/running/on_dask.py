@@ -3,44 +3,60 @@
 import logging
 import queue
 import tempfile
+import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from foundation import InputError, MillfrfError
 
-from .one_task import FAILED, Ended, Order, run_task
+from .one_task import FAILED, FOREIGN, Ended, Order, run_task
 from .worker_checks import check_workers
 
 CONNECT_SECONDS = 15.0
 """How long a scheduler, and then its first worker, is waited for."""
+
+ASK_SECONDS = 2.0
+"""Time between two questions for the number of workers."""
 
 SETTINGS = {"distributed.scheduler.allowed-failures": 3}
 """Dask's settings: a task whose worker has died four times is given up."""
 
 
 class OnDask:
-    """Submits orders to a Dask client; results and arrays stay in files, only :class:`Ended` comes back."""
+    """Submits orders to a Dask client; results and arrays stay in files, only :class:`Ended` comes back.
+
+    A worker that joined late with another version of the program gets no more work; what it was given goes elsewhere.
+    """
 
     def __init__(self, client: Any) -> None:
         self._client = client
         self._ended: queue.Queue[Any] = queue.Queue()
-        self._running: dict[Any, str] = {}
+        self._running: dict[Any, Order] = {}
         self._number = 0
+        self._workers: list[str] = []
+        self._asked = -ASK_SECONDS
+        self._foreign: set[str] = set()
 
     @property
     def n_workers(self) -> int:
-        """Number of workers that are there now."""
-        return max(1, len(self._client.scheduler_info(n_workers=-1)["workers"]))
+        """Number of workers that are there now, asked for now and then."""
+        now = time.monotonic()
+        if now - self._asked > ASK_SECONDS:
+            self._asked = now
+            self._workers = [one for one in self._client.nthreads() if one not in self._foreign]
+        return max(1, len(self._workers))
 
     def submit(self, order: Order) -> None:
         """Take an order."""
         self._number += 1
-        kind = order.identity.partition(":")[0]
-        future = self._client.submit(run_task, order, key=f"{kind}-{order.key[:16]}-{self._number}", pure=False)
-        self._running[future] = order.identity
+        name = f"{order.identity.partition(':')[0]}-{order.key[:16]}-{self._number}"
+        chosen = self._workers if self._foreign else None
+        future = self._client.submit(run_on_worker, order, key=name, pure=False, workers=chosen)
+        self._running[future] = order
         future.add_done_callback(self._ended.put)
 
     def next_ended(self, seconds: float) -> Ended | None:
@@ -57,20 +73,36 @@ class OnDask:
             if self._client.status not in ("running", "connecting"):
                 raise MillfrfError(GONE) from None
             return None
-        identity = self._running.pop(future)
+        order = self._running.pop(future)
         if future.status == "finished":
-            found: Ended = future.result()
-            return found
+            ended, worker = future.result()
+            return self._elsewhere(order, ended, worker) if ended.status == FOREIGN else ended
         if future.status == "error":
             error = future.exception()
             died = type(error).__name__ == "KilledWorker"
             reason = "its worker died four times while it ran" if died else f"{type(error).__name__}: {error}"
-            return Ended(identity, FAILED, " ".join(reason.split())[:300], 0.0)
+            return Ended(order.identity, FAILED, " ".join(reason.split())[:300], 0.0)
         raise MillfrfError(GONE)
+
+    def _elsewhere(self, order: Order, ended: Ended, worker: str) -> Ended | None:
+        """Give an order of a worker of another version to the others; it has failed where there are none."""
+        self._foreign.add(worker)
+        self._asked = -ASK_SECONDS
+        if self.n_workers and self._workers:
+            self.submit(order)
+            return None
+        return replace(ended, status=FAILED)
 
     def close(self) -> None:
         """Give up what has not begun."""
         self._client.cancel(list(self._running), force=True)
+
+
+def run_on_worker(order: Order) -> tuple[Ended, str]:
+    """Run a task in a worker; how it ended, and the worker's address."""
+    from distributed import get_worker
+
+    return run_task(order), get_worker().address
 
 
 GONE = "the scheduler is gone; results so far are kept: start it, and run the same command again"

@@ -22,7 +22,7 @@ from ..jobs import JOB_OF, Outcome, Work
 from .same_program import program_digest
 from .store import read_outcome, store_outcome
 
-DONE, REFUSED, FAILED, FULL = "done", "refused", "failed", "disk full"
+DONE, REFUSED, FAILED, FULL, FOREIGN = "done", "refused", "failed", "disk full", "foreign"
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,8 @@ class Ended:
     identity
         Kind and name of the task.
     status
-        ``done``, ``refused`` (stored), ``failed`` or ``disk full`` (not stored, tried again by the next run).
+        ``done``, ``refused`` (stored), ``failed`` or ``disk full`` (not stored, tried again by the next run), or
+        ``foreign`` (the worker has another version: to be done elsewhere).
     reason
         One line where it was not done.
     seconds : s
@@ -95,7 +96,7 @@ def run_task(order: Order) -> Ended:
 
 def _done(order: Order, said: io.StringIO) -> tuple[str, str, tuple[str, ...]]:
     if program_digest() != order.program:
-        return FAILED, f"the worker on {platform.node()} has another version of millfrf or of its libraries", ()
+        return FOREIGN, f"the worker on {platform.node()} has another version of millfrf or of its libraries", ()
     out = Path(order.out)
     found = read_outcome(out, order.identity, order.key)
     if found is None:

@@ -2,6 +2,7 @@
 
 import sys
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,41 +19,49 @@ class ProgressLines:
 
     Parameters
     ----------
-    total
-        Number of tasks that are left.
-    seconds : s
-        Time that all of them take together, on one worker.
+    expected : s
+        Time that each task is believed to take, by its identity.
     """
 
-    total: int
-    seconds: float
+    expected: Mapping[str, float]
     done: int = 0
     refused: int = 0
     failed: int = 0
-    _spent: float = 0.0
-    _worked: float = 0.0
+    _left: dict[str, float] = field(default_factory=dict)
+    _believed: dict[str, float] = field(default_factory=dict)
+    _taken: dict[str, float] = field(default_factory=dict)
     _started: float = field(default_factory=time.monotonic)
     _told: float = field(default_factory=time.monotonic)
     _bar: Any = None
 
-    def ended(self, ended: Ended, expected: float) -> None:
-        """Count one task; ``expected`` (s) is the time that it was believed to take."""
+    def __post_init__(self) -> None:
+        for identity, seconds in self.expected.items():
+            _add(self._left, identity, seconds)
+
+    def ended(self, ended: Ended) -> None:
+        """Count one task."""
         self.done += 1
         self.refused += ended.status == REFUSED
         self.failed += ended.status not in (DONE, REFUSED)
-        self._spent += expected
-        self._worked += ended.seconds
+        _add(self._left, ended.identity, -self.expected[ended.identity])
+        if ended.status == DONE:
+            _add(self._believed, ended.identity, self.expected[ended.identity])
+            _add(self._taken, ended.identity, ended.seconds)
 
     def line(self, workers: int) -> str:
         """Where the run stands, in one line."""
         elapsed = max(time.monotonic() - self._started, 1e-3)
-        text = f"{self.done} of {self.total} tasks, {self.done / elapsed:.2g}/s, {self.refused} refused"
+        text = f"{self.done} of {len(self.expected)} tasks, {self.done / elapsed:.2g}/s, {self.refused} refused"
         if self.failed:
             text += f", {self.failed} failed"
-        if self.done and self.done < self.total:
-            pace = self._worked / self._spent if self._spent > 0 else 1.0
-            text += f", about {shown_time(pace * max(self.seconds - self._spent, 0.0) / workers)} left"
+        if 0 < self.done < len(self.expected):
+            text += f", about {shown_time(self._seconds_left() / workers)} left"
         return text
+
+    def _seconds_left(self) -> float:
+        """Time of what is left on one worker: kinds that were met at their own pace, others as they were believed."""
+        paces = {kind: self._taken[kind] / one for kind, one in self._believed.items() if one > 0}
+        return sum(max(left, 0.0) * paces.get(kind, 1.0) for kind, left in self._left.items())
 
     def show(self, workers: int) -> None:
         """Show where the run stands, if it is time to."""
@@ -70,7 +79,7 @@ class ProgressLines:
         if self._bar is None:
             self._bar = progress_bar()
             self._bar.start()
-            self._bar.add_task("campaign", total=self.total)
+            self._bar.add_task("campaign", total=len(self.expected))
         self._bar.update(0, completed=self.done, description=self.line(workers))
 
     def stop(self) -> None:
@@ -78,6 +87,11 @@ class ProgressLines:
         if self._bar is not None:
             self._bar.stop()
             self._bar = None
+
+
+def _add(sums: dict[str, float], identity: str, seconds: float) -> None:
+    kind = identity.partition(":")[0]
+    sums[kind] = sums.get(kind, 0.0) + seconds
 
 
 def shown_time(seconds: float) -> str:

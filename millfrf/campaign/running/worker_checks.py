@@ -58,10 +58,16 @@ def check_workers(client: Any, out: Path, probe: Path, address: str | None) -> N
         answers = client.run(seen_by_worker, str(out), mark.name, str(probe), size, on_error="return")
     finally:
         mark.unlink()
+    threads = client.nthreads()
+    answers = {worker: _with_threads(answer, threads.get(worker, 1)) for worker, answer in answers.items()}
     faults = [fault for worker, answer in sorted(answers.items()) if (fault := _fault(answer, worker, out, probe))]
     if faults:
         more = f" (and {len(faults) - 1} more workers)" if len(faults) > 1 else ""
         raise InputError(f"{faults[0]}{more}")
+
+
+def _with_threads(answer: Any, threads: int) -> Any:
+    return {**answer, "threads": threads} if isinstance(answer, dict) else answer
 
 
 def _fault(answer: Any, worker: str, out: Path, probe: Path) -> str:
@@ -74,6 +80,8 @@ def _fault(answer: Any, worker: str, out: Path, probe: Path) -> str:
             "same version there"
         )
     named = f"worker {worker} on {answer['host']}"
+    if answer["threads"] != 1:
+        return f"{named} has {answer['threads']} threads; start it with --nthreads 1, and more workers instead"
     ours = {"python": platform.python_version(), "distributed": distributed.__version__}
     for name, version in ours.items():
         if answer[name] != version:

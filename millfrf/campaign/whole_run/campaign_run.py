@@ -187,12 +187,12 @@ def _run(opened: OpenedCampaign, state: State, executor: Executor) -> None:
     tasks = opened.plan.tasks
     left, rates = left_to_run(tasks, state.settled), measured_rates(opened.out)
     expected = {one: rates.seconds(tasks[one], opened.megabytes(tasks[one])) for one in left}
-    lines = ProgressLines(len(left), sum(expected.values()))
+    lines = ProgressLines(expected)
 
     def told(ended: Ended | None) -> None:
         if ended is not None:
             note_time(opened.out, ended, opened.megabytes(tasks[ended.identity]))
-            lines.ended(ended, expected[ended.identity])
+            lines.ended(ended)
         lines.show(executor.n_workers)
 
     try:
