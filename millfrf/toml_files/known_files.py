@@ -38,6 +38,7 @@ def toml_files() -> tuple[TomlFile, ...]:
     from modal_fit import PolesFile
     from robot_model import PlanarFile, SerialFile, SpatialFile
 
+    from ..campaign import CampaignFile
     from ..chain import PlanTable
     from ..taps import PointsTable
 
@@ -56,4 +57,5 @@ def toml_files() -> tuple[TomlFile, ...]:
         TomlFile("robot-serial", "a robot joint by joint, as `new robot` writes it", SerialFile, "", robots),
         TomlFile("robot-spatial", "a robot with closed loops, beams and own nodes", SpatialFile, "", robots),
         TomlFile("robot-planar", "a robot that moves in a plane", PlanarFile, "", robots),
+        TomlFile("campaign", "many recordings, and the jobs that are done with them", CampaignFile, "", ("campaign",)),
     )

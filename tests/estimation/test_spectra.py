@@ -1,5 +1,6 @@
 """Spectra and FRFs against scipy, analytic filters and invariants."""
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,13 @@ from estimation import (
     SpectralAccumulator,
     SpectralSettings,
     correct_high_pass,
+    count_segments,
     cross_spectra,
     h1,
     h1_side_by_side,
     input_coherence,
     input_independence,
+    join_parts,
     multiple_coherence,
     read_frf,
     settings_for,
@@ -245,3 +248,30 @@ def test_tests_that_differ_are_not_stacked() -> None:
     other.add(force, motion)
     with pytest.raises(InputError, match="1000 Hz, test 1 at 500 Hz"):
         sum_tests([one, other.result()])
+
+
+@pytest.mark.parametrize("overlap", [0.0, 0.5, 0.75])
+def test_parts_of_a_recording_add_up_to_the_whole(tmp_path: Path, overlap: float) -> None:
+    """The spectra of consecutive segments, joined, are those of all segments to rounding."""
+    channels = (
+        Channel("fx", "force", "N", "TCP", "+X"),
+        Channel("ax", "acceleration", "m/s^2", "TCP", "+X", input_delay_s=1e-3),
+    )
+    path = tmp_path / "long.h5"
+    with RecordingWriter(path, [StreamDescription("main", 500.0, 0.0, channels)], block_length=1000) as writer:
+        writer.append("main", np.random.default_rng(7).standard_normal((50_000, 2)))
+    settings = SpectralSettings(400, overlap, "hann")
+    with Recording(path) as recording:
+        whole = cross_spectra(recording, settings)
+        count = count_segments(50_000, settings)
+        edges = [0, 1, 37, 90, count]
+        parts = [cross_spectra(recording, settings, segments=part) for part in pairwise(edges)]
+        with pytest.raises(InputError, match=f"segments 3 to {count + 1} are asked for, it has {count}"):
+            cross_spectra(recording, settings, segments=(3, count + 1))
+    joined = join_parts(parts)
+    assert joined.n_segments == whole.n_segments == count
+    assert joined.n_tests == 1
+    assert joined.effective_averages == whole.effective_averages
+    for name in ("input_spectra", "cross_spectra", "output_spectra"):
+        theirs, ours = getattr(whole, name), getattr(joined, name)
+        assert np.abs(ours - theirs).max() < 1e-14 * np.abs(theirs).max()

@@ -1,4 +1,4 @@
-"""The tables of CAMPAIGN.toml, checked by pydantic: a table that is absent is a job that is not done."""
+"""The tables of CAMPAIGN.toml, checked by pydantic; `millfrf new schemas` and the reference read their docstrings."""
 
 from typing import Annotated, Literal
 
@@ -26,14 +26,35 @@ class _Banded(_Table):
 
 
 class CampaignTable(_Table):
-    """What the campaign is called, and the robot that it measures."""
+    """What the campaign is called, and the robot that it measures.
+
+    Parameters
+    ----------
+    title
+        Title of the report.
+    robot
+        Name of a robot that ships, or a robot file from the folder of this file; for postures, ``learn`` and
+        ``robot_diagnose``.
+    """
 
     title: str = "Campaign"
     robot: Text | None = None
 
 
 class RecordingsTable(_Table):
-    """Recordings by name, and where their labels come from."""
+    """Recordings by name, and where their labels come from.
+
+    Parameters
+    ----------
+    files
+        Names of recordings from the folder of this file, with wildcards such as ``recordings/*.h5``.
+    pattern
+        Regular expression for names without suffix; each named group such as ``(?P<pose>P\\d+)`` is a label.
+    table
+        CSV table with the column ``file``; each other column is a label.
+    setup
+        Labels from a recording's setup text: the dotted key there by the label, ``pose = "robot.pose"``.
+    """
 
     files: list[Text] = Field(default_factory=list)
     pattern: Text | None = None
@@ -48,13 +69,45 @@ class RecordingsTable(_Table):
 
 
 class SetsTable(_Table):
-    """Labels by which recordings belong together; none: each recording is a set of its own."""
+    """Labels by which recordings belong together; none: each recording is a set of its own.
+
+    Parameters
+    ----------
+    by
+        Labels that recordings of one set share: they are stacked to one FRF and one fit.
+    """
 
     by: list[Text] = Field(default_factory=list)
 
 
 class EstimateTable(_Banded):
-    """Options of ``millfrf estimate``; and how long the parts are into which a long recording is split."""
+    """Options of ``millfrf estimate``; and how long the parts are into which a long recording is split.
+
+    Parameters
+    ----------
+    segment_s : s
+        Duration of a segment; ``segment`` is the same.
+    overlap
+        Share of a segment that the next one shares, 0 to below 1.
+    window
+        Window of the segments: ``hann``, ``hamming`` or ``boxcar``.
+    stack
+        Way of stacking recordings: ``sum`` or ``side-by-side``.
+    excitation, response
+        Names of channels; empty: forces and voltages excite, motions respond.
+    band_hz : Hz
+        Lowest and highest frequency to keep; without it all lines, which take much room. ``band`` is the same.
+    stream
+        Sample clock; needed where a recording has several.
+    estimator
+        Estimator: ``h1``, ``h2``, ``hv``, ``instrumental-variable`` or ``local-polynomial``.
+    exclude
+        Whether segments with overload, clipping or dropped samples are left out; recordings then stay whole.
+    instrument
+        Channels that drive the forces, for ``instrumental-variable``.
+    part_s : s
+        A recording that is longer is split into parts of about this duration, each a task of its own.
+    """
 
     segment_s: Positive = Field(8.0, validation_alias=AliasChoices("segment_s", "segment"))
     overlap: Annotated[float, Field(ge=0, lt=1)] = 0.5
@@ -71,7 +124,23 @@ class EstimateTable(_Banded):
 
 
 class FitTable(_Banded):
-    """Options of ``millfrf fit``."""
+    """Options of ``millfrf fit``.
+
+    Parameters
+    ----------
+    band_hz : Hz
+        Lowest and highest frequency of the fit; ``band`` is the same.
+    method
+        Method: ``polyreference`` of FRFs or ``subspace`` of recordings; without it by whether there is ``[estimate]``.
+    max_order
+        Highest model order; without it by the data, or the method's own.
+    modes
+        Number of modes to keep; without it as many as are found.
+    excitation, response
+        Names of channels of recordings; empty: chosen by quantity.
+    stream
+        Sample clock; needed where a recording has several.
+    """
 
     band_hz: FrequencyBand = Field(validation_alias=AliasChoices("band_hz", "band"))
     method: Literal["polyreference", "subspace"] | None = None
@@ -83,14 +152,34 @@ class FitTable(_Banded):
 
 
 class CalibrateTable(_Table):
-    """Hammer FRFs by which a model is carried to the tool tip; names of files may hold labels in braces."""
+    """Hammer FRFs by which a model is carried to the tool tip; names of files may hold labels in braces.
+
+    Parameters
+    ----------
+    tip
+        FRF file: tapped at the tip, motion there; such as ``taps/{pose}_tip.h5``.
+    sensor
+        FRF file: tapped at the tip, motion at the sensor.
+    """
 
     tip: Text
     sensor: Text
 
 
 class LobesTable(_Table):
-    """Options of ``millfrf lobes``."""
+    """Options of ``millfrf lobes``.
+
+    Parameters
+    ----------
+    cutting
+        Cutting file; its name may hold labels in braces.
+    speeds_rpm : rpm
+        Lowest spindle speed, highest, and their number.
+    max_depth_m : m
+        Largest depth that is looked at.
+    method
+        Solver by its name, or ``certified``.
+    """
 
     cutting: Text
     speeds_rpm: tuple[Positive, Positive, Annotated[int, Field(ge=1)]]
@@ -99,7 +188,23 @@ class LobesTable(_Table):
 
 
 class DiagnoseTable(_Banded):
-    """Options of ``millfrf diagnose``; ``by``: labels of the recordings that are diagnosed together."""
+    """Options of ``millfrf diagnose``.
+
+    Parameters
+    ----------
+    model
+        Nominal model; its name may hold labels in braces, such as ``idle/{pose}.json``.
+    by
+        Labels of recordings that are diagnosed together; without it those of the sets; empty: all together.
+    band_hz : Hz
+        Band that is compared; without it that of the model. ``band`` is the same.
+    lab_error
+        What a lab's own fit is off, as shares: frequency, damping, shapes.
+    cutting
+        Cutting file whose lobes the report shows; its name may hold labels in braces.
+    stream
+        Sample clock; needed where a recording has several.
+    """
 
     model: Text
     by: list[Text] | None = None
@@ -110,7 +215,27 @@ class DiagnoseTable(_Banded):
 
 
 class RobotDiagnoseTable(_Banded):
-    """Options of ``millfrf robot diagnose``; ``by``: labels of the recordings that are diagnosed together."""
+    """Options of ``millfrf robot diagnose``.
+
+    Parameters
+    ----------
+    by
+        Labels of recordings that are diagnosed together; empty: all together.
+    feed_deg : deg
+        Direction of the channels' X axes from the base's x, Z up; without it the base's axes.
+    band_hz : Hz
+        Band that is compared; without it about the first modes. ``band`` is the same.
+    sensor_m : m
+        Place of the housing sensor from the tip, in the channels' axes.
+    payload_at_m : m
+        Place of a payload from the tip, in the tool's frame; without it any place.
+    rigid_links
+        Whether the model with rigid links is questioned.
+    model_error
+        What a right model is still off, as shares: frequency, damping, shapes.
+    stream
+        Sample clock; needed where a recording has several.
+    """
 
     by: list[Text] = Field(default_factory=list)
     feed_deg: Finite | None = None
@@ -123,7 +248,13 @@ class RobotDiagnoseTable(_Banded):
 
 
 class LearnTable(_Table):
-    """Options of ``millfrf robot learn``."""
+    """Options of ``millfrf robot learn``.
+
+    Parameters
+    ----------
+    feed_deg : deg
+        Direction of the models' X axes from the base's x; without it the base's axes.
+    """
 
     feed_deg: Finite | None = None
 
@@ -133,7 +264,23 @@ class ReportTable(_Table):
 
 
 class CampaignFile(_Table):
-    """The whole file."""
+    """The whole file; a job whose table is absent is not done.
+
+    Parameters
+    ----------
+    campaign
+        Title and robot of the campaign.
+    recordings
+        Recordings and their labels; several tables for several kinds of names.
+    sets
+        Labels that recordings of one set share.
+    estimate, fit, calibrate, lobes
+        Jobs that are done with each set, each with the result of the one before.
+    diagnose, robot_diagnose
+        Jobs that are done with recordings that belong together.
+    learn, report
+        Jobs that are done once, with the results of all sets.
+    """
 
     campaign: CampaignTable = CampaignTable()
     recordings: Annotated[list[RecordingsTable], Field(min_length=1)]

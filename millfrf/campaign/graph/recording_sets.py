@@ -113,8 +113,6 @@ def _set_of(name: str, members: Sequence[FoundRecording]) -> RecordingSet:
 
 
 def _one_posture(stated: Sequence[tuple[float, ...] | None]) -> tuple[float, ...] | None:
-    """The first of postures that agree; None where one is missing or another."""
-    first = stated[0]
-    if first is None or not all(one is not None and agree(first, one) for one in stated):
-        return None
-    return first
+    """The first of the postures that are stated, if they agree; else None."""
+    known = [one for one in stated if one is not None]
+    return known[0] if known and all(agree(known[0], one) for one in known) else None

@@ -1,5 +1,9 @@
 """A campaign in one process: its numbers are those of the commands, and a second run computes what changed, no more."""
 
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +12,7 @@ import pytest
 from estimation import read_frf
 from millfrf.__main__ import run
 from millfrf.campaign import RunOptions, RunSummary, run_campaign
+from millfrf.campaign.jobs import JOB_OF, Work
 
 
 def serial(campaign: Path, **options: bool) -> RunSummary:
@@ -22,8 +27,31 @@ def result(found: RunSummary, identity: str) -> Path:
     return folder_of(found.opened.out, identity.partition(":")[0], key)
 
 
+@pytest.fixture(scope="module")
+def first(maker: Callable[[Path], Path], tmp_path_factory: pytest.TempPathFactory) -> RunSummary:
+    """The first run, which computes everything."""
+    return serial(maker(tmp_path_factory.mktemp("first") / "campaign"))
+
+
+@pytest.fixture
+def campaign(first: RunSummary, tmp_path: Path) -> Path:
+    """A copy of the campaign with all its results."""
+    shutil.copytree(first.opened.base, tmp_path / "copy")
+    return tmp_path / "copy" / "campaign.toml"
+
+
+@pytest.fixture
+def fresh(first: RunSummary, tmp_path: Path) -> Path:
+    """A copy of the campaign with checks, estimates and fits alone."""
+    shutil.copytree(first.opened.base, tmp_path / "fresh")
+    for kind in ("calibrate", "lobes", "report"):
+        shutil.rmtree(tmp_path / "fresh" / "out" / "results" / kind)
+    return tmp_path / "fresh" / "campaign.toml"
+
+
 @pytest.fixture
 def done(campaign: Path) -> RunSummary:
+    """A second run, elsewhere."""
     return serial(campaign)
 
 
@@ -38,9 +66,11 @@ def test_numbers_are_those_of_the_commands(done: RunSummary, campaign: Path) -> 
     np.testing.assert_allclose(ours.multiple_coherence, theirs.multiple_coherence, rtol=1e-9)
 
 
-def test_a_second_run_computes_nothing_and_a_changed_recording_only_its_own(done: RunSummary, campaign: Path) -> None:
-    assert done.ran == 35
-    assert serial(campaign).ran == 0
+def test_a_second_run_computes_nothing_and_a_changed_recording_only_its_own(
+    first: RunSummary, done: RunSummary, campaign: Path
+) -> None:
+    assert first.ran == 35
+    assert done.ran == 0
     changed = campaign.parent / "recordings" / "P1_up.h5"
     changed.write_bytes((campaign.parent / "recordings" / "P1_up.h5").read_bytes() + b"\0")
     again = serial(campaign)
@@ -55,3 +85,75 @@ def test_a_broken_file_is_listed_and_hides_nothing_else(done: RunSummary, campai
     assert not done.state.failed
     assert (result(done, "lobes:P2") / "lobes.csv").is_file()
     assert "left out P2_broken" in (result(done, "estimate:P2") / "outcome.json").read_text()
+
+
+def test_results_between_others_may_be_deleted(done: RunSummary, campaign: Path) -> None:
+    """Spectra take much room, and nobody but other tasks reads them."""
+    for kind in ("spectra", "join"):
+        shutil.rmtree(campaign.parent / "out" / "results" / kind)
+    assert serial(campaign).ran == 0
+    (result(done, "fit:P1") / "model.json").unlink()
+    assert serial(campaign).ran == 1  # what was made of it is there, and is what it would be
+
+
+def test_refusals_are_tried_again_on_demand(done: RunSummary, campaign: Path) -> None:
+    del done
+    # the broken file's check and spectra, and the estimate, fit, calibration and lobes of its set
+    assert serial(campaign, retry=True).ran == 6
+
+
+def test_what_fails_by_chance_is_not_kept(
+    fresh: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fails(work: Work, folder: Path) -> list[str]:
+        raise RuntimeError("by chance")
+
+    monkeypatch.setitem(JOB_OF, "calibrate", fails)
+    words = ["campaign", str(fresh), "--workers", "0", "--out", str(fresh.parent / "out")]
+    assert run(words) == 1
+    said = capsys.readouterr().out
+    assert "failed: calibrate P1: unforeseen RuntimeError (test_run.py, line" in said
+    assert "4 left for the next run" in said  # two calibrations, and the lobes that need them
+    monkeypatch.undo()
+    assert run(words) == 0
+    assert "0 left for the next run" in capsys.readouterr().out
+
+
+def test_a_recording_that_changes_while_the_campaign_runs_is_not_mixed_up(
+    fresh: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judge = JOB_OF["check"]
+
+    def changing(work: Work, folder: Path) -> list[str]:
+        found = judge(work, folder)
+        if work.files[0].name == "P1_up.h5":
+            work.files[0].write_bytes(work.files[0].read_bytes() + b"0")
+        return found
+
+    shutil.rmtree(fresh.parent / "out" / "results")
+    monkeypatch.setitem(JOB_OF, "check", changing)
+    found = serial(fresh)
+    assert found.state.failed["check:P1_up"] == "P1_up.h5 changed while the campaign ran; run the campaign again"
+    assert found.state.failed["fit:P1"].startswith("not run: it needs ")
+    assert found.state.settled["lobes:P2"] == "done"
+
+
+def test_a_full_disk_ends_the_run_and_keeps_what_is_there(
+    fresh: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if sys.platform != "linux" or subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", disk]).returncode:
+        pytest.skip("only root may mount a small disk")
+    try:
+        words = ["campaign", str(fresh), "--workers", "0", "--out", str(disk / "out")]
+        assert run(words) == 1
+        said = capsys.readouterr()
+        assert "free space, then run the same command again" in said.out + said.err
+        assert "no room for" in said.out + said.err
+        kept = len(list(disk.glob("out/results/*/*/*/outcome.json")))
+        assert kept > 3
+        assert run([*words[:-1], str(disk / "out")]) == 1  # and it goes on as long as there is room
+        assert len(list(disk.glob("out/results/*/*/*/outcome.json"))) >= kept
+    finally:
+        subprocess.run(["umount", disk], check=True)
