@@ -13,16 +13,16 @@ KEPT = "tasks.csv"
 COLUMNS = ("task", "status", "seconds", "megabytes")
 
 DEFAULTS: Mapping[str, tuple[float, float]] = {
-    "check": (0.05, 0.03),
-    "spectra": (0.05, 0.03),
-    "join": (0.05, 0.0),
-    "sum": (0.05, 0.0),
-    "estimate": (0.2, 0.0),
-    "fit": (1.0, 0.05),
-    "calibrate": (0.2, 0.0),
-    "lobes": (5.0, 0.0),
-    "diagnose": (60.0, 0.5),
-    "robot_diagnose": (60.0, 0.5),
+    "check": (0.03, 0.01),
+    "spectra": (0.04, 0.03),
+    "join": (0.04, 0.0),
+    "sum": (0.04, 0.0),
+    "estimate": (0.15, 0.0),
+    "fit": (1.2, 2.8),
+    "calibrate": (0.4, 0.0),
+    "lobes": (1.0, 0.0),
+    "diagnose": (30.0, 10.0),
+    "robot_diagnose": (30.0, 10.0),
     "learn": (30.0, 0.0),
     "report": (20.0, 0.0),
 }
