@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from .diagnosis import Candidate
 from .settings import Settings
@@ -138,6 +138,15 @@ class Comparison(Protocol[Fit]):
 
     def needed(self, current: Fit, base: Fit) -> float:
         """Evidence that a further cause needs beside the causes of ``current``."""
+        ...
+
+
+@runtime_checkable
+class SureComparison(Protocol[Fit]):
+    """A comparison that knows whether a small cause is one of its own, or mends what the others leave undone."""
+
+    def is_of_its_own(self, search: Search[Fit], place: int, less: Fit) -> bool:
+        """Whether ``search.accepted[place]`` stays however small it is; ``less`` is the last step without it."""
         ...
 
 

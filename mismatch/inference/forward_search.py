@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from .comparison import Comparison, Fit, Search
+from .comparison import Comparison, Fit, Search, SureComparison
 from .diagnosis import Candidate
 
 Progress = Callable[[str], None]
@@ -37,7 +37,8 @@ def pruned(comparison: Comparison[Fit], found: Search[Fit]) -> Search[Fit]:
     """Let go of causes that later ones have made needless (backward elimination).
 
     What one cause leaves may look like another: a mode that imitates a joint is found before the joint is. Each cause
-    before the last is taken away; if the fit without it loses less than the evidence a cause needs, it stays away.
+    before the last is taken away; if the fit without it loses less than the evidence a cause needs, it stays away,
+    unless the comparison knows that it mends nothing of the others.
 
     Parameters
     ----------
@@ -51,9 +52,14 @@ def pruned(comparison: Comparison[Fit], found: Search[Fit]) -> Search[Fit]:
             break
         less = comparison.without(found, place)
         loss = less.score - found.current.score
-        if loss < comparison.needed(less, found.base):
+        if loss < comparison.needed(less, found.base) and not _stands(comparison, found, place, less):
             found = released(found, place, less, "rejected", loss)
     return found
+
+
+def _stands(comparison: Comparison[Fit], found: Search[Fit], place: int, less: Fit) -> bool:
+    """Whether a cause stays although it loses little, as it is one of its own."""
+    return isinstance(comparison, SureComparison) and comparison.is_of_its_own(found, place, less)
 
 
 def released(found: Search[Fit], place: int, less: Fit, stage: str, evidence: float) -> Search[Fit]:

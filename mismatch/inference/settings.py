@@ -19,7 +19,7 @@ Real = NDArray[float64]
 
 @dataclass(frozen=True)
 class EvidenceSettings(
-    Thresholds, shares=("as_good_form", "small", "small_after_law", "small_in_part", "mends_belief")
+    Thresholds, shares=("as_good_form", "small", "small_after_law", "own", "small_in_part", "mends_belief")
 ):
     """When a cause gains enough where it is fitted. Gains are in score: twice the logarithm of a Bayes factor.
 
@@ -44,6 +44,9 @@ class EvidenceSettings(
         Share of the evidence found so far below which a further cause may only mend the form of the first.
     small_after_law
         The same share once a joint's law is accepted, whose form is never quite the true one.
+    own
+        Share of its gain that a cause must keep while the forms of laws are free, to need no more than ``small`` after
+        one: it then mends no form.
     small_in_part
         Share of the evidence of all causes below which one is not told where the answer is partial: it may mend what is
         left of the others.
@@ -61,6 +64,7 @@ class EvidenceSettings(
     unclear: float = 5.0
     small: float = 0.01
     small_after_law: float = 0.1
+    own: float = 0.33
     small_in_part: float = 0.25
     mends_belief: float = 0.6
     farthest: float = 50.0

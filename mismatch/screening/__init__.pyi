@@ -1,3 +1,4 @@
+from .beside_laws import Gains, gains_beside_laws
 from .chain_screening import ScreenedChain, screen_chains
 from .joint_direction import JointSighting, SeenMotion, find_direction, seen_motion
 from .joint_laws_fitted import SightedLaws, joint_candidates, sighted_laws
@@ -11,6 +12,7 @@ from .whitened_residual import Floor, FloorRecord, linear_floor, noise_floor
 __all__ = [
     "Floor",
     "FloorRecord",
+    "Gains",
     "JointSighting",
     "ScreenedChain",
     "SeenMotion",
@@ -19,6 +21,7 @@ __all__ = [
     "channel_of",
     "find_direction",
     "find_mode",
+    "gains_beside_laws",
     "joint_candidates",
     "laws_by_level",
     "linear_candidates",

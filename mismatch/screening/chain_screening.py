@@ -35,6 +35,21 @@ def screen_chains(floor: Floor, hypothesis: Hypothesis, causes: list[ChainPhysic
     return sorted(found, key=lambda one: -one.gain)
 
 
+def gain_of_chain(floor: Floor, hypothesis: Hypothesis, absent: Cause) -> float:
+    """Gain in misfit of one linear cause at its place.
+
+    Parameters
+    ----------
+    floor
+        Residual of the fit so far.
+    hypothesis
+        Hypothesis of the fit so far.
+    absent
+        The cause with the numbers at which it does nothing.
+    """
+    return _gain(floor, hypothesis, absent)[0]
+
+
 def _gain(floor: Floor, hypothesis: Hypothesis, cause: Cause) -> tuple[float, Real]:
     with_it = hypothesis.with_cause(cause)
     here = with_it.coordinates()

@@ -1,6 +1,7 @@
 """Linear causes of one round: those of the measuring chain that promise most, and a further mode, fitted."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -9,10 +10,14 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..inference import Proposal, ScreeningSettings, in_processes
-from ..models import Cause, Fit, fit, with_chain
-from ..physics import FormedPhysics, answer_name
+from ..models import Cause, Fit, believed, fit, modes_are_odd, with_chain
+from ..physics import FormedPhysics, ModePhysics, answer_name
 from .chain_screening import ScreenedChain
-from .missing_mode import SightedMode
+from .missing_mode import SightedMode, find_mode
+from .whitened_residual import noise_floor
+
+MODE_STEPS = 12
+"""Steps at most of the fit of a further mode."""
 
 
 def linear_candidates(
@@ -24,6 +29,9 @@ def linear_candidates(
     least: float,
 ) -> list[Proposal[Fit]]:
     """Fit the linear causes that promise most.
+
+    Where the modes look odd, a further mode is also sought from the lab's own: one of them may have gone to where the
+    further one is.
 
     Parameters
     ----------
@@ -49,6 +57,8 @@ def linear_candidates(
     numbers = current.hypothesis.shape.per_mode - 2
     if mode is not None and mode.gain > max(least, numbers * cost, promising):
         tasks.append(partial(_with_mode, lines, current, mode, settings.resolved))
+    if mode is not None and modes_are_odd(current):
+        tasks.append(partial(_with_mode_from_belief, lines, current, mode.physics, settings.resolved))
     return [one for one in in_processes(tasks) if one is not None and np.isfinite(one.evidence)]
 
 
@@ -60,11 +70,22 @@ def _with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Pr
 def _with_mode(lines: list[WindowedSpectrum], current: Fit, mode: SightedMode, resolved: float) -> Proposal[Fit] | None:
     """The mode fitted; None where it is no wider than the lines of a record."""
     start = current.hypothesis.with_mode(mode.pole, mode.right, mode.left, mode.physics)
-    fitted = fit(lines, start, current.noises, iterations=12)
+    fitted = fit(lines, start, current.noises, iterations=MODE_STEPS)
     spacing = max(one.recording.rate / len(one.window) for one in lines)
     if not mode.physics.resolved(complex(fitted.hypothesis.model.poles[-1]), spacing, resolved):
         return None
     return Proposal(mode.physics.name, {}, fitted, current.score - fitted.score)
+
+
+def _with_mode_from_belief(
+    lines: list[WindowedSpectrum], current: Fit, physics: ModePhysics, resolved: float
+) -> Proposal[Fit] | None:
+    """The mode that would explain most beside the lab's own modes, fitted."""
+    lab = fit(lines, believed(current.hypothesis), iterations=0)
+    if not np.isfinite(lab.score):
+        return None
+    found = _with_mode(lines, lab, find_mode(noise_floor(lab, lines), lab.hypothesis, physics), resolved)
+    return None if found is None else replace(found, evidence=current.score - found.fitted.score)
 
 
 def channel_of(cause: Cause) -> dict[str, Any]:

@@ -122,7 +122,7 @@ def strained(hypothesis: Hypothesis) -> bool:
     )
 
 
-def evidence_needed(current: Fit, base: Fit, settings: EvidenceSettings) -> float:
+def evidence_needed(current: Fit, base: Fit, settings: EvidenceSettings, *, own: bool = False) -> float:
     """Gain in score that a further cause needs: a small one may only mend the form of those found.
 
     Parameters
@@ -133,13 +133,21 @@ def evidence_needed(current: Fit, base: Fit, settings: EvidenceSettings) -> floa
         The fit without any cause.
     settings
         Thresholds of the evidence.
+    own
+        Whether it is known to mend no law's form.
     """
-    share = settings.small_after_law if current.hypothesis.laws else settings.small
+    share = settings.small_after_law if current.hypothesis.laws and not own else settings.small
     return max(settings.least, share * (base.score - current.score))
 
 
 def worth_it(
-    proposal: Proposal[Fit], current: Fit, base: Fit, lines: list[WindowedSpectrum], settings: EvidenceSettings
+    proposal: Proposal[Fit],
+    current: Fit,
+    base: Fit,
+    lines: list[WindowedSpectrum],
+    settings: EvidenceSettings,
+    *,
+    own: bool = False,
 ) -> bool:
     """Whether a cause has enough evidence, in the misfit or in what the lab believes of the modes.
 
@@ -156,8 +164,10 @@ def worth_it(
         Windowed lines of the recordings.
     settings
         Thresholds of the evidence.
+    own
+        Whether the cause is known to mend no law's form.
     """
-    fitted, needed = proposal.fitted, evidence_needed(current, base, settings)
+    fitted, needed = proposal.fitted, evidence_needed(current, base, settings, own=own)
     if isinstance(fitted.hypothesis.causes[-1].physics, ModePhysics):
         needed, clear = needed + _places_of_a_mode(fitted, lines), _mode_measured(fitted, settings.clear)
     else:

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from estimation import WindowedSpectrum
 
 from ...inference import Proposal, Remainder, Round, Search, Settings, equivalents_of
-from ...models import Fit, fit, gives_one_up, settled
+from ...models import Cause, Fit, fit, gives_one_up, settled
 from ...physics import JointPhysics, Physics, answer_name
 from ...remainder import leftover
+from ...screening import gains_beside_laws
 from .acceptance import evidence_needed, impossible, plainest, possible_gains, twins_of, worth_it
 from .rounds import Standing, StructureRound, Weighed, likeliest_seen, only_modes, weigh
 
@@ -88,11 +89,39 @@ class StructureComparison:
             good = [one for one in good if one is not best]
             if impossible(chosen, evidence):
                 continue
-            if worth_it(chosen, search.current, search.base, self.lines, evidence):
+            if self._is_worth_it(chosen, search):
                 return chosen
             # another form of the same cause may have numbers that the data do tell
             good = [one for one in good if one.name == best.name]
         return None
+
+    def is_of_its_own(self, search: Search[Fit], place: int, less: Fit) -> bool:
+        """Whether an accepted cause mends no law's form, and explains most of what moves with the signal without it."""
+        whole, cause = search.current, search.accepted[place].fitted.hypothesis.causes[-1]
+        return self._mends_nothing(cause, (less, whole), search.base)
+
+    def _is_worth_it(self, chosen: Proposal[Fit], search: Search[Fit]) -> bool:
+        """Whether a cause has enough evidence; after a law less is enough of one that mends no form."""
+        current, base, evidence = search.current, search.base, self.settings.evidence
+        if worth_it(chosen, current, base, self.lines, evidence):
+            return True
+        if not current.hypothesis.laws or not worth_it(chosen, current, base, self.lines, evidence, own=True):
+            return False
+        return self._mends_nothing(chosen.fitted.hypothesis.causes[-1], (current, chosen.fitted), base)
+
+    def _mends_nothing(self, cause: Cause, fits: tuple[Fit, Fit], base: Fit) -> bool:
+        """Whether a cause (second fit) stands beside laws of any form, and explains most of what the first fit leaves.
+
+        What moves with the signal tells an effect that is there from one that an odd form asks for here and there.
+        """
+        (less, whole), evidence, limits = fits, self.settings.evidence, self.settings.verdict
+        needed = evidence_needed(less, base, evidence, own=True)
+        if not less.hypothesis.laws or less.score - whole.score < needed:
+            return False
+        if not gains_beside_laws(self.lines, less, [cause])[0].own(needed, evidence.own):
+            return False
+        before, after = (leftover(one.hypothesis, self.lines) for one in fits)
+        return after.noise_like(limits.noise_like) or after.size <= (1 - limits.partly) * before.size
 
     def _equivalents(self, weighed: Weighed, chosen: Proposal[Fit], current: Fit) -> tuple[str, ...]:
         """Names that cannot be told from the chosen one.

@@ -1,13 +1,15 @@
 """One round of the search in a structure: every cause is screened, and those that promise most are fitted."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from estimation import WindowedSpectrum
 
 from ...inference import Candidate, EvidenceSettings, Proposal, Remainder, Round, Settings, in_processes
-from ...models import Fit, Hypothesis
+from ...models import Cause, Fit, Hypothesis
 from ...physics import ChainPhysics, JointPhysics, ModePhysics, Physics, answer_name
 from ...remainder import leftover, share_of_response
 from ...screening import (
@@ -16,6 +18,7 @@ from ...screening import (
     SightedMode,
     channel_of,
     find_mode,
+    gains_beside_laws,
     joint_candidates,
     laws_by_level,
     linear_candidates,
@@ -25,6 +28,9 @@ from ...screening import (
     twin_laws,
 )
 from .acceptance import evidence_needed, impossible, possible_gains, strained
+
+FEW = 3
+"""Linear causes that promise little, at most, that are tried beside laws of any form."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +139,10 @@ def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
     chains, mode, sighted = _screened(standing, causes, laws if much else [])
     weighed = [Candidate(answer_name(one.cause.physics), one.gain, "screened", channel_of(one.cause)) for one in chains]
     weighed += [Candidate(mode.physics.name, mode.gain, "screened")] if mode is not None else []
-    least = settings.search.within_reach * evidence_needed(current, standing.base, settings.evidence)
+    weighed += sighted.weighed
+    least = settings.search.within_reach * evidence_needed(current, standing.base, settings.evidence, own=True)
+    stands_out = sighted.gain > 0
+    chains, mode, sighted = _of_their_own(standing, chains, mode, sighted)
     proposals: list[Proposal[Fit]] = []
     linear = max([one.gain for one in chains] + [mode.gain if mode is not None else 0.0, 0.0])
     if sighted.gain > settings.search.laws_first * linear:
@@ -142,16 +151,19 @@ def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
         tried = bool(proposals)
         proposals += linear_candidates(lines, current, chains, mode, settings.screening, least)
         if not tried and _joints_are_due(proposals, standing):
-            sighted = sighted if much else sighted_laws(lines, current, laws, settings)
+            if not much:
+                sighted = sighted_laws(lines, current, laws, settings)
+                weighed += sighted.weighed
+                stands_out = sighted.gain > 0
+                sighted = _of_their_own(standing, [], None, sighted)[2]
             best = possible_gains(proposals, settings.evidence)
             gained = best[0].evidence if best else 0.0
             proposals += joint_candidates(lines, current, sighted, settings, least, gained)
     if much and laws and not _explains(proposals, standing):
         proposals += laws_by_level(lines, current, laws, settings)
     proposals += twin_laws(lines, current, possible_gains(proposals, settings.evidence)[:1], causes)
-    weighed += sighted.weighed
     weighed += [_candidate(one, settings.evidence) for one in proposals]
-    return Weighed(proposals, weighed, sighted.gain > 0)
+    return Weighed(proposals, weighed, stands_out)
 
 
 def _screened(
@@ -170,6 +182,33 @@ def _screened(
     sighted, mode, screened = in_processes(makers)
     taken = {(cause.physics.name, cause.place) for cause in hypothesis.causes}
     return [one for one in screened if (one.cause.physics.name, one.cause.place) not in taken], mode, sighted
+
+
+def _of_their_own(
+    standing: Standing, chains: list[ScreenedChain], mode: SightedMode | None, sighted: SightedLaws
+) -> tuple[list[ScreenedChain], SightedMode | None, SightedLaws]:
+    """Causes that are fitted after a law: those that promise much, and of the others those that mend no law's form."""
+    lines, current, settings = standing.lines, standing.current, standing.settings
+    if not current.hypothesis.laws:
+        return chains, mode, sighted
+    needed = [evidence_needed(current, standing.base, settings.evidence, own=own) for own in (True, False)]
+    small, much = (settings.search.within_reach * one for one in needed)
+    chains = [one for one in chains if one.gain > small]
+    chains = [one for one in chains if one.gain > much] + [one for one in chains if one.gain <= much][:FEW]
+    laws = [one for one in sighted.screened if one.gain > small]
+    unsure = [one.cause for one in chains if one.gain <= much]
+    unsure += [Cause(mode.physics, np.zeros(0))] if mode is not None and small < mode.gain <= much else []
+    unsure += [one.causes[0] for one in laws if one.gain <= much]
+    gains = gains_beside_laws(lines, current, unsure)
+    out = {id(cause) for cause, gain in zip(unsure, gains, strict=True) if not gain.own(small, settings.evidence.own)}
+    # a mode stands for all places, and its cause was made here
+    lost = any(id(cause) in out for cause in unsure if isinstance(cause.physics, ModePhysics))
+    kept = tuple(one for one in laws if id(one.causes[0]) not in out)
+    return (
+        [one for one in chains if id(one.cause) not in out],
+        None if lost else mode,
+        replace(sighted, screened=kept),
+    )
 
 
 def _candidate(one: Proposal[Fit], evidence: EvidenceSettings) -> Candidate:

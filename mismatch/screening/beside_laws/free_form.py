@@ -1,0 +1,163 @@
+"""A joint's law whose form is free: shapes over deflection, velocity, memory and time are added to it."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...joints import JointLaw, JointMotion, saturated
+from ...models import Cause, Fit, held_values
+from ...physics import JointPhysics, Parameter
+
+Real = NDArray[np.float64]
+
+EVERYTHING = "xvmt"
+"""All families: deflection (x), velocity (v), memory (m), time (t)."""
+
+OF_FAMILY = {"x": "x", "v": "vm", "m": "vm", "t": "t"}
+"""Families whose shapes may mend a law of each family: dry friction gives way elastically before it slides."""
+
+KNEES = (0.2, 0.5, 1.0, 2.0)
+"""Knees of springs that saturate, in typical deflections."""
+
+SPEEDS = (0.01, 0.03, 0.1, 0.3, 1.0)
+"""Speeds at which friction saturates, in typical speeds."""
+
+YIELDS = (0.02, 0.05, 0.12, 0.3, 0.7, 1.5)
+"""Deflections at which elastic-plastic elements yield, in typical ones."""
+
+SHARPNESS = 4.0
+"""Sharpness of the knees of springs."""
+
+POINTS = 8193
+"""Points of the tables."""
+
+UNIT = 0.01
+"""Force of a shape's unit, over that of the structure's static stiffness at the typical deflection."""
+
+
+@dataclass(frozen=True)
+class FreeForm:
+    """A law with shapes that are added to it, each with a factor of its own: ``g + sum_k c_k s_k(x, v, memory, t)``.
+
+    The shapes only serve to see what a change of the form could explain; nothing is simulated far from ``c = 0``.
+
+    Parameters
+    ----------
+    law_of
+        The law whose form is free.
+    kinds
+        Families of the shapes, letters of ``xvmt``.
+    parameters
+        Numbers of the law, then one factor for each shape.
+    """
+
+    law_of: JointPhysics
+    kinds: str
+    parameters: tuple[Parameter, ...]
+    name: str = "free_form"
+    equation: str = "g + sum_k c_k s_k"
+    source: str = "Worden & Tomlinson, Nonlinearity in Structural Dynamics, section 7"
+    confusable_with: tuple[str, ...] = ()
+
+    def starts(self, motion: JointMotion) -> tuple[Real, ...]:
+        """Return no start: the form is freed where a law was fitted."""
+        del motion
+        return ()
+
+    def law(self, values: Real, motion: JointMotion) -> JointLaw:
+        """Return the law of the joint's force at these numbers."""
+        own = len(self.law_of.parameters)
+        law = self.law_of.law(values[:own], motion)
+        unit = UNIT * motion.stiffness * motion.deflection
+        factors = list(unit * values[own:])
+        changes: dict[str, Any] = {}
+        if "x" in self.kinds:
+            # a table reaches as far as the law's own
+            reach = law.reach if len(law.stiffness) else motion.reach
+            shapes = _over_deflection(_grid(reach / motion.deflection))
+            changes |= {"reach": reach, "stiffness": _with_shapes(law.stiffness, shapes, factors)}
+        if "v" in self.kinds:
+            speed = law.speed if len(law.damping) else motion.speed
+            shapes = _over_velocity(_grid(speed / motion.velocity))
+            changes |= {"speed": speed, "damping": _with_shapes(law.damping, shapes, factors)}
+        if "m" in self.kinds:
+            yields = np.array(YIELDS) * motion.deflection
+            springs = np.array([factors.pop(0) for _ in YIELDS]) / np.minimum(yields, motion.deflection)
+            changes |= {"springs": np.append(law.springs, springs), "yields": np.append(law.yields, yields)}
+        if "t" in self.kinds:
+            ramp, bend = (factor / motion.deflection for factor in factors)
+            changes |= {"ramp": law.ramp + ramp, "bend": law.bend + bend}
+        return replace(law, **changes)
+
+
+def with_free_forms(fitted: Fit, kinds: str = "") -> Fit:
+    """A fit in which the form of each joint's law is free; its prediction is the same.
+
+    Parameters
+    ----------
+    fitted
+        A fit with laws of joints.
+    kinds
+        Families of the shapes; empty: for each law those that may mend one of its family.
+    """
+    hypothesis = fitted.hypothesis
+    causes = tuple(one if one.axis is None else _freed(one, kinds) for one in hypothesis.causes)
+    return replace(fitted, hypothesis=replace(hypothesis, causes=causes))
+
+
+def families(law: JointLaw) -> str:
+    """Families that a law is of, letters of ``xvmt``.
+
+    Parameters
+    ----------
+    law
+        Law of a joint's force.
+
+    Examples
+    --------
+    >>> families(JointLaw(ramp=2.0)), families(JointLaw(damping=np.linspace(-1, 1, 9)))
+    ('t', 'v')
+    """
+    if law.ramp or law.bend:
+        # its part over the deflection is what the nominal model holds at
+        return "t"
+    has = {"x": len(law.stiffness), "v": len(law.damping), "m": len(law.springs)}
+    return "".join(kind for kind, there in has.items() if there)
+
+
+def _freed(cause: Cause, kinds: str) -> Cause:
+    """The law of a cause with shapes of factor zero."""
+    assert isinstance(cause.physics, JointPhysics)
+    mending = "".join(OF_FAMILY[one] for one in families(cause.law()))
+    kinds = "".join(kind for kind in EVERYTHING if kind in (kinds or mending))
+    count = sum({"x": len(KNEES) + 5, "v": len(SPEEDS) + 3, "m": len(YIELDS), "t": 2}[kind] for kind in kinds)
+    factors = tuple(Parameter(f"shape_{k + 1}", "", 1.0) for k in range(count))
+    # a protocol's attributes can be set, those of a frozen record cannot
+    physics: Any = FreeForm(cause.physics, kinds, (*cause.physics.parameters, *factors))
+    return replace(cause, physics=physics, values=np.concatenate([held_values(cause), np.zeros(count)]))
+
+
+def _over_deflection(x: Real) -> list[Real]:
+    """Shapes over the deflection, which is counted in typical ones: knees, powers, and an asymmetric one."""
+    knees = [saturated(x, knee, SHARPNESS) / max(knee, 1.0) for knee in KNEES]
+    return [*knees, x, x**2, x * np.abs(x), x**3 / 3, x**5 / 15]
+
+
+def _over_velocity(v: Real) -> list[Real]:
+    """Shapes over the velocity, which is counted in typical ones: friction that saturates, and powers."""
+    return [*(np.tanh(v / speed) for speed in SPEEDS), v, v * np.abs(v), v**3 / 3]
+
+
+def _grid(end: float) -> Real:
+    """Evenly spaced points of a table."""
+    return np.linspace(-end, end, POINTS)
+
+
+def _with_shapes(table: Real, shapes: list[Real], factors: list[float]) -> Real:
+    """A law's own table, or none, with shapes by their factors, which are taken from the list."""
+    added = np.sum([factors.pop(0) * shape for shape in shapes], axis=0)
+    if not len(table):
+        return np.asarray(added)
+    return np.asarray(added + np.interp(_grid(1.0), np.linspace(-1, 1, len(table)), table))
