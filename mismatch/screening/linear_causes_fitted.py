@@ -30,8 +30,8 @@ def linear_candidates(
 ) -> list[Proposal[Fit]]:
     """Fit the linear causes that promise most.
 
-    Where the modes look odd, a further mode is also sought from the lab's own: one of them may have gone to where the
-    further one is.
+    Where the modes look odd and no law moves them, a further mode is also sought from the lab's own: one of them may
+    have gone to where the further one is.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def linear_candidates(
     numbers = current.hypothesis.shape.per_mode - 2
     if mode is not None and mode.gain > max(least, numbers * cost, promising):
         tasks.append(partial(_with_mode, lines, current, mode, settings.resolved))
-    if mode is not None and modes_are_odd(current):
+    if mode is not None and not current.hypothesis.laws and modes_are_odd(current):
         tasks.append(partial(_with_mode_from_belief, lines, current, mode.physics, settings.resolved))
     return [one for one in in_processes(tasks) if one is not None and np.isfinite(one.evidence)]
 
