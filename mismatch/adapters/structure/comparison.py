@@ -98,7 +98,7 @@ class StructureComparison:
     def is_of_its_own(self, search: Search[Fit], place: int, less: Fit) -> bool:
         """Whether an accepted cause mends no law's form, and explains most of what moves with the signal without it."""
         whole, cause = search.current, search.accepted[place].fitted.hypothesis.causes[-1]
-        return self._mends_nothing(cause, (less, whole), search.base)
+        return self._mends_no_form(cause, (less, whole), search.base)
 
     def _is_worth_it(self, chosen: Proposal[Fit], search: Search[Fit]) -> bool:
         """Whether a cause has enough evidence; after a law less is enough of one that mends no form."""
@@ -107,9 +107,9 @@ class StructureComparison:
             return True
         if not current.hypothesis.laws or not worth_it(chosen, current, base, self.lines, evidence, own=True):
             return False
-        return self._mends_nothing(chosen.fitted.hypothesis.causes[-1], (current, chosen.fitted), base)
+        return self._mends_no_form(chosen.fitted.hypothesis.causes[-1], (current, chosen.fitted), base)
 
-    def _mends_nothing(self, cause: Cause, fits: tuple[Fit, Fit], base: Fit) -> bool:
+    def _mends_no_form(self, cause: Cause, fits: tuple[Fit, Fit], base: Fit) -> bool:
         """Whether a cause (second fit) stands beside laws of any form, and explains most of what the first fit leaves.
 
         What moves with the signal tells an effect that is there from one that an odd form asks for here and there.
