@@ -113,15 +113,18 @@ class StructureComparison:
         """Whether a cause (second fit) stands beside laws of any form, and explains most of what the first fit leaves.
 
         What moves with the signal tells an effect that is there from one that an odd form asks for here and there.
+        Where the law leaves nothing that does, a small cause may mend anything.
         """
         (less, whole), evidence, limits = fits, self.settings.evidence, self.settings.verdict
         needed = evidence_needed(less, base, evidence, own=True)
         if not less.hypothesis.laws or less.score - whole.score < needed:
             return False
-        if not gains_beside_laws(self.lines, less, [cause])[0].own(needed, evidence.own):
-            return False
         before, after = (leftover(one.hypothesis, self.lines) for one in fits)
-        return after.noise_like(limits.noise_like) or after.size <= (1 - limits.partly) * before.size
+        if before.noise_like(limits.noise_like):
+            return False
+        if not (after.noise_like(limits.noise_like) or after.size <= (1 - limits.partly) * before.size):
+            return False
+        return gains_beside_laws(self.lines, less, [cause])[0].own(needed, evidence.own)
 
     def _equivalents(self, weighed: Weighed, chosen: Proposal[Fit], current: Fit) -> tuple[str, ...]:
         """Names that cannot be told from the chosen one.

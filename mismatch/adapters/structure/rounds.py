@@ -193,11 +193,15 @@ def _of_their_own(
         return chains, mode, sighted
     needed = [evidence_needed(current, standing.base, settings.evidence, own=own) for own in (True, False)]
     small, much = (settings.search.within_reach * one for one in needed)
+    if standing.moving.noise_like(settings.verdict.noise_like):
+        # nothing is left that a small cause of its own would explain
+        small = much
     chains = [one for one in chains if one.gain > small]
     chains = [one for one in chains if one.gain > much] + [one for one in chains if one.gain <= much][:FEW]
+    mode = mode if mode is not None and mode.gain > small else None
     laws = [one for one in sighted.screened if one.gain > small]
     unsure = [one.cause for one in chains if one.gain <= much]
-    unsure += [Cause(mode.physics, np.zeros(0))] if mode is not None and small < mode.gain <= much else []
+    unsure += [Cause(mode.physics, np.zeros(0))] if mode is not None and mode.gain <= much else []
     unsure += [one.causes[0] for one in laws if one.gain <= much]
     gains = gains_beside_laws(lines, current, unsure)
     out = {id(cause) for cause, gain in zip(unsure, gains, strict=True) if not gain.own(small, settings.evidence.own)}
