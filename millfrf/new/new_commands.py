@@ -2,7 +2,7 @@
 
 import typer
 
-from .new_files import new_cut, new_schemas, new_session
+from .new_files import new_campaign, new_cut, new_schemas, new_session
 from .new_mapping import new_mapping
 from .new_robot import new_robot
 
@@ -23,4 +23,5 @@ new_app.command("mapping")(new_mapping)
 new_app.command("cut")(new_cut)
 new_app.command("session")(new_session)
 new_app.command("robot")(new_robot)
+new_app.command("campaign")(new_campaign)
 new_app.command("schemas")(new_schemas)

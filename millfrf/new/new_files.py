@@ -1,4 +1,4 @@
-"""`millfrf new cut`, `new session` and `new schemas`: commented files to begin with, and schemas for editors."""
+"""`millfrf new cut`, `session`, `campaign`, `schemas`: commented files to begin with, and schemas for editors."""
 
 import json
 from enum import StrEnum
@@ -52,6 +52,24 @@ def new_session(
 
     write_new(out, session_text(driver.value, channels), force=force)
     say(f"wrote {out}; fill in what is marked FILL IN, then: millfrf acquire {out} --check")
+
+
+def new_campaign(
+    files: Annotated[
+        list[str], typer.Argument(metavar="REC...", help="Recordings; quoted, with wildcards: 'recordings/*.h5'.")
+    ],
+    out: Out,
+    robot: Annotated[
+        str | None, typer.Option("--robot", metavar="ROBOT", help="Robot whose postures were measured.")
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Write a commented campaign file for `millfrf campaign`."""
+    from .making import campaign_text
+    from .writing_new import write_new
+
+    write_new(out, campaign_text(files, robot), force=force)
+    say(f"wrote {out}; fill in what is marked FILL IN, then: millfrf campaign {out} --dry-run")
 
 
 def new_schemas(

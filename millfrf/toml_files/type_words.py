@@ -30,8 +30,11 @@ def type_in_words(schema: Mapping[str, Any]) -> str:
         return f"`{schema['const']}`"
     if "enum" in schema:
         return " or ".join(f"`{value}`" for value in schema["enum"] if value != "")
-    if "$ref" in schema or schema.get("type") == "object":
+    if "$ref" in schema:
         return "table"
+    if schema.get("type") == "object":
+        held = schema.get("additionalProperties")
+        return "tables by name" if isinstance(held, dict) and "$ref" in held else "free table"
     if schema.get("type") == "array":
         return _list(schema)
     bounds = [words.format(f"{schema[key]:g}") for key, words in _BOUNDS if key in schema]
@@ -52,6 +55,8 @@ def _plural(words: str) -> str:
     first, _, rest = words.partition(" ")
     if words.startswith("whole number"):
         return words.replace("whole number", "whole numbers", 1)
+    if words == "free table":
+        return "free tables"
     if first in ("number", "table", "value", "list"):
         return f"{first}s {rest}".strip()
     return "texts" if words == "text" else words

@@ -37,6 +37,22 @@ def session_text(driver: str, n_channels: int) -> str:
     return template(title, tables, rows)
 
 
+def campaign_text(files: Sequence[str], robot: str | None) -> str:
+    """Text of a campaign file for recordings by name, and a robot where its postures matter."""
+    rows: dict[str, Sequence[Row]] = {
+        "[campaign]": [{} if robot is None else {"robot": robot}],
+        "[[recordings]]": [{"files": list(files)}],
+        "[sets]": [{}],
+        "[fit]": [{}],
+        "[report]": [{}],
+    }
+    title = (
+        f"A campaign for: millfrf campaign THIS.toml --dry-run. Marked {FILL_IN}: what must be given.\n"
+        "A job is done if its table is there: take the # away from [estimate], [calibrate], [lobes], [diagnose] ..."
+    )
+    return template(title, described_tables(_kind("campaign")), rows)
+
+
 def _kind(name: str) -> TomlFile:
     return next(file for file in toml_files() if file.name == name)
 

@@ -70,7 +70,7 @@ def _hidden(table: DescribedTable) -> Iterator[str]:
 
 def _plain_keys(table: DescribedTable) -> Iterator[DescribedKey]:
     """Keys that hold no table: tables have headings of their own."""
-    return (key for key in table.keys if key.kind not in ("table", "list of tables"))
+    return (key for key in table.keys if key.kind not in ("table", "tables by name", "list of tables"))
 
 
 def _explanation(text: str, keys: Sequence[DescribedKey], *, given: bool) -> str:

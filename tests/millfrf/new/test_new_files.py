@@ -127,3 +127,18 @@ def test_schemas_are_written_for_every_kind(tmp_path: Path) -> None:
     assert run(["new", "schemas", "--out", str(tmp_path / "schemas")]) == 0
     written = {path.name for path in (tmp_path / "schemas").iterdir()}
     assert written == {f"{file.name}.schema.json" for file in toml_files()}
+
+
+def test_a_campaign_names_its_recordings_and_what_is_missing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "campaign.toml"
+    _csv(tmp_path)
+    words = ["new", "campaign", "*.h5", "--robot", "kuka_kr90_r3100", "--out", str(out)]
+    assert run(words) == 0
+    content = tomllib.loads(out.read_text())
+    assert content["recordings"] == [{"files": ["*.h5"]}]
+    assert content["campaign"] == {"robot": "kuka_kr90_r3100"}
+    capsys.readouterr()
+    assert run(["campaign", str(out), "--dry-run"]) == 2
+    assert "fit.band_hz is missing" in capsys.readouterr().err
