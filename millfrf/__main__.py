@@ -20,6 +20,7 @@ from .new import new_app
 from .number_lists import options_of_several, with_lists_apart
 from .robot import robot_app
 from .terminal import printable, say
+from .usage_examples import with_examples
 from .usage_words import usage_in_words
 from .version import __version__
 
@@ -66,7 +67,7 @@ def run(arguments: Sequence[str]) -> int:
 
     Set ``MILLFRF_TRACEBACK=1`` to see where an unexpected failure came from.
     """
-    command = typer.main.get_command(app)
+    command = with_examples(typer.main.get_command(app))
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", MillfrfWarning)  # each command prints the doubts of its result

@@ -10,7 +10,9 @@ from typing import Any, get_args, get_origin, get_type_hints
 import typer
 from typer.models import ArgumentInfo
 
-_WORDS = {int: "whole number", float: "number", str: "text", Path: "file"}
+from millfrf.usage_examples import EXAMPLES
+
+_WORDS = {int: "N", float: "NUMBER", str: "TEXT", Path: "FILE"}
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ def command_page(command: Command) -> str:
     usage = " ".join([f"millfrf {command.words}", *(one.name for one in arguments), "[OPTIONS]" if options else ""])
     text = " ".join((inspect.getdoc(command.function) or "").split("\f")[0].split())
     lines = [f"# millfrf {command.words}", "", text, "", "```text", usage.strip(), "```", ""]
+    lines += ["```console", EXAMPLES[command.words], "```", ""]
     if arguments:
         lines += [
             "| argument | |",
