@@ -17,11 +17,9 @@ from foundation import InputError, LeftoverRemoved, MillfrfError, MillfrfWarning
 from .commands import COMMANDS
 from .cut import cut_app
 from .new import new_app
-from .number_lists import options_of_several, with_lists_apart
 from .robot import robot_app
 from .terminal import printable, say
-from .usage_examples import with_examples
-from .usage_words import usage_in_words
+from .usage import options_of_several, usage_in_words, with_examples, with_lists_apart
 from .version import __version__
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2

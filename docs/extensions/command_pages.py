@@ -10,7 +10,7 @@ from typing import Any, get_args, get_origin, get_type_hints
 import typer
 from typer.models import ArgumentInfo
 
-from millfrf.usage_examples import EXAMPLES
+from millfrf.usage import EXAMPLES
 
 _WORDS = {int: "N", float: "NUMBER", str: "TEXT", Path: "FILE"}
 

@@ -8,8 +8,7 @@ import pytest
 import typer
 
 from millfrf.__main__ import app, run
-from millfrf.number_lists import options_of_several, with_lists_apart
-from millfrf.usage_examples import EXAMPLES, commands_in, with_examples
+from millfrf.usage import EXAMPLES, commands_in, options_of_several, with_examples, with_lists_apart
 
 PROGRAM = with_examples(typer.main.get_command(app))
 COMMANDS = dict(commands_in(PROGRAM))

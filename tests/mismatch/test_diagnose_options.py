@@ -8,7 +8,7 @@ import pytest
 
 from millfrf import diagnose
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from millfrf.number_lists import with_lists_apart
+from millfrf.usage import with_lists_apart
 
 Ask = Callable[..., tuple[int, str, str]]
 
