@@ -164,16 +164,18 @@ def _library() -> tuple[Any, Any]:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Keep Dask's own words off the terminal."""
-    logger = logging.getLogger("distributed")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL)
+    """Keep Dask's own words off the terminal; each of its loggers has a level of its own."""
+    names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]
+    before = {name: logging.getLogger(name).level for name in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", module=r"distributed\..*")
             yield
     finally:
-        logger.setLevel(before)
+        for name, level in before.items():
+            logging.getLogger(name).setLevel(level)
 
 
 def _cluster(distributed: Any, workers: int, scratch: str) -> Any:
