@@ -7,6 +7,7 @@ import platform
 import re
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -58,8 +59,15 @@ def origin(
         What was asked for; paths and other objects are told as text.
     """
     files = [path for path in inputs if Path(path).is_file()]
-    asked = json.loads(json.dumps(dict(options or {}), default=str))
+    asked = json.loads(json.dumps(dict(options or {}), default=_told))
     return {"step": step, "sources": sources(files), "options": asked, "versions": versions()}
+
+
+def _told(value: object) -> Any:
+    """An option for JSON: tables of settings by their fields, functions by their names, other objects as text."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {one.name: getattr(value, one.name) for one in fields(value)}
+    return getattr(value, "__qualname__", None) or str(value)
 
 
 def made(step: str, inputs: Iterable[str | os.PathLike[str]], options: Mapping[str, Any] | None = None) -> str:

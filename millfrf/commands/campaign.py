@@ -46,6 +46,8 @@ def campaign(
     found = run_campaign(campaign, options, bar)
     for line in found.failures:
         say(f"failed: {line}")
+    for line in found.doubts:
+        say(f"warning: {line}")
     for line in found.lines():
         say(line)
     if found.state.failed:

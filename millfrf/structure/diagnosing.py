@@ -47,9 +47,12 @@ def diagnose_files(
     stream: str | None = None,
     band: Band | None = None,
     process: MillingProcess | None = None,
+    dated: bool = True,
     progress: Progress = silent,
 ) -> DiagnosisFiles:
     """Diagnose and write diagnosis, improved model and report into a folder, made if need be.
+
+    A report that is not ``dated`` does not tell when it was written, so that equal input gives equal bytes.
 
     Raises
     ------
@@ -71,7 +74,7 @@ def diagnose_files(
         for path in paths[:2]:
             add_to_json(path, origin("diagnose", [model_path, *recordings], asked))
         with progress("writing the report"):
-            write_diagnosis_report(paths[2], diagnosis, Path(model_path).name, process)
+            write_diagnosis_report(paths[2], diagnosis, Path(model_path).name, process, dated=dated)
     measured = measured_part(whole, recordings, stream=stream).responses
     missing = [label for label in whole.responses if label not in measured]
     note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []

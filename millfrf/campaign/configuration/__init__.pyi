@@ -1,4 +1,5 @@
 from .campaign_tables import JOBS, CampaignFile, EstimateTable
+from .copied_recordings import without_copies
 from .file_look import FileLook, hash_all, keep, look_at_other, place_below, read_kept
 from .found_recordings import FoundRecording, find_recordings
 from .labels import Labels, filled_in, labels_in, shown_value
@@ -21,5 +22,6 @@ __all__ = [
     "place_below",
     "read_kept",
     "shown_value",
+    "without_copies",
     "without_wrong_postures",
 ]

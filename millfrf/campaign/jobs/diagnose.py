@@ -33,5 +33,6 @@ def diagnose(work: Work, folder: Path) -> list[str]:
         stream=work.settings["stream"],
         band=None if band is None else (band[0], band[1]),
         process=process,
+        dated=False,
     )
     return [*lines, *doubts, *made.diagnosis.doubts]

@@ -35,7 +35,7 @@ def robot_diagnose(work: Work, folder: Path) -> list[str]:
         LabError(*asked["model_error"]),
         asked["stream"],
     )
-    told = diagnose_robot_files(_robot(work), recordings, folder, asking)
+    told = diagnose_robot_files(_robot(work), recordings, folder, asking, dated=False)
     return [*lines, *(line.removeprefix("warning: ") for line in told if line.startswith("warning: "))]
 
 

@@ -27,7 +27,7 @@ from ..running import (
     run_tasks,
 )
 from .dry_run import graph_table, time_lines
-from .lists import FAILURES, failure_rows, root_lines, write_lists
+from .lists import FAILURES, doubt_rows, failure_rows, recording_lines, root_lines, write_lists
 from .one_run import only_run
 from .opened import OpenedCampaign, open_campaign
 from .report_task import SUMMARY, publish, report_key, report_task
@@ -69,6 +69,8 @@ class RunSummary:
         Number of tasks that were run now.
     failures
         One line for each failure that is not only the consequence of another.
+    doubts
+        One line for each doubt about a recording by itself.
     summary
         Folder of tables and report, or None.
     """
@@ -77,6 +79,7 @@ class RunSummary:
     state: State
     ran: int
     failures: tuple[str, ...]
+    doubts: tuple[str, ...]
     summary: Path | None
 
     def lines(self) -> list[str]:
@@ -134,9 +137,11 @@ def run_campaign(path: Path, options: RunOptions, progress: Progress = silent) -
                 _run(opened, state, executor)
             rows = failure_rows(opened, state)
             failures = [*root_lines(rows), *opened.plan.left_out]
-            ran, summary = _report(opened, state, executor, failures)
-        write_lists(opened, state, rows)
-    return RunSummary(opened, state, len(left) + ran, tuple(failures), summary)
+            doubts = doubt_rows(opened, state)
+            ran, summary, refusal = _report(opened, state, executor, [*failures, *recording_lines(doubts)])
+            failures += [f"report: {refusal}"] if refusal else []
+        write_lists(opened, state, rows, doubts)
+    return RunSummary(opened, state, len(left) + ran, tuple(failures), tuple(recording_lines(doubts)), summary)
 
 
 def cores() -> int:
@@ -201,11 +206,11 @@ def _run(opened: OpenedCampaign, state: State, executor: Executor) -> None:
         lines.stop()
 
 
-def _report(opened: OpenedCampaign, state: State, executor: Executor, failures: list[str]) -> tuple[int, Path | None]:
-    """Write the report where it is asked for; number of tasks run for it (0: it was there), and its folder."""
+def _report(opened: OpenedCampaign, state: State, executor: Executor, lines: list[str]) -> tuple[int, Path | None, str]:
+    """Write the report where it is asked for: tasks run for it (0: it was there), its folder, why there is none."""
     if opened.file.report is None or state.full:
-        return 0, None
-    task = report_task(opened, state, failures)
+        return 0, None, ""
+    task = report_task(opened, state, lines)
     key = report_key(opened, task)
     ran = read_outcome(opened.out, task.identity, key) is None
     if ran:
@@ -213,12 +218,12 @@ def _report(opened: OpenedCampaign, state: State, executor: Executor, failures: 
         only = State(settled=dict(state.settled))
         run_tasks({task.identity: task}, only, lambda _: opened.order_of(task, keys), executor, lambda _: None)
         state.failed.update(only.failed)
-        state.settled.update({task.identity: only.settled[task.identity]} if task.identity in only.settled else {})
-    else:
-        state.settled[task.identity] = "done"
+        state.full = only.full
     found = read_outcome(opened.out, task.identity, key)
-    if found is None or not found.done:
-        failures.append(f"report: {state.failed.get(task.identity, '') if found is None else found.reason}")
-        return int(ran), None
+    if found is None:
+        return int(ran), None, state.failed.get(task.identity, "")
+    state.settled[task.identity] = "done" if found.done else "refused"
+    if not found.done:
+        return int(ran), None, found.reason
     publish(opened.out, key)
-    return int(ran), opened.out / SUMMARY
+    return int(ran), opened.out / SUMMARY, ""

@@ -6,11 +6,11 @@ from pathlib import Path
 
 from foundation import writing_whole_file
 
-from ..running import State, folder_of, log_of
+from ..running import State, folder_of, log_of, read_outcome
 from .opened import OpenedCampaign
 from .report_task import reason_of
 
-FAILURES, TASKS = "failures.csv", "tasks.csv"
+FAILURES, TASKS, DOUBTS = "failures.csv", "tasks.csv", "doubts.csv"
 
 
 def failure_rows(opened: OpenedCampaign, state: State) -> list[tuple[str, str, str, str]]:
@@ -32,9 +32,30 @@ def root_lines(rows: Iterable[tuple[str, str, str, str]]) -> list[str]:
     return list(seen)
 
 
-def write_lists(opened: OpenedCampaign, state: State, rows: Sequence[tuple[str, str, str, str]]) -> None:
-    """Write ``failures.csv`` and ``tasks.csv`` into the folder of results."""
+def doubt_rows(opened: OpenedCampaign, state: State) -> list[tuple[str, str, str]]:
+    """Kind, name and doubt, for each doubt about a result."""
+    rows = []
+    for identity, task in opened.plan.tasks.items():
+        key = opened.keys[identity]
+        found = read_outcome(opened.out, identity, key) if key and identity in state.settled else None
+        rows += [(task.kind, task.name, doubt) for doubt in (() if found is None else found.warnings)]
+    return rows
+
+
+def recording_lines(doubts: Iterable[tuple[str, str, str]]) -> list[str]:
+    """A line for each doubt about a recording by itself."""
+    return [f"{name} is doubted: {doubt}" for kind, name, doubt in doubts if kind == "check"]
+
+
+def write_lists(
+    opened: OpenedCampaign,
+    state: State,
+    rows: Sequence[tuple[str, str, str, str]],
+    doubts: Sequence[tuple[str, str, str]],
+) -> None:
+    """Write ``failures.csv``, ``doubts.csv`` and ``tasks.csv`` into the folder of results."""
     _write(opened.out / FAILURES, ("kind", "name", "became", "reason"), rows)
+    _write(opened.out / DOUBTS, ("kind", "name", "doubt"), doubts)
     tasks = []
     for identity, task in opened.plan.tasks.items():
         key = opened.keys[identity]

@@ -17,6 +17,7 @@ from ..configuration import (
     look_at_other,
     place_below,
     read_kept,
+    without_copies,
     without_wrong_postures,
 )
 from ..graph import Plan, Task, keys_of, plan_campaign
@@ -103,13 +104,15 @@ def open_campaign(path: Path, out: Path, progress: Progress, *, hashing: bool) -
     file = checked_toml(path, CampaignFile, "campaign")
     base = path.parent.resolve()
     kept = read_kept(out)
-    recordings = tuple(without_wrong_postures(find_recordings(file, base, out, kept, progress)))
+    found = find_recordings(file, base, out, kept, progress)
+    looks = {place_below(one.path, base): one.look for one in found}
+    if hashing:
+        looks = hash_all(looks, base, progress)
+    digests = {one.name: looks[place_below(one.path, base)].digest for one in found}
+    recordings = tuple(without_wrong_postures(without_copies(found, digests)))
     robot = _robot(file, base)
     postures = PostureReader(robot)
     plan = plan_campaign(file, base, recordings, robot, postures.typed)
-    looks = {place_below(one.path, base): one.look for one in recordings}
-    if hashing:
-        looks = hash_all(looks, base, progress)
     by_path = {str(one.path): looks[place_below(one.path, base)] for one in recordings}
     for task in plan.tasks.values():
         for name in task.files:

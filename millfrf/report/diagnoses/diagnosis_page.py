@@ -35,6 +35,8 @@ def write_diagnosis_report(
     diagnosis: StructureDiagnosis,
     model_name: str = "",
     process: MillingProcess | None = None,
+    *,
+    dated: bool = True,
 ) -> None:
     """Write one HTML page, figures inside, that needs no other file and no network.
 
@@ -48,6 +50,8 @@ def write_diagnosis_report(
         Name of the nominal model, for the title.
     process
         Milling process for the lobes; None: one that is assumed.
+    dated
+        Whether the page tells when it was written; without, equal input gives equal bytes.
 
     Raises
     ------
@@ -55,7 +59,7 @@ def write_diagnosis_report(
         The folder cannot be written to.
     """
     with collection_paused():
-        text = report_text(diagnosis, model_name, process)
+        text = report_text(diagnosis, model_name, process, dated=dated)
     with writing_whole_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
 
@@ -74,14 +78,16 @@ def _drawn_sections(diagnosis: StructureDiagnosis, process: MillingProcess | Non
     return [behaviour, law, held_out, lobes, location, growth]
 
 
-def report_text(diagnosis: StructureDiagnosis, model_name: str = "", process: MillingProcess | None = None) -> str:
+def report_text(
+    diagnosis: StructureDiagnosis, model_name: str = "", process: MillingProcess | None = None, *, dated: bool = True
+) -> str:
     """The page as text."""
     sections = (number_section(diagnosis), *_drawn_sections(diagnosis, process), candidate_section(diagnosis))
     names = ", ".join(one.recording.name for one in diagnosis.details.recordings)
     environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
     return environment.get_template("diagnosis.html.j2").render(
         title=f"{model_name or 'Nominal model'} against {names}",
-        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC") if dated else "",
         style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
         verdict=verdict_sentence(diagnosis),
         answers=answers(diagnosis),

@@ -23,6 +23,8 @@ def write_robot_report(
     found: RobotDiagnosis,
     robot_name: str,
     summary: list[str],
+    *,
+    dated: bool = True,
 ) -> None:
     """Write one HTML page, figures inside, that needs no other file and no network.
 
@@ -36,12 +38,14 @@ def write_robot_report(
         Name of the robot, for the title.
     summary
         Verdict, a sentence on it, and a line for each cause and held-out recording.
+    dated
+        Whether the page tells when it was written; without, equal input gives equal bytes.
     """
     environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
     names = ", ".join(one.name for one in found.details.robot.recordings)
     text = environment.get_template("diagnosis.html.j2").render(
         title=f"{robot_name} against {names}",
-        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC") if dated else "",
         style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
         verdict=f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",
         answers=[("What was found", summary[2:] or ["Nothing to change."])],

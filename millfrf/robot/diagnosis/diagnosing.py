@@ -42,8 +42,12 @@ class Asking:
     stream: str | None
 
 
-def diagnose_robot_files(robot: str, paths: Sequence[Path], out: Path, asking: Asking) -> list[str]:
+def diagnose_robot_files(
+    robot: str, paths: Sequence[Path], out: Path, asking: Asking, *, dated: bool = True
+) -> list[str]:
     """Diagnose, write ``robot_diagnosis.json``, ``model_<recording>.json`` and ``report.html``; lines that sum it up.
+
+    A report that is not ``dated`` does not tell when it was written, so that equal input gives equal bytes.
 
     Raises
     ------
@@ -80,7 +84,7 @@ def diagnose_robot_files(robot: str, paths: Sequence[Path], out: Path, asking: A
         for path in folder.glob("*.json"):
             add_to_json(path, origin("robot diagnose", [robot, *paths], asdict(asking)))
         with bar("writing the report"):
-            write_robot_report(folder / "report.html", found, case.name, lines)
+            write_robot_report(folder / "report.html", found, case.name, lines, dated=dated)
     lines += [f"warning: {doubt}" for doubt in doubts]
     return [*lines, f"wrote {out / 'robot_diagnosis.json'}, {out / 'report.html'} and a model for each recording"]
 

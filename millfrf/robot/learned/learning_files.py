@@ -85,7 +85,7 @@ def learn_from_files(
         left_out = left_out_postures(learned)
     with writing_whole_file(out) as temporary:
         write_learned_postures(temporary, learned)
-        add_to_json(temporary, {"robot": robot, **origin("robot learn", [robot, *models], asdict(asking))})
+        add_to_json(temporary, {"robot": Path(robot).name, **origin("robot learn", [robot, *models], asdict(asking))})
     _show(case, learned)
     _tell_left_out(left_out)
     for name, frequency in learned.unpaired:

@@ -1,9 +1,11 @@
 """A small campaign: two poses of three immersions from the simulated cell, and one file that is no recording."""
 
 import importlib.util
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import pytest
 
 _SPEC = importlib.util.spec_from_file_location(
@@ -40,38 +42,30 @@ method = "zero-order"
 
 @pytest.fixture(scope="session")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Good files of every kind."""
-    folder = tmp_path_factory.mktemp("good")
-    good_files.make(folder)
+    """The campaign in a folder, from which each test takes its own copy."""
+    files, folder = tmp_path_factory.mktemp("good"), tmp_path_factory.mktemp("made") / "campaign"
+    good_files.make(files)
+    (folder / "recordings").mkdir(parents=True)
+    for pose in ("P1", "P2"):
+        for immersion in ("up", "down", "central"):
+            target = folder / "recordings" / f"{pose}_{immersion}.h5"
+            target.write_bytes((files / f"{immersion}.h5").read_bytes())
+            with h5py.File(target, "r+") as file:
+                file.attrs["title"] = pose  # else they were copies of each other
+    (folder / "recordings" / "P2_broken.h5").write_text("no recording")
+    for name in ("cut.toml", "frf_tip.h5", "frf_housing.h5", "model_tip.json"):
+        (folder / name).write_bytes((files / name).read_bytes())
+    (folder / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
     return folder
 
 
 @pytest.fixture
 def campaign(good: Path, tmp_path: Path) -> Path:
     """The campaign's file in a folder with all that it names."""
-    make_campaign(good, tmp_path / "campaign")
-    return tmp_path / "campaign" / "campaign.toml"
-
-
-def make_campaign(good: Path, folder: Path) -> None:
-    """Write the campaign into a folder."""
-    (folder / "recordings").mkdir(parents=True)
-    for pose in ("P1", "P2"):
-        for immersion in ("up", "down", "central"):
-            target = folder / "recordings" / f"{pose}_{immersion}.h5"
-            target.write_bytes((good / f"{immersion}.h5").read_bytes())
-    (folder / "recordings" / "P2_broken.h5").write_text("no recording")
-    for name in ("cut.toml", "frf_tip.h5", "frf_housing.h5", "model_tip.json"):
-        (folder / name).write_bytes((good / name).read_bytes())
-    (folder / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
+    return Path(shutil.copytree(good, tmp_path / "campaign")) / "campaign.toml"
 
 
 @pytest.fixture(scope="session")
 def maker(good: Path) -> Callable[[Path], Path]:
     """Makes the campaign in a folder and returns its file."""
-
-    def make(folder: Path) -> Path:
-        make_campaign(good, folder)
-        return folder / "campaign.toml"
-
-    return make
+    return lambda folder: Path(shutil.copytree(good, folder)) / "campaign.toml"
