@@ -1,8 +1,10 @@
 """What a result says of its making."""
 
 import tomllib
+from pathlib import Path
 
-from millfrf.provenance import with_warnings
+from millfrf.provenance import origin, with_warnings
+from mismatch import Settings
 
 
 def test_warnings_of_two_jobs_stand_in_one_table() -> None:
@@ -20,3 +22,12 @@ def test_warnings_of_two_jobs_stand_in_one_table() -> None:
     assert kept["cut"] == {"depth_m": 0.001}
     assert kept["made_by_millfrf"]["warnings"] == ["late samples", "other"]
     assert "warnings" in with_warnings("no = [toml", ["said"])
+
+
+def test_options_are_told_without_addresses() -> None:
+    """Equal options give equal text in every process."""
+    told = origin("diagnose", [], {"settings": Settings(), "out": Path("a") / "b"})["options"]
+    assert told["out"] == str(Path("a") / "b")
+    assert told["settings"]["lab"]["frequency"] == 0.01
+    assert told["settings"]["proof"]["test"] == "signed_ranks"
+    assert " at 0x" not in str(told)

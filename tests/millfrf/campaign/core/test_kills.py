@@ -3,10 +3,12 @@
 import hashlib
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
@@ -89,3 +91,55 @@ def test_workers_and_then_the_run_are_killed(
     assert resumed.returncode == 0, fault
     assert "0 left for the next run" in said
     assert contents(out) == undisturbed
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_dies_ends_the_run_in_one_line_and_another_takes_over(
+    maker: Callable[[Path], Path], undisturbed: dict[str, str], tmp_path: Path
+) -> None:
+    campaign, out = maker(tmp_path / "campaign"), tmp_path / "out"
+    with cluster(tmp_path, 2) as (address, scheduler):
+        run = started(campaign, out, "--scheduler", address)
+        wait_for_results(out, 8, run)
+        scheduler.kill()
+        said, fault = run.communicate(timeout=120)
+    lines = [line for line in fault.splitlines() if " tasks, " not in line]
+    assert run.returncode == 1
+    assert lines == [
+        "millfrf: the scheduler is gone; results so far are kept: start it, and run the same command again"
+    ]
+    with cluster(tmp_path, 2) as (address, scheduler):
+        resumed = started(campaign, out, "--scheduler", address)
+        said, fault = resumed.communicate(timeout=300)
+    assert resumed.returncode == 0, fault
+    assert "0 left for the next run" in said
+    assert contents(out) == undisturbed
+
+
+@contextmanager
+def cluster(folder: Path, workers: int) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+    """A scheduler and workers as a lab starts them, by Dask's own commands."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    address = f"tcp://127.0.0.1:{port}"
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[4])}
+    words = [
+        ["scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"],
+        *[
+            ["worker", address, "--nthreads", "1", "--no-dashboard", "--memory-limit", "0", "--local-directory", folder]
+            for _ in range(workers)
+        ],
+    ]
+    quiet = subprocess.DEVNULL
+    started = [
+        subprocess.Popen([sys.executable, "-m", "dask", *one], stdout=quiet, stderr=quiet, env=environment, cwd=folder)
+        for one in words
+    ]
+    try:
+        yield address, started[0]
+    finally:
+        for one in started:
+            one.terminate()
+        for one in started:
+            one.wait(timeout=60)
