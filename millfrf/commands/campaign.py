@@ -50,5 +50,5 @@ def campaign(
         say(f"warning: {line}")
     for line in found.lines():
         say(line)
-    if found.state.failed:
+    if found.state.failed or found.state.full:
         raise typer.Exit(FAILED)

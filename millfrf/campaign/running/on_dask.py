@@ -1,12 +1,14 @@
 """The executor on Dask: worker processes of this machine, or those of a scheduler by its address."""
 
+import asyncio
 import logging
 import queue
 import tempfile
 import time
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -43,19 +45,30 @@ class OnDask:
 
     @property
     def n_workers(self) -> int:
-        """Number of workers that are there now, asked for now and then."""
+        """Number of workers that are there now, asked for now and then.
+
+        Raises
+        ------
+        MillfrfError
+            The scheduler is gone.
+        """
         now = time.monotonic()
         if now - self._asked > ASK_SECONDS:
             self._asked = now
-            self._workers = [one for one in self._client.nthreads() if one not in self._foreign]
-        return max(1, len(self._workers))
+            with _telling_of_the_end():
+                self._workers = [one for one in self._client.nthreads() if one not in self._foreign]
+        return len(self._workers)
 
     def submit(self, order: Order) -> None:
         """Take an order."""
         self._number += 1
         name = f"{order.identity.partition(':')[0]}-{order.key[:16]}-{self._number}"
         chosen = self._workers if self._foreign else None
-        future = self._client.submit(run_on_worker, order, key=name, pure=False, workers=chosen)
+        with _telling_of_the_end():
+            # others than the chosen come last: where these have died an order would else wait for ever
+            future = self._client.submit(
+                run_on_worker, order, key=name, pure=False, workers=chosen, allow_other_workers=chosen is not None
+            )
         self._running[future] = order
         future.add_done_callback(self._ended.put)
 
@@ -75,10 +88,12 @@ class OnDask:
             return None
         order = self._running.pop(future)
         if future.status == "finished":
-            ended, worker = future.result()
+            with _telling_of_the_end():
+                ended, worker = future.result()
             return self._elsewhere(order, ended, worker) if ended.status == FOREIGN else ended
         if future.status == "error":
-            error = future.exception()
+            with _telling_of_the_end():
+                error = future.exception()
             died = type(error).__name__ == "KilledWorker"
             reason = "its worker died four times while it ran" if died else f"{type(error).__name__}: {error}"
             return Ended(order.identity, FAILED, " ".join(reason.split())[:300], 0.0)
@@ -88,14 +103,25 @@ class OnDask:
         """Give an order of a worker of another version to the others; it has failed where there are none."""
         self._foreign.add(worker)
         self._asked = -ASK_SECONDS
-        if self.n_workers and self._workers:
+        if self.n_workers:
             self.submit(order)
             return None
         return replace(ended, status=FAILED)
 
     def close(self) -> None:
         """Give up what has not begun."""
-        self._client.cancel(list(self._running), force=True)
+        if self._running and self._client.status == "running":
+            with suppress(OSError, TimeoutError):
+                self._client.cancel(list(self._running), force=True)
+
+
+@contextmanager
+def _telling_of_the_end() -> Iterator[None]:
+    """Say in one line that the scheduler is gone, however Dask's client notices it."""
+    try:
+        yield
+    except (OSError, TimeoutError, CancelledError, asyncio.CancelledError) as error:
+        raise MillfrfError(GONE) from error
 
 
 def run_on_worker(order: Order) -> tuple[Ended, str]:
@@ -138,14 +164,16 @@ def dask_executor(address: str | None, workers: int, out: Path, probe: Path) -> 
         try:
             client = _client(distributed, address if cluster is None else cluster)
             try:
-                check_workers(client, out, probe, address)
+                with _telling_of_the_end():
+                    check_workers(client, out, probe, address)
                 executor = OnDask(client)
                 try:
                     yield executor
                 finally:
                     executor.close()
             finally:
-                client.close(timeout=5)
+                with suppress(OSError, TimeoutError):
+                    client.close(timeout=5)
         finally:
             if cluster is not None:
                 cluster.close(timeout=10)

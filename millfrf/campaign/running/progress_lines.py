@@ -54,7 +54,9 @@ class ProgressLines:
         text = f"{self.done} of {len(self.expected)} tasks, {self.done / elapsed:.2g}/s, {self.refused} refused"
         if self.failed:
             text += f", {self.failed} failed"
-        if 0 < self.done < len(self.expected):
+        if not workers:
+            text += ", no worker is there: waiting for one"
+        elif 0 < self.done < len(self.expected):
             text += f", about {shown_time(self._seconds_left() / workers)} left"
         return text
 

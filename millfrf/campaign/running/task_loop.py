@@ -81,7 +81,7 @@ def run_tasks(
     names = list(tasks)
     running = 0
     while ready or running:
-        while ready and running < DEPTH * executor.n_workers and not state.full:
+        while ready and running < DEPTH * max(1, executor.n_workers) and not state.full:
             executor.submit(order_of(names[heapq.heappop(ready)]))
             running += 1
         if not running:

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from foundation import InputError
+from foundation import DiskFull, InputError
 
 from ...progress import Progress, silent
 from ...tables import Table
@@ -140,7 +140,10 @@ def run_campaign(path: Path, options: RunOptions, progress: Progress = silent) -
             doubts = doubt_rows(opened, state)
             ran, summary, refusal = _report(opened, state, executor, [*failures, *recording_lines(doubts)])
             failures += [f"report: {refusal}"] if refusal else []
-        write_lists(opened, state, rows, doubts)
+        try:
+            write_lists(opened, state, rows, doubts)
+        except DiskFull as error:
+            state.full = state.full or str(error)
     return RunSummary(opened, state, len(left) + ran, tuple(failures), tuple(recording_lines(doubts)), summary)
 
 
