@@ -7,8 +7,9 @@ from foundation import SI_UNITS, InputError, si_factor
 
 _UNIT = re.compile(r"^(?P<name>.*?)[\s_]*[\[(](?P<unit>[^\[\]()]+)[\])]\s*$")
 _AXIS = re.compile(r"(?:^|[^a-z])?([xyz])(?:[^a-z]|$)|([xyz])$", re.IGNORECASE)
+_PLACE = re.compile("tip|tcp|housing|spindle", re.IGNORECASE)
 _STEMS: Mapping[str, tuple[str, ...]] = {
-    "force": ("force", "kraft", "load", "f"),
+    "force": ("hammer", "force", "kraft", "load", "f"),
     "acceleration": ("acceleration", "beschleunigung", "accel", "acc", "a"),
     "velocity": ("velocity", "geschwindigkeit", "vel", "v"),
     "displacement": ("displacement", "weg", "disp", "d", "s"),
@@ -54,12 +55,11 @@ def guessed_channel(heading: str, unit: str = "") -> dict[str, str]:
         found["quantity"] = quantity
         if unit:
             found["unit"] = unit
-    if quantity in ("force", "moment", "acceleration", "velocity", "displacement"):
-        axis = _AXIS.search(name)
-        if axis:
-            at_tip = quantity in ("force", "moment") or re.search("tcp|tip", name, re.IGNORECASE)
-            found["node"] = "TCP" if at_tip else "HOUSING"
-            found["direction"] = f"+{(axis[1] or axis[2]).upper()}"
+    axis, stated = _AXIS.search(name), _PLACE.search(name)
+    if axis and (stated or quantity in ("force", "moment", "acceleration", "velocity", "displacement")):
+        at_tip = quantity in ("force", "moment") if stated is None else stated[0].lower() in ("tip", "tcp")
+        found["node"] = "TCP" if at_tip else "HOUSING"
+        found["direction"] = f"+{(axis[1] or axis[2]).upper()}"
     return found
 
 
