@@ -1,5 +1,6 @@
 """What is wrong with a campaign is one line that names it, before anything is computed."""
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -156,3 +157,9 @@ def test_a_second_run_at_the_same_time_is_refused(campaign: Path) -> None:
 
     with only_run(campaign.parent / "out"), pytest.raises(InputError, match="another run works in"):
         run_campaign(campaign, RunOptions(campaign.parent / "out", workers=0))
+
+
+def test_without_dask_the_extra_is_named(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"needs? Dask, which is not installed: pip install 'millfrf\[cluster\]'"):
+        run_campaign(campaign, RunOptions(campaign.parent / "out", workers=1))
