@@ -28,7 +28,7 @@ from ..running import (
 )
 from .dry_run import graph_table, time_lines
 from .lists import FAILURES, doubt_rows, failure_rows, recording_lines, root_lines, write_lists
-from .one_run import only_run
+from .one_run import only_run, program_changed
 from .opened import OpenedCampaign, open_campaign
 from .report_task import SUMMARY, publish, report_key, report_task
 
@@ -110,6 +110,8 @@ def dry_run_lines(path: Path, options: RunOptions, progress: Progress = silent) 
     rates = measured_rates(opened.out)
     workers = max(1, cores() if options.workers is None else options.workers)
     lines = [*time_lines(opened, settled, rates, workers), *opened.plan.left_out]
+    if program_changed(opened.out):
+        lines.append("millfrf or a library that computes has changed since the last run: all results are made anew")
     return graph_table(opened, settled, rates), lines
 
 

@@ -9,7 +9,7 @@ from types import ModuleType
 
 from foundation import InputError, LeftoverRemoved, remove_leftovers
 
-from ..running import RESULTS
+from ..running import RESULTS, program_digest
 
 _fcntl: ModuleType | None
 try:
@@ -17,7 +17,7 @@ try:
 except ImportError:  # Windows
     _fcntl = None
 
-LOCK = ".running"
+LOCK, PROGRAM = ".running", ".program"
 
 
 @contextmanager
@@ -45,9 +45,18 @@ def only_run(out: Path) -> Iterator[None]:
             except OSError:  # a disk without locks
                 pass
         _remove_unfinished(out)
+        (out / PROGRAM).write_text(program_digest(), encoding="utf-8")
         yield
     finally:
         os.close(descriptor)
+
+
+def program_changed(out: Path) -> bool:
+    """Whether the last run in a folder was one of another version, whose results do not count now."""
+    try:
+        return (out / PROGRAM).read_text(encoding="utf-8") != program_digest()
+    except OSError:
+        return False
 
 
 def _remove_unfinished(out: Path) -> None:

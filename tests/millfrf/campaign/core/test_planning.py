@@ -13,8 +13,9 @@ from millfrf.campaign.configuration.labels import joined_labels, labels_of_setup
 from millfrf.campaign.graph import Task, in_order, keys_of
 from millfrf.campaign.graph.recording_sets import RecordingSet, grouped
 from millfrf.campaign.graph.spectra_tasks import estimate_tasks
-from millfrf.campaign.running import left_to_run
+from millfrf.campaign.running import DONE, REFUSED, Ended, ProgressLines, left_to_run, measured_rates, note_time
 from millfrf.campaign.whole_run.dry_run import longest_chain
+from millfrf.campaign.whole_run.one_run import PROGRAM, only_run
 
 
 def recording(name: str, seconds: float = 60.0, **values: str | float) -> FoundRecording:
@@ -132,3 +133,40 @@ def test_a_dry_run_tells_the_graph_and_writes_nothing(campaign: Path, capsys: py
     assert "7 recordings, 2 sets, 34 tasks and the report; 34 to run" in said
     assert "default rates, which may be off" in said
     assert not (campaign.parent / "campaign_results").exists()
+
+
+def test_a_dry_run_tells_that_another_version_made_the_results(
+    campaign: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = campaign.parent / "campaign_results"
+    with only_run(out):
+        pass
+    words = "has changed since the last run: all results are made anew"
+    assert run(["campaign", str(campaign), "--dry-run"]) == 0
+    assert words not in capsys.readouterr().out
+    (out / PROGRAM).write_text("that of last year")
+    assert run(["campaign", str(campaign), "--dry-run"]) == 0
+    assert words in capsys.readouterr().out
+
+
+def test_time_left_counts_each_kind_at_its_own_pace() -> None:
+    lines = ProgressLines({"check:a": 1.0, "check:b": 1.0, "fit:a": 100.0, "fit:b": 100.0})
+    lines.ended(Ended("check:a", DONE, "", 10.0))
+    assert "1 of 4 tasks" in lines.line(1)
+    assert lines.line(1).endswith("about 4 min left")  # 10 s of the other check, and fits as they were believed
+    lines.ended(Ended("fit:a", DONE, "", 10.0))
+    assert lines.line(2).endswith("about 10 s left")
+    lines.ended(Ended("check:b", REFUSED, "no", 0.1))
+    assert "1 refused" in lines.line(1)
+    assert lines.line(0).endswith("no worker is there: waiting for one")
+
+
+def test_rates_are_measured_by_earlier_runs(tmp_path: Path) -> None:
+    before = measured_rates(tmp_path)
+    assert not before.measured
+    note_time(tmp_path, Ended("fit:a", DONE, "", 30.0), 2.0)
+    note_time(tmp_path, Ended("fit:b", REFUSED, "no pole", 500.0), 2.0)
+    after = measured_rates(tmp_path)
+    assert after.measured == {"fit"}
+    assert after.seconds(Task("fit", "c"), 2.0) == pytest.approx(30.0)
+    assert after.seconds(Task("lobes", "c"), 0.0) == before.seconds(Task("lobes", "c"), 0.0)
