@@ -1,11 +1,18 @@
-"""A model that states the errors of its modes can be given one more, and be left without it again."""
+"""A model can be given one more mode, and be left without it again; one that took its place gives it back."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from mismatch import ModelShape, Settings
-from modal_fit import ModeErrors
+from estimation import BandRecording, windowed_spectrum
+from mismatch import Hypothesis, LabError, ModelShape, Settings, band_of, fit
+from mismatch.inference import ScreeningSettings
+from mismatch.models import modes_are_odd
+from mismatch.physics import ModePhysics, library
+from mismatch.screening import find_mode, linear_candidates, noise_floor
+from modal_fit import ModalModel, ModeErrors
 
 from .one_mode_rig import Rig
 
@@ -18,3 +25,27 @@ def test_a_further_mode_beside_a_model_that_states_its_errors() -> None:
     again, _ = more.without_mode(0, np.zeros(more.size))
     assert len(again.nominal.poles) == 1
     assert len(more.bare.nominal.poles) == 1
+
+
+def test_a_mode_whose_place_a_labs_mode_has_taken_is_found_there(
+    small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], BandRecording]
+) -> None:
+    """The lab's mode at 14 Hz is refitted to a resonance at 17 Hz that it lacks: what is left then lies at 14 Hz."""
+    pole = 2 * np.pi * 17.0 * (-0.02 + 1j)
+    right, left = 3.0 * np.array([-0.3, 1.0]) / (2j * pole.imag * 40.0), np.array([-0.3, 1.0]) + 0j
+    truth = ModelShape(small_model, LabError()).with_mode(pole, right, left).nominal
+    trials = [trial_of(truth, name, level, k) for k, (name, level) in enumerate((("low", 20.0), ("high", 60.0)))]
+    lines = [windowed_spectrum(one, band_of(truth, one.rate), 1.0) for one in trials]
+    shape = ModelShape(small_model, LabError())
+    u = np.zeros(shape.size)
+    u[shape.per_mode] = (17.0 / 14.0 - 1) / LabError().frequency
+    taken = fit(lines, Hypothesis(shape, u), iterations=30)
+    assert taken.hypothesis.model.natural_frequencies[1] == pytest.approx(17.0, abs=0.2)
+    assert modes_are_odd(taken)
+    physics = library()["missing_mode"]
+    assert isinstance(physics, ModePhysics)
+    sighted = find_mode(noise_floor(taken, lines), taken.hypothesis, physics)
+    assert abs(sighted.pole) / (2 * np.pi) == pytest.approx(14.0, abs=0.3)
+    (found,) = linear_candidates(lines, taken, [], sighted, ScreeningSettings(), 20.0)
+    np.testing.assert_allclose(found.fitted.hypothesis.model.natural_frequencies, [6.0, 14.0, 17.0], rtol=2e-3)
+    assert not modes_are_odd(found.fitted)
