@@ -15,7 +15,8 @@ from typing import Any
 
 from foundation import InputError, MillfrfError
 
-from .one_task import FAILED, FOREIGN, Ended, Order, run_task
+from .one_task import DONE, FAILED, FOREIGN, REFUSED, Ended, Order, run_task
+from .store import read_outcome
 from .worker_checks import check_workers
 
 CONNECT_SECONDS = 15.0
@@ -87,17 +88,16 @@ class OnDask:
                 raise MillfrfError(GONE) from None
             return None
         order = self._running.pop(future)
-        if future.status == "finished":
+        if future.status not in ("finished", "error"):
+            raise MillfrfError(GONE)
+        try:
             with _telling_of_the_end():
                 ended, worker = future.result()
-            return self._elsewhere(order, ended, worker) if ended.status == FOREIGN else ended
-        if future.status == "error":
-            with _telling_of_the_end():
-                error = future.exception()
-            died = type(error).__name__ == "KilledWorker"
-            reason = "its worker died four times while it ran" if died else f"{type(error).__name__}: {error}"
-            return Ended(order.identity, FAILED, " ".join(reason.split())[:300], 0.0)
-        raise MillfrfError(GONE)
+        except MillfrfError:
+            raise
+        except Exception as error:  # of Dask: a job raises nothing
+            return _given_up(order, error)
+        return self._elsewhere(order, ended, worker) if ended.status == FOREIGN else ended
 
     def _elsewhere(self, order: Order, ended: Ended, worker: str) -> Ended | None:
         """Give an order of a worker of another version to the others; it has failed where there are none."""
@@ -122,6 +122,16 @@ def _telling_of_the_end() -> Iterator[None]:
         yield
     except (OSError, TimeoutError, CancelledError, asyncio.CancelledError) as error:
         raise MillfrfError(GONE) from error
+
+
+def _given_up(order: Order, error: Exception) -> Ended:
+    """What became of a task whose workers died: it may have stored its result before."""
+    found = read_outcome(Path(order.out), order.identity, order.key)
+    if found is not None:
+        return Ended(order.identity, DONE if found.done else REFUSED, found.reason, 0.0)
+    died = type(error).__name__ == "KilledWorker"
+    reason = "its worker died four times while it ran" if died else f"{type(error).__name__}: {error}"
+    return Ended(order.identity, FAILED, " ".join(reason.split())[:300], 0.0)
 
 
 def run_on_worker(order: Order) -> tuple[Ended, str]:

@@ -135,8 +135,7 @@ def run_campaign(path: Path, options: RunOptions, progress: Progress = silent) -
             _forget_refused(opened, state)
         left = left_to_run(opened.plan.tasks, state.settled)
         with _executor(opened, options, bool(left)) as executor:
-            if left:
-                _run(opened, state, executor)
+            ended = _run(opened, state, executor) if left else 0
             rows = failure_rows(opened, state)
             failures = [*root_lines(rows), *opened.plan.left_out]
             doubts = doubt_rows(opened, state)
@@ -146,7 +145,7 @@ def run_campaign(path: Path, options: RunOptions, progress: Progress = silent) -
             write_lists(opened, state, rows, doubts)
         except DiskFull as error:
             state.full = state.full or str(error)
-    return RunSummary(opened, state, len(left) + ran, tuple(failures), tuple(recording_lines(doubts)), summary)
+    return RunSummary(opened, state, ended + ran, tuple(failures), tuple(recording_lines(doubts)), summary)
 
 
 def cores() -> int:
@@ -192,8 +191,8 @@ def _executor(opened: OpenedCampaign, options: RunOptions, needed: bool) -> Iter
         yield executor
 
 
-def _run(opened: OpenedCampaign, state: State, executor: Executor) -> None:
-    """Run what is left, and tell of it."""
+def _run(opened: OpenedCampaign, state: State, executor: Executor) -> int:
+    """Run what is left, and tell of it; number of tasks that ended."""
     tasks = opened.plan.tasks
     left, rates = left_to_run(tasks, state.settled), measured_rates(opened.out)
     expected = {one: rates.seconds(tasks[one], opened.megabytes(tasks[one])) for one in left}
@@ -209,6 +208,7 @@ def _run(opened: OpenedCampaign, state: State, executor: Executor) -> None:
         run_tasks(tasks, state, opened.order, executor, told)
     finally:
         lines.stop()
+    return lines.done
 
 
 def _report(opened: OpenedCampaign, state: State, executor: Executor, lines: list[str]) -> tuple[int, Path | None, str]:

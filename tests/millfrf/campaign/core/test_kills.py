@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import psutil
@@ -43,8 +43,11 @@ def wait_for_results(out: Path, number: int, run: subprocess.Popen[str]) -> None
 
 def workers_of(run: subprocess.Popen[str]) -> list[psutil.Process]:
     """Processes below the run that compute: those whose command line is that of a spawned process."""
-    below = psutil.Process(run.pid).children(recursive=True)
-    return [one for one in below if "spawn_main" in " ".join(one.cmdline())]
+    try:
+        below = psutil.Process(run.pid).children(recursive=True)
+        return [one for one in below if "spawn_main" in " ".join(one.cmdline())]
+    except psutil.Error:  # one of them ended meanwhile
+        return []
 
 
 @pytest.fixture(scope="module")
@@ -90,6 +93,30 @@ def test_workers_and_then_the_run_are_killed(
     said, fault = resumed.communicate(timeout=300)
     assert resumed.returncode == 0, fault
     assert "0 left for the next run" in said
+    assert contents(out) == undisturbed
+
+
+@pytest.mark.slow
+def test_tasks_whose_workers_always_die_are_left_for_the_next_run(
+    maker: Callable[[Path], Path], undisturbed: dict[str, str], tmp_path: Path
+) -> None:
+    campaign, out = maker(tmp_path / "campaign"), tmp_path / "out"
+    run = started(campaign, out, "--workers", "2")
+    wait_for_results(out, 3, run)
+    end = time.monotonic() + 300
+    while run.poll() is None and time.monotonic() < end:
+        for one in workers_of(run):
+            with suppress(psutil.Error):
+                if time.time() - one.create_time() > 3:
+                    one.kill()
+        time.sleep(0.5)
+    said, fault = run.communicate(timeout=10)
+    assert run.returncode == 1, (said, fault)
+    assert "its worker died four times while it ran" in said
+    assert "unforeseen" not in said + fault
+    resumed = started(campaign, out, "--workers", "2")
+    said, fault = resumed.communicate(timeout=300)
+    assert resumed.returncode == 0, fault
     assert contents(out) == undisturbed
 
 
