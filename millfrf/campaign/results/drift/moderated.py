@@ -11,10 +11,10 @@ from scipy.stats import t as student
 
 Real = NDArray[np.float64]
 
-FREEDOM = np.logspace(0, 3, 19)
+FREEDOM = np.logspace(0.2, 3, 18)
 """Degrees of freedom that the common variance may be worth: few where series differ, many where they are alike."""
 
-USUAL_FREEDOM, DECADES = 6.0, 0.65
+USUAL_FREEDOM, DECADES = 6.0, 0.4
 """Prior of them: median, and standard deviation in powers of ten. A handful of series cannot tell them."""
 
 FACTORS = np.exp(np.linspace(-3.5, 3.5, 57))

@@ -97,10 +97,10 @@ def test_a_drift_of_five_times_the_scatter_in_one_pose_is_found_and_only_there()
     assert found >= 18
 
 
-def test_a_drift_of_three_times_the_scatter_is_found_in_four_sessions_of_four() -> None:
+def test_a_drift_of_three_times_the_scatter_is_found_in_four_sessions_of_six() -> None:
     found = 0
     for seed in range(20):
-        made = Simulated(seed, repeats=4, poses=4)
+        made = Simulated(seed, repeats=6, poses=4)
         drifts = find_drifts(made.series({(3, 2): -3.4e-3 / 3 * made.session}), made.labels("session"))
         found += ("P03", 2) in _firm(drifts)
     assert found >= 17
@@ -213,15 +213,18 @@ def test_of_two_sets_that_differ_it_is_not_told_which_is_off() -> None:
 
 
 def test_two_sets_a_pose_are_judged_by_how_the_other_poses_differ() -> None:
-    found, alarms = 0, 0
+    # a pose measured twice has no scatter of its own: the drift must be large, and is suspected where it is not named
+    found, suspected, alarms = 0, 0, 0
     for seed in range(10):
         made = Simulated(seed, sessions=2, repeats=1, poses=12, modes=3)
         drifts = find_drifts(made.series({(3, 1): -0.02 * made.session}), made.labels("session"))
         found += _firm(drifts) == [("P03", 1)]
+        suspected += [(one.series.pose, one.series.mode) for one in drifts.suspects] == [("P03", 1)]
         made = Simulated(seed, sessions=2, repeats=1, poses=12, modes=3)
         quiet = find_drifts(made.series(), made.labels("session"))
         alarms += bool(quiet.drifts or quiet.pooled)
-    assert found >= 9
+    assert found + suspected == 10
+    assert found >= 7
     assert alarms <= 1
 
 
