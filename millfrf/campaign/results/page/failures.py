@@ -8,7 +8,7 @@ from ..read_set import SetResults
 
 
 def all_failures(sets: Sequence[SetResults], failures: Sequence[str]) -> tuple[tuple[str, str], ...]:
-    """Give each failure with the set that it belongs to, each once; those of the whole campaign come first.
+    """Give each failure with the set that it belongs to, each reason once; those that the campaign lists come first.
 
     Parameters
     ----------
@@ -17,8 +17,13 @@ def all_failures(sets: Sequence[SetResults], failures: Sequence[str]) -> tuple[t
     failures
         Failures that the campaign lists, one line each.
     """
-    own = [(one.name, line) for one in sets for line in one.failures if line not in failures]
-    return tuple(dict.fromkeys([("", line) for line in failures] + own))
+    found: dict[str, str] = dict.fromkeys(failures, "")
+    for one in sets:
+        for line in one.failures:
+            reason = line.partition(": ")[2] or line
+            said = next((known for known in found if known.endswith(reason)), line)
+            found[said] = found.get(said) or one.name
+    return tuple((name, line) for line, name in found.items())
 
 
 def failure_section(failed: Sequence[tuple[str, str]]) -> Section:

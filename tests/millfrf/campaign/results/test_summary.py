@@ -92,3 +92,13 @@ def test_a_campaign_in_which_everything_failed_says_so(campaign: Any, tmp_path: 
     assert "P01.h5: no samples; record again" in page
     assert len(pd.read_csv(tmp_path / "modes.csv", comment="#")) == 1
     assert len(pd.read_parquet(tmp_path / "modes.parquet")) == 1
+
+
+def test_a_failure_that_campaign_and_set_both_tell_stands_once(
+    campaign: Any, modelled: Any, shapes: Any, tmp_path: Path
+) -> None:
+    campaign.add({"pose": "P01"}, None, failures=("check of P01_1: P01_1.h5 is cut off",))
+    verdict = write_summary(
+        tmp_path, "Hall 3", campaign.sets, robot=None, learned=None, failures=("check P01_1: P01_1.h5 is cut off",)
+    )
+    assert [line for line in verdict if "P01_1.h5" in line] == ["Failed: P01: check P01_1: P01_1.h5 is cut off"]
