@@ -81,7 +81,7 @@ def speed_up(folder: str, poses: int = 8) -> None:
         )
     text = (made / "campaign.toml").read_text(encoding="utf-8")
     for job in ("fit", "calibrate", "lobes", "learn", "report"):
-        text = re.sub(rf"^\[{job}\]\n(?:[^\[].*\n|\n)*", "", text, flags=re.MULTILINE)
+        text = re.sub(rf"^\[{job}\]\n(?:[^\[\n].*\n|\n)*", "", text, flags=re.MULTILINE)
     (made / "diagnoses.toml").write_text(text, encoding="utf-8")
     busiest = {}
     for workers in (1, 2):

@@ -102,17 +102,14 @@ def killed_and_resumed(campaign: Path, out: Path, workers: int, at: int) -> None
 def found_of_hidden(folder: Path, out: Path) -> None:
     """Print whether the drift and the five broken files stand in the summary."""
     truth = json.loads((folder / "concealed.json").read_text(encoding="utf-8"))
-    told = "\n".join(path.read_text(encoding="utf-8") for path in sorted(out.rglob("*.csv")) + [_page(out)])
+    pages = [path for path in sorted(out.rglob("*")) if path.suffix in (".csv", ".html", ".log")]
+    told = "\n".join(path.read_text(encoding="utf-8") for path in pages)
     for one in truth["broken"]:
         name = Path(one["file"]).stem
         lines = [line.strip() for line in told.splitlines() if name in line]
         shortest = re.sub(r"<[^>]+>", " ", min(lines, key=len)) if lines else "NOT LISTED"
         print(f"{one['fault']:15} {name:16} {shortest[:160]}")
     print(f"drift hidden in {truth['drift']['pose']}, joint {truth['drift']['joint']}")
-
-
-def _page(out: Path) -> Path:
-    return out / "summary" / "report.html"
 
 
 def main(folder: str, poses: int = 20, seed: int = 0, workers: int = 4, each: int = 10, left_out: str = "") -> None:
@@ -127,7 +124,7 @@ def main(folder: str, poses: int = 20, seed: int = 0, workers: int = 4, each: in
     campaign = made / "trial.toml"
     text = (made / "campaign.toml").read_text(encoding="utf-8")
     for job in filter(None, left_out.split(",")):
-        text = re.sub(rf"^\[{job}\]\n(?:[^\[].*\n|\n)*", "", text, flags=re.MULTILINE)
+        text = re.sub(rf"^\[{job}\]\n(?:[^\[\n].*\n|\n)*", "", text, flags=re.MULTILINE)
     campaign.write_text(text, encoding="utf-8")
     first, second, third = (base / name for name in ("undisturbed", "worker_killed", "resumed"))
     undisturbed(campaign, first, 2)

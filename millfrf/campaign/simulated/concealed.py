@@ -37,6 +37,7 @@ def write_concealed(path: Path, laboratory: Laboratory, planned: Sequence[Planne
             "pose": pose_name(drift.pose),
             "joint": drift.joint,
             "stiffness_factor_in_each_session": list(drift.factors),
+            "frequency_hz_in_each_session": [_softened(laboratory, factor) for factor in drift.factors],
         },
         "temperature": {
             "reference_c": REFERENCE_TEMPERATURE,
@@ -49,6 +50,13 @@ def write_concealed(path: Path, laboratory: Laboratory, planned: Sequence[Planne
         "recordings": [asdict(one) for one in planned],
     }
     path.write_text(json.dumps(content, indent=1), encoding="utf-8")
+
+
+def _softened(laboratory: Laboratory, factor: float) -> list[float]:
+    """True frequencies of the drifting pose at the reference temperature, Hz."""
+    condition = Condition(joint_factors={laboratory.drift.joint: factor})
+    found = laboratory.true.structure(laboratory.postures[laboratory.drift.pose], condition).natural_frequencies
+    return [float(value) for value in found[found < BAND[1]]]
 
 
 def _pose(laboratory: Laboratory, number: int) -> dict[str, Any]:

@@ -65,6 +65,14 @@ def test_one_file_of_each_fault_lies_outside_the_drifting_pose(folder: Path, tru
     assert all(truth["drift"]["pose"] not in one["file"] for one in truth["broken"])
 
 
+def test_the_truth_tells_how_far_the_drift_moves_each_mode(truth: dict) -> None:
+    first, last = (np.array(truth["drift"]["frequency_hz_in_each_session"][k]) for k in (0, -1))
+    pose = next(one for one in truth["poses"] if one["pose"] == truth["drift"]["pose"])
+    assert np.allclose(first, pose["frequency_hz"])
+    assert (last <= first).all()
+    assert 0.008 < (1 - last / first).max() < 0.02
+
+
 @pytest.mark.parametrize("kind", ["truncated", "no HDF5 file", "damaged block"])
 def test_files_broken_on_the_way_are_refused(folder: Path, truth: dict, kind: str) -> None:
     with pytest.raises(InputError):

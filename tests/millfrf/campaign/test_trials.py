@@ -18,7 +18,7 @@ def test_runs_that_were_killed_end_with_the_same_bytes_and_list_every_broken_fil
     made = tmp_path / "campaign"
     make_campaign(SimulatedCampaign(made, 36, 6, seed=1))
     text = (made / "campaign.toml").read_text()
-    text = re.sub(r"^\[diagnose\]\n(?:[^\[].*\n|\n)*", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^\[diagnose\]\n(?:[^\[\n].*\n|\n)*", "", text, flags=re.MULTILINE)
     (made / "trial.toml").write_text(text)
     whole, one_worker, resumed = (tmp_path / name for name in ("whole", "one_worker", "resumed"))
     campaign_trial.undisturbed(made / "trial.toml", whole, 2)

@@ -104,13 +104,14 @@ def trial(seed: int, poses: int, new: int, left_out: int, sessions: int, limits:
         make_campaign(options)
     laboratory, planned = laboratory_of(options)
     process = read_cutting_process(folder / "cut.toml")
-    sets = fitted_sets(folder, laboratory, [one for one in planned if one.session <= sessions])
+    chosen = [one for one in planned if one.session <= sessions]
+    sets = fitted_sets(folder, laboratory, chosen)
     case = read_spatial_robot(laboratory.robot)
     measured = [
         (pose, measured_modes(f"{pose_name(pose)} {number}", laboratory.postures[pose], model))
         for number, (pose, model) in enumerate(sets)
     ]
-    mean = Condition(float(np.mean([one.temperature for one in planned])))
+    mean = Condition(float(np.mean([one.temperature for one in chosen])))
     learned = learn_postures(case.robot, [modes for _, modes in measured])
     print(f"seed {seed}: {len(sets)} sets, learned", file=sys.stderr, flush=True)
     fresh = spread_postures(case.robot.mechanism, named_posture(case, "ready"), new, np.random.default_rng([seed, 99]))
