@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..terminal import say
+from ..terminal import answer, say
 
 
 def inspect(
@@ -20,15 +20,14 @@ def inspect(
     from ..inspection import inspect_file
     from ..progress import bar
     from ..tables import show
-    from ..terminal import printable
 
     findings = inspect_file(file, bar)
-    say(printable(f"{file.name}: {findings.summary}"))
+    say(f"{file.name}: {findings.summary}")
     for table in findings.tables:
         show(table)
     for note in findings.notes:
-        say(printable(note))
+        say(note)
     for concern in findings.concerns:
-        say(printable(f"warning: {concern}"))
+        answer(f"warning: {concern}")
     if not findings.concerns:
         say("nothing looks wrong")

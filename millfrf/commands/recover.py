@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..terminal import say
+from ..terminal import answer, say
 
 if TYPE_CHECKING:
     from acquisition import Recovered
@@ -33,7 +33,7 @@ def recover(
         origin = made("recover", [recording])
         back = recover_file(recording, out, progress=update, provenance=origin)
     for line in recovered_lines(back):
-        say(line)
+        answer(line)
     say(f"wrote {back.path}")
 
 

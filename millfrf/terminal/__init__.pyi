@@ -1,4 +1,11 @@
 from .rich_output import as_it_stands, print_table, printable, progress_bar
-from .saying import say
+from .saying import answer, say
 
-__all__ = ["as_it_stands", "print_table", "printable", "progress_bar", "say"]
+__all__ = [
+    "answer",
+    "as_it_stands",
+    "print_table",
+    "printable",
+    "progress_bar",
+    "say",
+]

@@ -1,4 +1,4 @@
-"""`say`: a line of a command's answer, as it stands; names from files cannot move the cursor or paint the screen."""
+"""`say`, `answer`: lines of a command, as they stand; names from files cannot move the cursor or paint the screen."""
 
 import typer
 
@@ -18,3 +18,14 @@ def say(text: str = "") -> None:
     wrote a�[2Jb.h5
     """
     typer.echo(printable(text), err=text.startswith(_WARNING))
+
+
+def answer(text: str) -> None:
+    """Print text on standard output, a warning too: where warnings are what was asked for.
+
+    Examples
+    --------
+    >>> answer("warning: ax is dead")
+    warning: ax is dead
+    """
+    typer.echo(printable(text))

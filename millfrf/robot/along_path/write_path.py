@@ -28,7 +28,7 @@ from ...options import check_output
 from ...progress import bar
 from ...provenance import add_comment, origin
 from ...result_folder import refuse_file
-from ...terminal import say
+from ...terminal import answer, say
 from ..asked_loads import Loads, check_positive
 from ..postures import Asked, posture_of, spatial
 from ..results import RPM, say_doubts
@@ -82,7 +82,7 @@ def write_optimised_path(
         found = optimised(cut, path, asked.redundancy(path), loading, asked.wanted(), first, pool)
     warnings += doubts(found, path)
     for line in summary(found, asked.wanted(), max_depth, depth):
-        say(line)
+        answer(line)
     told = origin(
         "robot path", [robot, path_file, cutting], {"rpm": rpm, "depth_m": depth, "asked": asked, "loads": loads}
     )
