@@ -181,6 +181,10 @@ class ModePhysics(Protocol):
     parameters: tuple[Parameter, ...]
     confusable_with: tuple[str, ...]
 
+    def overdamped(self, pole: complex) -> str:
+        """Why a pole, rad/s, is no mode; empty where it may be one."""
+        ...
+
     def resolved(self, pole: complex, spacing: float, least: float) -> bool:
         """Tell whether a mode is wider than ``least`` spacings of lines, Hz; else it is a tone or chance."""
         ...

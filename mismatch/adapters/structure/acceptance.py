@@ -31,6 +31,8 @@ def impossible(proposal: Proposal[Fit], settings: EvidenceSettings) -> str:
     cause = proposal.fitted.hypothesis.causes[-1]
     if cause.axis is not None:
         return _far_modes(proposal.fitted.hypothesis, settings.farthest)
+    if isinstance(cause.physics, ModePhysics):
+        return cause.physics.overdamped(complex(proposal.fitted.hypothesis.model.poles[-1]))
     said: Callable[[Real, Real], str] | None = getattr(cause.physics, "impossible", None)
     if said is None:
         return ""
