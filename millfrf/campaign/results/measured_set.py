@@ -35,9 +35,6 @@ class MeasuredSet:
         Diagnosis of the set, JSON; None: there is none.
     failures
         One line for each step that failed.
-    recording_frfs
-        FRF of each recording alone, in the order of ``recordings``, None where it has none; empty: not made. With
-        them an outlying recording is named, not only its set.
     """
 
     name: str
@@ -49,7 +46,6 @@ class MeasuredSet:
     lobes: Path | None
     diagnosis: Path | None
     failures: tuple[str, ...]
-    recording_frfs: tuple[Path | None, ...] = ()
 
     @property
     def pose(self) -> str:

@@ -149,7 +149,7 @@ def deviation_words(deviations: Sequence[Deviation], sets: Sequence[SetResults])
     row = deviations[0].row
     rivals = sorted({sets[rival].name for one in deviations for rival in one.rivals})
     recordings = sets[row].measured.recordings
-    held = f" (of {len(recordings)} recordings)" if len(recordings) > 1 else ""
+    held = f" ({len(recordings)} recordings)" if len(recordings) > 1 else ""
     told = f"{sets[row].name}{held}: {'; '.join(parts)} what the other sets of its pose lead one to expect."
     if rivals:
         told += f" With so few sets it may as well be {' or '.join(rivals)} that is off: cannot tell which."

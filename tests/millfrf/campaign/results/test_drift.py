@@ -66,11 +66,11 @@ def test_intervals_of_the_slope_hold_the_truth_in_95_per_cent() -> None:
 
 def test_pure_scatter_drifts_in_at_most_one_campaign_of_twenty() -> None:
     alarms = 0
-    for seed in range(60):
+    for seed in range(40):
         made = Simulated(seed)
         drifts = find_drifts(made.series(), made.labels("session", "temperature_c"))
         alarms += bool(drifts.drifts or drifts.pooled)
-    assert alarms <= 3
+    assert alarms <= 2
 
 
 def test_scatter_that_differs_between_poses_is_no_drift() -> None:
