@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from figures import house_style, new_figure
 
 from .places import MapPlane
+from .written_values import free_sides
 
 SHADES = "cividis"
 """Rises in lightness from end to end, and looks the same to the colour blind."""
@@ -78,11 +79,12 @@ def _panel(figure: Figure, axes: Axes, panel: MapPanel, plane: MapPlane) -> None
         marks = axes.scatter(at[:, 0], at[:, 1], c=values, cmap=SHADES, s=42, edgecolors="black", linewidths=0.5)
         bar = figure.colorbar(marks, ax=axes, location="bottom", ticks=MaxNLocator(5), shrink=0.9, aspect=28, pad=0.02)
         bar.ax.tick_params(labelsize=7)
-    if len(known) <= MOST_WRITTEN:
-        digits = _digits(values)
-        for pose, value in zip(known, values, strict=True):
-            x, y = plane.places[pose]
-            axes.annotate(f"{value:.{digits}f}", (x, y), (0, 4.5), textcoords="offset points", ha="center", fontsize=6)
+    if known and len(known) <= MOST_WRITTEN:
+        texts = [f"{value:.{_digits(values)}f}" for value in values]
+        for place, text, side in zip(at, texts, free_sides(at, texts), strict=True):
+            if side is not None:
+                x, y = place
+                axes.annotate(text, (x, y), side, textcoords="offset points", ha="center", va="center", fontsize=6)
     axes.margins(0.14)
     axes.locator_params(nbins=5)
 

@@ -30,10 +30,12 @@ def draw_trends(drifts: Sequence[Drift], every: Sequence[Trend], words: Sequence
         Title and label of the x axis of each drift.
     """
     shown = list(drifts[:MOST_PANELS])
-    rows = -(-len(shown) // COLUMNS)
+    columns = min(COLUMNS, len(shown))
+    rows = -(-len(shown) // columns)
     with house_style():
         figure = new_figure(rows * ROW_MM + 4.0)
-        axes = figure.subplots(rows, COLUMNS, squeeze=False)
+        figure.set_figwidth(figure.get_figwidth() * columns / COLUMNS)
+        axes = figure.subplots(rows, columns, squeeze=False)
         for k, place in enumerate(axes.ravel()):
             if k >= len(shown):
                 place.set_visible(False)
