@@ -178,6 +178,11 @@ def _clock(input_path: Path, mapping: RecordingMapping, files: dict[Path, ArrayF
 def _stored_rate(name: str, input_path: Path, mapping: RecordingMapping, files: dict[Path, ArrayFile]) -> float:
     """Sample rate that stands in the file under a name."""
     file, found = _found(name, input_path, mapping, files)
+    if (found or name) not in file.fields:
+        there = ", ".join(file.fields)
+        raise FileFormatError(
+            f"sample_rate = {name!r}: {file.path.name} has no such array ({there}); give Hz as a number"
+        )
     values = file.array(found or name).reshape(-1)
     if len(values) != 1 or not (np.isfinite(values[0]) and values[0] > 0):
         shown = f"{len(values)} numbers" if len(values) != 1 else f"{values[0]:g}"

@@ -69,7 +69,7 @@ def test_the_truth_tells_how_far_the_drift_moves_each_mode(truth: dict) -> None:
     first, last = (np.array(truth["drift"]["frequency_hz_in_each_session"][k]) for k in (0, -1))
     pose = next(one for one in truth["poses"] if one["pose"] == truth["drift"]["pose"])
     assert np.allclose(first, pose["frequency_hz"])
-    assert (last <= first).all()
+    assert (last <= first * (1 + 1e-9)).all()  # a joint that softens raises no frequency, but for rounding
     assert 0.008 < (1 - last / first).max() < 0.02
 
 
