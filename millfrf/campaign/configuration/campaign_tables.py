@@ -254,9 +254,13 @@ class LearnTable(_Table):
     ----------
     feed_deg : deg
         Direction of the models' X axes from the base's x; without it the base's axes.
+    sets_per_pose
+        Number of sets of each posture that are learned from, the first ones: time rises with the third power of it, and
+        repeats say little of other postures.
     """
 
     feed_deg: Finite | None = None
+    sets_per_pose: Annotated[int, Field(ge=1)] = 1
 
 
 class ReportTable(_Table):

@@ -234,6 +234,7 @@ def _learning(
     ]
     settings = {
         "feed_deg": table.feed_deg,
+        "sets_per_pose": table.sets_per_pose,
         "robot": _robot_name(planner),
         "names": [one.name for one in posed],
         "poses": [planner.pose_of(one) for one in posed],

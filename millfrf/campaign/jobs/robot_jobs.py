@@ -1,5 +1,6 @@
 """The jobs `robot_diagnose` and `learn`: what is wrong with the robot's model, and what it learns from all poses."""
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -52,9 +53,22 @@ def learn(work: Work, folder: Path) -> list[str]:
     left = [(one.folder / MODEL, name, pose) for one, name, pose in named if one.done]
     if not left:
         raise InputError("no set has a modal model")
-    models, names, poses = zip(*left, strict=True)
+    taken = _first_of_each_pose(left, asked["sets_per_pose"])
+    models, names, poses = zip(*taken, strict=True)
     learn_from_files(_robot(work), models, LearningFrom(poses, asked["feed_deg"]), folder / LEARNED, names)
-    return [f"left out {name}: {one.reason}" for one, name, _ in named if not one.done]
+    beside = [f"{len(left) - len(taken)} further sets of the same poses: see sets_per_pose"] * (len(left) > len(taken))
+    return [*(f"left out {name}: {one.reason}" for one, name, _ in named if not one.done), *beside]
+
+
+def _first_of_each_pose(left: list[tuple[Path, str, str]], most: int) -> list[tuple[Path, str, str]]:
+    """Models with name and posture, of each posture the first ``most``: more say little of other postures."""
+    counts: Counter[str] = Counter()
+    taken = []
+    for one in left:
+        if counts[one[2]] < most:
+            taken.append(one)
+        counts[one[2]] += 1
+    return taken
 
 
 def _robot(work: Work) -> str:
