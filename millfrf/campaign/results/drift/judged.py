@@ -29,6 +29,9 @@ AS_GOOD = 4.0
 ALIKE = 0.5
 """Correlation of two labels in a pose from which one may stand for the other."""
 
+APART = 3.0
+"""Standard errors, differences between poses included, from which a pose drifts in a way of its own."""
+
 RESTS, HELD = 0.3, 1.5
 """Share of a slope, and standard errors, below which it falls without the one set that it rests on."""
 
@@ -60,6 +63,14 @@ class Drift:
     as_good: tuple[tuple[str, float], ...]
     rests_on: int | None
 
+    @property
+    def own(self) -> bool:
+        """Whether the pose drifts in a way of its own: not as the other poses do on average."""
+        if self.others is None:
+            return True
+        spread = np.hypot(np.hypot(self.trend.error, self.others.error), self.others.between)
+        return bool(abs(self.trend.slope - self.others.slope) > APART * spread)
+
 
 @dataclass(frozen=True)
 class Drifts:
@@ -68,7 +79,8 @@ class Drifts:
     Parameters
     ----------
     drifts
-        Trends of single poses that are more than chance, one a mode and quantity, the most certain first.
+        Trends of single poses that are more than chance, one a mode and quantity; those of a pose's own come first,
+        then the most certain.
     pooled
         Mean trends over poses that are more than chance.
     suspects
@@ -119,7 +131,11 @@ def find_drifts(series: Sequence[Series], labels: Labels) -> Drifts:
     drifts = [_drift(one, value, trends, labels) for one, value in best.values()]
     suspects = [one for one in trends if one.p_value < SUSPECT and _key(one.series) not in best]
     return Drifts(
-        tuple(sorted(drifts, key=lambda one: (one.trend.p_value, one.trend.series.pose, one.trend.series.mode))),
+        tuple(
+            sorted(
+                drifts, key=lambda one: (not one.own, one.trend.p_value, one.trend.series.pose, one.trend.series.mode)
+            )
+        ),
         tuple(one for one, taken in zip(pooled, named[len(trends) :], strict=True) if taken),
         tuple(sorted(suspects, key=lambda one: one.p_value)),
         tuple(trends),

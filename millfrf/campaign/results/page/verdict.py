@@ -33,8 +33,7 @@ def verdict_sentences(
     """
     usable = sum(one.model is not None for one in sets)
     told = [f"{usable} of {len(sets)} sets have a modal model."]
-    found = [drift_words(one, sets) for one in drifts.drifts] + [pooled_words(one) for one in drifts.pooled]
-    told += _cut("Drift: ", found) or [
+    told += _cut("Drift: ", _drift_sentences(drifts, sets)) or [
         "No drift was found." if drifts.count else "Nothing can be said of drift: no pose was measured twice."
     ]
     off = [deviation_words(group, sets) for group in deviations_by_set(outliers)]
@@ -45,6 +44,14 @@ def verdict_sentences(
     ]
     told += _cut("Failed: ", [f"{name}: {line}" if name else line for name, line in failed]) or ["Nothing failed."]
     return told
+
+
+def _drift_sentences(drifts: Drifts, sets: Sequence[SetResults]) -> list[str]:
+    """Poses that drift in a way of their own, then what all poses share, and how many poses only follow."""
+    own = [drift_words(one, sets) for one in drifts.drifts if one.own]
+    shared = len(drifts.drifts) - len(own)
+    follow = [f"{shared} trends of single poses only follow what all poses do; the section lists them."]
+    return [*own, *(pooled_words(one) for one in drifts.pooled), *(follow if shared else [])]
 
 
 def _cut(start: str, sentences: Sequence[str]) -> list[str]:
