@@ -60,11 +60,13 @@ def linear_candidates(
     if mode is not None and not current.hypothesis.laws and modes_are_odd(current):
         tasks.append(partial(_with_mode_from_belief, lines, current, mode.physics, settings.resolved))
     found = [one for one in in_processes(tasks) if one is not None and np.isfinite(one.evidence)]
-    modes = [one for one in found if isinstance(one.fitted.hypothesis.causes[-1].physics, ModePhysics)]
-    # of one mode from two beginnings the better counts
-    return [one for one in found if all(one is not mode for mode in modes)] + sorted(
-        modes, key=lambda one: -one.evidence
-    )[:1]
+    others = [one for one in found if not _adds_mode(one)]
+    modes = sorted((one for one in found if _adds_mode(one)), key=lambda one: -one.evidence)
+    return [*others, *modes[:1]]  # of one mode from two beginnings the better counts
+
+
+def _adds_mode(proposal: Proposal[Fit]) -> bool:
+    return isinstance(proposal.fitted.hypothesis.causes[-1].physics, ModePhysics)
 
 
 def _with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Proposal[Fit]:

@@ -2,13 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from estimation import BandRecording, windowed_spectrum
 from mismatch import Hypothesis, LabError, ModelShape, Settings, band_of, fit
-from mismatch.inference import ScreeningSettings
+from mismatch.adapters.structure.acceptance import impossible
+from mismatch.inference import Proposal, ScreeningSettings
 from mismatch.models import modes_are_odd
 from mismatch.physics import ModePhysics, library
 from mismatch.screening import find_mode, linear_candidates, noise_floor
@@ -49,3 +52,14 @@ def test_a_mode_whose_place_a_labs_mode_has_taken_is_found_there(
     (found,) = linear_candidates(lines, taken, [], sighted, ScreeningSettings(), 20.0)
     np.testing.assert_allclose(found.fitted.hypothesis.model.natural_frequencies, [6.0, 14.0, 17.0], rtol=2e-3)
     assert not modes_are_odd(found.fitted)
+
+
+@pytest.mark.parametrize(("damping", "said"), [(0.05, ""), (0.25, ""), (0.77, "a mode damped by 77 % is no resonance")])
+def test_a_pole_without_a_peak_cannot_be_a_missing_mode(damping: float, said: str) -> None:
+    """What has a slope and no peak mends the form of a law; the candidate is told with the reason."""
+    omega = 2 * np.pi * 5.9
+    pole = -damping * omega + 1j * omega * np.sqrt(1 - damping**2)
+    cause = SimpleNamespace(axis=None, physics=library()["missing_mode"])
+    hypothesis = SimpleNamespace(causes=(cause,), model=SimpleNamespace(poles=np.array([-1 + 100j, pole])))
+    proposal: Any = Proposal("missing_mode", {}, SimpleNamespace(hypothesis=hypothesis), 2691.0)
+    assert impossible(proposal, Settings().evidence) == said
