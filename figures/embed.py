@@ -9,6 +9,8 @@ from matplotlib.figure import Figure
 
 from foundation import InputError, writing_whole_file
 
+from .redrawn_svg import redrawn
+from .small_svg import SmallSvg
 from .style import house_style
 
 _SUFFIXES = {".svg": "svg", ".png": "png", ".pdf": "pdf"}
@@ -26,8 +28,8 @@ def as_data_uri(figure: Figure, *, kind: str = "svg") -> str:
     return f"data:image/{'svg+xml' if kind == 'svg' else 'png'};base64,{text}"
 
 
-def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Write a figure by suffix: ``.svg``, ``.png`` (200 dpi) or ``.pdf``.
+def save_figure(figure: Figure | SmallSvg, path: str | os.PathLike[str]) -> None:
+    """Write a figure, or a page of small panels, by suffix: ``.svg``, ``.png`` (200 dpi) or ``.pdf``.
 
     Raises
     ------
@@ -37,5 +39,11 @@ def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     kind = _SUFFIXES.get(Path(path).suffix.lower())
     if kind is None:
         raise InputError(f"cannot write a figure to {path}; use one of {', '.join(_SUFFIXES)}")
+    if isinstance(figure, SmallSvg) and kind == "svg":
+        with writing_whole_file(path) as temporary:
+            Path(temporary).write_text(figure.svg(), encoding="utf-8")
+        return
+    drawn = redrawn(figure) if isinstance(figure, SmallSvg) else figure
+    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)  # equal figures give equal files
     with writing_whole_file(path) as temporary, house_style():
-        figure.savefig(temporary, format=kind, dpi=200)
+        drawn.savefig(temporary, format=kind, dpi=200, metadata=metadata)

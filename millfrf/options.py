@@ -15,6 +15,10 @@ if TYPE_CHECKING:  # the commands start without loading the room of FRFs
 
 Band = Annotated[tuple[float, float] | None, typer.Option("--band", metavar="LO HI", help="Frequency band, Hz.")]
 Output = Annotated[Path, typer.Option("--out", metavar="FILE", help="File to write.")]
+Figures = Annotated[
+    Path | None, typer.Option("--figures", metavar="DIR", help="Folder for each figure as a file of its own.")
+]
+FigureFormat = Annotated[str, typer.Option("--figure-format", help="Format of --figures: svg, png or pdf.")]
 Responding = Annotated[
     list[str] | None, typer.Option("--response", help="Channel that responds; repeat, or separate by commas.")
 ]

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..options import Band, Output, check_band, check_output
+from ..options import Band, FigureFormat, Figures, Output, check_band, check_output
 from ..terminal import say
 
 
@@ -19,12 +19,15 @@ def report(
     reference: Annotated[
         Path | None, typer.Option("--reference", metavar="MODEL.json", help="Known dynamics to draw beside the fit.")
     ] = None,
+    figures: Figures = None,
+    figure_format: FigureFormat = "svg",
 ) -> None:
     """The modal-fitting report of a test: set-up, settings, modes, figures, lobes, versions."""
     from ..progress import bar
-    from ..report import ReportOptions, write_report
+    from ..report import ReportOptions, asked_figures, write_report
 
     check_output(out, (".html", ".htm"), files)
-    for doubt in write_report(out, files, ReportOptions(title, check_band(band), reference), bar):
+    options = ReportOptions(title, check_band(band), reference, asked_figures(figures, figure_format))
+    for doubt in write_report(out, files, options, bar):
         say(f"warning: {doubt}")
-    say(f"wrote {out}")
+    say(f"wrote {out}" + ("" if figures is None else f" and its figures in {figures}"))

@@ -1,19 +1,24 @@
 from .collection import Collected, collect
 from .diagnoses import write_cut_report, write_diagnosis_report, write_robot_report
 from .page import ReportOptions, write_report
-from .results_page import ResultsPage, write_results_page
-from .section import Fold, Picture, Section
+from .pages import FigureFiles, ResultsPage, asked_figures, page_text, write_figures, write_results_page
+from .section import Fold, Picture, Section, picture_of
 
 __all__ = [
     "Collected",
+    "FigureFiles",
     "Fold",
     "Picture",
     "ReportOptions",
     "ResultsPage",
     "Section",
+    "asked_figures",
     "collect",
+    "page_text",
+    "picture_of",
     "write_cut_report",
     "write_diagnosis_report",
+    "write_figures",
     "write_report",
     "write_results_page",
     "write_robot_report",

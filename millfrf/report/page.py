@@ -4,12 +4,8 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from importlib.resources import files
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-
-from foundation import writing_whole_file
 from modal_fit import ModalModel, read_modal_model
 
 from ..file_kinds import MODEL
@@ -24,6 +20,8 @@ from ..gate import (
 from ..progress import Progress, silent
 from ..provenance import sha256, versions
 from .collection import Collected, SourceFile, collect
+from .pages import FigureFiles, ResultsPage, write_results_page
+from .section import Section
 from .sections import (
     channel_section,
     chatter_in_brief,
@@ -53,11 +51,14 @@ class ReportOptions:
         Frequency axis of its figures; None: chosen by the fit.
     reference
         Model file with known dynamics to draw beside the measured ones.
+    figures
+        Folder and format in which each figure is written as a file too; None: no files.
     """
 
     title: str = "In-process FRF and modal fit"
     band: tuple[float, float] | None = None
     reference: str | os.PathLike[str] | None = None
+    figures: FigureFiles | None = None
 
 
 def write_report(
@@ -78,15 +79,16 @@ def write_report(
     InputError
         A file that cannot be used; nothing is written.
     """
-    collected = collect(paths)
-    text = report_text(collected, options or ReportOptions(), progress)
-    with writing_whole_file(path) as temporary:
-        Path(temporary).write_text(text, encoding="utf-8")
+    collected, chosen = collect(paths), options or ReportOptions()
+    page, sections = report_page(collected, chosen, progress)
+    write_results_page(path, page, sections, chosen.figures)
     return list(collected.doubts)
 
 
-def report_text(collected: Collected, options: ReportOptions, progress: Progress = silent) -> str:
-    """The page as text."""
+def report_page(
+    collected: Collected, options: ReportOptions, progress: Progress = silent
+) -> tuple[ResultsPage, tuple[Section, ...]]:
+    """Head and sections of the report, before it becomes a page."""
     reference = None if options.reference is None else read_modal_model(options.reference)
     channels, concerns = channel_section(collected, progress)
     with progress("stability"):
@@ -105,16 +107,17 @@ def report_text(collected: Collected, options: ReportOptions, progress: Progress
         channels,
         file_section(collected),
     )
-    environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
-    return environment.get_template("report.html.j2").render(
-        title=options.title,
-        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
-        brief=[*_in_brief(collected), *stability.brief, *chatter_in_brief(collected)],
-        warnings=_warnings(collected, [*stability.warnings, *concerns]),
-        sections=[section for section in sections if not section.empty],
-        versions=versions(),
+    page = ResultsPage(
+        "Modal-fitting report",
+        options.title,
+        f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by millfrf {versions()['millfrf']}",
+        (*_in_brief(collected), *stability.brief, *chatter_in_brief(collected)),
+        tuple(_warnings(collected, [*stability.warnings, *concerns])),
+        verdict_title="In brief",
+        warnings_title="Before you trust the figures",
+        clear="No warning from estimation, fit or channel levels.",
     )
+    return page, sections
 
 
 def _with_reference(collected: Collected, options: ReportOptions, reference: ModalModel | None) -> Collected:

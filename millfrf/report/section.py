@@ -1,6 +1,11 @@
 """Parts of a report: sections with sentences, tables, figures and parts that fold."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from matplotlib.figure import Figure
+
+from figures import SmallSvg, as_data_uri
 
 from ..tables import Table
 
@@ -17,11 +22,32 @@ class Picture:
         What it shows and how to read it.
     alternative
         Words for readers who cannot see the picture.
+    figure
+        The drawing itself, from which files in other formats are made.
     """
 
     uri: str
     caption: str
     alternative: str
+    figure: Figure | SmallSvg = field(repr=False, compare=False)
+
+
+def picture_of(
+    figure: Figure | SmallSvg, caption: str, alternative: str, *, kind: Literal["svg", "png"] = "svg"
+) -> Picture:
+    """A figure as a picture of a page.
+
+    Parameters
+    ----------
+    figure
+        Figure, or page of small panels.
+    caption, alternative
+        As in :class:`Picture`.
+    kind
+        ``svg``, or ``png`` for figures of very many points.
+    """
+    uri = figure.uri() if isinstance(figure, SmallSvg) else as_data_uri(figure, kind=kind)
+    return Picture(uri, caption, alternative, figure)
 
 
 @dataclass(frozen=True)

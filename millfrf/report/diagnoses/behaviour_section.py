@@ -1,9 +1,9 @@
 """What modes do with the level, whatever law stands behind it: sentences and a figure."""
 
-from figures import as_data_uri, behaviour_figure
+from figures import behaviour_figure
 from mismatch import StructureDiagnosis
 
-from ..section import Picture, Section
+from ..section import Section, picture_of
 
 TITLE = "What the modes do with the level"
 
@@ -23,5 +23,5 @@ def behaviour_section(diagnosis: StructureDiagnosis) -> Section:
         "Each recording refitted alone by a linear model, no law assumed. Bars are two standard errors and count what "
         "a linear model cannot follow. (a) Natural frequency from that at the lowest level; (b) damping ratio."
     )
-    picture = Picture(as_data_uri(behaviour_figure(found)), caption, "Natural frequency and damping by level")
+    picture = picture_of(behaviour_figure(found), caption, "Natural frequency and damping by level")
     return Section(TITLE, told, (), (picture,))

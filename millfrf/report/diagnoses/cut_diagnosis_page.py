@@ -1,23 +1,25 @@
 """The page that a cutting diagnosis leaves behind."""
 
 import os
-from datetime import UTC, datetime
-from importlib.resources import files
-from pathlib import Path
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from figures import as_data_uri, cut_orders_figure, cut_turn_figure, house_style
-from foundation import writing_whole_file
+from figures import cut_orders_figure, cut_turn_figure, house_style
 from mismatch import COEFFICIENT_NAMES, CutDiagnosis
 
-from ...provenance import versions
 from ...tables import Table
-from ..section import Picture, Section
+from ..pages import FigureFiles, ResultsPage, write_results_page
+from ..section import Section, picture_of
+from .made_when import made_when
 
 
-def write_cut_report(path: str | os.PathLike[str], found: CutDiagnosis, cut_name: str, summary: list[str]) -> None:
+def write_cut_report(
+    path: str | os.PathLike[str],
+    found: CutDiagnosis,
+    cut_name: str,
+    summary: list[str],
+    figures: FigureFiles | None = None,
+) -> None:
     """Write one HTML page, figures inside, that needs no other file and no network.
 
     Parameters
@@ -30,21 +32,20 @@ def write_cut_report(path: str | os.PathLike[str], found: CutDiagnosis, cut_name
         Name of the cut, for the title.
     summary
         Verdict, a sentence on it, and a line for each finding.
+    figures
+        Folder and format in which each figure is written as a file too; None: no files.
     """
-    environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
     names = ", ".join(spectra.recording.name for spectra in found.details.cut.spectra)
-    text = environment.get_template("diagnosis.html.j2").render(
-        title=f"{cut_name} against {names}",
-        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
-        style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
-        verdict=f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",
-        answers=[("What was found", summary[2:])],
-        warnings=_warnings(found),
-        sections=[_around_the_turn(found), _by_order(found), _coefficients(found), _candidates(found)],
-        versions=versions(),
+    page = ResultsPage(
+        "Diagnosis of computed against measured cutting forces",
+        f"{cut_name} against {names}",
+        made_when(),
+        (f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",),
+        tuple(_warnings(found)),
+        (("What was found", tuple(summary[2:])),),
     )
-    with writing_whole_file(path) as temporary:
-        Path(temporary).write_text(text, encoding="utf-8")
+    sections = [_around_the_turn(found), _by_order(found), _coefficients(found), _candidates(found)]
+    write_results_page(path, page, sections, figures)
 
 
 def _warnings(found: CutDiagnosis) -> list[str]:
@@ -64,18 +65,18 @@ def _warnings(found: CutDiagnosis) -> list[str]:
 
 def _around_the_turn(found: CutDiagnosis) -> Section:
     with house_style():
-        picture = as_data_uri(cut_turn_figure(found))
+        figure = cut_turn_figure(found)
     name = found.details.cut.spectra[0].recording.name
     caption = (
         f"Force on the tool around the turn of the spindle in {name}, mean of all turns, without its constant part, in "
         "the band that is compared (its upper end makes the ripple). Below: measured less computed."
     )
-    return Section("Around the turn", (), (), (Picture(picture, caption, "Measured and computed force"),))
+    return Section("Around the turn", (), (), (picture_of(figure, caption, "Measured and computed force"),))
 
 
 def _by_order(found: CutDiagnosis) -> Section:
     with house_style():
-        picture = as_data_uri(cut_orders_figure(found))
+        figure = cut_orders_figure(found)
     caption = "Amplitude of the force and of what is left of it; teeth of equal chips give multiples of their number."
     better = found.improvement
     columns: tuple[str, ...] = ("as computed", "coefficients refitted", "noise")
@@ -84,7 +85,7 @@ def _by_order(found: CutDiagnosis) -> Section:
         columns, numbers = (*columns[:2], "with causes", "noise"), (*numbers[:2], better.after, better.noise_floor)
     row = tuple(f"{100 * number:.3g}" for number in numbers)
     table = Table("Error on blocks of time that were not fitted (% of the force)", columns, (row,))
-    return Section("By spindle order", (), (table,), (Picture(picture, caption, "Error by spindle order"),))
+    return Section("By spindle order", (), (table,), (picture_of(figure, caption, "Error by spindle order"),))
 
 
 def _coefficients(found: CutDiagnosis) -> Section:

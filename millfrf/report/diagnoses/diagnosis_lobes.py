@@ -4,14 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cutting import MillingProcess
-from figures import as_data_uri, lobes_figure
+from figures import lobes_figure
 from foundation import InputError
 from mismatch import Hypothesis, StructureDiagnosis, equivalent_receptance
 from modal_fit import ModalModel
 from stability import StabilityLobes, zero_order
 
 from ...tables import Table
-from ..section import Picture, Section
+from ..section import Section, picture_of
 from .diagnosis_answers import offered_in_words
 
 ASSUMED = MillingProcess(
@@ -71,7 +71,7 @@ def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProce
     columns = ("structure", "depth stable at every speed (mm)", "over nominal")
     table = Table("Depth that is stable at every speed drawn", columns, rows)
     caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
-    picture = Picture(as_data_uri(lobes_figure(curves)), caption, "Stability lobes before and after")
+    picture = picture_of(lobes_figure(curves), caption, "Stability lobes before and after")
     return Section(title, (sentence, *offered_in_words(diagnosis)), (table,), (picture,))
 
 

@@ -2,19 +2,13 @@
 
 import os
 from collections.abc import Callable
-from datetime import UTC, datetime
 from functools import partial
-from importlib.resources import files
-from pathlib import Path
-
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from cutting import MillingProcess
-from foundation import writing_whole_file
 from mismatch import StructureDiagnosis, in_processes
 
-from ...provenance import versions
 from ..collection_paused import collection_paused
+from ..pages import FigureFiles, ResultsPage, write_results_page
 from ..section import Section
 from .behaviour_section import behaviour_section
 from .diagnosis_answers import answers, verdict_sentence, warnings
@@ -28,6 +22,7 @@ from .diagnosis_sections import (
     location_section,
     number_section,
 )
+from .made_when import made_when
 
 
 def write_diagnosis_report(
@@ -37,6 +32,7 @@ def write_diagnosis_report(
     process: MillingProcess | None = None,
     *,
     dated: bool = True,
+    figures: FigureFiles | None = None,
 ) -> None:
     """Write one HTML page, figures inside, that needs no other file and no network.
 
@@ -52,6 +48,8 @@ def write_diagnosis_report(
         Milling process for the lobes; None: one that is assumed.
     dated
         Whether the page tells when it was written; without, equal input gives equal bytes.
+    figures
+        Folder and format in which each figure is written as a file too; None: no files.
 
     Raises
     ------
@@ -59,9 +57,17 @@ def write_diagnosis_report(
         The folder cannot be written to.
     """
     with collection_paused():
-        text = report_text(diagnosis, model_name, process, dated=dated)
-    with writing_whole_file(path) as temporary:
-        Path(temporary).write_text(text, encoding="utf-8")
+        sections = (number_section(diagnosis), *_drawn_sections(diagnosis, process), candidate_section(diagnosis))
+        names = ", ".join(one.recording.name for one in diagnosis.details.recordings)
+        page = ResultsPage(
+            "Diagnosis of a model against recordings",
+            f"{model_name or 'Nominal model'} against {names}",
+            made_when(dated=dated),
+            (verdict_sentence(diagnosis),),
+            tuple(warnings(diagnosis)),
+            answers(diagnosis),
+        )
+        write_results_page(path, page, sections, figures)
 
 
 def _drawn_sections(diagnosis: StructureDiagnosis, process: MillingProcess | None) -> list[Section]:
@@ -76,22 +82,3 @@ def _drawn_sections(diagnosis: StructureDiagnosis, process: MillingProcess | Non
     ]
     held_out, location, lobes, law, growth, behaviour = in_processes(makers)
     return [behaviour, law, held_out, lobes, location, growth]
-
-
-def report_text(
-    diagnosis: StructureDiagnosis, model_name: str = "", process: MillingProcess | None = None, *, dated: bool = True
-) -> str:
-    """The page as text."""
-    sections = (number_section(diagnosis), *_drawn_sections(diagnosis, process), candidate_section(diagnosis))
-    names = ", ".join(one.recording.name for one in diagnosis.details.recordings)
-    environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
-    return environment.get_template("diagnosis.html.j2").render(
-        title=f"{model_name or 'Nominal model'} against {names}",
-        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC") if dated else "",
-        style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
-        verdict=verdict_sentence(diagnosis),
-        answers=answers(diagnosis),
-        warnings=warnings(diagnosis),
-        sections=[section for section in sections if not section.empty],
-        versions=versions(),
-    )

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from figures import as_data_uri, channel_map_figure, growth_figure, law_figure, spectra_figure, time_map_figure
+from figures import channel_map_figure, growth_figure, law_figure, spectra_figure, time_map_figure
 from foundation import InputError
 from mismatch import (
     Candidate,
@@ -20,7 +20,7 @@ from mismatch import (
 )
 
 from ...tables import Table
-from ..section import Picture, Section
+from ..section import Picture, Section, picture_of
 from .diagnosis_answers import number, place, words
 
 MOST_CANDIDATES = 15
@@ -182,7 +182,7 @@ def _short_place(one: Candidate) -> str:
 
 
 def _picture(figure: Figure, caption: str, alternative: str) -> Picture:
-    return Picture(as_data_uri(figure), caption, alternative)
+    return picture_of(figure, caption, alternative)
 
 
 def if_possible(make: Callable[[], Section], title: str) -> Section:

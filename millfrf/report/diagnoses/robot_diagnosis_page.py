@@ -1,21 +1,17 @@
 """The page that a robot's diagnosis leaves behind."""
 
 import os
-from datetime import UTC, datetime
-from importlib.resources import files
-from pathlib import Path
 
 import numpy as np
-from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from figures import as_data_uri, house_style, robot_evidence_figure, robot_spectra_figure
-from foundation import writing_whole_file
+from figures import house_style, robot_evidence_figure, robot_spectra_figure
 from mismatch import ROBOT, Candidate, RobotDiagnosis, number_of, standard_error_of
 
-from ...provenance import versions
 from ...robot import UNITS, refusal, told_number, what_is_asked
 from ...tables import Table
-from ..section import Picture, Section
+from ..pages import FigureFiles, ResultsPage, write_results_page
+from ..section import Section, picture_of
+from .made_when import made_when
 
 
 def write_robot_report(
@@ -25,6 +21,7 @@ def write_robot_report(
     summary: list[str],
     *,
     dated: bool = True,
+    figures: FigureFiles | None = None,
 ) -> None:
     """Write one HTML page, figures inside, that needs no other file and no network.
 
@@ -40,21 +37,19 @@ def write_robot_report(
         Verdict, a sentence on it, and a line for each cause and held-out recording.
     dated
         Whether the page tells when it was written; without, equal input gives equal bytes.
+    figures
+        Folder and format in which each figure is written as a file too; None: no files.
     """
-    environment = Environment(loader=PackageLoader("millfrf", "report"), autoescape=True, undefined=StrictUndefined)
     names = ", ".join(one.name for one in found.details.robot.recordings)
-    text = environment.get_template("diagnosis.html.j2").render(
-        title=f"{robot_name} against {names}",
-        written_at=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC") if dated else "",
-        style=files("millfrf.report").joinpath("report.css").read_text(encoding="utf-8"),
-        verdict=f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",
-        answers=[("What was found", summary[2:] or ["Nothing to change."])],
-        warnings=[*found.doubts, *_warnings(found)],
-        sections=[_spectra(found), _candidates(found), _postures(found)],
-        versions=versions(),
+    page = ResultsPage(
+        "Diagnosis of a robot model against recordings",
+        f"{robot_name} against {names}",
+        made_when(dated=dated),
+        (f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",),
+        (*found.doubts, *_warnings(found)),
+        (("What was found", tuple(summary[2:]) or ("Nothing to change.",)),),
     )
-    with writing_whole_file(path) as temporary:
-        Path(temporary).write_text(text, encoding="utf-8")
+    write_results_page(path, page, [_spectra(found), _candidates(found), _postures(found)], figures)
 
 
 def _warnings(found: RobotDiagnosis) -> list[str]:
@@ -76,7 +71,7 @@ def _warnings(found: RobotDiagnosis) -> list[str]:
 
 def _spectra(found: RobotDiagnosis) -> Section:
     with house_style():
-        picture = as_data_uri(robot_spectra_figure(found))
+        figure = robot_spectra_figure(found)
     caption = (
         "Root of response power over force power, all channels of a recording together, as receptance. The modes of "
         "the robot are drawn without the small deviations that a right model is allowed."
@@ -90,18 +85,18 @@ def _spectra(found: RobotDiagnosis) -> Section:
         pairs = zip(rows, found.held_out, strict=True)
         rows = [(*row[:2], f"{100 * one.after:.3g}", row[2]) for row, one in pairs]
     table = Table("Error of recordings that were left out of the fit (% of the response)", columns, tuple(rows))
-    return Section("On the recordings", (), (table,), (Picture(picture, caption, "Spectra before and after"),))
+    return Section("On the recordings", (), (table,), (picture_of(figure, caption, "Spectra before and after"),))
 
 
 def _candidates(found: RobotDiagnosis) -> Section:
     with house_style():
-        picture = as_data_uri(robot_evidence_figure(found))
+        figure = robot_evidence_figure(found)
     rows = tuple((one.name, *_number(one), f"{one.evidence:.1f}", refusal(one) or "-") for one in found.candidates)
     columns = ("change", "number", "unit", "evidence", "recordings left out")
     table = Table("Every change alone with its number, error of the fit alone", columns, rows)
     caption = "Gain in score of each single change (twice a log Bayes factor); blue: accepted, or as good."
     tables = (_errors(found), table) if found.physics else (table,)
-    return Section("What was weighed", (), tables, (Picture(picture, caption, "Evidence of the candidates"),))
+    return Section("What was weighed", (), tables, (picture_of(figure, caption, "Evidence of the candidates"),))
 
 
 def _errors(found: RobotDiagnosis) -> Table:

@@ -2,11 +2,11 @@
 
 import math
 
-from figures import ShownCut, as_data_uri, chatter_figure
+from figures import ShownCut, chatter_figure
 
 from ...chain import KeptCut, tone_table, verdict_table
 from ..collection import Collected
-from ..section import Picture, Section
+from ..section import Picture, Section, picture_of
 
 TOGETHER = 3
 """Cuts in one figure."""
@@ -60,4 +60,4 @@ def _picture(name: str, kept: list[KeptCut]) -> Picture:
         "is left (solid) is held against the recording's own noise floor (dashed). Gaps: hidden by an order. Lines "
         "that were named have arrows."
     )
-    return Picture(as_data_uri(chatter_figure(shown)), caption, "Spectra of judged cuts")
+    return picture_of(chatter_figure(shown), caption, "Spectra of judged cuts")

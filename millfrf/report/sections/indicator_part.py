@@ -3,10 +3,10 @@
 import numpy as np
 
 from estimation import Frf
-from figures import as_data_uri, indicator_figure
+from figures import indicator_figure
 from modal_fit import ComplexModeIndicator, ModalModel, complex_mode_indicator, multivariate_mode_indicator
 
-from ..section import Picture
+from ..section import Picture, picture_of
 
 Band = tuple[float, float]
 
@@ -42,9 +42,7 @@ def indicator_part(name: str, frf: Frf, model: ModalModel, band: Band) -> tuple[
         + ("Mode indicator (MIF)" if single else "Multivariate mode indicator (MIF)")
         + ", the share of the motion in phase with the forces: 0 at a real mode that stands alone."
     )
-    picture = Picture(
-        as_data_uri(indicator_figure(indicator, multivariate, model)), caption, "Mode indicators over frequency"
-    )
+    picture = picture_of(indicator_figure(indicator, multivariate, model), caption, "Mode indicators over frequency")
     return picture, _unexplained(name, indicator, model)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from acquisition import Recording
-from figures import as_data_uri, time_figure
+from figures import time_figure
 
 from ...chain import LOCAL
 from ...gate import level_table, look
@@ -13,7 +13,7 @@ from ...progress import Progress
 from ...tables import Table
 from ...taps import tap_concerns
 from ..collection import Collected, SourceFile
-from ..section import Picture, Section
+from ..section import Picture, Section, picture_of
 
 MOST_OVERVIEWS = 4
 
@@ -92,7 +92,7 @@ def _overview(file: SourceFile, stream: Any) -> Picture:
         f"{file.path.name}: every channel over the whole recording (left, largest and smallest sample in each of 600 "
         "intervals) and a quarter of a second from its middle (right)."
     )
-    return Picture(as_data_uri(time_figure(stream), kind="png"), caption, "Forces and motion over time")
+    return picture_of(time_figure(stream), caption, "Forces and motion over time", kind="png")
 
 
 def settings_section(collected: Collected) -> Section:

@@ -1,12 +1,12 @@
 """The section on reciprocity: FRFs measured both ways, and left against right vectors."""
 
 from estimation import reciprocity_pairs
-from figures import as_data_uri, reciprocity_figure
+from figures import reciprocity_figure
 
 from ...gate import shown_pairs
 from ...reciprocity_tables import pair_table, vector_table
 from ..collection import Collected
-from ..section import Picture, Section
+from ..section import Section, picture_of
 
 MOST_DRAWN = 6
 """Pairs that are drawn."""
@@ -29,7 +29,7 @@ def reciprocity_section(collected: Collected) -> Section:
             "their difference over their root mean square. A structure at rest is reciprocal; a robot that moves need "
             "not be."
         )
-        pictures.append(Picture(as_data_uri(reciprocity_figure(pairs, frf.unit)), caption, "Reciprocity of FRFs"))
+        pictures.append(picture_of(reciprocity_figure(pairs, frf.unit), caption, "Reciprocity of FRFs"))
     vectors = [vector_table(model, file.path.name) for file, model in collected.models]
     tables += [table for table in vectors if table is not None]
     return Section("Reciprocity", tables=tuple(tables), pictures=tuple(pictures))

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from figures import as_data_uri, input_figure, stabilisation_figure
+from figures import input_figure, stabilisation_figure
 from modal_fit import ModalModel
 
 from ...chain import EstimateOptions, chart_from_json, spectra_of_tests
 from ...progress import Progress
 from ...tables import error_table, mode_table
 from ..collection import Collected, SourceFile
-from ..section import Fold, Picture, Section
+from ..section import Fold, Picture, Section, picture_of
 from .dropped_part import dropped_part
 from .frfs import Band, axis_of, band_of, shown_frf
 from .indicator_part import has_lines, indicator_part
@@ -35,7 +35,7 @@ def input_section(collected: Collected, band: Band | None, progress: Progress) -
             f"{len(tests)} tests stacked{', and the smallest of each test alone' if len(tests) > 1 else ''}; where the "
             "smallest vanishes the inputs are dependent; (c) coherence between each two inputs."
         )
-        pictures.append(Picture(as_data_uri(input_figure(tests, axis)), caption, "Independence of the inputs"))
+        pictures.append(picture_of(input_figure(tests, axis), caption, "Independence of the inputs"))
     return Section("Excitation", pictures=tuple(pictures))
 
 
@@ -107,4 +107,4 @@ def _stabilisation(collected: Collected, file: SourceFile, model: ModalModel) ->
         f"{file.path.name}: stabilisation chart; (a) poles over model order above the summed FRF, (b) damping of the "
         "poles that are stable in frequency and damping. Vertical lines and diamonds: modes of the fitted model."
     )
-    return Picture(as_data_uri(stabilisation_figure(chart, shown, model)), caption, "Stabilisation chart")
+    return picture_of(stabilisation_figure(chart, shown, model), caption, "Stabilisation chart")

@@ -1,10 +1,10 @@
 """Mode shapes in a report: table, auto-MAC with MPC and MPD, and every vector in the complex plane."""
 
-from figures import as_data_uri, assurance_figure, compass_figure, mode_figure
+from figures import assurance_figure, compass_figure, mode_figure
 from modal_fit import ModalModel, ModeShapes
 
 from ...tables import Table, shape_table, shapes_of
-from ..section import Picture
+from ..section import Picture, picture_of
 
 FEW = 6
 """Degrees of freedom up to which right and left vectors are drawn with a name at each component."""
@@ -45,7 +45,7 @@ def _assurance(name: str, model: ModalModel, shapes: ModeShapes) -> Picture:
         f"{len(shapes.dofs)} points cannot tell apart; (b) modal phase collinearity, 1 for a real mode; (c) mean phase "
         "deviation, 0 for a real mode."
     )
-    return Picture(as_data_uri(assurance_figure(model, shapes)), caption, "Auto-MAC matrix, MPC and MPD")
+    return picture_of(assurance_figure(model, shapes), caption, "Auto-MAC matrix, MPC and MPD")
 
 
 def _compasses(name: str, model: ModalModel, shapes: ModeShapes) -> Picture:
@@ -54,7 +54,7 @@ def _compasses(name: str, model: ModalModel, shapes: ModeShapes) -> Picture:
         "best straight line; circle: largest component. Components on the horizontal line are a real mode; "
         "a single one off it is a doubtful point."
     )
-    return Picture(as_data_uri(compass_figure(model, shapes)), caption, "Modal vectors in the complex plane")
+    return picture_of(compass_figure(model, shapes), caption, "Modal vectors in the complex plane")
 
 
 def _right_and_left(name: str, model: ModalModel) -> Picture:
@@ -62,7 +62,7 @@ def _right_and_left(name: str, model: ModalModel) -> Picture:
         f"{name}: modal vectors in the complex plane, each scaled to its largest component. Right "
         "and left vectors agree where the structure is reciprocal; components on one line are a real mode."
     )
-    return Picture(as_data_uri(mode_figure(model)), caption, "Modal vectors")
+    return picture_of(mode_figure(model), caption, "Modal vectors")
 
 
 def _alike(name: str, model: ModalModel, shapes: ModeShapes) -> tuple[str, ...]:

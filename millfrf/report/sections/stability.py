@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from cutting import MillingProcess
-from figures import LobesBand, as_data_uri, lobes_figure
+from figures import LobesBand, lobes_figure
 from stability import StabilityLobes
 
 from ...tables import Table
 from ..collection import Collected
 from ..lobes_check import CheckedLobes, checked_lobes, lobes_warnings
 from ..recommendation import recommendation
-from ..section import Picture, Section
+from ..section import Section, picture_of
 
 DIFFERS = 0.1
 """Relative difference of two depth limits that counts as different advice."""
@@ -64,10 +64,10 @@ def stability_findings(collected: Collected) -> StabilityFindings:
         drawn_speeds = advised.band.basis.count("samples")
         caption += f" Light band: 95 % interval of {first_name}"
         caption += f"; at {drawn_speeds} speeds from draws of its errors." if drawn_speeds else ", to first order."
-    picture = Picture(as_data_uri(lobes_figure(drawn, band=band)), caption, "Stability lobes")
+    picture = picture_of(lobes_figure(drawn, band=band), caption, "Stability lobes")
     section = Section("Stability lobes", tuple(sentences), tuple(tables), (picture,))
     warnings = (*lobes_warnings(checked, collected), *advised.warnings)
-    return StabilityFindings(section, _brief(first_name, first), warnings)
+    return StabilityFindings(section, (*_brief(first_name, first), *advised.sentences[:1]), warnings)
 
 
 def lobes_section(collected: Collected) -> Section:

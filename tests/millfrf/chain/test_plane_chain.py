@@ -50,5 +50,5 @@ def _every_frf_is_drawn(path: Path) -> None:
         misfits += re.findall(r">([\d.]+) %</text>", svg)
     assert len(titles) == len(set(titles)) == len(misfits) == 222
     assert sorted(misfits, key=float, reverse=True) == misfits  # the worst first
-    ranked = re.findall(r"<td>(\d+)</td><td>([ABC]:\+Z / \d+:\+[XZ])</td>", page)
+    ranked = re.findall(r'<th scope="row" class="n">(\d+)</th><td>([ABC]:\+Z / \d+:\+[XZ])</td>', page)
     assert [name for _, name in ranked[-222:]] == titles

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from cutting import MillingProcess, write_cutting_process
-from millfrf.report import collect
+from millfrf.report import ReportOptions, collect, page_text
 from millfrf.report.lobes_check import checked_lobes
-from millfrf.report.page import ReportOptions, report_text
+from millfrf.report.page import report_page
 from millfrf.report.recommendation import recommendation
 from millfrf.report.sections.stability import stability_findings
 from modal_fit import ModalModel, write_modal_model
@@ -61,7 +61,7 @@ def test_zero_order_lobes_do_not_make_the_advice(tmp_path: Path) -> None:
 
 def test_the_more_exact_of_two_files_is_the_headline(tmp_path: Path) -> None:
     paths = files(tmp_path, ("zero-order", "certified"))
-    text = report_text(collect(paths), ReportOptions())
+    text = page_text(*report_page(collect(paths), ReportOptions()))
     assert "lobes_certified.csv: time-periodic" in text
     assert "lobes_zero-order.csv: averaged coefficients (zero-order)" in text
     findings = stability_findings(collect(paths))

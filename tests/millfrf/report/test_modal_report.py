@@ -106,7 +106,7 @@ def test_many_frfs_are_ranked_and_drawn_page_by_page(folder: Path) -> None:
     said = words(folder / "model.html")
     assert "misfit of 24 FRFs between" in said
     assert "FRFs 1 to 24 of 24, misfit" in said
-    assert len(re.findall(r"<td>\d+</td><td>\d+:\+Z / \d+:\+Z</td>", text)) == 12 + 24
+    assert len(re.findall(r"<th scope=\"row\" class=\"n\">\d+</th><td>\d+:\+Z / \d+:\+Z</td>", text)) == 12 + 24
     assert "above 30 %" in words(folder / "fewer.html")  # three of five modes are missing
 
 

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from figures import as_data_uri, save_figure
+from figures import save_figure
 
-from ....report import Picture
+from ....report import Picture, picture_of
 from ..drift import Drifts
 from ..pictures import draw_trends
 from .trend_words import label_words, mode_words
@@ -36,4 +36,4 @@ def trend_pictures(folder: Path, drifts: Drifts) -> tuple[Picture, ...]:
         "What drifts: marks are the sets with twice the fits' standard errors, the line is the trend with its 95 % "
         "band. Grey lines are the same mode in the other poses. Also drifts.png."
     )
-    return (Picture(as_data_uri(figure), caption, "Trends of what drifts"),)
+    return (picture_of(figure, caption, "Trends of what drifts"),)

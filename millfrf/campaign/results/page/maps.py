@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from figures import as_data_uri, save_figure
+from figures import save_figure
 
-from ....report import Picture, Section
+from ....report import Picture, Section, picture_of
 from ..drift import DAMPING, DEPTH, FREQUENCY, Series
 from ..identity import IdentifiedModes
 from ..pictures import MapPanel, MapPlane, draw_maps
@@ -76,7 +76,7 @@ def _scatter(series: Sequence[Series]) -> Mapping[str, float]:
 def _picture(path: Path, panels: Sequence[MapPanel], plane: MapPlane, caption: str, alternative: str) -> Picture:
     figure = draw_maps(panels, plane)
     save_figure(figure, path)
-    return Picture(as_data_uri(figure), f"{caption} Also {path.name}.", alternative)
+    return picture_of(figure, f"{caption} Also {path.name}.", alternative)
 
 
 def _modes_caption(plane: MapPlane) -> str:

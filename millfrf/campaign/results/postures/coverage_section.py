@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from figures import as_data_uri, save_figure
+from figures import save_figure
 
-from ....report import Picture, Section
+from ....report import Section, picture_of
 from ....tables import Table
 from .coverage import Contradiction, PostureCoverage
 from .coverage_figure import draw_coverage
@@ -40,7 +40,7 @@ def posture_section(folder: Path, coverage: PostureCoverage, robot: str) -> Sect
         "Each pose left out in turn: grey bars are the 95 % bands that the other poses give, dots measured values "
         "inside them, crosses measured values outside. Also left_out_poses.png."
     )
-    picture = Picture(as_data_uri(figure), caption, "Bands of poses that were left out, and what was measured there")
+    picture = picture_of(figure, caption, "Bands of poses that were left out, and what was measured there")
     return Section("Posture model", tuple(sentences), (_table(coverage),), (picture,))
 
 

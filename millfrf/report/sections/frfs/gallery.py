@@ -7,7 +7,7 @@ from estimation import Frf
 from figures import ENTRIES_PER_PAGE, GalleryEntry, gallery_page
 from modal_fit import Synthesis
 
-from ...section import Fold, Picture
+from ...section import Fold, picture_of
 from .choice import Band
 
 
@@ -46,7 +46,7 @@ def gallery_folds(
             for p, q in chosen
         ]
         title = f"FRFs {first + 1} to {first + len(chosen)} of {len(order)}" + _span(compared, chosen)
-        picture = Picture(gallery_page(entries, f).uri(), _caption(frf, compared, reference), title)
+        picture = picture_of(gallery_page(entries, f), _caption(frf, compared, reference), title)
         folds.append(Fold(title, pictures=(picture,), opened=first == 0))
     return tuple(folds)
 

@@ -3,12 +3,12 @@
 import numpy as np
 
 from estimation import Frf
-from figures import FrfCurves, as_data_uri, frf_figures, synthesis_figure
+from figures import FrfCurves, frf_figures, synthesis_figure
 from foundation import InputError
 from modal_fit import ModalModel, Synthesis, synthesis
 
 from ...collection import Collected, SourceFile
-from ...section import Fold, Picture, Section
+from ...section import Fold, Picture, Section, picture_of
 from .choice import Band, axis_of, band_of, knows, shown_frf
 from .gallery import gallery_folds
 from .misfits import misfit_sentence, misfit_table
@@ -63,7 +63,7 @@ def _sum(file: SourceFile, frf: Frf, compared: Synthesis) -> Picture:
         f"{file.path.name}: sum of the magnitudes of all FRFs, measured and synthesised from the model, and of what "
         "the model leaves. Peaks of the last one are modes that are missing, or that move from point to point."
     )
-    return Picture(as_data_uri(synthesis_figure(compared, frf.unit)), caption, "Sum of measured and synthesised FRFs")
+    return picture_of(synthesis_figure(compared, frf.unit), caption, "Sum of measured and synthesised FRFs")
 
 
 def _large(
@@ -80,7 +80,7 @@ def _large(
     curves = FrfCurves(shown, band or axis_of(shown, fit_band), model, known, fit_band)
     caption = _frf_caption(file, found, known, spread=shown.entry_variance() is not None)
     words = "FRF magnitude, phase and multiple coherence"
-    return tuple(Picture(as_data_uri(figure), caption, words) for figure in frf_figures(curves))
+    return tuple(picture_of(figure, caption, words) for figure in frf_figures(curves))
 
 
 def _frf_caption(
