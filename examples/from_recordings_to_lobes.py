@@ -13,24 +13,21 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import Recording, record
-from cutting import MillingProcess
 from estimation import cross_spectra, h1, settings_for, sum_tests
 from modal_fit import ModalModel, fit_polyreference
-from replay_data import LinearSweep, MillingCell, dynamometer, table_one_model, tip_accelerometers
+from replay_data import (
+    ACETAL_CUTTER,
+    SWEEP_IMMERSIONS,
+    LinearSweep,
+    MillingCell,
+    dynamometer,
+    table_one_model,
+    tip_accelerometers,
+)
 from stability import StabilityLobes, certified_lobes
 
 RPM = pi / 30
-CUTTER = MillingProcess(
-    teeth=2,
-    diameter=12.7e-3,
-    edge_angle=pi / 2,
-    ktc=119e6,
-    krc=0.17,
-    kac=0.33,
-    start_angle=pi / 2,
-    exit_angle=pi,
-    feed_per_tooth=0.15e-3,
-)
+CUTTER = replace(ACETAL_CUTTER, runout=0.0)
 
 FITTED = (15.2, 45.0)
 """Hz. Limits depend on the FRF at the chatter frequency and at harmonics of the tooth passing beside it (18 + 27 Hz at
@@ -44,7 +41,7 @@ def mill(folder: Path, seconds: float) -> list[Path]:
     """Three speed sweeps, 450 to 690 rpm, each in another immersion so that the forces are independent."""
     files = []
     sweep = LinearSweep(450 * RPM, 690 * RPM, seconds)
-    for number, (start, exit_) in enumerate([(0.38, 0.61), (0.77, 1.0), (0.0, 0.23)]):
+    for number, (start, exit_) in enumerate(SWEEP_IMMERSIONS.values()):
         process = replace(CUTTER, start_angle=start * pi, exit_angle=exit_ * pi)
         sensors = dynamometer() + tip_accelerometers()
         cell = MillingCell(table_one_model(), process, 2e-3, sweep, seconds, sensors=sensors, seed=number)

@@ -15,32 +15,17 @@ from pathlib import Path
 import numpy as np
 from scipy.io import savemat
 
-from cutting import MillingProcess
-from replay_data import HammerCell, LinearSweep, MillingCell, default_structure
+from replay_data import ACETAL_CUTTER, SWEEP_IMMERSIONS, HammerCell, LinearSweep, MillingCell, default_structure
 
 RPM = math.pi / 30
 G, KILO = 9.80665, 1e3
-CUTTER = MillingProcess(
-    teeth=2,
-    diameter=12.7e-3,
-    edge_angle=math.pi / 2,
-    ktc=119e6,
-    krc=0.17,
-    kac=0.33,
-    start_angle=math.pi / 2,
-    exit_angle=math.pi,
-    feed_per_tooth=0.15e-3,
-    runout=10e-6,
-)
-IMMERSIONS = {"central": (0.38, 0.61), "down": (0.77, 1.0), "up": (0.0, 0.23)}
-"""Start and exit angle over pi."""
 
 
 def write_lab_files(folder: Path, seconds: float = 60.0) -> None:
     """Write the six files; each sweep of the spindle speed takes ``seconds``."""
     structure, sweep = default_structure(), LinearSweep(450 * RPM, 690 * RPM, seconds)
-    for seed, (name, (start, leave)) in enumerate(IMMERSIONS.items()):
-        process = replace(CUTTER, start_angle=start * math.pi, exit_angle=leave * math.pi)
+    for seed, (name, (start, leave)) in enumerate(SWEEP_IMMERSIONS.items()):
+        process = replace(ACETAL_CUTTER, start_angle=start * math.pi, exit_angle=leave * math.pi)
         cell = MillingCell(structure, process, 2e-3, sweep, seconds, sample_rate=2048.0, oversampling=10, seed=seed)
         samples = cell.samples().astype(np.float32)
         fields = {"Fs": cell.sample_rate, "F": samples[:, :3] / KILO, "acc": samples[:, 3:] / G}

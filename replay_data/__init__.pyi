@@ -12,6 +12,8 @@ from .concealment import (
 )
 from .hammer_cell import HammerCell
 from .laboratory import (
+    ACETAL_CUTTER,
+    SWEEP_IMMERSIONS,
     Sensor,
     cutting_table,
     dynamometer,
@@ -27,9 +29,11 @@ from .simulation import Material, Settling, settle, tip_motion
 from .speed_profiles import ConstantSpeed, DriftingSpeed, LinearSweep, RepeatedSweep, SpeedProfile
 
 __all__ = [
+    "ACETAL_CUTTER",
     "FINE_RATE",
     "FOREIGN",
     "LEVELS",
+    "SWEEP_IMMERSIONS",
     "ConcealedCell",
     "ConcealedEffect",
     "ConstantSpeed",

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from foundation import SI_UNITS, InputError, checked_toml, si_factor
 
 from ..channel import Channel
+from ..channel_keys import ChannelKeys
 
 _STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -50,29 +51,15 @@ class ArrayMapping(BaseModel):
     axes: tuple[str, ...] | None = None
 
 
-class ChannelMapping(BaseModel):
+class ChannelMapping(ChannelKeys):
     """One channel: its place in the file, its place on the machine, and how its numbers become SI.
 
     ``value = (stored - offset) / sensitivity * (unit in SI)``
 
     Parameters
     ----------
-    name
-        Name of the channel in the recording.
-    quantity
-        What it measures: ``force``, ``acceleration``, ``velocity``, ``displacement``, ``moment``, ``angle``,
-        ``angular_velocity``, ``voltage``, ``temperature`` or ``dimensionless``.
     unit
         Unit of the stored numbers after ``sensitivity``: ``kN``, ``g``, ``um``; the recording holds SI units.
-    node
-        Point of the machine where the sensor sits: ``TCP`` is the tool's tip, ``HOUSING`` the spindle's housing, others
-        are free.
-    direction
-        Axis and sense in which the sensor counts positive, such as ``+X`` or ``-Z``.
-    high_pass_hz : Hz
-        Corner of the sensor's or amplifier's high-pass, of first order; its effect is taken out of FRFs.
-    sensor
-        Type and serial number, for the reader.
     input_delay_s : s
         Time by which the input lags behind the others; it is taken out.
     array
@@ -88,17 +75,10 @@ class ChannelMapping(BaseModel):
         Stored number that means zero.
     """
 
-    model_config = _STRICT
-    name: Annotated[str, Field(min_length=1)]
-    quantity: str
     unit: str
-    node: str = ""
-    direction: str = ""
     array: str | None = None
     column: Annotated[int, Field(ge=1)] | str | None = None
     full_scale: Annotated[float, Field(gt=0)] | None = None
-    high_pass_hz: Annotated[float, Field(gt=0)] | None = None
-    sensor: str = ""
     input_delay_s: Annotated[float, Field(ge=0, le=1)] | None = None
     sensitivity: float = 1.0
     offset: float = 0.0

@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from foundation import SI_UNITS, InputError, si_factor
 
 from ..channel import Channel
+from ..channel_keys import ChannelKeys
 from ..drivers import NiCounter, NiInput
 
 STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
@@ -14,25 +15,11 @@ Positive = Annotated[float, Field(gt=0)]
 Name = Annotated[str, Field(min_length=1)]
 
 
-class ChannelTable(BaseModel):
+class ChannelTable(ChannelKeys):
     """One input of a session file.
 
     Parameters
     ----------
-    name
-        Name of the channel in the recording.
-    quantity
-        What it measures: ``force``, ``acceleration``, ``velocity``, ``displacement``, ``moment``, ``angle``,
-        ``angular_velocity``, ``voltage``, ``temperature`` or ``dimensionless``.
-    node
-        Point of the machine where the sensor sits: ``TCP`` is the tool's tip, ``HOUSING`` the spindle's housing, others
-        are free.
-    direction
-        Axis and sense in which the sensor counts positive, such as ``+X`` or ``-Z``.
-    high_pass_hz : Hz
-        Corner of the sensor's or amplifier's high-pass, of first order; its effect is taken out of FRFs.
-    sensor
-        Type and serial number, for the reader.
     unit
         Unit of the calibration sheet: ``N``, ``kN``, ``g``, ``m/s^2``, ``V``.
     terminal
@@ -65,9 +52,6 @@ class ChannelTable(BaseModel):
         Time by which an amplifier before the input delays the signal; the module's own delay is added.
     """
 
-    model_config = STRICT
-    name: Name
-    quantity: str
     unit: str
     terminal: Name
     mv_per_unit: float | None = None
@@ -82,10 +66,6 @@ class ChannelTable(BaseModel):
     terminal_configuration: Literal["", "rse", "nrse", "differential", "pseudodifferential"] = ""
     teds: bool = False
     delay_us: Annotated[float, Field(ge=0, le=1e6)] = 0.0
-    node: str = ""
-    direction: str = ""
-    high_pass_hz: Positive | None = None
-    sensor: str = ""
 
     @model_validator(mode="after")
     def _understood(self) -> "ChannelTable":

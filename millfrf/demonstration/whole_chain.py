@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import Source, record
-from cutting import MillingProcess
+from cutting import write_cutting_process
 from estimation import Frf
 from figures import lobes_figure
 from foundation import writing_whole_file, writing_whole_folder
 from modal_fit import ModalModel, write_modal_model
 from replay_data import (
+    ACETAL_CUTTER,
+    SWEEP_IMMERSIONS,
     HammerCell,
     LinearSweep,
     MillingCell,
@@ -46,22 +48,6 @@ from ..tables import Table
 from .demo_trap import Trap, report_trap, spring_trap, trap_table
 
 RPM = math.pi / 30
-CUTTER = MillingProcess(
-    teeth=2,
-    diameter=12.7e-3,
-    edge_angle=math.pi / 2,
-    ktc=119e6,
-    krc=0.17,
-    kac=0.33,
-    start_angle=math.pi / 2,
-    exit_angle=math.pi,
-    feed_per_tooth=0.15e-3,
-    runout=10e-6,
-)
-"""The paper's cutter in acetal, half-immersion down-milling (Mohammadi & Ahmadi)."""
-
-IMMERSIONS = {"central": (0.38, 0.61), "down": (0.77, 1.0), "up": (0.0, 0.23)}
-"""Start and exit angles of the three sweeps over pi (ibid.)."""
 
 SWEEP_RPM, SWEEP_SECONDS, SWEEP_DEPTH = (450.0, 690.0), 60.0, 2e-3
 KEPT_BAND = (5.0, 60.0)
@@ -166,15 +152,19 @@ def _run(
     say("drawing lobes and report ...")
     structures: dict[str, Frf | ModalModel] = {"identified": identified, "hammer": tip, "true": true}
     for name, structure in structures.items():
-        lobes = compute_lobes(structure, CUTTER, speed_axis(*AXIS_RPM[name]), MAX_DEPTH, progress=progress, name=name)
+        lobes = compute_lobes(
+            structure, ACETAL_CUTTER, speed_axis(*AXIS_RPM[name]), MAX_DEPTH, progress=progress, name=name
+        )
         write_lobes(folder / f"lobes_{name}.csv", lobes, provenance=made("lobes", [folder / STRUCTURES[name]]))
     compared = np.array(COMPARED_RPM) * RPM
-    limits = {name: certified_lobes(structure, CUTTER, compared, MAX_DEPTH) for name, structure in structures.items()}
+    limits = {
+        name: certified_lobes(structure, ACETAL_CUTTER, compared, MAX_DEPTH) for name, structure in structures.items()
+    }
     _draw_lobes(folder)
     _report(folder, sweeps, progress)
     say("trying a cut that averaged coefficients call stable ...")
-    trap = spring_trap(identified, true, CUTTER)
-    report_trap(folder, identified, CUTTER, progress)
+    trap = spring_trap(identified, true, ACETAL_CUTTER)
+    report_trap(folder, identified, ACETAL_CUTTER, progress)
     return identified, true, limits, trap
 
 
@@ -237,8 +227,8 @@ def _record_all(folder: Path, options: DemoOptions, progress: Progress) -> tuple
     structure, noise = default_structure(), options.noise
     sweep = LinearSweep(SWEEP_RPM[0] * RPM, SWEEP_RPM[1] * RPM, options.seconds)
     sweeps = []
-    for number, (name, (start, exit_)) in enumerate(IMMERSIONS.items()):
-        process = replace(CUTTER, start_angle=start * math.pi, exit_angle=exit_ * math.pi)
+    for number, (name, (start, exit_)) in enumerate(SWEEP_IMMERSIONS.items()):
+        process = replace(ACETAL_CUTTER, start_angle=start * math.pi, exit_angle=exit_ * math.pi)
         cell = MillingCell(
             structure,
             process,
@@ -291,8 +281,7 @@ def _draw_lobes(folder: Path) -> None:
 
 
 def _report(folder: Path, sweeps: list[Path], progress: Progress) -> None:
-    with writing_whole_file(folder / "cut.toml") as temporary:
-        temporary.write_text(cutting_text(CUTTER), encoding="utf-8")
+    write_cutting_process(folder / "cut.toml", ACETAL_CUTTER)
     names = (
         "frf_in_process.h5",
         "frf_hammer_tip.h5",
@@ -305,20 +294,3 @@ def _report(folder: Path, sweeps: list[Path], progress: Progress) -> None:
         "Simulated robot cell: in-process FRF and modal fit", reference=folder / "true_model_tip.json"
     )
     write_report(folder / REPORT, [*sweeps, *(folder / name for name in (*names, *tables))], options, progress)
-
-
-def cutting_text(process: MillingProcess) -> str:
-    """A cutting file of a process."""
-    entries: dict[str, float] = {
-        "teeth": process.teeth,
-        "diameter_m": process.diameter,
-        "edge_angle_deg": math.degrees(process.edge_angle),
-        "ktc_pa": process.ktc,
-        "krc": process.krc,
-        "kac": process.kac,
-        "start_angle_deg": math.degrees(process.start_angle),
-        "exit_angle_deg": math.degrees(process.exit_angle),
-        "feed_per_tooth_m": process.feed_per_tooth,
-        "runout_m": process.runout,
-    }
-    return "[cutting]\n" + "".join(f"{key} = {value!r}\n" for key, value in entries.items())

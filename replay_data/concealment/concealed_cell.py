@@ -7,10 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Block, StreamDescription
-from cutting import MillingProcess
 from modal_fit import ModalModel
 
-from ..laboratory import Decimator, Sensor, dynamometer, setup_text, tip_accelerometers
+from ..laboratory import ACETAL_CUTTER, Decimator, Sensor, dynamometer, setup_text, tip_accelerometers
 from ..milling_cell import MillingCell
 from ..sampled_cell import STREAM
 from ..simulation import tip_motion
@@ -33,7 +32,7 @@ IMMERSION = (0.38 * math.pi, math.pi)
 LEVELS = {"low": 0.1e-3, "mid": 0.2e-3, "high": 0.35e-3}
 """Feed per tooth, m."""
 
-CUTTER = MillingProcess(2, 12.7e-3, math.pi / 2, 119e6, 0.17, 0.33, *IMMERSION, LEVELS["mid"], runout=10e-6)
+CUTTER = replace(ACETAL_CUTTER, start_angle=IMMERSION[0], exit_angle=IMMERSION[1], feed_per_tooth=LEVELS["mid"])
 
 
 def milling_force(structure: ModalModel, level: str, seconds: float, seed: int) -> Real:

@@ -12,7 +12,8 @@ from .robot_files import (
     robot_text,
 )
 from .serial_file import SerialFile, read_serial_robot
-from .spatial_file import SpatialCase, SpatialFile, read_spatial_robot
+from .spatial_file import SpatialCase, read_spatial_robot
+from .spatial_tables import SpatialFile
 
 __all__ = [
     "PlanarCase",

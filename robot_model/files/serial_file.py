@@ -12,8 +12,9 @@ from foundation import InputError
 from ..kinematics import LARGEST_TRAVEL
 from ..serial_chains import BASE, RigidPart, SerialChain, SerialJoint, inertia_fault, place_of, spatial_robot, symmetric
 from ..spatial import check_tip
+from .common_tables import Damping, Pose, named_postures, rayleigh_of, upwards
 from .robot_files import Table, read_as
-from .spatial_file import Damping, Pose, SpatialCase, named_postures, rayleigh_of, upwards
+from .spatial_file import SpatialCase
 from .update_table import UpdateTable, uncertainty_of, with_late_numbers
 
 Real = NDArray[np.float64]

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from ...demonstration import cutting_text
+from cutting import write_cutting_process
+
 from .at_rest import BAND
 from .recordings import CUTTER
 
@@ -53,4 +54,4 @@ by = ["pose"]
 def write_campaign_files(folder: Path, robot: str) -> None:
     """Write both files into the campaign's folder."""
     (folder / "campaign.toml").write_text(CAMPAIGN.format(robot=robot), encoding="utf-8")
-    (folder / CUT).write_text(cutting_text(CUTTER), encoding="utf-8")
+    write_cutting_process(folder / CUT, CUTTER)

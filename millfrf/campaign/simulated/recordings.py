@@ -10,11 +10,20 @@ from numpy.typing import NDArray
 
 from acquisition import RecordingWriter
 from cutting import MillingProcess
-from replay_data import ConstantSpeed, LinearSweep, MillingCell, Sensor, dynamometer, housing_accelerometers, setup_text
+from replay_data import (
+    SWEEP_IMMERSIONS,
+    ConstantSpeed,
+    LinearSweep,
+    MillingCell,
+    Sensor,
+    dynamometer,
+    housing_accelerometers,
+    setup_text,
+)
 
 from .faults import clipped_sensors, spoil
 from .hidden import HiddenDrift
-from .schedule import IMMERSIONS, LEVEL_TEST, PlannedRecording, pose_name
+from .schedule import LEVEL_TEST, PlannedRecording, pose_name
 from .true_robot import TrueRobot
 
 Real = NDArray[np.float64]
@@ -101,7 +110,7 @@ def write_recording(laboratory: Laboratory, planned: PlannedRecording, folder: P
 def _cell(laboratory: Laboratory, planned: PlannedRecording, sensors: Sequence[Sensor] = SENSORS) -> MillingCell:
     structure = laboratory.true.structure(laboratory.postures[planned.pose], laboratory.drift.condition(planned))
     porous = planned.immersion == LEVEL_TEST
-    start, leave = (0.0, 1.0) if porous else IMMERSIONS[planned.immersion]
+    start, leave = (0.0, 1.0) if porous else SWEEP_IMMERSIONS[planned.immersion]
     sweep = LinearSweep(SWEEP_RPM[0] * RPM, SWEEP_RPM[1] * RPM, SECONDS)
     slot = ConstantSpeed(SLOT_RPM * RPM)
     cell = MillingCell(

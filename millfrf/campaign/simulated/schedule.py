@@ -7,9 +7,7 @@ from itertools import product
 import numpy as np
 
 from foundation import InputError
-
-IMMERSIONS = {"central": (0.38, 0.61), "down": (0.77, 1.0), "up": (0.0, 0.23)}
-"""Start and exit angles of the sweeps over pi (Mohammadi & Ahmadi)."""
+from replay_data import SWEEP_IMMERSIONS
 
 LEVEL_TEST = "porous"
 """A slot in porous material at another level: its random forces are independent in one recording."""
@@ -39,7 +37,7 @@ class PlannedRecording:
     pose
         Number of the pose, from 0.
     immersion
-        One of :data:`IMMERSIONS`, or :data:`LEVEL_TEST`.
+        One of :data:`replay_data.SWEEP_IMMERSIONS`, or :data:`LEVEL_TEST`.
     session
         Number of the session, from 1.
     level
@@ -97,7 +95,7 @@ def sessions_of(recordings: int, poses: int) -> tuple[int, int]:
             f"{recordings} recordings in {poses} poses: give a multiple of the poses, {LEAST_A_POSE} or more a pose, "
             f"for example {10 * poses}"
         )
-    return divmod(each, len(IMMERSIONS))
+    return divmod(each, len(SWEEP_IMMERSIONS))
 
 
 def drawn_schedule(
@@ -117,20 +115,20 @@ def drawn_schedule(
     sessions, others = sessions_of(recordings, poses)
     spoilt = generator.choice([p for p in range(poses) if p != drifting], len(FAULTS), replace=False).tolist()
     places = {
-        (pose, int(generator.integers(1, sessions + 1)), str(generator.choice(list(IMMERSIONS)))): fault
+        (pose, int(generator.integers(1, sessions + 1)), str(generator.choice(list(SWEEP_IMMERSIONS)))): fault
         for pose, fault in zip(spoilt, FAULTS, strict=True)
     }
     planned: list[PlannedRecording] = []
     for session in range(1, sessions + 1):
         mean = generator.uniform(*MEAN_TEMPERATURES)
-        tests = list(product(IMMERSIONS, [FULL_LEVEL]))
+        tests = list(product(SWEEP_IMMERSIONS, [FULL_LEVEL]))
         if session == sessions:
             tests += [(LEVEL_TEST, OTHER_LEVEL)] * others
         for turn, pose in enumerate(generator.permutation(poses).tolist()):
             for number, (immersion, level) in enumerate(tests):
                 minutes = MINUTES_A_POSE * turn + MINUTES_A_RECORDING * number
                 when = FIRST_DAY + datetime.timedelta(days=DAYS_BETWEEN * (session - 1), minutes=minutes)
-                again = f"_{number - len(IMMERSIONS) + 1}" if number > len(IMMERSIONS) else ""
+                again = f"_{number - len(SWEEP_IMMERSIONS) + 1}" if number > len(SWEEP_IMMERSIONS) else ""
                 planned.append(
                     PlannedRecording(
                         f"{pose_name(pose)}_{immersion}_{session}{again}",

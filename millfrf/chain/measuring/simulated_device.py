@@ -9,6 +9,7 @@ import numpy as np
 from acquisition import AroundSource, Block, EventAxis, Events, Paced, Session, SimulatedDevice, Source
 from cutting import MillingProcess, process_from_table
 from replay_data import (
+    ACETAL_CUTTER,
     ConstantSpeed,
     MillingCell,
     RepeatedSweep,
@@ -83,10 +84,8 @@ def _profile(session: Session, device: SimulatedDevice, path: str | os.PathLike[
 
 def _process(session: Session, path: str | os.PathLike[str]) -> MillingProcess:
     """The session's cutter in its immersion; what the session does not say is the demonstration's."""
-    from ...demonstration import CUTTER
-
     told = {**session.cutting, **{key: session.cut[key] for key in _ENGAGEMENT if key in session.cut}}
-    default: dict[str, Any] = cutting_table(CUTTER)
+    default: dict[str, Any] = cutting_table(ACETAL_CUTTER)
     if any(key in told for key in _ENGAGEMENT):
         default = {key: value for key, value in default.items() if key not in _ENGAGEMENT}
     return process_from_table(default | told, os.fspath(path))

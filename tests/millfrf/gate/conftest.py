@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from acquisition import record
-from millfrf.demonstration.whole_chain import CUTTER, IMMERSIONS, SWEEP_DEPTH
-from replay_data import LinearSweep, MillingCell, default_structure, milling_sensors
+from millfrf.demonstration.whole_chain import SWEEP_DEPTH
+from replay_data import ACETAL_CUTTER, SWEEP_IMMERSIONS, LinearSweep, MillingCell, default_structure, milling_sensors
 
 RPM = math.pi / 30
 SECONDS = 24.0
@@ -19,10 +19,10 @@ def sweeps(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """The demonstration's three sweeps, 24 s each at 1024 Hz: ``central``, ``down`` and ``up``."""
     folder = tmp_path_factory.mktemp("sweeps")
     made = {}
-    for number, (name, (start, exit_)) in enumerate(IMMERSIONS.items()):
+    for number, (name, (start, exit_)) in enumerate(SWEEP_IMMERSIONS.items()):
         cell = MillingCell(
             default_structure(),
-            replace(CUTTER, start_angle=start * math.pi, exit_angle=exit_ * math.pi),
+            replace(ACETAL_CUTTER, start_angle=start * math.pi, exit_angle=exit_ * math.pi),
             SWEEP_DEPTH,
             LinearSweep(450 * RPM, 690 * RPM, SECONDS),
             SECONDS,

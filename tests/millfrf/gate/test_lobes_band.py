@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cutting import write_cutting_process
 from foundation import Band
 from millfrf.__main__ import DONE, run
 from millfrf.chain import compute_lobes, speed_axis
-from millfrf.demonstration.whole_chain import CUTTER, cutting_text
 from modal_fit import ModalModel, write_modal_model
-from replay_data import default_structure, tip_model
+from replay_data import ACETAL_CUTTER, default_structure, tip_model
 from stability import read_lobes
 
 
@@ -23,7 +23,7 @@ def fitted(band: Band | None) -> ModalModel:
 
 
 def warnings(band: Band | None, lowest: float, highest: float, count: int = 5) -> str:
-    lobes = compute_lobes(fitted(band), CUTTER, speed_axis(lowest, highest, count), 0.05, "zero-order")
+    lobes = compute_lobes(fitted(band), ACETAL_CUTTER, speed_axis(lowest, highest, count), 0.05, "zero-order")
     return " ".join(text for text in lobes.warnings if "in which the structure was measured" in text)
 
 
@@ -52,10 +52,10 @@ def test_averaged_coefficients_have_no_harmonics_to_doubt() -> None:
 def test_harmonics_outside_the_band_that_move_a_limit_are_said(band: Band, doubted: bool) -> None:
     speeds = speed_axis(1000, 1400, 5)
     whole = replace(tip_model(default_structure()), band=(2.0, 500.0))
-    known = compute_lobes(whole if band[1] > 100 else fitted(band), CUTTER, speeds, 0.01)
+    known = compute_lobes(whole if band[1] > 100 else fitted(band), ACETAL_CUTTER, speeds, 0.01)
     said = " ".join(text for text in known.warnings if "harmonics of the tooth passing outside" in text)
     assert bool(said) is doubted
-    truth = compute_lobes(whole, CUTTER, speeds, 0.01).depth_limits
+    truth = compute_lobes(whole, ACETAL_CUTTER, speeds, 0.01).depth_limits
     off = np.abs(known.depth_limits / truth - 1).max()
     assert bool(off > 0.05) is doubted
 
@@ -64,13 +64,13 @@ def test_an_frf_without_a_band_holds_on_its_valid_lines() -> None:
     axis = np.arange(1.0, 60.0, 0.25)
     frf = fitted(None).frf(axis)
     narrow = replace(frf, valid=(axis > 12) & (axis < 24))
-    lobes = compute_lobes(narrow, CUTTER, speed_axis(6000, 6000, 1), 0.05, "zero-order")
+    lobes = compute_lobes(narrow, ACETAL_CUTTER, speed_axis(6000, 6000, 1), 0.05, "zero-order")
     assert "beyond the 12.25 to 23.75 Hz" in " ".join(lobes.warnings)
 
 
 def test_the_doubt_reaches_terminal_file_and_reader(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_modal_model(tmp_path / "m.json", fitted((12.0, 24.0)))
-    (tmp_path / "cut.toml").write_text(cutting_text(CUTTER), encoding="utf-8")
+    write_cutting_process(tmp_path / "cut.toml", ACETAL_CUTTER)
     out = tmp_path / "lobes.csv"
     code = run(
         ["lobes", str(tmp_path / "m.json"), "--cutting", str(tmp_path / "cut.toml"), "--speeds", "5800", "6000", "2"]

@@ -12,6 +12,7 @@ from estimation import Frf, write_frf
 from foundation import HOUSING, TIP
 from modal_fit import ModalModel, write_modal_model
 from replay_data import (
+    SWEEP_IMMERSIONS,
     HammerCell,
     LinearSweep,
     MillingCell,
@@ -93,7 +94,6 @@ direction = "+X"
 PATH = "x_m,y_m,z_m,rx_rad,ry_rad,rz_rad,fx_n,fy_n,fz_n\n" + "".join(
     f"{1.0 + 0.1 * i},0.0,0.8,3.14159,0,0,50,80,-20\n" for i in range(3)
 )
-IMMERSIONS = {"central": (0.38, 0.61), "down": (0.77, 1.0), "up": (0.0, 0.23)}
 
 
 def make(folder: Path) -> None:
@@ -142,7 +142,7 @@ def _recordings(folder: Path) -> None:
     structure = default_structure()
     sensors = dynamometer(0.01) + housing_accelerometers(0.01)
     sweep = LinearSweep(450 * RPM, 690 * RPM, 20.0)
-    for number, (name, (start, leave)) in enumerate(IMMERSIONS.items()):
+    for number, (name, (start, leave)) in enumerate(SWEEP_IMMERSIONS.items()):
         process = replace(PROCESS, start_angle=start * math.pi, exit_angle=leave * math.pi)
         cell = MillingCell(structure, process, 2e-3, sweep, 20.0, sample_rate=RATE, sensors=sensors, seed=number)
         record(cell, folder / f"{name}.h5")

@@ -15,6 +15,7 @@ import psutil
 import pytest
 
 PROGRAM = [sys.executable, "-m", "millfrf"]
+ENVIRONMENT = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[4])}
 
 
 def contents(out: Path) -> dict[str, str]:
@@ -29,13 +30,26 @@ def started(campaign: Path, out: Path, *words: str) -> subprocess.Popen[str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[4])},
+        env=ENVIRONMENT,
     )
+
+
+def resumed(campaign: Path, out: Path, *words: str) -> str:
+    """Run the same command again to its end; what it said."""
+    run = started(campaign, out, *words)
+    said, fault = run.communicate(timeout=300)
+    assert run.returncode == 0, fault
+    return said
+
+
+def finished(out: Path) -> int:
+    """Number of tasks with an outcome."""
+    return len(list(out.glob("results/*/*/*/outcome.json")))
 
 
 def wait_for_results(out: Path, number: int, run: subprocess.Popen[str]) -> None:
     end = time.monotonic() + 120
-    while len(list(out.glob("results/*/*/*/outcome.json"))) < number:
+    while finished(out) < number:
         assert run.poll() is None, run.communicate()
         assert time.monotonic() < end
         time.sleep(0.02)
@@ -66,10 +80,8 @@ def test_a_run_that_was_killed_is_resumed_with_the_same_bytes(
     wait_for_results(out, 12, killed)
     killed.send_signal(signal.SIGKILL)
     killed.wait()
-    there = len(list(out.glob("results/*/*/*/outcome.json")))
-    resumed = started(campaign, out, "--workers", "0")
-    said, fault = resumed.communicate(timeout=120)
-    assert resumed.returncode == 0, fault
+    there = finished(out)
+    said = resumed(campaign, out, "--workers", "0")
     assert f"{len([one for one in undisturbed if one.endswith('outcome.json')]) - there} tasks run now" in said
     assert contents(out) == undisturbed
 
@@ -86,13 +98,8 @@ def test_workers_and_then_the_run_are_killed(
     below = psutil.Process(run.pid).children(recursive=True)
     run.send_signal(signal.SIGKILL)
     run.wait()
-    gone, alive = psutil.wait_procs(below, timeout=20)
-    assert not alive, alive
-    del gone
-    resumed = started(campaign, out, "--workers", "2")
-    said, fault = resumed.communicate(timeout=300)
-    assert resumed.returncode == 0, fault
-    assert "0 left for the next run" in said
+    assert not psutil.wait_procs(below, timeout=20)[1]
+    assert "0 left for the next run" in resumed(campaign, out, "--workers", "2")
     assert contents(out) == undisturbed
 
 
@@ -114,9 +121,7 @@ def test_tasks_whose_workers_always_die_are_left_for_the_next_run(
     assert run.returncode == 1, (said, fault)
     assert "its worker died four times while it ran" in said
     assert "unforeseen" not in said + fault
-    resumed = started(campaign, out, "--workers", "2")
-    said, fault = resumed.communicate(timeout=300)
-    assert resumed.returncode == 0, fault
+    resumed(campaign, out, "--workers", "2")
     assert contents(out) == undisturbed
 
 
@@ -129,17 +134,14 @@ def test_a_scheduler_that_dies_ends_the_run_in_one_line_and_another_takes_over(
         run = started(campaign, out, "--scheduler", address)
         wait_for_results(out, 8, run)
         scheduler.kill()
-        said, fault = run.communicate(timeout=120)
+        fault = run.communicate(timeout=120)[1]
     lines = [line for line in fault.splitlines() if " tasks, " not in line]
     assert run.returncode == 1
     assert lines == [
         "millfrf: the scheduler is gone; results so far are kept: start it, and run the same command again"
     ]
     with cluster(tmp_path, 2) as (address, scheduler):
-        resumed = started(campaign, out, "--scheduler", address)
-        said, fault = resumed.communicate(timeout=300)
-    assert resumed.returncode == 0, fault
-    assert "0 left for the next run" in said
+        assert "0 left for the next run" in resumed(campaign, out, "--scheduler", address)
     assert contents(out) == undisturbed
 
 
@@ -150,7 +152,6 @@ def cluster(folder: Path, workers: int) -> Iterator[tuple[str, subprocess.Popen[
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     address = f"tcp://127.0.0.1:{port}"
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[4])}
     words = [
         ["scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"],
         *[
@@ -159,14 +160,14 @@ def cluster(folder: Path, workers: int) -> Iterator[tuple[str, subprocess.Popen[
         ],
     ]
     quiet = subprocess.DEVNULL
-    started = [
-        subprocess.Popen([sys.executable, "-m", "dask", *one], stdout=quiet, stderr=quiet, env=environment, cwd=folder)
+    processes = [
+        subprocess.Popen([sys.executable, "-m", "dask", *one], stdout=quiet, stderr=quiet, env=ENVIRONMENT, cwd=folder)
         for one in words
     ]
     try:
-        yield address, started[0]
+        yield address, processes[0]
     finally:
-        for one in started:
+        for one in processes:
             one.terminate()
-        for one in started:
+        for one in processes:
             one.wait(timeout=60)
