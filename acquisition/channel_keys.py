@@ -21,7 +21,8 @@ class ChannelKeys(BaseModel):
     direction
         Axis and sense in which the sensor counts positive, such as ``+X`` or ``-Z``.
     high_pass_hz : Hz
-        Corner of the sensor's or amplifier's high-pass, of first order; its effect is taken out of FRFs.
+        Corner of the sensor's or amplifier's high-pass, of first order; ``estimate``, ``fit`` and diagnoses take its
+        effect out, ``tap`` that of responses.
     sensor
         Type and serial number, for the reader.
     """

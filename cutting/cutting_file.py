@@ -24,43 +24,52 @@ class CuttingTable(BaseModel):
     Parameters
     ----------
     teeth
-        Number of cutting edges.
+        Number of cutting edges, 1 or more.
     diameter_m : m
-        Diameter of the cutter.
+        Diameter of the cutter, above 0.
     edge_angle_deg : deg
-        Cutting edge angle: 90 for a square end mill, less for a chamfer or face mill.
+        Cutting edge angle, above 0 to 90: 90 for a square end mill, less for a chamfer or face mill.
     ktc_pa : Pa
-        Tangential force coefficient (specific cutting force). Typical: 0.5e9 to 1e9 for aluminium, 2e9 to 3e9 for
-        steel, some 1e8 for porous material.
+        Tangential force coefficient (specific cutting force), above 0. Typical: 0.5e9 to 1e9 for aluminium, 2e9 to
+        3e9 for steel, some 1e8 for porous material.
     krc
         Radial force coefficient as a share of ``ktc_pa``; positive: the chip pushes the tooth away from the surface.
     kac
         Axial force coefficient as a share of ``ktc_pa``; positive: the chip pulls the tool along -Z, out of the
         spindle, as a right-hand helix does (square end mill).
-    start_angle_deg, exit_angle_deg : deg
-        Immersion angles at which a tooth enters and leaves the cut, 0 to 180, from +Y (normal to the feed) in the sense
-        of rotation; or instead ``immersion``.
+    start_angle_deg : deg
+        Immersion angle at which a tooth enters the cut, 0 to below ``exit_angle_deg``, from +Y (normal to the feed) in
+        the sense of rotation; or instead ``immersion``.
+    exit_angle_deg : deg
+        Immersion angle at which a tooth leaves the cut, at most 180, likewise.
     immersion
         Way the cutter is led: ``up``, ``down``, ``central`` (each with ``radial_depth_m``) or ``slot``.
     radial_depth_m : m
         Radial depth of cut, at most the diameter.
     feed_per_tooth_m : m
-        Feed per tooth; it decides whether teeth leave the cut, not the depth limit.
-    kte_n_per_m, kre_n_per_m, kae_n_per_m : N/m
-        Tangential, radial and axial edge coefficients: force per metre of engaged edge without chip.
+        Feed per tooth, 0 or more; it decides whether teeth leave the cut, not the depth limit.
+    kte_n_per_m : N/m
+        Tangential edge coefficient, 0 or more: force per metre of engaged edge beside that of the chip.
+    kre_n_per_m : N/m
+        Radial edge coefficient, likewise.
+    kae_n_per_m : N/m
+        Axial edge coefficient, likewise; its sense is that of ``kac``.
     runout_m : m
-        Radial offset of the spindle axis.
+        Radial offset of the cutter from the spindle's axis, 0 or more; tooth j, from 0, runs
+        ``runout_m cos(2 pi j / teeth)`` large.
     helix_angle_deg : deg
         Helix angle of the edges, 0 to below 90; 0: straight edges.
     pitch_angles_deg : deg
         Angle from each tooth to the one before it in the cut, one a tooth, 360 together; empty: equal pitch.
     process_damping_n_per_m : N/m
-        Coefficient of process damping: the flank takes ``C v_n / V`` per metre of edge; 0: none, which is on the safe
-        side.
+        Coefficient C of process damping, 0 or more: the flank takes ``C v_n / V`` per metre of edge, with v_n the speed
+        into the surface and V the cutting speed; 0: none, which is on the safe side.
     ktc_std_pa : Pa
-        Standard error of ``ktc_pa``; it goes into the bands of the limits. 0: not known.
-    krc_std, kac_std
-        Standard errors of ``krc`` and ``kac``, likewise.
+        Standard error of ``ktc_pa``, below it; it goes into the bands of the limits. 0: not known.
+    krc_std
+        Standard error of ``krc``, likewise.
+    kac_std
+        Standard error of ``kac``, likewise.
     """
 
     model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)

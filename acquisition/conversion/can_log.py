@@ -33,7 +33,7 @@ class LogSignal(BaseModel):
     series
         Name of the event series in the recording; empty: the same.
     factor
-        Factor to SI units.
+        Factor to SI units; to rpm for the series ``spindle_speed_rpm``, which ``chatter`` reads.
     """
 
     model_config = _STRICT
@@ -48,7 +48,7 @@ class LogMapping(BaseModel):
     Parameters
     ----------
     recording
-        File beside the log; its samples and events go into the output too.
+        Recording (HDF5) beside the log; its samples and events go into the output too.
     dbc
         File beside the log that names the signals.
     offset_s : s

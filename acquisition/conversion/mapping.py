@@ -61,18 +61,18 @@ class ChannelMapping(ChannelKeys):
     unit
         Unit of the stored numbers after ``sensitivity``: ``kN``, ``g``, ``um``; the recording holds SI units.
     input_delay_s : s
-        Time by which the input lags behind the others; it is taken out.
+        Time by which the input lags behind the others; samples stay as they are, spectra and fits take it out.
     array
         Key of ``[arrays.KEY]`` or name of an array in the input; left out where there is only one.
     column
         Column along the ``channel`` axis: a number counted from 1, or a heading of the table. Left out where there
         is one column.
     full_scale
-        Largest magnitude the input holds, in ``unit``.
+        Largest magnitude the input holds, in ``unit``; samples at it count as overload.
     sensitivity
-        Stored numbers per ``unit``, for example 0.1 where 0.1 V are 1 g.
+        Stored numbers per ``unit``, for example 0.1 where 0.1 V are 1 g; not 0, and below 0 where the sign is turned.
     offset
-        Stored number that means zero.
+        Stored number that means zero; it is subtracted before ``sensitivity`` divides.
     """
 
     unit: str
@@ -122,11 +122,11 @@ class CsvOptions(BaseModel):
     Parameters
     ----------
     delimiter
-        Character between columns; left out: seen from the file.
+        Character between columns; left out: comma, semicolon or tabulator, as the first row has them.
     decimal
         Character of decimals, ``.`` or ``,``.
     skip_lines
-        Number of lines before the headings.
+        Number of lines at the top that are passed over, before the headings or the first row.
     encoding
         Encoding of the text.
     """
@@ -151,25 +151,27 @@ class RecordingMapping(BaseModel):
     arrays
         Arrays by key, for those not simply found by name in the input.
     axes
-        Axes of every array that does not name its own; left out: ``sample, channel``.
+        Axes of every array that does not name its own; left out: ``sample, channel``, and a single row is one channel.
     join
         Axes whose entries follow one another in time, slowest first.
     split
         Axis whose entries become one recording each: ``rec.h5`` becomes ``rec-1.h5``, ``rec-2.h5`` ...
-    title, setup
-        Title of the recording, and its set-up as TOML text (tool, cut, pose).
+    title
+        Title of the recording.
+    setup
+        Set-up of the recording as TOML text (tool, cut, pose).
     recorded_at
         Time of the recording, ISO 8601 with zone, such as ``2026-03-02T09:30:00Z``.
     stream
         Name of the sample clock in the recording.
     time
-        Array or column of times, evenly spaced; instead of ``sample_rate``.
+        Array or column of times, evenly spaced to 1 % of a step; instead of ``sample_rate``.
     time_unit
         Unit of these times.
     start_time : s
-        Time of the first sample.
+        Time of the first sample; with ``time`` it is added to the first of those times.
     dtype
-        Type of the stored samples; left out: float32 where it holds the input's digits.
+        Type of the stored samples; left out: ``float32`` where it holds the input's digits, else ``float64``.
     csv
         How a CSV file is written, where it cannot be seen.
     """

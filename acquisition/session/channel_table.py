@@ -25,7 +25,7 @@ class ChannelTable(ChannelKeys):
     terminal
         Name of the terminal, such as ``cDAQ1Mod1/ai0``.
     mv_per_unit : mV per unit
-        Sensitivity of the sensor.
+        Sensitivity of the sensor; not 0, and below 0 where the sign is turned.
     units_per_volt : unit per V
         Scale of a device with a voltage output, given instead of a sensitivity.
     amplifier_range : unit, or pC with pc_per_unit
@@ -38,11 +38,11 @@ class ChannelTable(ChannelKeys):
     amplifier
         Name of the `[[amplifier]]` that is told the range; empty: it is set by hand.
     range_v : V
-        Largest magnitude of the input.
+        Largest voltage that the input holds, either sign.
     iepe_ma : mA
-        Excitation current of an IEPE sensor; 0: none.
+        Excitation current of an IEPE sensor, for accelerations and forces; 0: none.
     coupling
-        ``ac`` or ``dc``; empty: as the module chooses.
+        ``ac`` or ``dc``; empty: as the module chooses, ``ac`` with IEPE.
     terminal_configuration
         ``rse``, ``nrse``, ``differential`` or ``pseudodifferential``; empty: as the module chooses.
     teds

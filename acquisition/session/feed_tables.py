@@ -35,7 +35,7 @@ class SignalTable(BaseModel):
     series
         Name of the event series in the recording; empty: the same.
     factor
-        Factor to SI units, or to rpm where the name of the series says so.
+        Factor to SI units; to rpm for the series ``spindle_speed_rpm``, which ``chatter`` reads.
     """
 
     model_config = STRICT
@@ -68,8 +68,10 @@ class CanTable(BaseModel):
 
     Parameters
     ----------
-    interface, channel
-        Interface and channel in the words of python-can: ``socketcan`` and ``can0``; ``pcan`` and ``PCAN_USBBUS1``.
+    interface
+        Interface in the words of python-can, such as ``socketcan`` or ``pcan``.
+    channel
+        Channel of that interface, such as ``can0`` or ``PCAN_USBBUS1``.
     dbc
         DBC file of the bus, from the folder of the session file.
     signals
@@ -109,7 +111,7 @@ class TachometerTable(BaseModel):
     pattern
         Regular expression whose first group is the number; left out: the first number of the line.
     factor
-        Factor by which the number is multiplied.
+        Factor to SI units; to rpm for the series ``spindle_speed_rpm``, which ``chatter`` reads.
     period_s : s
         Time between two lines where the instrument keeps it exactly; left out: the times of arrival count.
     silence_s : s
@@ -150,7 +152,7 @@ class RegisterTable(BaseModel):
     series
         Name of the event series in the recording.
     factor
-        Factor by which the integer is multiplied.
+        Factor from the integer to SI units; to rpm for the series ``spindle_speed_rpm``, which ``chatter`` reads.
     signed
         Whether the integer is in two's complement.
     input_register
@@ -275,7 +277,8 @@ class CommandTable(BaseModel):
     send
         Text to send; ``{fx}`` stands for the range of channel fx.
     expect
-        Regular expression that the answer must match; empty: no answer is awaited.
+        Regular expression that the answer must match from its beginning, ``{fx}`` for a range as in ``send``; empty:
+        no answer is awaited.
     wait_s : s
         Time to wait for the answer, or after a command without one.
     """
@@ -303,8 +306,10 @@ class AmplifierTable(BaseModel):
         Speed of the line.
     ending
         Characters at the end of each command.
-    on_open, on_close
-        Commands when the recording begins and ends.
+    on_open
+        Commands when the recording begins; they are not sent again where the line was lost.
+    on_close
+        Commands when the recording ends.
     check
         Questions with the answers that must come.
     check_every_s : s

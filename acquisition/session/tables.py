@@ -101,11 +101,13 @@ class SimulatedDevice(BaseModel):
         First and last spindle speed of a sweep, back and forth as long as it is recorded; left out: those of the plan,
         else of the demonstration.
     sweep_s : s
-        Duration of a sweep; left out: as planned.
+        Duration of a sweep; left out: as planned, and without ``[plan]`` ``duration_s``, else 60 s.
     spindle_speed_rpm : rpm
         A steady speed instead of a sweep.
-    noise, seed
-        Noise of every sensor as a share of its signal, and the seed of it.
+    noise
+        Noise of every sensor as a share of its signal.
+    seed
+        Seed of the noise.
     speed
         Factor over real time.
     driver
@@ -160,8 +162,12 @@ class Session(BaseModel):
         Duration of the recording; left out: until stopped.
     band_hz : Hz
         Lowest and highest frequency that matter; the sample rate is held against them.
-    tool, cut, pose, cutting, plan
-        Free tables; they go into the recording as its set-up (``cutting`` and ``plan`` are those of `millfrf plan`).
+    tool, cut, pose
+        Free tables; they go into the recording as its set-up.
+    cutting
+        Table ``[cutting]`` of a cutting file; it goes into the recording as part of its set-up.
+    plan
+        Table ``[plan]`` as `millfrf plan` reads it; it goes into the recording as part of its set-up.
     live
         Settings of the live page.
     device
@@ -169,9 +175,17 @@ class Session(BaseModel):
     channels
         Inputs of that device; needed for ``ni``, refused for the others, which bring their own.
     counters
-        Counters of that device, read at each sample of the inputs.
-    can, tachometer, modbus, rsi, amplifier
-        Tables of further devices.
+        Counters of that device, read at each sample of the inputs; with ``ni`` only.
+    can
+        CAN buses that are heard beside.
+    tachometer
+        Instruments that send a number a line.
+    modbus
+        Drives that are asked for registers.
+    rsi
+        KUKA controllers that send their joint angles.
+    amplifier
+        Charge amplifiers that are told their ranges.
     """
 
     model_config = STRICT

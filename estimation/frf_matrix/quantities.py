@@ -64,8 +64,13 @@ def to_receptance(frf: Frf) -> Frf:
     )
 
 
-def correct_high_pass(frf: Frf, corners: Sequence[float | None]) -> Frf:
-    """Divide each response by its sensor's first-order high-pass ``s / (s + 2 pi corner)``.
+def correct_high_pass(
+    frf: Frf, corners: Sequence[float | None], force_corners: Sequence[float | None] | None = None
+) -> Frf:
+    """Take out the first-order high-passes ``s / (s + 2 pi corner)`` of the responses' and the excitations' sensors.
+
+    Each row is divided by the high-pass of its response, each column multiplied by that of its excitation:
+    ``H = diag(1 / h_p) H_measured diag(h_q)``.
 
     Parameters
     ----------
@@ -73,20 +78,28 @@ def correct_high_pass(frf: Frf, corners: Sequence[float | None]) -> Frf:
         Measured FRF to correct.
     corners : Hz
         Corner of each response's high-pass; None or 0: none.
+    force_corners : Hz
+        Corner of each excitation's high-pass, likewise; None: none has one.
 
     Raises
     ------
     InputError
-        Not one corner for each response.
+        Not one corner for each response, or for each excitation.
     """
-    if len(corners) != len(frf.responses):
-        raise InputError(f"{len(corners)} high-pass corners for {len(frf.responses)} responses; give one for each")
-    if not any(corners):
+    forces = [None] * len(frf.excitations) if force_corners is None else list(force_corners)
+    for found, wanted, what in ((corners, frf.responses, "responses"), (forces, frf.excitations, "excitations")):
+        if len(found) != len(wanted):
+            raise InputError(f"{len(found)} high-pass corners for {len(wanted)} {what}; give one for each")
+    if not any(corners) and not any(forces):
         return frf
-    factor = before_high_pass(frf.laplace, [corner or 0.0 for corner in corners])
+    rows, columns = (before_high_pass(frf.laplace, [one or 0.0 for one in found]) for found in (corners, forces))
+    columns = 1 / columns
     covariance = frf.covariance
     if covariance is not None:
-        scaled = covariance.response * factor[:, :, None] * factor.conj()[:, None, :]
-        covariance = FrfCovariance(scaled, covariance.excitation)
+        covariance = FrfCovariance(
+            covariance.response * rows[:, :, None] * rows.conj()[:, None, :],
+            covariance.excitation * columns[:, :, None] * columns.conj()[:, None, :],
+        )
     valid = frf.valid & (frf.frequencies > 0)
-    return replace(frf, values=frf.values * factor[:, :, None], covariance=covariance, valid=valid)
+    values = frf.values * rows[:, :, None] * columns[:, None, :]
+    return replace(frf, values=values, covariance=covariance, valid=valid)

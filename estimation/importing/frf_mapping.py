@@ -113,9 +113,11 @@ class EntryMapping(FrfParts):
 
     Parameters
     ----------
-    response, excitation
-        Degrees of freedom, ``node:direction``. One of them may be left out where parts are lists: they run along the
-        ``responses`` or ``excitations`` under ``[frf]``.
+    response
+        Degree of freedom of the response, ``node:direction``. It or ``excitation`` may be left out where parts are
+        lists: they run along the ``responses`` or ``excitations`` under ``[frf]``.
+    excitation
+        Degree of freedom of the excitation, likewise.
     file
         Name of the file that holds the FRF; left out: the only one.
     record
@@ -149,15 +151,19 @@ class FrfTable(FrfParts):
         Arrays or columns; ``H[2]`` is the second column of array H. Where file or headings leave no doubt they may be
         left out. Lists run along ``responses`` or ``excitations``.
     phase_unit
-        Unit of the phases, ``deg`` or ``rad``.
+        Unit of the phases, ``deg`` or ``rad``; left out: as the heading says, and needed where it does not.
     decibels
-        Whether the magnitude is 20 times the logarithm of the ratio to 1 ``unit``.
+        Whether the magnitude is 20 times the decimal logarithm of the ratio to 1 ``unit``; left out: as the heading
+        says, else false.
     axes
-        Order of the axes of arrays that have several.
-    responses, excitations
-        Degrees of freedom along the axes, in which ``1..68:+Z`` stands for 68 of them; for a UFF file, those to take.
+        Order of the axes of arrays that have several; left out: by their lengths, where these leave one order.
+    responses
+        Degrees of freedom along the axis of responses, in which ``1..68:+Z`` stands for 68 of them; for a UFF file,
+        those to take.
+    excitations
+        Degrees of freedom along the axis of excitations, likewise.
     conjugate
-        Whether the file's phases stand for ``exp(-i w t)``.
+        Whether the file's phases stand for ``exp(-i w t)``, so that the conjugate is taken.
     averages
         Number of averages behind each FRF.
     exponential_time_constant_s : s
@@ -166,8 +172,10 @@ class FrfTable(FrfParts):
         Title of the FRF file that is written.
     frequency_unit
         Unit of the frequencies; left out: the heading or Hz.
-    frequency_step_hz, frequency_start_hz : Hz
-        Distance of evenly spaced lines, and frequency of the first.
+    frequency_step_hz : Hz
+        Distance of evenly spaced lines.
+    frequency_start_hz : Hz
+        Frequency of the first of evenly spaced lines.
     """
 
     quantity: Literal["receptance", "mobility", "accelerance", "transfer"] | None = None

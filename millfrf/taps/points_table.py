@@ -25,8 +25,10 @@ class PointRow(BaseModel):
         Name of the recording, without its folder.
     hit
         Point and direction of the hammer, ``node:direction``; empty: as the file says.
-    from_s, to_s : s
-        Times between which this point was hit, on the recording's axis, s; left out: from the beginning, to the end.
+    from_s : s
+        Time from which this point was hit, on the recording's axis; left out: from the beginning.
+    to_s : s
+        Time until which this point was hit, after ``from_s``; left out: to the end.
     channels
         ``node:direction`` of channels that stood elsewhere than the file says, by name.
     """

@@ -22,9 +22,9 @@ class Damping(Table):
     frequencies_hz : Hz
         Two frequencies at which the ``ratios`` hold (Rayleigh).
     ratios
-        Damping ratios there.
+        Damping ratios there, 0 to below 1; 4 % is 0.04.
     ratio
-        One damping ratio for all modes, instead.
+        One damping ratio for all modes, instead; 4 % is 0.04.
     """
 
     frequencies_hz: tuple[float, float] | None = None
@@ -41,8 +41,8 @@ class Pose(Table):
         Name of the posture.
     driven : deg; prismatic joints m
         Values of the driven joints in the order of the frames.
-    driven_deg : deg
-        Older name of ``driven``.
+    driven_deg : deg; prismatic joints m
+        Older name of ``driven``: prismatic joints are in metres here too.
     """
 
     name: str

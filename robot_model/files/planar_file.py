@@ -82,8 +82,10 @@ class _Pose(Table):
         Name of the posture.
     angles_deg : deg
         Joint angles, each from the link before.
-    measured_first_mode_hz, predicted_first_mode_hz : Hz
-        Lowest natural frequency as published, where it is.
+    measured_first_mode_hz : Hz
+        Lowest natural frequency as its source measured it; for comparison only.
+    predicted_first_mode_hz : Hz
+        Lowest natural frequency as its source computed it; for comparison only.
     """
 
     name: str

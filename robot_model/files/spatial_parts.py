@@ -16,6 +16,7 @@ from .spatial_tables import BodyRow, FrameRow, JointRow, LinkRow, TubeTable
 
 
 def frame_of(row: FrameRow) -> Frame:
+    """A frame with angles in rad."""
     lower, upper = _limits(row)
     return Frame(
         row.name,
@@ -73,6 +74,7 @@ def _stiffness(row: JointRow) -> NDArray[np.float64]:
 
 
 def link_of(row: LinkRow) -> Link:
+    """A link; one without a tube is rigid."""
     if row.frame is None and any(row.angles_deg):
         raise InputError(f"link {list(row.nodes)}: angles_deg turn a frame; give its name too, frame = ...")
     if row.tube is None and row.elements > 1:
@@ -92,6 +94,7 @@ def _section(tube: TubeTable) -> Section:
 
 
 def body_of(row: BodyRow) -> LumpedBody:
+    """A body whose inertia a rigid body can have."""
     inertia = symmetric(row.inertia_kg_m2)
     fault = inertia_fault(inertia)
     if fault is not None:

@@ -18,11 +18,11 @@ class HeadTable(Table):
     kind
         ``serial``, ``spatial`` or ``planar``: which tables the file has.
     gravity_m_per_s2 : m/s^2
-        Gravity as a stiffness of the structure; 0: left out.
+        Gravity as a stiffness of the structure, for open chains only; 0: left out.
     up
         Axis of the base against the weight: ``[0, 0, 1]`` stands on the floor, ``[0, 0, -1]`` hangs from a ceiling.
     repeatability_m : m
-        Pose repeatability after ISO 9283 (RP).
+        Pose repeatability after ISO 9283 (RP), such as 6e-5 for 0.06 mm.
     tip_node
         Node of the tool's tip; it stands at the origin of ``tool_frame``.
     tool_frame
@@ -35,11 +35,13 @@ class HeadTable(Table):
     tool_frame: str
     gravity_m_per_s2: float = Field(0.0, ge=0, le=30)
     up: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    repeatability_m: float | None = Field(None, gt=0, le=0.01)
+    repeatability_m: float | None = Field(None, ge=1e-6, le=5e-3)
 
 
 class FrameRow(Table):
-    """A row ``[[frames]]``, after Khalil and Kleinfinger.
+    """A row ``[[frames]]``: turn about z, shift along z, turn about x, shift along x, turn and shift along the new z.
+
+    The parameters are those of Khalil and Kleinfinger.
 
     Parameters
     ----------
@@ -50,15 +52,23 @@ class FrameRow(Table):
     motion
         ``revolute``, ``prismatic`` or ``fixed``.
     active
-        False: the joint follows from a closed loop.
-    gamma_deg, alpha_deg, theta_deg : deg
-        Angles gamma, alpha and theta; theta is the zero of a revolute joint.
-    b_m, d_m, r_m : m
-        Lengths b, d and r; r is the zero of a prismatic joint.
+        Whether the joint is driven; false: it follows from a closed loop.
+    gamma_deg : deg
+        First turn, about z of the frame before.
+    b_m : m
+        First shift, along that z.
+    alpha_deg : deg
+        Turn about x.
+    d_m : m
+        Shift along x.
+    theta_deg : deg
+        Last turn, about the frame's own z; of a revolute joint its zero, to which the joint's angle is added.
+    r_m : m
+        Last shift, along the frame's own z; of a prismatic joint its zero.
     limits_deg : deg
-        Least and largest angle.
+        Least and largest angle of a revolute joint; left out: none.
     limits_m : m
-        Least and largest travel.
+        Least and largest travel of a prismatic joint; left out: none.
     """
 
     name: str
@@ -84,16 +94,18 @@ class JointRow(DriveKeys):
         Frame whose z is the axis of the joint.
     nodes
         Node before and node after the joint.
-    radial_n_per_m, axial_n_per_m : N/m
-        Stiffness of the bearing across and along the joint's axis; left out: rigid.
+    radial_n_per_m : N/m
+        Stiffness of the bearing across the joint's axis; left out: rigid.
+    axial_n_per_m : N/m
+        Stiffness of the bearing along the joint's axis; left out: rigid.
     tilting_nm_per_rad : N m/rad
         Stiffness of the bearing against tilting of the axis; left out: rigid.
     turning_nm_per_rad : N m/rad
-        Stiffness about the axis: the gear of a revolute joint.
+        Stiffness about the axis: the gear of a revolute joint; left out: rigid.
     damping_nms_per_rad : N m s/rad
-        Viscous damping about the axis.
+        Viscous damping about the axis of a revolute joint.
     damping_ns_per_m : N s/m
-        Viscous damping along the axis.
+        Viscous damping along the axis of a prismatic joint.
     """
 
     frame: str
@@ -111,10 +123,14 @@ class TubeTable(Table):
 
     Parameters
     ----------
-    outer_m, inner_m : m
-        Outer and inner diameter.
-    young_pa, shear_pa : Pa
-        Young's and shear modulus.
+    outer_m : m
+        Outer diameter of the tube.
+    inner_m : m
+        Inner diameter of the tube, below the outer one.
+    young_pa : Pa
+        Young's modulus of the material.
+    shear_pa : Pa
+        Shear modulus of the material.
     density_kg_per_m3 : kg/m^3
         Density of the material.
     theory
@@ -143,7 +159,7 @@ class LinkRow(Table):
     frame
         Frame whose axes, turned by ``angles_deg``, are those of the section.
     angles_deg : deg
-        Turns about x, y and z.
+        Turns about x, then the turned y, then the turned z; x then lies along the link.
     """
 
     nodes: tuple[int, int]
@@ -181,11 +197,11 @@ class BodyRow(Table):
     frame
         Frame in whose axes centre and inertia are told.
     mass_kg : kg
-        Mass of the body.
+        Mass of the body, not 0; below 0 where another body of its node has that much too much.
     centre_m : m
-        Centre of mass.
+        Centre of mass from the node.
     inertia_kg_m2 : kg m^2
-        Inertia about the centre: ``xx yy zz``, or ``xx yy zz xy xz yz``.
+        Inertia about the centre of mass: ``xx yy zz``, or ``xx yy zz xy xz yz`` with the signs of the matrix's entries.
     """
 
     node: int
@@ -225,7 +241,7 @@ class SpatialFile(BaseModel):
     points
         Nodes at no joint.
     bodies
-        Rigid bodies; without them a robot has statics only.
+        Rigid bodies at nodes; a robot without any mass, of bodies or tubes, has statics only.
     damping
         Damping of the structure.
     poses

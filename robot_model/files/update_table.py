@@ -17,17 +17,23 @@ class Number(Table):
     name
         Name of the number.
     kind
-        What it is: ``stiffness``, ``damping``, a payload's mass and so on.
+        What it is: ``stiffness``, ``joint damping``, ``damping``, ``links``, ``inertia``, ``body``, ``payload``,
+        ``tool mass``, ``sprung mass``, ``tool`` or ``base``.
     unit
-        Unit of the number.
-    frame, group, axis
-        Where it acts: frame, group of links, axis.
+        Unit of spread, value and standard error; empty: they are natural logarithms of a factor on the file's number
+        (stiffness, links, damping, inertia), or ratios.
+    frame
+        Joint of a stiffness or of a joint's damping.
+    group
+        Directions of that joint, such as its gear or its bearing; empty for the others.
+    axis
+        Direction of a payload's place, 0 to 2, and 3 for its mass; of a tool or base 0 or 1.
     spread
-        Standard deviation before the measurements.
+        Standard deviation of the belief before the measurements, in ``unit``.
     value
-        Change that was found, in the same scale.
+        Change that was found, in ``unit``; where this is empty, 0.1 is a factor of 1.105.
     standard_error
-        Its standard error.
+        Standard error of ``value``, in ``unit``.
     told
         Whether the measurements tell it.
     in_file

@@ -202,6 +202,30 @@ def test_receptance_and_the_sensor_high_pass() -> None:
     np.testing.assert_allclose(found.values[1:, 0, 0], truth[1:], rtol=1e-12)
 
 
+def test_the_high_pass_of_a_force_is_taken_out_of_its_column() -> None:
+    """Forces that two amplifiers of different corners pass: H1 of what is recorded, corrected, is H1 of the forces."""
+    rng = np.random.default_rng(3)
+    n, corners = 60_000, (2.0, 0.5)
+    s = 2j * np.pi * np.fft.rfftfreq(n, 1 / RATE)
+    force = rng.standard_normal((n, 2))
+    motion = np.fft.irfft(np.fft.rfft(force @ [1.0, -0.7]) / (s**2 + 8 * s + (2 * np.pi * 10) ** 2), n)
+    passes = [np.divide(s, s + 2 * np.pi * corner) for corner in corners]
+    recorded = np.stack([np.fft.irfft(np.fft.rfft(force[:, k]) * passes[k], n) for k in range(2)], axis=1)
+    settings = SpectralSettings(2000, 0.5, "hann")
+    measured = np.stack([motion, 2 * motion], axis=1) + 1e-6 * rng.standard_normal((n, 2))
+    truth, frf = (h1(accumulate(f, measured, settings)) for f in (force, recorded))
+    found = correct_high_pass(frf, [None, None], corners)
+    band = (frf.frequencies > 1) & (frf.frequencies < 30)
+    scale = np.abs(truth.values[band]).max()
+    assert np.abs(found.values - truth.values)[band].max() < 0.01 * scale
+    assert np.abs(frf.values - truth.values)[band].max() > 0.1 * scale
+    assert found.covariance is not None
+    assert frf.covariance is not None
+    ratio = found.covariance.variance()[band] / frf.covariance.variance()[band]
+    expected = np.abs([passes[k][:: n // 2000][: len(frf.frequencies)][band] for k in range(2)]) ** 2
+    np.testing.assert_allclose(ratio[:, 0, :], expected.T, rtol=1e-9)
+
+
 def test_frf_files_round_trip_and_refuse_what_they_are_not(tmp_path: Path) -> None:
     force, motion, _ = two_by_two(4000, 0.3, 1)
     frf = h1(accumulate(force, motion, SpectralSettings(64, 0.5, "hann")))

@@ -49,7 +49,8 @@ class RecordingsTable(_Table):
     files
         Names of recordings from the folder of this file, with wildcards such as ``recordings/*.h5``.
     pattern
-        Regular expression for names without suffix; each named group such as ``(?P<pose>P\\d+)`` is a label.
+        Regular expression that is found in names without suffix; each named group such as ``(?P<pose>P\\d+)`` is a
+        label.
     table
         CSV table with the column ``file``; each other column is a label.
     setup
@@ -93,8 +94,10 @@ class EstimateTable(_Banded):
         Window of the segments: ``hann``, ``hamming`` or ``boxcar``.
     stack
         Way of stacking recordings: ``sum`` or ``side-by-side``.
-    excitation, response
-        Names of channels; empty: forces and voltages excite, motions respond.
+    excitation
+        Names of channels that excite; empty: forces and voltages.
+    response
+        Names of channels that respond; empty: motions.
     band_hz : Hz
         Lowest and highest frequency to keep; without it all lines, which take much room. ``band`` is the same.
     stream
@@ -136,8 +139,10 @@ class FitTable(_Banded):
         Highest model order; without it by the data, or the method's own.
     modes
         Number of modes to keep; without it as many as are found.
-    excitation, response
-        Names of channels of recordings; empty: chosen by quantity.
+    excitation
+        Names of channels of recordings that excite; empty: chosen by quantity.
+    response
+        Names of channels of recordings that respond; empty: chosen by quantity.
     stream
         Sample clock; needed where a recording has several.
     """
@@ -174,7 +179,7 @@ class LobesTable(_Table):
     cutting
         Cutting file; its name may hold labels in braces.
     speeds_rpm : rpm
-        Lowest spindle speed, highest, and their number.
+        Lowest spindle speed, highest, and how many, a whole number.
     max_depth_m : m
         Largest depth that is looked at.
     method
@@ -278,12 +283,22 @@ class CampaignFile(_Table):
         Recordings and their labels; several tables for several kinds of names.
     sets
         Labels that recordings of one set share.
-    estimate, fit, calibrate, lobes
-        Jobs that are done with each set, each with the result of the one before.
-    diagnose, robot_diagnose
-        Jobs that are done with recordings that belong together.
-    learn, report
-        Jobs that are done once, with the results of all sets.
+    estimate
+        FRF of each set.
+    fit
+        Modal model of each set, of its FRF or of its recordings.
+    calibrate
+        Model of each set carried to the tool tip.
+    lobes
+        Depth limits of each set.
+    diagnose
+        What a nominal model leaves out, of recordings that belong together.
+    robot_diagnose
+        What the robot's model leaves out, of recordings that belong together.
+    learn
+        Dynamics over postures, once, with the models of all sets.
+    report
+        Table of modes and report, once, with the results of all sets.
     """
 
     campaign: CampaignTable = CampaignTable()

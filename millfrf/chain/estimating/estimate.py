@@ -131,7 +131,8 @@ def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOp
 def _finished(frf: Frf, tests: tuple[CrossSpectra, ...], doubts: Sequence[str], options: EstimateOptions) -> Estimate:
     """Take out the sensors' high-pass, and state the band in which the FRF is known."""
     total = sum_tests(tests)
-    frf = correct_high_pass(frf, [channel.high_pass_hz for channel in total.responses])
+    corners = [[one.high_pass_hz for one in channels] for channels in (total.responses, total.excitations)]
+    frf = correct_high_pass(frf, *corners)
     driven = np.interp(frf.frequencies, total.frequencies, driven_lines(total).astype(float)) >= 0.5
     frf = replace(frf, band=known_band(frf, driven))
     return Estimate(frf, tests, input_independence(total), tuple(doubts), options)

@@ -70,7 +70,7 @@ def test_a_schema_refuses_what_the_command_refuses() -> None:
 
 def test_a_schema_tells_meaning_and_unit_at_the_key() -> None:
     properties: dict[str, Any] = json_schema(FILES["cut"])["properties"]["cutting"]["properties"]
-    assert properties["diameter_m"]["description"] == "Diameter of the cutter. [m]"
+    assert properties["diameter_m"]["description"] == "Diameter of the cutter, above 0. [m]"
     assert properties["edge_angle_deg"]["default"] == 90.0
 
 
