@@ -7,7 +7,17 @@ from .table_mistakes import mistake_in_words, shown
 from .toml_tables import checked_toml
 from .units import SI_UNITS, si_factor, unit_factor
 from .valid_band import Band, checked_band, shared_band
-from .whole_files import LeftoverRemoved, is_disk_full, remove_leftovers, writing_whole_file, writing_whole_folder
+from .whole_files import (
+    LeftoverRemoved,
+    free_name,
+    is_disk_full,
+    keeping_files,
+    keeps_files,
+    refuse_replacing,
+    remove_leftovers,
+    writing_whole_file,
+    writing_whole_folder,
+)
 
 __all__ = [
     "HOUSING",
@@ -32,10 +42,14 @@ __all__ = [
     "counted",
     "doubts_line",
     "drawing",
+    "free_name",
     "is_disk_full",
+    "keeping_files",
+    "keeps_files",
     "listed",
     "mistake_in_words",
     "optional_library",
+    "refuse_replacing",
     "remove_leftovers",
     "require_memory",
     "same_values",

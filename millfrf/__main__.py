@@ -19,7 +19,7 @@ from .cut import cut_app
 from .new import new_app
 from .robot import robot_app
 from .terminal import printable, say
-from .usage import options_of_several, usage_in_words, with_examples, with_lists_apart
+from .usage import framed, options_of_several, usage_in_words, with_examples, with_lists_apart
 from .version import __version__
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -54,7 +54,7 @@ def _program(
 
 
 for _function in COMMANDS:
-    app.command()(_function)
+    app.command(_function.__name__)(framed(_function.__name__, _function))
 app.add_typer(robot_app)
 app.add_typer(new_app)
 app.add_typer(cut_app)

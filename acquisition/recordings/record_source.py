@@ -22,6 +22,7 @@ def record(
     observer: Callable[[Block | Events], None] | None = None,
     spare_bytes: int = SPARE_BYTES,
     provenance: str = "",
+    overwrite: bool = False,
 ) -> None:
     """Write ``source`` to a new recording until it ends or ``stop`` says so.
 
@@ -46,6 +47,8 @@ def record(
         Disk space kept aside, in bytes.
     provenance
         Where the recording comes from, as JSON text.
+    overwrite
+        Whether a recording of that name may be replaced, unless it is being written.
 
     Raises
     ------
@@ -65,6 +68,7 @@ def record(
         event_axes=announced_events(source),
         spare_bytes=spare_bytes,
         provenance=provenance,
+        overwrite=overwrite,
     ) as writer:
         try:
             source.open()

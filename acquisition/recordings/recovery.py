@@ -61,6 +61,7 @@ def recover(
     out: str | os.PathLike[str] | None = None,
     progress: Callable[[int], None] | None = None,
     provenance: str = "",
+    overwrite: bool = False,
 ) -> Recovered:
     """Copy what is sound of a recording into a new file that opens anywhere; the old one is left as it is.
 
@@ -77,6 +78,8 @@ def recover(
         Called with the number of samples copied, over all streams.
     provenance
         Where the new file comes from, as JSON text; empty: what the source says.
+    overwrite
+        Whether a file ``out`` may be replaced.
 
     Raises
     ------
@@ -89,7 +92,7 @@ def recover(
     target = Path(out) if out is not None else source.with_name(f"{source.stem}.recovered.h5")
     if not source.is_file():
         raise InputError(f"no file {source}; check the name")
-    if target.exists():
+    if target.exists() and (not overwrite or target.samefile(source)):
         raise InputError(f"{target} exists; choose another name as out (--out) or remove it first")
     if is_being_written(source):
         raise InputError(f"{source} is still being written; stop its writer first")

@@ -27,6 +27,11 @@ class LeftoverRemoved(UserWarning):
     """What a killed run had left unfinished in a folder was removed."""
 
 
+def is_unfinished(place: Path) -> bool:
+    """Whether a place lies in a folder that is still being written, where everything is the writer's own."""
+    return any(part.startswith(PREFIX) and part.endswith(SUFFIX) for part in place.parts)
+
+
 def take_lock(folder: Path) -> int | None:
     """Lock an unfinished folder for this process.
 

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from ..errors import DiskFull, InputError
 from .full_disk import is_disk_full, naming_full_disk
-from .leftovers import PREFIX, SUFFIX, remove_leftovers, take_lock
+from .keeping import note_made, refuse_replacing
+from .leftovers import PREFIX, SUFFIX, is_unfinished, remove_leftovers, take_lock
 
 
 @contextmanager
@@ -33,7 +34,8 @@ def writing_whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     InputError
-        The folder does not exist or cannot be written to, or the name is that of a folder or a device.
+        The folder does not exist or cannot be written to, the name is that of a folder or a device, or of a file that
+        must stay (`keeping_files`).
     DiskFull
         No room was left; an old file of that name is as it was.
 
@@ -53,12 +55,15 @@ def writing_whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
         raise InputError(f"cannot write {path}: it is a folder; give a file name")
     if target.exists() and not target.is_file():
         raise InputError(f"cannot write {path}: it is a device, which cannot be replaced whole; give a file name")
+    refuse_replacing(path)
     with _unfinished(target, Path(path)) as (folder, nested):
         temporary = folder / target.name
         yield temporary
         if not nested:
             _sync(temporary)
+        refuse_replacing(path)  # it may have come up meanwhile
         _put_in_place(temporary, target)
+        note_made([target])
         if not nested:
             _sync(target.parent)
 
@@ -83,7 +88,8 @@ def writing_whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     Raises
     ------
     InputError
-        There is a file of that name, or the folder cannot be made or written to.
+        There is a file of that name, the folder cannot be made or written to, or a file in it that would be replaced
+        must stay (`keeping_files`).
     DiskFull
         No room was left; nothing was moved.
     """
@@ -101,17 +107,21 @@ def writing_whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary.mkdir()
         yield temporary
         _sync_all(temporary)
+        places = [target / file.relative_to(temporary) for file in temporary.rglob("*") if not file.is_dir()]
+        for place in places:
+            refuse_replacing(place)
         if target.is_dir():
             _move_into(temporary, target)
         else:
             _put_in_place(temporary, target)
+        note_made(places)
         _sync(target.parent)
 
 
 @contextmanager
 def _unfinished(target: Path, said: Path) -> Iterator[tuple[Path, bool]]:
     """A locked folder beside the target, removed in the end; and whether it lies in another unfinished one."""
-    nested = any(part.startswith(PREFIX) and part.endswith(SUFFIX) for part in target.parent.parts)
+    nested = is_unfinished(target.parent)
     if not nested:
         remove_leftovers(target.parent)
     with naming_full_disk(said):

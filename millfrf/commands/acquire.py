@@ -23,6 +23,7 @@ def acquire(
     ] = "127.0.0.1",
     live_port: Annotated[int, typer.Option("--live-port", min=0, max=65535, help="0: any free port.")] = 0,
     at_once: Annotated[bool, typer.Option("--at-once", help="With --live: record without waiting for Start.")] = False,
+    force: bool = False,
 ) -> None:
     """Record from the devices of a session until its duration is over, Stop is pressed or Ctrl-C."""
     from foundation import InputError
@@ -34,8 +35,6 @@ def acquire(
         raise InputError("give either --out REC.h5 to record or --check to look at the signals first")
     if out is not None:
         check_output(out, (".h5", ".hdf5"))
-        if out.exists():
-            raise InputError(f"{out} exists; choose another name or remove it first")
     opened = open_session(session)
     for stream in opened.source.streams:
         say(f"stream {stream.name}: {len(stream.channels)} channels at {stream.sample_rate:.9g} Hz")
@@ -46,10 +45,12 @@ def acquire(
     elif live:
         from ..chain import acquire_live
 
-        tally = acquire_live(opened, out, address=live_address, port=live_port, at_once=at_once, say=say)
+        tally = acquire_live(
+            opened, out, address=live_address, port=live_port, at_once=at_once, overwrite=force, say=say
+        )
         _report(tally, out)
     else:
-        _record(opened, out)
+        _record(opened, out, force)
 
 
 def _check(source: object, seconds: float) -> None:
@@ -73,13 +74,13 @@ def _check(source: object, seconds: float) -> None:
     say("pre-flight: nothing wrong")
 
 
-def _record(opened: object, out: Path) -> None:
+def _record(opened: object, out: Path, overwrite: bool) -> None:
     from ..chain import OpenedSession, acquire
     from ..progress import bar
 
     assert isinstance(opened, OpenedSession)
     with bar(f"recording {out.name}", opened.source.n_samples) as update:
-        tally = acquire(opened, out, progress=update)
+        tally = acquire(opened, out, progress=update, overwrite=overwrite)
     _report(tally, out)
 
 

@@ -27,7 +27,7 @@ def convert(
     """
     from acquisition import SUFFIXES as CAN_LOGS
     from acquisition import add_can_log
-    from foundation import InputError
+    from foundation import InputError, refuse_replacing
 
     from ..chain import FRF_SUFFIXES, convert_files, is_frf_conversion, is_uff_conversion
     from ..progress import bar
@@ -36,6 +36,8 @@ def convert(
     if len(files) < 2:
         raise InputError(f"{files[0]} alone: give files to read and a file to write: millfrf convert IN... OUT")
     *sources, target = files
+    if not any(one.exists() and target.exists() and target.samefile(one) for one in sources):
+        refuse_replacing(target)
     if sources[0].suffix.lower() in CAN_LOGS and not is_frf_conversion(sources, mapping):
         if mapping is None:
             raise InputError(f"{sources[0]} needs --map MAP.toml with recording, dbc and signals")

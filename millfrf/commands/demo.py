@@ -7,9 +7,28 @@ import typer
 
 from ..terminal import say
 
+DEFAULT = Path("millfrf-demo")
+FILES = {
+    "chain": ("report.html", "cut.toml", "model_tip.json", "model_housing.json", "frf_in_process.h5", "lobes.png"),
+    "conceal": (
+        "sealed.bin",
+        "nominal.json",
+        "frf_taps.h5",
+        "diagnosis",
+        *(f"recordings/{name}.h5" for name in ("taps", "low", "mid", "high")),
+    ),
+    "campaign": ("campaign.toml", "cut.toml", "concealed.json"),
+}
+"""What each kind of demonstration writes into its folder, as far as a user's own files may bear such names."""
+
 
 def demo(
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for all results.")] = Path("millfrf-demo"),
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="DIR", help="Folder for all results; default: millfrf-demo, or millfrf-demo-2..."
+        ),
+    ] = None,
     noise: Annotated[float, typer.Option("--noise", help="Noise of every sensor, as a share of its signal.")] = 0.01,
     seed: Annotated[int | None, typer.Option("--seed", help="Of noise and taps.  [default: 0; --conceal: any]")] = None,
     conceal: Annotated[
@@ -22,6 +41,7 @@ def demo(
     poses: Annotated[int, typer.Option("--poses", help="Of --campaign: poses of the robot.")] = 20,
 ) -> None:
     """Mill, record, estimate, fit, calibrate, draw the lobes and report, without hardware, in about a minute."""
+    out = _folder(out, "campaign" if campaign else "conceal" if conceal else "chain")
     if campaign:
         _campaign(out, recordings, poses, 0 if seed is None else seed)
         return
@@ -36,6 +56,17 @@ def demo(
     for table in comparison_tables(result):
         show(table)
     say(f"report: {result.report.resolve()}")
+
+
+def _folder(out: Path | None, what: str) -> Path:
+    """Where the results go: a folder that was named must not hold such results; else the next that is free."""
+    from foundation import free_name, refuse_replacing
+
+    if out is None:
+        return free_name(DEFAULT)
+    for name in FILES[what]:
+        refuse_replacing(out / name)
+    return out
 
 
 def _concealed(out: Path, noise: float, seed: int | None) -> None:

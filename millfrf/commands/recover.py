@@ -14,14 +14,16 @@ if TYPE_CHECKING:
 def recover(
     recording: Annotated[Path, typer.Argument(metavar="REC.h5", help="Recording that was left open or damaged.")],
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="File to write; else REC.recovered.h5 beside it.")
+        Path | None, typer.Option("--out", metavar="FILE", help="File to write; default: REC.recovered.h5 beside it.")
     ] = None,
+    force: bool = False,
 ) -> None:
     """Copy what is sound of a recording into a new one: after a kill, a power failure, or damage on the disk.
 
     Damaged samples are listed, and never copied; the old file is left as it is.
     """
     from acquisition import recover as recover_file
+    from foundation import free_name
 
     from ..options import check_output
     from ..progress import bar
@@ -29,9 +31,10 @@ def recover(
 
     if out is not None:
         check_output(out, (".h5", ".hdf5"), [recording])
+    target = out or free_name(recording.with_name(f"{recording.stem}.recovered.h5"))
     with bar(f"recovering {recording.name}") as update:
         origin = made("recover", [recording])
-        back = recover_file(recording, out, progress=update, provenance=origin)
+        back = recover_file(recording, target, progress=update, provenance=origin, overwrite=force)
     for line in recovered_lines(back):
         answer(line)
     say(f"wrote {back.path}")

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..terminal import say
+from ..usage import framed
 
 cut_app = typer.Typer(
     name="cut",
@@ -20,7 +21,6 @@ def _group() -> None:
     """Keeps `diagnose` a verb of the group while it is the only one."""
 
 
-@cut_app.command()
 def diagnose(
     cutting: Annotated[Path, typer.Argument(metavar="CUT.toml", help="Cutter, engagement, coefficients.")],
     recordings: Annotated[list[Path], typer.Argument(metavar="REC...", help="Recordings of that cut.")],
@@ -50,3 +50,6 @@ def diagnose(
     asking = Asking(depth, speed, model, coefficient_error, force_error, stream)
     for line in diagnose_cut_files(cutting, recordings, out, asking):
         say(line)
+
+
+cut_app.command("diagnose")(framed("cut diagnose", diagnose))

@@ -176,7 +176,7 @@ def _diagnose(nominal: Path, milled: list[Path], out: Path, say: Callable[[str],
     """Run ``millfrf diagnose`` and read what it wrote."""
     written = out / "diagnosis.json"
     written.unlink(missing_ok=True)
-    command = [sys.executable, "-m", "millfrf", "diagnose", *map(str, (nominal, *milled)), "--out", str(out)]
+    command = [sys.executable, "-m", "millfrf", "diagnose", *map(str, (nominal, *milled)), "--out", str(out), "--force"]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     if run.returncode or not written.exists():
         last = (run.stderr.strip() or run.stdout.strip() or "no message").splitlines()[-1]

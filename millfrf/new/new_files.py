@@ -10,7 +10,6 @@ import typer
 from ..terminal import say
 
 Out = Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write.")]
-Force = Annotated[bool, typer.Option("--force", help="Replace a file that is there.")]
 
 
 class Driver(StrEnum):
@@ -28,13 +27,12 @@ def new_cut(
         float | None, typer.Option("--diameter", metavar="M", help="Diameter of the cutter, m.")
     ] = None,
     plan: Annotated[bool, typer.Option("--plan", help="Add the table of a plan of speed sweeps.")] = False,
-    force: Force = False,
 ) -> None:
     """Write a commented cutting file; what only you know is left out, and lobes name it as missing."""
     from .making import cut_text
     from .writing_new import write_new
 
-    write_new(out, cut_text(teeth, diameter, plan=plan), force=force)
+    write_new(out, cut_text(teeth, diameter, plan=plan))
     say(f"wrote {out}; fill in what is marked FILL IN, then: millfrf lobes MODEL.json --cutting {out} ...")
 
 
@@ -44,13 +42,12 @@ def new_session(
     channels: Annotated[
         int, typer.Option("--channels", metavar="N", min=1, max=256, help="Number of inputs to describe.")
     ] = 6,
-    force: Force = False,
 ) -> None:
     """Write a commented session file for `millfrf acquire`."""
     from .making import session_text
     from .writing_new import write_new
 
-    write_new(out, session_text(driver.value, channels), force=force)
+    write_new(out, session_text(driver.value, channels))
     say(f"wrote {out}; fill in what is marked FILL IN, then: millfrf acquire {out} --check")
 
 
@@ -62,13 +59,12 @@ def new_campaign(
     robot: Annotated[
         str | None, typer.Option("--robot", metavar="ROBOT", help="Robot whose postures were measured.")
     ] = None,
-    force: Force = False,
 ) -> None:
     """Write a commented campaign file for `millfrf campaign`."""
     from .making import campaign_text
     from .writing_new import write_new
 
-    write_new(out, campaign_text(files, robot), force=force)
+    write_new(out, campaign_text(files, robot))
     say(f"wrote {out}; fill in what is marked FILL IN, then: millfrf campaign {out} --dry-run")
 
 
@@ -76,15 +72,12 @@ def new_schemas(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the schemas.")],
 ) -> None:
     """Write a JSON schema of each TOML file, for editors that complete and check keys."""
-    from foundation import writing_whole_file
+    from foundation import writing_whole_folder
 
-    from ..result_folder import refuse_file
     from ..toml_files import json_schema, toml_files
 
-    refuse_file(out)
-    out.mkdir(parents=True, exist_ok=True)
-    for file in toml_files():
-        path = out / f"{file.name}.schema.json"
-        with writing_whole_file(path) as temporary:
-            temporary.write_text(json.dumps(json_schema(file), indent=2) + "\n", encoding="utf-8")
+    with writing_whole_folder(out) as folder:
+        for file in toml_files():
+            text = json.dumps(json_schema(file), indent=2) + "\n"
+            (folder / f"{file.name}.schema.json").write_text(text, encoding="utf-8")
     say(f"wrote {len(toml_files())} schemas into {out}; first line of a TOML file: #:schema PATH.schema.json")

@@ -11,14 +11,13 @@ from ..terminal import say
 def new_mapping(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Recording of another program: .mat .csv .npz ...")],
     out: Annotated[Path, typer.Option("--out", metavar="MAP.toml", help="Mapping to write.")],
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
 ) -> None:
     """Write a commented mapping with the columns, units and sample rate that a file tells."""
     from .making import mapping_for
     from .writing_new import write_new
 
     made = mapping_for(file)
-    write_new(out, made.text, force=force)
+    write_new(out, made.text)
     say(f"wrote {out}: {made.n_channels} channels; quantities and places are guessed from names, check them")
     if made.n_open:
         say(f"{made.n_open} places are open, each marked FILL IN; millfrf convert names what is missing")

@@ -7,7 +7,7 @@ import numpy as np
 
 from cutting import MillingProcess
 from figures import LobesBand, lobes_figure, save_figure
-from foundation import TIP, InputError, writing_whole_file
+from foundation import TIP, InputError, refuse_replacing, writing_whole_file
 from modal_fit import ModalModel, Residuals
 from robot_model import SpatialCase, in_posture, read_robot, shown_values
 from stability import StabilityLobes, judge_mode_coupling, with_residual_flexibility, write_lobes
@@ -22,7 +22,7 @@ from .depth_maps import depth_over_redundancy, write_posture_map
 from .postures import Asked, cut_place, mechanism_of, posture_of, spatial
 from .results import RPM, say_doubts
 from .settled_modes import settled_modes
-from .update_bands import band_of_lobes, write_band
+from .update_bands import band_beside, band_of_lobes, write_band
 
 _TIME_PERIODIC = ("certified", "collocation", "semi-discretization")
 """Methods whose cost grows with the highest mode."""
@@ -80,6 +80,8 @@ def write_lobes_in_posture(
     asked_for: dict[str, object] = {"speeds_rpm": speeds, "depth_max_m": max_depth, "method": method, "links": links}
     asked_for["posture"] = shown_values(mechanism_of(case), driven)
     asked_for["mode_coupling"] = coupling
+    if band is not None:
+        refuse_replacing(band_beside(out))
     write_lobes(out, found, provenance=made("robot lobes", [robot, cutting], asked_for))
     for warning in found.warnings:
         say(f"warning: {warning}")

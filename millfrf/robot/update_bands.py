@@ -54,9 +54,14 @@ def band_of_lobes(
         return None, f"the update's covariance gives no band of these lobes: {error}"
 
 
+def band_beside(out: Path) -> Path:
+    """Place of a band beside a table of lobes."""
+    return out.with_name(f"{out.stem}_band.csv")
+
+
 def write_band(out: Path, band: LimitBand) -> Path:
     """Write the band beside the lobes: ``<lobes>_band.csv`` with speed (rpm), both ends (m) and how they were found."""
-    place = out.with_name(f"{out.stem}_band.csv")
+    place = band_beside(out)
     with writing_whole_file(place) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream)
         writer.writerow(["spindle_speed_rpm", "depth_limit_low_m", "depth_limit_high_m", "basis"])

@@ -1,10 +1,16 @@
 from .examples import EXAMPLES, commands_in, with_examples
+from .framing import FOLDERS, OWN_FOLDER, WRITING, framed, option_names
 from .number_lists import options_of_several, with_lists_apart
 from .parser_words import usage_in_words
 
 __all__ = [
     "EXAMPLES",
+    "FOLDERS",
+    "OWN_FOLDER",
+    "WRITING",
     "commands_in",
+    "framed",
+    "option_names",
     "options_of_several",
     "usage_in_words",
     "with_examples",

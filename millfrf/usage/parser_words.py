@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from itertools import pairwise
 
 _INVALID = re.compile(r"Invalid value for '(?P<option>--[\w-]+)[^:]*: (?P<said>.*)", re.DOTALL)
 
@@ -21,6 +22,8 @@ def usage_in_words(said: str, arguments: Sequence[str]) -> str:
     >>> usage_in_words("Invalid value for '--modes': Input should be a valid integer", ["fit", "--modes", "2.5"])
     "--modes 2.5 is not understood: give a whole number. Try 'millfrf --help'."
     """
+    if "unexpected extra argument" in said and _number_behind_force(arguments):
+        return "--force takes no number: it replaces files that are there; the force on a robot's tip is --tip-force N."
     found = _INVALID.match(said)
     if found is None or not re.search(r"Input should|is not a valid", found["said"]):
         return f"{said} Try 'millfrf --help'."
@@ -29,6 +32,11 @@ def usage_in_words(said: str, arguments: Sequence[str]) -> str:
     number = "integer" in found["said"]
     wanted = "a whole number" if number and len(typed.split()) == 2 else "a whole number for N" if number else "numbers"
     return f"{typed} is not understood: give {wanted}. Try 'millfrf --help'."
+
+
+def _number_behind_force(arguments: Sequence[str]) -> bool:
+    """Whether somebody types `--force 650`, as `robot stiffness` took it before."""
+    return any(one == "--force" and re.fullmatch(r"[-+.\deE]+", other) for one, other in pairwise(arguments))
 
 
 def _values(option: str, arguments: Sequence[str]) -> list[str]:

@@ -82,8 +82,8 @@ def test_mistakes_in_files(
 
 
 TYPED = [
-    (["stiffness", KUKA, "--force", "nan"], "--force nan"),
-    (["stiffness", KUKA, "--force", "-3"], "--force -3"),
+    (["stiffness", KUKA, "--tip-force", "nan"], "--tip-force nan"),
+    (["stiffness", KUKA, "--tip-force", "-3"], "--tip-force -3"),
     (["stiffness", KUKA, "--payload", "nan"], "payload nan"),
     (["stiffness", KUKA, "--payload-at", "0", "0", "0.1"], "--payload KG"),
     (["stiffness", KUKA, "--payload", "5", "--payload-at", "0", "0", "200"], "metres"),

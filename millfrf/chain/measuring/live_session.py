@@ -68,6 +68,7 @@ def acquire_live(
     address: str = LOOPBACK,
     port: int = 0,
     at_once: bool = False,
+    overwrite: bool = False,
     say: Callable[[str], object] = str,
 ) -> Tally | None:
     """Show a session's signals on a page and record them from Start to Stop.
@@ -82,6 +83,8 @@ def acquire_live(
         Network address and port of the page.
     at_once
         Whether to record without waiting for Start.
+    overwrite
+        Whether a recording of that name may be replaced.
     say
         Function that is told the page's address.
 
@@ -109,7 +112,7 @@ def acquire_live(
                 monitor.restart()
                 source = WithFeeds(opened.source, [control])
                 stop = _stopping(control)
-                tally = acquire(replace(opened, source=source), out, watchers=[monitor], stop=stop)
+                tally = acquire(replace(opened, source=source), out, watchers=[monitor], stop=stop, overwrite=overwrite)
                 monitor.finish()
                 control.ended("; ".join([f"Wrote {os.fspath(out)}: {tally.summary()}", *tally.device_story().losses]))
             except MillfrfError as error:

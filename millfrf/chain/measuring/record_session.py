@@ -135,6 +135,7 @@ def acquire(
     watchers: Sequence[Watcher] = (),
     stop: Callable[[], bool] = lambda: False,
     progress: Callable[[int], None] | None = None,
+    overwrite: bool = False,
 ) -> Tally:
     """Record a session; Ctrl-C, ``stop`` and the session's duration end it in order.
 
@@ -150,6 +151,8 @@ def acquire(
         Function that is asked before every block; True ends the recording.
     progress
         Function that is called with the number of samples written.
+    overwrite
+        Whether a recording of that name may be replaced.
 
     Raises
     ------
@@ -179,6 +182,7 @@ def acquire(
                 observer=observe,
                 progress=progress,
                 provenance=made("acquire", [opened.path]),
+                overwrite=overwrite,
                 stop=lambda: ended(interrupted() or stop() or tally.seconds() >= duration),
             )
     except (DeviceError, DiskFull) as error:

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import typer
 
+from ...usage import framed
 from ..diagnosis import diagnose
 from .compensate import compensate
 from .deviation import deviation
@@ -44,6 +45,6 @@ robot_app = typer.Typer(
     rich_markup_mode=None,
 )
 for _name, _function in COMMANDS.items():
-    robot_app.command(_name)(_function)
+    robot_app.command(_name)(framed(f"robot {_name}", _function))
 
 __all__ = ["robot_app"]

@@ -11,7 +11,10 @@ from .options import At, Feed, Joints, Pose, Redundancy, Robot, Turn
 
 def show(
     robot: Robot,
-    out: Annotated[Path, typer.Option("--out", metavar="FILE.html", help="Page to write.")] = Path("robot.html"),
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE.html", help="Page to write; default: robot.html, or robot-2.html..."),
+    ] = None,
     pose: Pose = None,
     joints: Joints = None,
     at: At = None,
@@ -21,8 +24,12 @@ def show(
     browser: Annotated[bool, typer.Option("--browser", help="Open the page in the browser.")] = False,
 ) -> None:
     """A page with the robot, its joints, its posture and its mode shapes: one file, no network."""
+    from foundation import free_name
+
     from ..postures import Asked
     from ..shown import show_robot
 
-    for line in show_robot(robot, Asked(pose, joints, at, feed, turn, redundancy), out, browser):
+    for line in show_robot(
+        robot, Asked(pose, joints, at, feed, turn, redundancy), out or free_name(Path("robot.html")), browser
+    ):
         say(line)

@@ -17,7 +17,9 @@ def stiffness(
     turn: Turn = 0.0,
     redundancy: Redundancy = "tool",
     links: Links = False,
-    force: Annotated[float, typer.Option("--force", metavar="N", help="Force to deflect it with.")] = 650.0,
+    tip_force: Annotated[
+        float, typer.Option("--tip-force", metavar="N", help="Force at the tip to deflect it with.")
+    ] = 650.0,
     payload: PayloadMass = 0.0,
     payload_at: PayloadAt = None,
     out: Annotated[
@@ -32,4 +34,4 @@ def stiffness(
     from ..postures import Asked
 
     asked = Asked(pose, joints, at, feed, turn, redundancy)
-    show_stiffness(robot, asked, force, loads_of(payload, payload_at), links, out, (picture, table))
+    show_stiffness(robot, asked, tip_force, loads_of(payload, payload_at), links, out, (picture, table))

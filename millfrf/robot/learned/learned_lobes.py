@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from foundation import InputError, warning_lines, writing_whole_file
+from foundation import InputError, refuse_replacing, warning_lines, writing_whole_file
 from stability import StabilityLobes, write_lobes
 
 from ...chain import compute_lobes, lobes_summary, speed_axis
@@ -49,6 +49,8 @@ def write_learned_lobes(
     """
     cutting, speeds, max_depth, method = cut
     check_output(out, (".csv",), [learned, cutting])
+    beside = out.with_name(f"{out.stem}_band.csv")
+    refuse_replacing(beside)
     if picture is not None:
         check_output(picture, (".png", ".pdf", ".svg"))
     if speeds is None:
@@ -63,7 +65,6 @@ def write_learned_lobes(
     with bar("band of the depth limit", SAMPLES) as update:
         band = depth_band(found.draws, process, axis, max_depth, progress=update)
     options = {"posture": posture, "speeds_rpm": speeds, "depth_max_m": max_depth, "method": method}
-    beside = out.with_name(f"{out.stem}_band.csv")
     write_lobes(out, lobes, provenance=made("robot lobes", [robot, learned, cutting], options))
     with writing_whole_file(beside) as temporary:
         _write_band(temporary, band, lobes)

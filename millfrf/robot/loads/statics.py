@@ -35,7 +35,7 @@ def show_stiffness(
 ) -> None:
     """Compliance, principal directions, deflection under the force, under weight, and both; picture and table."""
     check_drawn(drawn, out)
-    check_positive("force", force, "newtons", 1e6)
+    check_positive("tip-force", force, "newtons", 1e6)
     if out is not None:
         check_output(out, (".json",))
     case = read_robot(robot)

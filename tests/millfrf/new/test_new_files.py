@@ -118,7 +118,7 @@ def test_nothing_is_replaced_unasked(tmp_path: Path, capsys: pytest.CaptureFixtu
     out = tmp_path / "cut.toml"
     out.write_text("mine")
     assert run(["new", "cut", "--out", str(out)]) == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "replace it with --force" in capsys.readouterr().err
     assert out.read_text() == "mine"
     assert run(["new", "cut", "--out", str(out), "--force"]) == 0
 
