@@ -31,7 +31,7 @@ def command(folder: Path, points: int, rpm: float) -> tuple[str, float, float]:
     rows = "".join(f"{x:.6f},0.1,0.7,0,0,1\n" for x in np.linspace(1.4, 2.0, points))
     (folder / "path.csv").write_text("x_m,y_m,z_m,i,j,k\n" + rows, encoding="utf-8")
     write_cutting_process(folder / "cut.toml", CUT)
-    words = f"robot path {ROBOT} path.csv --cutting cut.toml --speed {rpm:g} --depth 0.002 --out out"
+    words = f"robot path {ROBOT} path.csv --cutting cut.toml --speed {rpm:g} --depth 0.002 --out out --force"
     started, used = time.perf_counter(), processor_seconds()
     run = subprocess.run(
         [sys.executable, "-m", "millfrf", *words.split()], cwd=folder, capture_output=True, text=True, check=True

@@ -55,7 +55,7 @@ def main(folder: Path, pictures: Path | None) -> int:
     write_cutting_process(cutting, STATED)
     paths = mill(folder)
     asked = ["cut", "diagnose", str(cutting), *map(str, paths), "--depth", str(DEPTH)]
-    code = run([*asked, "--out", str(folder / "cut_diagnosis")])
+    code = run([*asked, "--out", str(folder / "cut_diagnosis"), "--force"])
     if code == 0 and pictures is not None:
         draw(paths, pictures)
     return code

@@ -70,8 +70,9 @@ def main(folder: Path, change: str = "joint-3", postures: int = 3, duration: flo
         files.append(str(path))
         poses += ["--pose", posture]
     place = [str(value) for value in SENSOR]
-    options = ["--sensor", *place, "--band", "5", "45", *truth.options, "--out", str(folder / "diagnosis")]
-    return run(["robot", "diagnose", ROBOT, *files, *poses, *options])
+    options = ["--sensor", *place, "--band", "5", "45", *truth.options]
+    out = ["--out", str(folder / "diagnosis"), "--force"]
+    return run(["robot", "diagnose", ROBOT, *files, *poses, *options, *out])
 
 
 if __name__ == "__main__":

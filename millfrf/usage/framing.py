@@ -81,7 +81,7 @@ def option_names(hint: Any) -> tuple[str, ...]:
 
 def _named(words: str, writing: tuple[str, ...], given: Mapping[str, Any]) -> Iterator[Path]:
     """Files that the command will write, as far as its options tell; an input is left to the command to refuse."""
-    inputs = [path for name, value in given.items() if name not in writing for path in _paths(value)]
+    inputs = [path for name, value in given.items() if name not in writing for path in _paths(value, str)]
     for name in writing:
         for path in _paths(given.get(name)):
             if path.is_dir():
@@ -90,6 +90,6 @@ def _named(words: str, writing: tuple[str, ...], given: Mapping[str, Any]) -> It
                 yield path
 
 
-def _paths(value: object) -> list[Path]:
+def _paths(value: object, *kinds: type) -> list[Path]:
     several = value if isinstance(value, list | tuple) else [value]
-    return [one for one in several if isinstance(one, Path)]
+    return [Path(one) for one in several if isinstance(one, (Path, *kinds))]

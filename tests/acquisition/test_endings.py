@@ -123,14 +123,17 @@ def test_a_second_writer_is_refused_and_the_first_goes_on(tmp_path: Path, capsys
 
     def second(block: object) -> None:
         assert run(["acquire", str(session), "--out", str(out)]) == 2
+        assert run(["acquire", str(session), "--out", str(out), "--force"]) == 2
         assert run(["inspect", str(out)]) == 0
         assert run(["recover", str(out)]) == 2
 
     tally = acquire(open_session(session), out, watchers=[second])
     assert tally.samples == {"main": 3000}
     said, complained = capsys.readouterr()
-    refused, unneeded = complained.splitlines()
-    assert refused.endswith("a.h5 exists; choose another name or remove it first")
+    refused, forced, unneeded = complained.splitlines()
+    assert refused.endswith("a.h5 exists; replace it with --force, or choose another name")
+    assert "a.h5" in forced
+    assert "written" in forced
     assert "warning: the recording is still being written" in said
     assert unneeded.endswith("is still being written; stop its writer first")
     with Recording(out) as recording:

@@ -208,6 +208,8 @@ def test_the_command_recovers_and_says_what(killer: Killer, tmp_path: Path, caps
     killer.kill_after(0.02, path, 1)
     assert run(["recover", str(path)]) == 0
     assert "a.recovered.h5" in capsys.readouterr().out
-    assert run(["recover", str(path)]) == 2
-    assert "exists" in capsys.readouterr().err
+    assert run(["recover", str(path)]) == 0
+    assert "a.recovered-2.h5" in capsys.readouterr().out
+    assert run(["recover", str(path), "--out", str(tmp_path / "a.recovered.h5")]) == 2
+    assert "exists; replace it with --force" in capsys.readouterr().err
     assert run(["recover", str(tmp_path / "none.h5")]) == 2

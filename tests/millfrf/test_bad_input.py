@@ -214,9 +214,9 @@ def test_the_same_commands_succeed_on_good_input(bench: Path, monkeypatch: pytes
     monkeypatch.chdir(bench)
     good_arrays(bench)
     assert run(CONVERT) == DONE
-    assert run(ESTIMATE) == DONE
-    assert run([*FIT, "--band", "10", "30"]) == DONE
-    assert run([*LOBES, "--max-depth", "0.01"]) == DONE
+    assert run([*ESTIMATE, "--force"]) == DONE
+    assert run([*FIT, "--band", "10", "30", "--force"]) == DONE
+    assert run([*LOBES, "--max-depth", "0.01", "--force"]) == DONE
     assert run(["report", "out.csv", "cut.toml", "model.json", "--out", "out.html"]) == DONE
     for source, target in (("frf.h5", "a.uff"), ("a.uff", "b.h5.h5"), ("model.json", "m.uff"), ("m.uff", "m.json")):
         assert run(["convert", source, target]) == DONE

@@ -140,7 +140,7 @@ def test_deviation_of_drilled_holes(tmp_path: Path, capsys: pytest.CaptureFixtur
         entry = [float(row[f"weight_{axis}_m"]) for axis in "xy"]
         # the axis must lie in its zone at entry, under weight alone, and under full thrust: they may not cancel
         assert float(row["position_tolerance_m"]) > 2 * max(np.hypot(*moved), np.hypot(*entry))
-    known = [*options, "--repeatability", "0.04"]
+    known = [*options, "--repeatability", "0.04", "--force"]
     assert run(["robot", "deviation", "staubli_rx170", *known]) == DONE
     captured = capsys.readouterr()
     assert "holds at 6" in captured.out
@@ -153,7 +153,8 @@ def test_deviation_of_drilled_holes(tmp_path: Path, capsys: pytest.CaptureFixtur
 
 def test_lobes_and_posture_map(tmp_path: Path, cut: str) -> None:
     out = tmp_path / "l.csv"
-    common = ["staubli_rx170", "--cutting", cut, "--max-depth", "0.02", "--at", "0.9", "0.1", "0.8", "--out", str(out)]
+    common = ["staubli_rx170", "--cutting", cut, "--max-depth", "0.02", "--at", "0.9", "0.1", "0.8"]
+    common += ["--out", str(out), "--force"]
     assert run(["robot", "lobes", *common, "--speeds", "2500", "3000", "3"]) == DONE
     assert len(read_lobes(out).depth_limits) == 3
     assert run(["robot", "lobes", *common, "--angles", "-20", "20", "3", "--speed", "3000"]) == DONE
@@ -187,9 +188,9 @@ def test_workspace_map(tmp_path: Path, cut: str, capsys: pytest.CaptureFixture[s
     area = ["staubli_rx170", "--picture", str(picture), "--x", "0.7", "1.1", "3", "--y", "-0.2", "0.2", "2"]
     assert run(["robot", "map", *area]) == DONE
     assert "6 of 6 places reached" in capsys.readouterr().out
-    assert run(["robot", "map", *area, "--cutting", cut, "--speed", "3000"]) == DONE
+    assert run(["robot", "map", *area, "--force", "--cutting", cut, "--speed", "3000"]) == DONE
     assert "depth limit" in capsys.readouterr().out
-    assert run(["robot", "map", *area, "--speed", "3000"]) == BAD_INPUT
+    assert run(["robot", "map", *area, "--force", "--speed", "3000"]) == BAD_INPUT
 
 
 def test_compensation(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

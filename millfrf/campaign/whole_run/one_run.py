@@ -19,6 +19,9 @@ except ImportError:  # Windows
 
 LOCK, PROGRAM = ".running", ".program"
 
+WRITTEN = ("report.html", "modes.csv", "modes.parquet", "tasks.csv", "failures.csv", "doubts.csv", "recordings.json")
+"""Files that every run writes anew into its folder: in a folder of something else they may be a user's own."""
+
 
 @contextmanager
 def only_run(out: Path) -> Iterator[None]:
@@ -27,10 +30,12 @@ def only_run(out: Path) -> Iterator[None]:
     Raises
     ------
     InputError
-        Another run works there, or the folder cannot be made or written to.
+        Another run works there, the folder cannot be made or written to, or it holds files that a run would replace
+        and no campaign has written.
     """
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file; name a folder with --out")
+    _refuse_foreign(out)
     try:
         out.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(out / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
@@ -49,6 +54,14 @@ def only_run(out: Path) -> Iterator[None]:
         yield
     finally:
         os.close(descriptor)
+
+
+def _refuse_foreign(out: Path) -> None:
+    if (out / LOCK).exists() or (out / RESULTS).is_dir():
+        return
+    found = [name for name in WRITTEN if (out / name).exists()]
+    if found:
+        raise InputError(f"{out / found[0]} exists and is of no campaign; name another folder with --out")
 
 
 def program_changed(out: Path) -> bool:

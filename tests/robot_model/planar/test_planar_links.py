@@ -95,7 +95,7 @@ def test_lobes_take_links_in(tmp_path: Path) -> None:
         "start_angle_deg = 0.0\nexit_angle_deg = 180.0\n"
     )
     asked = ["robot", "lobes", "chen_2026", "--pose", "P2", "--cutting", str(cut), "--max-depth", "0.005"]
-    asked += ["--speeds", "3000", "5000", "2", "--out", str(out)]
+    asked += ["--speeds", "3000", "5000", "2", "--out", str(out), "--force"]
     limits = []
     for options in ([], ["--links"], ["--links", "--method", "zero-order"]):
         assert run([*asked, *options]) == DONE

@@ -52,7 +52,7 @@ def test_a_base_on_the_ceiling_turns_the_robot(tmp_path: Path) -> None:
     base = ["--base", "1", "2", "3", "--base-turned", "180", "0", "0"]
     assert run(["new", "robot", str(UR10E), "--out", str(out), *base]) == DONE
     hung = read_robot(out)
-    assert run(["new", "robot", str(UR10E), "--out", str(out)]) == DONE
+    assert run(["new", "robot", str(UR10E), "--out", str(out), "--force"]) == DONE
     stood = read_robot(out)
     assert isinstance(hung, SpatialCase)
     assert isinstance(stood, SpatialCase)

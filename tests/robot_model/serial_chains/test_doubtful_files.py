@@ -17,7 +17,7 @@ def made(tmp_path: Path, text: str, *options: str) -> tuple[int, Path]:
     """Exit code of the command and the file that it wrote, from the text of a URDF."""
     urdf, out = tmp_path / "robot.urdf", tmp_path / "robot.toml"
     urdf.write_text(text)
-    return run(["new", "robot", str(urdf), "--out", str(out), *TOOL, *options]), out
+    return run(["new", "robot", str(urdf), "--out", str(out), "--force", *TOOL, *options]), out
 
 
 def warnings_of(out: Path) -> str:

@@ -209,7 +209,8 @@ def test_compensation_of_the_kuka_moves_against_its_weight(tmp_path: Path) -> No
     path.write_text("x_m,y_m,z_m,rx_rad,ry_rad,rz_rad,fx_n,fy_n,fz_n\n" + rows)
     corrected = {}
     for weight in ("all", "none"):
-        assert run(["robot", "compensate", "kuka_kr90_r3100", str(path), "--out", str(out), "--weight", weight]) == DONE
+        asked = ["robot", "compensate", "kuka_kr90_r3100", str(path), "--weight", weight]
+        assert run([*asked, "--out", str(out), "--force"]) == DONE
         table = list(csv.DictReader(apart(out.read_text().splitlines())[1]))
         corrected[weight] = np.array([[float(row[name]) for name in ("x_m", "y_m", "z_m")] for row in table])
     assert corrected["none"] == pytest.approx(np.array(places), abs=1e-9)
@@ -249,7 +250,7 @@ def test_warnings_stand_in_what_is_written(tmp_path: Path, capsys: pytest.Captur
     assert run(["robot", "compensate", "fanuc_s420if", str(out), "--out", str(again), "--weight", "none"]) == DONE
     *before, last = out.read_text().splitlines()
     out.write_text("\n".join([*before, "one," + last.partition(",")[2]]))
-    assert run(["robot", "compensate", "fanuc_s420if", str(out), "--out", str(again)]) == BAD_INPUT
+    assert run(["robot", "compensate", "fanuc_s420if", str(out), "--out", str(again), "--force"]) == BAD_INPUT
     assert f"in line {len(before) + 1} is no number" in capsys.readouterr().err
 
 
@@ -269,16 +270,15 @@ def test_commands_tell_the_weight(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert run(["robot", "stiffness", "kuka_kr90_r3100", "--payload", "-5"]) == BAD_INPUT
     assert "payload -5" in capsys.readouterr().err
     path, out = tmp_path / "p.csv", tmp_path / "o.csv"
+    written = ["--out", str(out), "--force"]
     path.write_text("x_m,y_m,z_m,rx_rad,ry_rad,rz_rad,fx_n,fy_n,fz_n\n1.5,0,0.7,3.14159,0,0,100,0,200\n")
-    assert run(["robot", "compensate", "kuka_kr90_r3100", str(path), "--out", str(out)]) == DONE
+    assert run(["robot", "compensate", "kuka_kr90_r3100", str(path), *written]) == DONE
     printed = capsys.readouterr().out
     assert "weight" in printed
     assert "weight_z_m" in apart(out.read_text().splitlines())[1][0]
-    assert (
-        run(["robot", "compensate", "kuka_kr90_r3100", str(path), "--out", str(out), "--weight", "half"]) == BAD_INPUT
-    )
+    assert run(["robot", "compensate", "kuka_kr90_r3100", str(path), *written, "--weight", "half"]) == BAD_INPUT
     path.write_text(path.read_text().replace("1.5,0,0.7", "1.4,0,0.7"))
-    assert run(["robot", "compensate", "fanuc_s420if", str(path), "--out", str(out), "--weight", "none"]) == DONE
+    assert run(["robot", "compensate", "fanuc_s420if", str(path), *written, "--weight", "none"]) == DONE
     assert "the robot unknown" in capsys.readouterr().out
     fanuc = ["robot", "stiffness", "fanuc_s420if"]
     assert run(fanuc) == DONE

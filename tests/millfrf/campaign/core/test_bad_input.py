@@ -159,6 +159,15 @@ def test_a_second_run_at_the_same_time_is_refused(campaign: Path) -> None:
         run_campaign(campaign, RunOptions(campaign.parent / "out", workers=0))
 
 
+def test_a_folder_with_files_of_no_campaign_is_refused(campaign: Path) -> None:
+    out = campaign.parent / "mine"
+    out.mkdir()
+    (out / "report.html").write_text("mine")
+    with pytest.raises(InputError, match=r"report\.html exists and is of no campaign; name another folder"):
+        run_campaign(campaign, RunOptions(out, workers=0))
+    assert [(path.name, path.read_text()) for path in out.iterdir()] == [("report.html", "mine")]
+
+
 def test_without_dask_the_extra_is_named(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"needs? Dask, which is not installed: pip install 'millfrf\[cluster\]'"):
