@@ -12,7 +12,7 @@ from typer.models import OptionInfo
 
 from foundation import keeping_files, refuse_replacing
 
-WRITING = ("--out", "--picture", "--table", "--report", "--candidates")
+WRITING = ("--out", "--picture", "--table", "--report", "--candidates", "--figures")
 """Options that name a file or folder to write."""
 
 FOLDERS: Mapping[str, tuple[str, ...]] = {
@@ -90,6 +90,6 @@ def _named(words: str, writing: tuple[str, ...], given: Mapping[str, Any]) -> It
                 yield path
 
 
-def _paths(value: object, *kinds: type) -> list[Path]:
+def _paths(value: Any, *kinds: type) -> list[Path]:
     several = value if isinstance(value, list | tuple) else [value]
     return [Path(one) for one in several if isinstance(one, (Path, *kinds))]
