@@ -81,7 +81,7 @@ def option_names(hint: Any) -> tuple[str, ...]:
 
 def _named(words: str, writing: tuple[str, ...], given: Mapping[str, Any]) -> Iterator[Path]:
     """Files that the command will write, as far as its options tell; an input is left to the command to refuse."""
-    inputs = [path for name, value in given.items() if name not in writing for path in _paths(value, str)]
+    inputs = [path for name, value in given.items() if name not in writing for path in _paths(value, texts=True)]
     for name in writing:
         for path in _paths(given.get(name)):
             if path.is_dir():
@@ -90,6 +90,7 @@ def _named(words: str, writing: tuple[str, ...], given: Mapping[str, Any]) -> It
                 yield path
 
 
-def _paths(value: Any, *kinds: type) -> list[Path]:
-    several = value if isinstance(value, list | tuple) else [value]
-    return [Path(one) for one in several if isinstance(one, (Path, *kinds))]
+def _paths(value: Any, *, texts: bool = False) -> list[Path]:
+    """Paths among what an option was given; ``texts``: also what was typed as text, such as the name of a robot."""
+    several: list[Any] = list(value) if isinstance(value, list | tuple) else [value]
+    return [Path(one) for one in several if isinstance(one, Path) or (texts and isinstance(one, str))]
