@@ -12,8 +12,10 @@ from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parent
 ENVIRONMENT = Path(os.environ.get("MILLFRF_VENV", PROJECT / ".venv"))
-USAGE = "usage: python3 run.py demo [--out DIR ...] | test [PYTEST OPTIONS] | docs [SPHINX OPTIONS] | lint"
-SITE = PROJECT / "docs" / "_build" / "html"
+USAGE = (
+    "usage: python3 run.py demo [--out DIR ...] | test [PYTEST OPTIONS] | docs [SPHINX OPTIONS] | lint | release [DIR]"
+)
+SITE = PROJECT / "docs" / "_build"
 
 
 def program(name: str) -> str:
@@ -33,19 +35,22 @@ def install(extras: str) -> None:
 
 def build_site(options: list[str]) -> int:
     """Build the site from the pages, the docstrings and the command line; a warning is a failure."""
-    command = [program("python"), "-m", "sphinx", "-q", "-W", "--keep-going", "-j", "2", "-b", "html", *options]
-    code = subprocess.run([*command, "docs", str(SITE)], cwd=PROJECT).returncode
+    builder = options[options.index("-b") + 1] if "-b" in options[:-1] else "html"
+    command = [program("python"), "-m", "sphinx", "-q", "-W", "--keep-going", "-j", "2", "-b", builder, *options]
+    code = subprocess.run([*command, "docs", str(SITE / builder)], cwd=PROJECT).returncode
     if code == 0:
-        print(f"open {SITE / 'index.html'}")
+        print(f"open {SITE / builder / ('index.html' if builder == 'html' else 'output.txt')}")
     return code
 
 
 def run(arguments: list[str]) -> int:
     """Install what the job needs and do it; returns the exit code."""
-    if not arguments or arguments[0] not in ("demo", "test", "docs", "lint"):
+    if not arguments or arguments[0] not in ("demo", "test", "docs", "lint", "release"):
         print(USAGE)
         return 2
     job, *rest = arguments
+    if job == "release":
+        return subprocess.run([sys.executable, str(PROJECT / ".ci" / "release.py"), *rest]).returncode
     if job == "demo":
         install("")
         return subprocess.run([program("millfrf"), "demo", *rest]).returncode

@@ -1,0 +1,45 @@
+"""Equations of the pages become MathML that a browser can read; what is not understood is told."""
+
+import importlib
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def equations() -> Iterator[Any]:
+    """The extension of the site."""
+    sys.path.insert(0, str(ROOT / "docs" / "extensions"))
+    yield importlib.import_module("offline_equations")
+    sys.path.remove(str(ROOT / "docs" / "extensions"))
+
+
+def _warnings(equations: Any, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    told: list[str] = []
+    monkeypatch.setattr(equations._LOG, "warning", lambda text, *values, **_: told.append(text % values))
+    return told
+
+
+def test_every_equation_of_the_pages_is_understood(equations: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    told = _warnings(equations, monkeypatch)
+    pages = [path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md")]
+    found = [text for page in pages for text in re.findall(r"\$\$(.*?)\$\$", page, re.DOTALL)]
+    assert len(found) > 8
+    for text in found:
+        assert ElementTree.fromstring(equations.mathml(text, "block")).tag.endswith("math")
+    assert told == []
+
+
+@pytest.mark.parametrize("latex", [r"\unheardof{x}", r"\begin{aligned} a &= b \\ c &= d \end{aligned}"])
+def test_what_is_not_understood_is_told(equations: Any, monkeypatch: pytest.MonkeyPatch, latex: str) -> None:
+    told = _warnings(equations, monkeypatch)
+    equations.mathml(latex, "block")
+    assert len(told) == 1
+    assert "not understood" in told[0]
