@@ -53,6 +53,17 @@ from .style import (
     panel_letter,
     place_panels,
 )
+from .zoomed import (
+    EntryCurves,
+    ZoomedPlot,
+    browser_library,
+    zoomed_chart,
+    zoomed_frfs,
+    zoomed_indicators,
+    zoomed_limits,
+    zoomed_matrix,
+    zoomed_sums,
+)
 
 __all__ = [
     "COLOURS",
@@ -63,15 +74,18 @@ __all__ = [
     "SHADE",
     "TRUE",
     "WIDTH_MM",
+    "EntryCurves",
     "FrfCurves",
     "GalleryEntry",
     "LobesBand",
     "ShownCut",
     "SmallSvg",
     "TriedCut",
+    "ZoomedPlot",
     "as_data_uri",
     "assurance_figure",
     "behaviour_figure",
+    "browser_library",
     "channel_map_figure",
     "chatter_figure",
     "coherent_lines",
@@ -108,4 +122,10 @@ __all__ = [
     "synthesis_figure",
     "time_figure",
     "time_map_figure",
+    "zoomed_chart",
+    "zoomed_frfs",
+    "zoomed_indicators",
+    "zoomed_limits",
+    "zoomed_matrix",
+    "zoomed_sums",
 ]

@@ -1,5 +1,5 @@
 from .chatter import ShownCut, chatter_figure
-from .lobes import LobesBand, TriedCut, lobes_figure
+from .lobes import LobesBand, TriedCut, depth_axis_top, lobes_figure
 from .lobes_axes import draw_lobes
 
 __all__ = [
@@ -7,6 +7,7 @@ __all__ = [
     "ShownCut",
     "TriedCut",
     "chatter_figure",
+    "depth_axis_top",
     "draw_lobes",
     "lobes_figure",
 ]

@@ -1,4 +1,4 @@
-from .frf import FrfCurves, coherent_lines, frf_figures
+from .frf import SYMBOLS, FrfCurves, coherent_lines, frf_figures, lines_in_band, model_axis, model_entry
 from .frf_axes import draw_frf
 from .gallery import ENTRIES_PER_PAGE, GalleryEntry, gallery_page
 from .inputs import input_figure
@@ -9,6 +9,7 @@ from .spectra_axes import draw_spectra
 
 __all__ = [
     "ENTRIES_PER_PAGE",
+    "SYMBOLS",
     "FrfCurves",
     "GalleryEntry",
     "coherent_lines",
@@ -18,6 +19,9 @@ __all__ = [
     "frf_figures",
     "gallery_page",
     "input_figure",
+    "lines_in_band",
+    "model_axis",
+    "model_entry",
     "reciprocity_figure",
     "time_figure",
 ]

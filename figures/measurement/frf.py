@@ -24,7 +24,8 @@ _MANY = 2000
 _AROUND = np.concatenate([-np.geomspace(0.05, 30, 25)[::-1], [0.0], np.geomspace(0.05, 30, 25)])
 """Half widths of a mode's peak around which its curve has points."""
 
-_SYMBOLS = {"receptance": "H", "mobility": "Y", "accelerance": "A"}
+SYMBOLS = {"receptance": "H", "mobility": "Y", "accelerance": "A"}
+"""Letter of each quantity."""
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ def coherent_lines(frf: Frf) -> NDArray[np.bool_]:
     return np.asarray(coherent) if coherent.any() else frf.valid
 
 
-def _lines(curves: FrfCurves) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64] | None]:
+def lines_in_band(curves: FrfCurves) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64] | None]:
     """Frequencies, values and standard deviation inside the band; not a number where there is no FRF."""
     frf = curves.measured
     inside = (frf.frequencies >= curves.band[0]) & (frf.frequencies <= curves.band[1])
@@ -152,7 +153,7 @@ def _lines(curves: FrfCurves) -> tuple[NDArray[np.float64], NDArray[np.complex12
     return frf.frequencies[inside], values, deviation
 
 
-def _axis_of(model: ModalModel, model_band: tuple[float, float]) -> NDArray[np.float64]:
+def model_axis(model: ModalModel, model_band: tuple[float, float]) -> NDArray[np.float64]:
     """Frequencies (Hz) dense enough for every peak: evenly over the band, and around each mode."""
     low, high = max(model_band[0], 1e-3), model_band[1]
     width = np.abs(model.poles.real) / (2 * np.pi)
@@ -174,7 +175,7 @@ def _models(curves: FrfCurves) -> list[tuple[str, ModalModel, tuple[float, float
 
 
 def _draw_entry(magnitude: Axes, phase: Axes, curves: FrfCurves, p: int, q: int) -> None:
-    frequencies, values, deviation = _lines(curves)
+    frequencies, values, deviation = lines_in_band(curves)
     size, angle = np.abs(values[:, p, q]), np.angle(values[:, p, q], deg=True)
     if deviation is not None:
         spread = 2 * deviation[:, p, q]
@@ -189,8 +190,8 @@ def _draw_entry(magnitude: Axes, phase: Axes, curves: FrfCurves, p: int, q: int)
     magnitude.plot(frequencies, size, color=MEASURED, linewidth=0.9, label="Measured")
     phase.plot(frequencies, angle, ".", color=MEASURED, markersize=1.8, rasterized=len(frequencies) > _MANY)
     for label, model, band, style in _models(curves):
-        axis = _axis_of(model, band)
-        entry = _entry(model, axis, curves.measured, p, q)
+        axis = model_axis(model, band)
+        entry = model_entry(model, axis, curves.measured, p, q)
         if entry is None:
             continue
         magnitude.plot(axis, np.abs(entry), label=label, **style)
@@ -198,7 +199,9 @@ def _draw_entry(magnitude: Axes, phase: Axes, curves: FrfCurves, p: int, q: int)
     magnitude.set_yscale("log")
 
 
-def _entry(model: ModalModel, axis: NDArray[np.float64], like: Frf, p: int, q: int) -> NDArray[np.complex128] | None:
+def model_entry(
+    model: ModalModel, axis: NDArray[np.float64], like: Frf, p: int, q: int
+) -> NDArray[np.complex128] | None:
     """The model's entry of the same degrees of freedom, under the same exponential window; None where it has none."""
     if like.responses[p] not in model.responses or like.excitations[q] not in model.excitations:
         return None
@@ -240,7 +243,7 @@ def _label(magnitude: Axes, phase: Axes, frf: Frf, p: int, q: int, *, outer: boo
     phase.yaxis.set_major_locator(MultipleLocator(90))
     phase.set_yticks([-180, 0, 180])
     if outer:
-        symbol = _SYMBOLS.get(frf.quantity, "H")
+        symbol = SYMBOLS.get(frf.quantity, "H")
         magnitude.set_ylabel(f"|{symbol}| ({frf.unit})")
         phase.set_ylabel("Phase (°)")
         for axes in (magnitude, phase):

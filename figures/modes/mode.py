@@ -17,7 +17,7 @@ def mode_figure(model: ModalModel) -> Figure:
     n_modes = min(len(model.poles), MOST_MODES)
     with house_style():
         beside = n_modes <= 2
-        figure = new_figure(62.0 if beside else 104.0)
+        figure = new_figure(66.0 if beside else 112.0)
         shape = (1, 2 * max(n_modes, 1)) if beside else (2, n_modes)
         panels = figure.subplots(*shape, squeeze=False, subplot_kw={"projection": "polar"})
         for mode in range(n_modes):
@@ -25,8 +25,8 @@ def mode_figure(model: ModalModel) -> Figure:
             heading = f"Mode {mode + 1}, {model.natural_frequencies[mode]:.2f} Hz\n"
             _draw(right, model.right[mode], model.responses)
             _draw(left, model.left[mode], model.excitations)
-            right.set_title(f"{heading}right (responses)", pad=6)
-            left.set_title(f"{heading if beside else ''}left (excitations)", pad=6)
+            right.set_title(f"{heading}right (responses)", pad=12)
+            left.set_title(f"{heading if beside else ''}left (excitations)", pad=12)
         legend_above(figure, panels[0, 0])
     return figure
 

@@ -5,7 +5,7 @@ from typing import Literal
 
 from matplotlib.figure import Figure
 
-from figures import SmallSvg, as_data_uri
+from figures import SmallSvg, ZoomedPlot, as_data_uri
 
 from ..tables import Table
 
@@ -24,16 +24,24 @@ class Picture:
         Words for readers who cannot see the picture.
     figure
         The drawing itself, from which files in other formats are made.
+    zoomed
+        The same for the screen, to zoom and to point at; None: the picture alone.
     """
 
     uri: str
     caption: str
     alternative: str
     figure: Figure | SmallSvg = field(repr=False, compare=False)
+    zoomed: ZoomedPlot | None = None
 
 
 def picture_of(
-    figure: Figure | SmallSvg, caption: str, alternative: str, *, kind: Literal["svg", "png"] = "svg"
+    figure: Figure | SmallSvg,
+    caption: str,
+    alternative: str,
+    *,
+    kind: Literal["svg", "png"] = "svg",
+    zoomed: ZoomedPlot | None = None,
 ) -> Picture:
     """A figure as a picture of a page.
 
@@ -45,9 +53,11 @@ def picture_of(
         As in :class:`Picture`.
     kind
         ``svg``, or ``png`` for figures of very many points.
+    zoomed
+        As in :class:`Picture`.
     """
     uri = figure.uri() if isinstance(figure, SmallSvg) else as_data_uri(figure, kind=kind)
-    return Picture(uri, caption, alternative, figure)
+    return Picture(uri, caption, alternative, figure, zoomed)
 
 
 @dataclass(frozen=True)

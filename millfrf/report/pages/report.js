@@ -1,5 +1,5 @@
 "use strict";
-(() => {
+const reportPage = (() => {
   const say = words => { document.getElementById("said").textContent = words; };
 
   function button(words, name, act) {
@@ -52,4 +52,5 @@
     closed.forEach(one => { one.open = true; });
   });
   addEventListener("afterprint", () => closed.forEach(one => { one.open = false; }));
+  return { button, say };
 })();

@@ -9,12 +9,14 @@ from importlib.resources import files
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
+from figures import browser_library
 from foundation import writing_whole_file
 
 from ...provenance import versions
 from ..section import Section
-from .figures_written import FigureFiles, write_figures
+from .figures_written import FigureFiles, pictures_of, write_figures
 from .table_columns import of_numbers
 
 
@@ -69,12 +71,15 @@ def page_text(page: ResultsPage, sections: Sequence[Section]) -> str:
         loader=PackageLoader("millfrf.report", "pages"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     environment.globals["of_numbers"] = of_numbers
-    script = _own("report.js")
+    environment.filters["in_script"] = _in_script
+    scripts = [_own("report.js")]
+    if any(picture.zoomed for picture in pictures_of(sections)):
+        scripts = [browser_library(), _own("report.js") + _own("plots.js")]
     return environment.get_template("page.html.j2").render(
         page=page,
         style=_own("report.css"),
-        scripts=[script],
-        policy=_policy([script]),
+        scripts=scripts,
+        policy=_policy(scripts),
         sections=[section for section in sections if not section.empty],
         versions=versions(),
     )
@@ -109,6 +114,11 @@ def write_results_page(
     with writing_whole_file(path) as temporary:
         Path(temporary).write_text(text, encoding="utf-8")
     return written
+
+
+def _in_script(text: str) -> Markup:
+    """JSON that cannot end the element in which it stands."""
+    return Markup(text.replace("<", "\\u003c"))
 
 
 def _own(name: str) -> str:

@@ -24,4 +24,4 @@ def of_numbers(table: Table) -> list[bool]:
 
 def _numbers(cells: list[str]) -> bool:
     told = [cell for cell in cells if cell.strip() not in _NONE]
-    return bool(told) and all(_NUMBER.match(cell) for cell in told)
+    return bool(cells) and all(_NUMBER.match(cell) for cell in told)

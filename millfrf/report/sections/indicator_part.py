@@ -3,7 +3,7 @@
 import numpy as np
 
 from estimation import Frf
-from figures import indicator_figure
+from figures import indicator_figure, zoomed_indicators
 from modal_fit import ComplexModeIndicator, ModalModel, complex_mode_indicator, multivariate_mode_indicator
 
 from ..section import Picture, picture_of
@@ -42,7 +42,9 @@ def indicator_part(name: str, frf: Frf, model: ModalModel, band: Band) -> tuple[
         + ("Mode indicator (MIF)" if single else "Multivariate mode indicator (MIF)")
         + ", the share of the motion in phase with the forces: 0 at a real mode that stands alone."
     )
-    picture = picture_of(indicator_figure(indicator, multivariate, model), caption, "Mode indicators over frequency")
+    zoomed = zoomed_indicators(indicator, multivariate, model)
+    words = f"Mode indicators of {name} over frequency"
+    picture = picture_of(indicator_figure(indicator, multivariate, model), caption, words, zoomed=zoomed)
     return picture, _unexplained(name, indicator, model)
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from figures import input_figure, stabilisation_figure
+from figures import input_figure, stabilisation_figure, zoomed_chart
 from modal_fit import ModalModel
 
 from ...chain import EstimateOptions, chart_from_json, spectra_of_tests
@@ -107,4 +107,6 @@ def _stabilisation(collected: Collected, file: SourceFile, model: ModalModel) ->
         f"{file.path.name}: stabilisation chart; (a) poles over model order above the summed FRF, (b) damping of the "
         "poles that are stable in frequency and damping. Vertical lines and diamonds: modes of the fitted model."
     )
-    return picture_of(stabilisation_figure(chart, shown, model), caption, "Stabilisation chart")
+    zoomed = zoomed_chart(chart, shown, model)
+    words = f"Stabilisation chart of {file.path.name}: poles over model order and damping"
+    return picture_of(stabilisation_figure(chart, shown, model), caption, words, zoomed=zoomed)

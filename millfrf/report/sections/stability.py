@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cutting import MillingProcess
-from figures import LobesBand, lobes_figure
+from figures import LobesBand, lobes_figure, zoomed_limits
 from stability import StabilityLobes
 
 from ...tables import Table
@@ -64,7 +64,8 @@ def stability_findings(collected: Collected) -> StabilityFindings:
         drawn_speeds = advised.band.basis.count("samples")
         caption += f" Light band: 95 % interval of {first_name}"
         caption += f"; at {drawn_speeds} speeds from draws of its errors." if drawn_speeds else ", to first order."
-    picture = picture_of(lobes_figure(drawn, band=band), caption, "Stability lobes")
+    words = f"Stability lobes: depth limit over spindle speed of {', '.join(drawn)}"
+    picture = picture_of(lobes_figure(drawn, band=band), caption, words, zoomed=zoomed_limits(drawn, band))
     section = Section("Stability lobes", tuple(sentences), tuple(tables), (picture,))
     warnings = (*lobes_warnings(checked, collected), *advised.warnings)
     return StabilityFindings(section, (*_brief(first_name, first), *advised.sentences[:1]), warnings)

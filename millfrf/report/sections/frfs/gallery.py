@@ -4,11 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf
-from figures import ENTRIES_PER_PAGE, GalleryEntry, gallery_page
+from figures import ENTRIES_PER_PAGE, EntryCurves, GalleryEntry, gallery_page, zoomed_frfs
 from modal_fit import Synthesis
 
 from ...section import Fold, picture_of
 from .choice import Band
+
+ZOOMED = 96
+"""Entries that zoom, the worst fitted ones; all of a large matrix would make a page of tens of megabytes."""
 
 
 def gallery_folds(
@@ -46,9 +49,18 @@ def gallery_folds(
             for p, q in chosen
         ]
         title = f"FRFs {first + 1} to {first + len(chosen)} of {len(order)}" + _span(compared, chosen)
-        picture = picture_of(gallery_page(entries, f), _caption(frf, compared, reference), title)
+        zoomed = None
+        if first < ZOOMED:
+            zoomed = zoomed_frfs([_curves(one) for one in entries], f, f, f"|H| ({frf.unit})")
+        picture = picture_of(gallery_page(entries, f), _caption(frf, compared, reference), title, zoomed=zoomed)
         folds.append(Fold(title, pictures=(picture,), opened=first == 0))
     return tuple(folds)
+
+
+def _curves(entry: GalleryEntry) -> EntryCurves:
+    """A panel as curves to zoom into."""
+    label = f"{entry.title}, misfit {entry.misfit}" if entry.misfit else entry.title
+    return EntryCurves(label, entry.measured, entry.fitted)
 
 
 def _order(frf: Frf, compared: Synthesis | None) -> list[tuple[int, int]]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from estimation import Frf
-from figures import FrfCurves, frf_figures, synthesis_figure
+from figures import FrfCurves, frf_figures, synthesis_figure, zoomed_matrix, zoomed_sums
 from foundation import InputError
 from modal_fit import ModalModel, Synthesis, synthesis
 
@@ -63,7 +63,9 @@ def _sum(file: SourceFile, frf: Frf, compared: Synthesis) -> Picture:
         f"{file.path.name}: sum of the magnitudes of all FRFs, measured and synthesised from the model, and of what "
         "the model leaves. Peaks of the last one are modes that are missing, or that move from point to point."
     )
-    return picture_of(synthesis_figure(compared, frf.unit), caption, "Sum of measured and synthesised FRFs")
+    words = f"Sum of measured and synthesised FRFs of {file.path.name}, and their difference"
+    zoomed = zoomed_sums(compared, frf.unit)
+    return picture_of(synthesis_figure(compared, frf.unit), caption, words, zoomed=zoomed)
 
 
 def _large(
@@ -79,8 +81,10 @@ def _large(
     known = reference if reference is not None and knows(reference, shown) else None
     curves = FrfCurves(shown, band or axis_of(shown, fit_band), model, known, fit_band)
     caption = _frf_caption(file, found, known, spread=shown.entry_variance() is not None)
-    words = "FRF magnitude, phase and multiple coherence"
-    return tuple(picture_of(figure, caption, words) for figure in frf_figures(curves))
+    words = f"FRF magnitude, phase and coherence of {file.path.name}"
+    first, *others = frf_figures(curves)
+    zoomed = picture_of(first, caption, words, zoomed=zoomed_matrix(curves))  # every entry, whatever the page
+    return (zoomed, *(picture_of(figure, caption, words) for figure in others))
 
 
 def _frf_caption(

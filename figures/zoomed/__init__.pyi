@@ -1,0 +1,19 @@
+from .chart import zoomed_chart
+from .frf import EntryCurves, zoomed_frfs
+from .indicators import zoomed_indicators
+from .limits import zoomed_limits
+from .matrix import zoomed_matrix
+from .plot import ZoomedPlot, browser_library
+from .sums import zoomed_sums
+
+__all__ = [
+    "EntryCurves",
+    "ZoomedPlot",
+    "browser_library",
+    "zoomed_chart",
+    "zoomed_frfs",
+    "zoomed_indicators",
+    "zoomed_limits",
+    "zoomed_matrix",
+    "zoomed_sums",
+]
