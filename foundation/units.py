@@ -30,7 +30,16 @@ _LETTERS = re.compile(r"[\w\s.*/^()+-]+")
 _UNREADABLE = (AttributeError, ValueError, AssertionError, TypeError, ArithmeticError, SyntaxError, TokenError)
 """What pint raises besides its own, since it reads units with Python's tokenizer and calculates with them."""
 
-_SPOKEN = {"g": "standard_gravity", "g0": "standard_gravity", "gn": "standard_gravity", "1": "", "rpm": "rpm"}
+_SPOKEN = {
+    "acceleration": {"g": "standard_gravity", "g0": "standard_gravity", "gn": "standard_gravity"},
+    "dimensionless": {"1": ""},
+    "angular_velocity": {"rev/min": "rpm", "U/min": "rpm"},
+    "moment": {"Nm": "N m", "kNm": "kN m", "Nmm": "N mm"},
+}
+"""Units as labs write them, for the quantity of which they are."""
+
+_TURNS = ("radian", "degree", "revolution", "turn", "revolutions_per_minute", "arcminute", "arcsecond", "grade")
+"""Parts of the names of units that tell an angle; `1/min`, `Hz` and `count` leave open how large one of it is."""
 
 
 @cache
@@ -54,12 +63,13 @@ def si_factor(quantity: str, unit: str) -> float:
     Raises
     ------
     InputError
-        Unknown quantity, unknown unit, a unit of another dimension, or one with an offset (degC).
+        Unknown quantity, unknown unit, a unit of another dimension, one with an offset (degC), or one of an angle that
+        leaves the angle open (1/min, Hz, counts).
 
     Examples
     --------
-    >>> si_factor("force", "kN")
-    1000.0
+    >>> si_factor("force", "kN"), si_factor("moment", "Nm")
+    (1000.0, 1.0)
     >>> round(si_factor("acceleration", "g"), 5)
     9.80665
     """
@@ -70,12 +80,16 @@ def si_factor(quantity: str, unit: str) -> float:
         return 1.0
     import pint
 
-    spoken = _SPOKEN.get(unit, unit) if quantity in ("acceleration", "dimensionless", "angular_velocity") else unit
+    spoken = _SPOKEN.get(quantity, {})
     try:
-        registry = _registry()
-        return float(registry.Quantity(1.0, spoken).to(_SPOKEN.get(target, target)).magnitude)
+        found = _registry().Quantity(1.0, spoken.get(unit, unit))
+        factor = float(found.to(spoken.get(target, target)).magnitude)
     except (pint.PintError, *_UNREADABLE) as error:
         raise InputError(f"unit {unit!r} is not a unit of {quantity}; use {target} or one convertible to it") from error
+    if quantity in ("angle", "angular_velocity") and not any(turn in str(found.units) for turn in _TURNS):
+        remedy = "rpm for 1/min, or turn/s for Hz" if quantity == "angular_velocity" else "rad, deg or turn"
+        raise InputError(f"unit {unit!r} does not say how large an angle one of it is; write {remedy}")
+    return factor
 
 
 def unit_factor(unit: str, target: str) -> float | None:

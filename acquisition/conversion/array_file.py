@@ -41,6 +41,8 @@ class ArrayFile:
         Sample rate, where the file states it.
     units
         Units of those columns, where a row below the headings tells them.
+    array_units
+        Units of arrays by their name, where the file states them (TDMS).
     """
 
     def __init__(
@@ -50,12 +52,14 @@ class ArrayFile:
         headings: tuple[str, ...] = (),
         sample_rate: float | None = None,
         units: tuple[str, ...] = (),
+        array_units: Mapping[str, str] | None = None,
     ) -> None:
         self.path = path
         self.fields = fields
         self.headings = headings
         self.sample_rate = sample_rate
         self.units = units
+        self.array_units = dict(array_units or {})
 
     def array(self, name: str | None) -> NDArray[np.floating]:
         """The array of that name; None asks for the only one.
@@ -96,18 +100,19 @@ def open_arrays(path: Path, **csv_options: Any) -> ArrayFile:
         ".mat": _mat,
         ".h5": _hdf5,
         ".hdf5": _hdf5,
-        ".tdms": _tdms,
     }
     sampled: dict[str, Callable[[Path], tuple[dict[str, Any], float]]] = {
         ".wav": read_wav,
         ".uff": read_uff_times,
         ".unv": read_uff_times,
     }
-    if suffix not in readers and suffix not in sampled:
+    if suffix not in readers and suffix not in sampled and suffix != ".tdms":
         raise InputError(f"cannot read {path.name}: suffix {path.suffix!r}; use one of {', '.join(SUFFIXES)}")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what the readers' libraries say beside their errors is no line of ours
+            if suffix == ".tdms":
+                return _tdms(path)
             if suffix in sampled:
                 fields, rate = sampled[suffix](path)
                 return ArrayFile(path, fields, sample_rate=rate)
@@ -136,13 +141,22 @@ def _npz(path: Path) -> dict[str, Any]:
         return {name: archive[name] for name in archive.files}
 
 
-def _tdms(path: Path) -> dict[str, Any]:
-    """National Instruments' format: channels by ``group/channel``."""
+def _tdms(path: Path) -> ArrayFile:
+    """National Instruments' format: channels by ``group/channel``, with rate and units as their properties say them."""
     from nptdms import TdmsFile
 
     logging.getLogger("nptdms").setLevel(logging.CRITICAL)  # it prints whole pieces of a damaged file
     with TdmsFile.open(path) as opened:
-        return {f"{group.name}/{channel.name}": channel[:] for group in opened.groups() for channel in group.channels()}
+        channels = {f"{group.name}/{one.name}": one for group in opened.groups() for one in group.channels()}
+        fields = {name: one[:] for name, one in channels.items()}
+        steps = {float(one.properties.get("wf_increment", 0.0)) for one in channels.values()}
+        told = {name: one.properties.get("unit_string") for name, one in channels.items()}
+    rate = 1 / steps.pop() if len(steps) == 1 and min(steps) > 0 else None
+    if rate is not None and abs(rate - round(rate)) < 1e-9 * rate:
+        rate = float(round(rate))
+    return ArrayFile(
+        path, fields, sample_rate=rate, array_units={name: str(unit) for name, unit in told.items() if unit}
+    )
 
 
 def _mat(path: Path) -> dict[str, Any]:

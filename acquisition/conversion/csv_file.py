@@ -4,7 +4,7 @@ import csv
 import io
 import json
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,9 @@ from foundation import FileFormatError
 from ..recordings import check_format, stream_from_attributes
 from .content import ArraySamples, Content
 from .flat_fields import event_texts
+
+_MISSING = ("", "-", "--", "---", "?", "*", "na", "n/a", "n.a.", "nan", "#n/a", "#nv", "null", "none", "inf", "-inf")
+"""How programs mark a value that is missing."""
 
 
 @dataclass(frozen=True)
@@ -31,12 +34,15 @@ class CsvTable:
 def read_csv(
     path: Path, *, delimiter: str | None = None, decimal: str = ".", skip_lines: int = 0, encoding: str = "utf-8-sig"
 ) -> CsvTable:
-    """Read a table of numbers; lines that begin with ``#`` are comments, a row without numbers below headings is units.
+    """Read a table of numbers; lines that begin with ``#`` are comments.
+
+    A row of texts is headings, a further one below it their units. Marks of missing values (``-``, ``NaN``, ``n/a``)
+    and numbers with another decimal sign are no such texts: a row of them is a row of values, and refused as such.
 
     Parameters
     ----------
     delimiter
-        Sign between the columns; None: comma, semicolon or tabulator, whichever the first line holds most of.
+        Sign between the columns; None: semicolon or tabulator where the first line holds one, else comma.
     decimal
         Decimal sign, a point or a comma.
     skip_lines
@@ -52,17 +58,46 @@ def read_csv(
     rows = [(n, line) for n, line in lines if line.strip() and not line.startswith("#")]
     if not rows:
         raise FileFormatError(f"{path} holds no rows of numbers; check the file and skip_lines")
-    chosen = delimiter or max(",;\t", key=rows[0][1].count)
+    chosen = delimiter or usual_delimiter(rows[0][1], decimal)
     heads: list[tuple[str, ...]] = []
     while rows and len(heads) < 2:
         fields = tuple(field.strip() for field in next(csv.reader([rows[0][1]], delimiter=chosen)))
-        numeric = [_is_number(field, decimal) for field in fields]
-        if all(numeric) or (heads and (any(numeric) or len(fields) != len(heads[0]))):
+        if not is_row_of_texts(fields) or (heads and not _is_units(fields, len(heads[0]))):
             break
         heads.append(fields)
         rows = rows[1:]
     headings, units = (*heads, (), ())[:2]
     return CsvTable(headings, _parse(rows, chosen, decimal, path), units)
+
+
+def usual_delimiter(line: str, decimal: str) -> str:
+    """Semicolon or tabulator where a line holds one, else comma; never the decimal sign.
+
+    Examples
+    --------
+    >>> usual_delimiter("0,001;1,5", "."), usual_delimiter("t,Fx", "."), usual_delimiter("t", ",")
+    (';', ',', ';')
+    """
+    found = max(";\t", key=line.count)
+    return found if found in line or decimal == "," else ","
+
+
+def is_row_of_texts(fields: Sequence[str]) -> bool:
+    """Whether some cell is a text: neither empty nor a number, in either decimal sign, nor a mark of a missing value.
+
+    Examples
+    --------
+    >>> is_row_of_texts(["s", "-"]), is_row_of_texts(["NaN", "-"]), is_row_of_texts(["0,5", "1,5"])
+    (True, False, False)
+    """
+    return any(not _is_number_of_any(field) and field.strip().lower() not in _MISSING for field in fields)
+
+
+def _is_units(fields: Sequence[str], width: int) -> bool:
+    """Whether a row of texts below headings is units: one for each heading, and none that begins as a number does."""
+    begun = [field.lstrip("+-").lstrip("[(")[:1].isdigit() for field in fields]
+    inverse = [field.startswith(("1/", "10^")) for field in fields]
+    return len(fields) == width and not any(b and not i for b, i in zip(begun, inverse, strict=True))
 
 
 def read_text(path: Path, encoding: str = "utf-8-sig") -> str:
@@ -146,8 +181,15 @@ def _offence(rows: list[tuple[int, str]], delimiter: str, decimal: str) -> str:
             return f"line {number} has {len(fields)} columns, the first row has {width}"
         for column, field in enumerate(fields, 1):
             if not _is_number(field, decimal):
-                return f"line {number}, column {column}: {field.strip()[:40]!r} is not a number"
+                other = (
+                    "" if not _is_number_of_any(field) else "; its decimal sign is the other: see decimal under [csv]"
+                )
+                return f"line {number}, column {column}: {field.strip()[:40]!r} is not a number{other}"
     return "it cannot be read as a table of numbers"
+
+
+def _is_number_of_any(field: str) -> bool:
+    return _is_number(field, ".") or _is_number(field, ",")
 
 
 def _is_number(field: str, decimal: str) -> bool:

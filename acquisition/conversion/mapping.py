@@ -122,7 +122,7 @@ class CsvOptions(BaseModel):
     Parameters
     ----------
     delimiter
-        Character between columns; left out: comma, semicolon or tabulator, as the first row has them.
+        Character between columns; left out: semicolon or tabulator where the first row holds one, else comma.
     decimal
         Character of decimals, ``.`` or ``,``.
     skip_lines
@@ -147,7 +147,7 @@ class RecordingMapping(BaseModel):
         One a column of the recording, in this order.
     sample_rate : Hz
         Samples a second, or the name of the array that holds this one number; or instead ``time``; neither where the
-        file states its own (WAV, UFF).
+        file states its own (WAV, UFF, TDMS waveforms).
     arrays
         Arrays by key, for those not simply found by name in the input.
     axes

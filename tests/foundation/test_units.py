@@ -1,5 +1,6 @@
 """Units: published factors, refusals, and consistency over prefixes."""
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -51,3 +52,25 @@ def test_degrees_of_freedom_survive_the_round_trip(node: str, direction: str) ->
 def test_malformed_degrees_of_freedom_are_refused(text: str) -> None:
     with pytest.raises(InputError, match="not understood"):
         DegreeOfFreedom.parse(text)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "said"),
+    [
+        ("angular_velocity", "1/min", "write rpm for 1/min"),
+        ("angular_velocity", "Hz", "turn/s for Hz"),
+        ("angle", "counts", "write rad, deg or turn"),
+    ],
+)
+def test_a_unit_that_leaves_the_angle_open_is_refused(quantity: str, unit: str, said: str) -> None:
+    """1/min of a spindle is 2 pi/60 rad/s, not 1/60."""
+    with pytest.raises(InputError, match=said):
+        si_factor(quantity, unit)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "factor"),
+    [("angular_velocity", "rev/min", np.pi / 30), ("angular_velocity", "turn/s", 2 * np.pi), ("moment", "kNm", 1e3)],
+)
+def test_units_as_labs_write_them(quantity: str, unit: str, factor: float) -> None:
+    assert si_factor(quantity, unit) == pytest.approx(factor, rel=1e-12)

@@ -9,6 +9,7 @@ from typing import Any
 import tomlkit
 
 from ...toml_files import DescribedKey, DescribedTable
+from .questions import Question
 
 FILL_IN = "FILL IN"
 """Mark of a key that must be given and that nothing tells; the command that reads the file names it as missing."""
@@ -28,8 +29,8 @@ def template(title: str, tables: Sequence[DescribedTable], rows: Mapping[str, Se
     tables
         Tables in their order; one that is not in ``rows`` is written as a comment as a whole.
     rows
-        Values by heading (`[arrays.H]` for a table `[arrays.NAME]`), a row a table; keys without a value stand there as
-        comments. Only the first row of several explains its keys.
+        Values or questions by heading (`[arrays.H]` for a table `[arrays.NAME]`), a row a table; keys without a value
+        stand there as comments. Only the first row of several explains its keys.
     """
     parts = [*(f"# {line}" for line in title.splitlines()), ""]
     for table in tables:
@@ -81,7 +82,10 @@ def _explanation(text: str, keys: Sequence[DescribedKey], *, given: bool) -> str
 
 
 def _line(key: DescribedKey, row: Row, *, marked: bool) -> str:
-    """Key and value; as a comment where there is none."""
+    """Key and value; as a comment where there is none, with the question where there is one."""
+    asked = row.get(key.name)
+    if isinstance(asked, Question):
+        return f"{f'{key.name} = {asked.refused}' if asked.refused else f'# {key.name} ='}    # {FILL_IN}: {asked.text}"
     if key.name in row:
         return f"{key.name} = {tomlkit.item(row[key.name]).as_string()}"
     mark = f"    # {FILL_IN}" if marked and key.default is None else ""
