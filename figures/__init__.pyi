@@ -1,4 +1,4 @@
-from .cuts import LobesBand, ShownCut, TriedCut, chatter_figure, draw_lobes, lobes_figure
+from .cuts import LobesBand, ShownCut, StableAbove, TriedCut, chatter_figure, draw_lobes, lobes_figure
 from .diagnosis import (
     behaviour_figure,
     channel_map_figure,
@@ -80,6 +80,7 @@ __all__ = [
     "LobesBand",
     "ShownCut",
     "SmallSvg",
+    "StableAbove",
     "TriedCut",
     "ZoomedPlot",
     "as_data_uri",

@@ -22,6 +22,7 @@ from ..style import (
     panel_letter,
     place_panels,
 )
+from .islands import StableAbove, draw_stable_above
 
 LIMITS = "limits"
 """Mark of the lines of depth limits, by which a further line finds its number and so its own colour."""
@@ -62,11 +63,25 @@ class LobesBand:
 
 
 def lobes_figure(
-    curves: Mapping[str, StabilityLobes], cuts: Sequence[TriedCut] = (), band: LobesBand | None = None
+    curves: Mapping[str, StabilityLobes],
+    cuts: Sequence[TriedCut] = (),
+    band: LobesBand | None = None,
+    stable_above: Sequence[StableAbove] = (),
 ) -> Figure:
     """Depth limits in mm over rpm, one line for each entry; the area above the first is shaded.
 
     Where a cut is stable at all depths asked for, the line is interrupted.
+
+    Parameters
+    ----------
+    curves
+        Lobes by the name in the legend.
+    cuts
+        Cuts that were made.
+    band
+        Confidence interval of the first lobes.
+    stable_above
+        Ranges of depth that are stable above an island of instability of the first lobes.
     """
     with house_style():
         figure = new_figure(115.0, None)
@@ -80,10 +95,12 @@ def lobes_figure(
             depth.fill_between(
                 band.spindle_speeds_rpm, low, high, color=COLOURS[1], alpha=0.3, linewidth=0, label="95 % interval"
             )
-        top = depth_axis_top(list(curves.values()), cuts)
+        top = max([depth_axis_top(list(curves.values()), cuts), *(1.05e3 * one.high for one in stable_above)])
         depth.set_ylim(0, top)
         if curves:
-            shade_unstable(depth, next(iter(curves.values())), top)
+            first = next(iter(curves.values()))
+            shade_unstable(depth, first, top)
+            draw_stable_above(depth, stable_above, first.spindle_speeds_rpm.tolist())
         depth.set_ylabel("Axial depth limit (mm)")
         chatter.set_ylabel("Chatter\nfrequency (Hz)")
         chatter.set_xlabel("Spindle speed (rpm)")

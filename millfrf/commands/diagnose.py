@@ -7,7 +7,7 @@ import typer
 
 from foundation import InputError
 
-from ..options import check_band, check_shares
+from ..options import FigureFormat, Figures, check_band, check_shares
 from ..terminal import say
 
 
@@ -39,16 +39,20 @@ def diagnose(
         Path | None, typer.Option("--cutting", metavar="CUT.toml", help="Cut whose stability lobes the report shows.")
     ] = None,
     stream: Annotated[str | None, typer.Option("--stream", help="Sample clock.")] = None,
+    figures: Figures = None,
+    figure_format: FigureFormat = "svg",
 ) -> None:
     """Locate where a model and recordings disagree, name the physics left out, model it, show that the fit improves."""
     from mismatch import LabError, Settings
 
     from ..gate import read_checked_cutting
     from ..progress import bar
+    from ..report import asked_figures
     from ..structure import diagnose_files, nominal_from_simulation
 
     check_shares("--lab-error", lab_error, (0.01, 0.12, 0.03))
     check_band(band)
+    drawn = asked_figures(figures, figure_format)
     model, recordings = (files[0], files[1:]) if simulated is None else (simulated, files)
     if not recordings:
         raise InputError("no recording given; name the nominal model and then one or more recordings")
@@ -62,7 +66,17 @@ def diagnose(
     for doubt in doubts:
         say(f"warning: {doubt}")
     settings = Settings(LabError(*lab_error))
-    result = diagnose_files(model, recordings, out, settings, stream=stream, band=band, process=process, progress=bar)
+    result = diagnose_files(
+        model,
+        recordings,
+        out,
+        settings,
+        stream=stream,
+        band=band,
+        process=process,
+        figures=drawn,
+        progress=bar,
+    )
     for line in result.summary:
         say(line)
     say(f"wrote {', '.join(str(path) for path in result.written)}")

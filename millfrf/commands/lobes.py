@@ -25,23 +25,30 @@ def lobes(
             "zero-order, nyquist, multi-frequency, collocation or semi-discretization.",
         ),
     ] = "certified",
+    picture: Annotated[
+        Path | None, typer.Option("--picture", metavar="FILE", help="Picture: .png, .pdf or .svg, islands drawn.")
+    ] = None,
 ) -> None:
     """Stability lobes from a modal model or straight from a measured FRF."""
     from cutting import read_cutting_process
     from modal_fit import read_modal_model
     from stability import write_lobes
 
-    from ..chain import lobes_summary, mode_coupling_line
+    from ..chain import draw_lobes_of, lobes_summary, mode_coupling_line
     from ..face import lobes as lobes_of
     from ..file_kinds import MODEL, kind_of
     from ..progress import bar
     from ..provenance import of_lobes
 
     check_output(out, (".csv",))
+    if picture is not None:
+        check_output(picture, (".png", ".pdf", ".svg"))
     result = lobes_of(dynamics, cutting, speeds=speeds, max_depth=max_depth, method=method, progress=bar)
     asked = {"speeds_rpm": speeds, "max_depth_m": max_depth, "method": method}
     write_lobes(out, result, provenance=of_lobes([dynamics, cutting], asked))
+    if picture is not None:
+        draw_lobes_of(dynamics, cutting, result, max_depth, picture)
     echo_warnings(result.warnings)
-    say(f"wrote {out}: {lobes_summary(result, max_depth)}")
+    say(f"wrote {out}{'' if picture is None else f' and {picture}'}: {lobes_summary(result, max_depth)}")
     if kind_of(dynamics) == MODEL:
         say(mode_coupling_line(read_modal_model(dynamics), read_cutting_process(cutting), max_depth))

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from ..options import FigureFormat, Figures
 from ..terminal import say
 from ..usage import framed
 
@@ -43,12 +44,16 @@ def diagnose(
         float, typer.Option("--force-error", help="What each line of a right computed force is off, a share.")
     ] = 0.01,
     stream: Annotated[str | None, typer.Option("--stream", help="Sample clock.")] = None,
+    figures: Figures = None,
+    figure_format: FigureFormat = "svg",
 ) -> None:
     """Which physics does the computed cutting force leave out: runout, regenerative feedback, process damping?"""
+    from ..report import asked_figures
     from .diagnosing import Asking, diagnose_cut_files
 
     asking = Asking(depth, speed, model, coefficient_error, force_error, stream)
-    for line in diagnose_cut_files(cutting, recordings, out, asking):
+    drawn = asked_figures(figures, figure_format)
+    for line in diagnose_cut_files(cutting, recordings, out, asking, drawn):
         say(line)
 
 

@@ -14,7 +14,7 @@ from modal_fit import read_modal_model
 from ..gate import RECORD_AGAIN, check_depth, check_one_speed, check_recordings, read_checked_cutting
 from ..progress import bar
 from ..provenance import add_comment, add_to_json, origin
-from ..report import write_cut_report
+from ..report import FigureFiles, write_cut_report
 from ..result_folder import refuse_file
 from .diagnosis_words import summary
 
@@ -31,7 +31,9 @@ class Asking:
     stream: str | None
 
 
-def diagnose_cut_files(cutting: Path, paths: Sequence[Path], out: Path, asking: Asking) -> list[str]:
+def diagnose_cut_files(
+    cutting: Path, paths: Sequence[Path], out: Path, asking: Asking, figures: FigureFiles | None = None
+) -> list[str]:
     """Diagnose, write ``diagnosis.json``, ``improved_cut.toml`` and ``report.html``; lines that sum it up.
 
     Raises
@@ -64,7 +66,7 @@ def diagnose_cut_files(cutting: Path, paths: Sequence[Path], out: Path, asking: 
         add_to_json(folder / "diagnosis.json", made_of)
         add_comment(folder / "improved_cut.toml", made_of)
         with bar("writing the report"):
-            write_cut_report(folder / "report.html", found, cutting.name, lines)
+            write_cut_report(folder / "report.html", found, cutting.name, lines, figures)
     written = ", ".join(str(out / name) for name in ("diagnosis.json", "improved_cut.toml", "report.html"))
     return [*lines, f"wrote {written}"]
 

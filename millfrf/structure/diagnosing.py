@@ -24,7 +24,7 @@ from ..chain import SUBSPACE, FitOptions, fit_recordings
 from ..gate import check_model_and_recordings
 from ..progress import Progress, silent
 from ..provenance import add_to_json, origin
-from ..report import write_diagnosis_report
+from ..report import FigureFiles, write_diagnosis_report
 from ..result_folder import refuse_file
 from .diagnosis_words import diagnosis_lines
 
@@ -48,11 +48,13 @@ def diagnose_files(
     band: Band | None = None,
     process: MillingProcess | None = None,
     dated: bool = True,
+    figures: FigureFiles | None = None,
     progress: Progress = silent,
 ) -> DiagnosisFiles:
     """Diagnose and write diagnosis, improved model and report into a folder, made if need be.
 
-    A report that is not ``dated`` does not tell when it was written, so that equal input gives equal bytes.
+    A report that is not ``dated`` does not tell when it was written, so that equal input gives equal bytes. With
+    ``figures`` each of its figures becomes a file too.
 
     Raises
     ------
@@ -74,7 +76,7 @@ def diagnose_files(
         for path in paths[:2]:
             add_to_json(path, origin("diagnose", [model_path, *recordings], asked))
         with progress("writing the report"):
-            write_diagnosis_report(paths[2], diagnosis, Path(model_path).name, process, dated=dated)
+            write_diagnosis_report(paths[2], diagnosis, Path(model_path).name, process, dated=dated, figures=figures)
     measured = measured_part(whole, recordings, stream=stream).responses
     missing = [label for label in whole.responses if label not in measured]
     note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []

@@ -6,9 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from cutting import MillingProcess
-from figures import LobesBand, lobes_figure, zoomed_limits
+from figures import LobesBand, StableAbove, lobes_figure, zoomed_limits
+from foundation import InputError
 from stability import StabilityLobes
 
+from ...chain import stable_above
 from ...tables import Table
 from ..collection import Collected
 from ..lobes_check import CheckedLobes, checked_lobes, lobes_warnings
@@ -65,10 +67,23 @@ def stability_findings(collected: Collected) -> StabilityFindings:
         caption += f" Light band: 95 % interval of {first_name}"
         caption += f"; at {drawn_speeds} speeds from draws of its errors." if drawn_speeds else ", to first order."
     words = f"Stability lobes: depth limit over spindle speed of {', '.join(drawn)}"
-    picture = picture_of(lobes_figure(drawn, band=band), caption, words, zoomed=zoomed_limits(drawn, band))
+    islands = _islands(checked[0])
+    caption += " Hatched: stable above an island of instability." if islands else ""
+    drawing, zoomed = lobes_figure(drawn, (), band, islands), zoomed_limits(drawn, band, islands)
+    picture = picture_of(drawing, caption, words, zoomed=zoomed)
     section = Section("Stability lobes", tuple(sentences), tuple(tables), (picture,))
     warnings = (*lobes_warnings(checked, collected), *advised.warnings)
     return StabilityFindings(section, (*_brief(first_name, first), *advised.sentences[:1]), warnings)
+
+
+def _islands(leading: CheckedLobes) -> tuple[StableAbove, ...]:
+    """Depths that are stable above islands of the lobes that lead; none where structure or cut are not known."""
+    if leading.structure is None or leading.process is None or leading.certified is None:
+        return ()
+    try:
+        return stable_above(leading.structure[1], leading.process, leading.headline[1], leading.max_depth)
+    except InputError:
+        return ()
 
 
 def lobes_section(collected: Collected) -> Section:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ...options import check_shares
+from ...options import FigureFormat, Figures, check_shares
 from ...terminal import say
 
 
@@ -39,13 +39,17 @@ def diagnose(
         typer.Option("--model-error", help="What a right model is still off: frequency, damping, shapes, as shares."),
     ] = (0.01, 0.15, 0.05),
     stream: Annotated[str | None, typer.Option("--stream", help="Sample clock.")] = None,
+    figures: Figures = None,
+    figure_format: FigureFormat = "svg",
 ) -> None:
     """Which is wrong in a robot's model: joint stiffness, link flexibility, payload, tool, posture, damping?"""
     from mismatch import LabError
 
+    from ...report import asked_figures
     from .diagnosing import Asking, diagnose_robot_files
 
     check_shares("--model-error", model_error, (0.01, 0.15, 0.05))
     asking = Asking(tuple(pose or ()), feed, band, sensor, payload_at, rigid_links, LabError(*model_error), stream)
-    for line in diagnose_robot_files(robot, recordings, out, asking):
+    drawn = asked_figures(figures, figure_format)
+    for line in diagnose_robot_files(robot, recordings, out, asking, figures=drawn):
         say(line)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from h5py import is_hdf5
@@ -21,6 +22,9 @@ from ...provenance import add_to_json, origin
 from ...result_folder import refuse_file
 from ..postures import Asked, posture_of, spatial
 from .diagnosis_words import summary
+
+if TYPE_CHECKING:  # the report asks this room for its words
+    from ...report import FigureFiles
 
 Real = NDArray[np.float64]
 
@@ -43,11 +47,18 @@ class Asking:
 
 
 def diagnose_robot_files(
-    robot: str, paths: Sequence[Path], out: Path, asking: Asking, *, dated: bool = True
+    robot: str,
+    paths: Sequence[Path],
+    out: Path,
+    asking: Asking,
+    *,
+    dated: bool = True,
+    figures: "FigureFiles | None" = None,
 ) -> list[str]:
     """Diagnose, write ``robot_diagnosis.json``, ``model_<recording>.json`` and ``report.html``; lines that sum it up.
 
-    A report that is not ``dated`` does not tell when it was written, so that equal input gives equal bytes.
+    A report that is not ``dated`` does not tell when it was written, so that equal input gives equal bytes. With
+    ``figures`` each of its figures becomes a file too.
 
     Raises
     ------
@@ -84,7 +95,7 @@ def diagnose_robot_files(
         for path in folder.glob("*.json"):
             add_to_json(path, origin("robot diagnose", [robot, *paths], asdict(asking)))
         with bar("writing the report"):
-            write_robot_report(folder / "report.html", found, case.name, lines, dated=dated)
+            write_robot_report(folder / "report.html", found, case.name, lines, dated=dated, figures=figures)
     lines += [f"warning: {doubt}" for doubt in doubts]
     return [*lines, f"wrote {out / 'robot_diagnosis.json'}, {out / 'report.html'} and a model for each recording"]
 
