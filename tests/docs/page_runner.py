@@ -67,16 +67,19 @@ def command_lines(block: str) -> Iterator[list[str]]:
             yield words
 
 
-def run_page(page: str, folder: Path) -> int:
-    """Do all that a page says, with ``folder`` as the working folder already; return how many blocks were run."""
-    names: dict[str, Any] = {"__name__": "__main__"}
+def run_page(page: str, names: dict[str, Any] | None = None) -> int:
+    """Do all that a page says in the working folder; return how many blocks were run.
+
+    ``names`` are those that the page's programs find, and hold theirs afterwards.
+    """
+    names = {} if names is None else names
     count = 0
     for step in steps(page):
         if step.kind == "write":
-            (folder / step.name).write_text(step.text, encoding="utf-8")
+            Path(step.name).write_text(step.text, encoding="utf-8")
         elif step.kind == "copy":
             source, name = step.text.split()
-            shutil.copy(ROOT / source, folder / name)
+            shutil.copy(ROOT / source, name)
         elif step.kind in COMMANDS:
             for words in command_lines(step.text):
                 _do(words)

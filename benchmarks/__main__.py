@@ -1,0 +1,158 @@
+"""Accuracy and speed on this machine, as one page: `python -m benchmarks [--only NAME ...] [--out docs/measured.md]`.
+
+Runs the benchmarks of this folder one after the other, each in a process of its own, and writes what they print, with
+date, version and machine. `--list` names them. What fails, or takes too long, stands in the page as such.
+"""
+
+import argparse
+import os
+import platform
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+LIMIT = 1800.0
+"""Seconds after which a benchmark is stopped."""
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """A benchmark by its module, the options that it is given here, and the question that it answers."""
+
+    name: str
+    question: str
+    options: tuple[str, ...] = ()
+
+    @property
+    def command(self) -> str:
+        """What a reader types to repeat it."""
+        return " ".join(["python -m", f"benchmarks.{self.name}", *self.options])
+
+
+BENCHMARKS = (
+    Benchmark("accuracy", "How near do fits of stacked milling sweeps come to the truth?", ("--seeds", "2")),
+    Benchmark("narrow_fits", "What do lobes of fits in a narrow band cost?"),
+    Benchmark("pole_speed", "How long do poles of all orders take, beside other packages?"),
+    Benchmark("frf_speed", "How long does an FRF matrix take, beside other packages?", ("--seconds", "120")),
+    Benchmark("lobe_speed", "How long do lobes take, beside plain semi-discretisation?"),
+    Benchmark("diagnosis_speed", "What does a diagnosis cost, in Fourier transforms of one prediction?"),
+    Benchmark("path_speed", "How long do postures along a tool path take?", ("20",)),
+    Benchmark("simulated_cell", "How much faster than real time is the simulated cell?", ("20",)),
+    Benchmark("acquisition_speed", "What does recording take of the processor?"),
+    Benchmark("import_speed", "How long does an import take?"),
+)
+"""Those that print a table in minutes. Trials of hours (`blind_trial`, `frf_trial`, `campaign_trial`, `memory` and
+others) have commands and pages of their own."""
+
+
+def main() -> int:
+    """Run what is asked for and write the page; returns 1 where a benchmark failed."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__.split("\n\n")[0])
+    parser.add_argument("--only", nargs="+", metavar="NAME", choices=[one.name for one in BENCHMARKS])
+    parser.add_argument("--out", type=Path, metavar="PAGE.md", help="page to write; else the terminal alone")
+    parser.add_argument("--list", action="store_true", help="name the benchmarks and end")
+    options = parser.parse_args()
+    chosen = [one for one in BENCHMARKS if options.only is None or one.name in options.only]
+    if options.list:
+        print(*(f"{one.name:18s} {one.question}" for one in chosen), sep="\n")
+        return 0
+    page, failures = [_head()], 0
+    for one in chosen:
+        print(f"== {one.command}", flush=True)
+        printed, ending, seconds = run(one)
+        print(printed, ending, sep="\n", flush=True)
+        failures += bool(ending)
+        page.append(_section(one, printed, ending, seconds))
+    if options.out:
+        unfinished = options.out.with_suffix(".unfinished")
+        unfinished.write_text("\n".join(page), encoding="utf-8")
+        unfinished.replace(options.out)
+        print(options.out)
+    return int(failures > 0)
+
+
+def run(one: Benchmark, limit: float = LIMIT) -> tuple[str, str, float]:
+    """Standard output of a benchmark, how it ended otherwise than in order, and its seconds."""
+    environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-m", f"benchmarks.{one.name}", *one.options]
+    started = time.monotonic()
+    try:
+        ended = subprocess.run(command, cwd=ROOT, env=environment, capture_output=True, text=True, timeout=limit)
+    except subprocess.TimeoutExpired as error:
+        said = error.stdout.decode() if isinstance(error.stdout, bytes) else error.stdout or ""
+        return said.strip(), f"stopped after {limit:.0f} s", limit
+    ending = ""
+    if ended.returncode:
+        last = ended.stderr.strip().splitlines()[-1:] or ["no message"]
+        ending = f"ended with code {ended.returncode}: {last[0]}"
+    return ended.stdout.strip(), ending, time.monotonic() - started
+
+
+def machine() -> list[tuple[str, str]]:
+    """What a time depends on, in words without the machine's name."""
+    import matplotlib
+    import numpy as np
+    import scipy
+
+    from millfrf.version import __version__
+
+    load = f"{os.getloadavg()[0]:.1f} processes waiting" if hasattr(os, "getloadavg") else "not known"
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    libraries = (("numpy", np), ("scipy", scipy), ("matplotlib", matplotlib))
+    versions = ", ".join(f"{name} {module.__version__}" for name, module in libraries)
+    return [
+        ("date", datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")),
+        ("millfrf", f"{__version__}, commit {_commit()}"),
+        ("processor", f"{_processor()}, {cores} cores"),
+        ("memory", _memory()),
+        ("system", f"{platform.system()} {platform.machine()}"),
+        ("Python", f"{platform.python_version()}, {versions}"),
+        ("load before", f"{load}: where it is above the cores, other work shared the machine"),
+    ]
+
+
+def _head() -> str:
+    rows = "\n".join(f"| {name} | {value} |" for name, value in machine())
+    return f"""# Measured on one machine
+
+Written by `python -m benchmarks --out docs/measured.md`; nothing in it is typed by hand. Ratios compare runs on the
+same machine in the same minutes; times are of this machine. [Accuracy](accuracy.md) says what the tables mean, and has
+the longer trials.
+
+| | |
+|---|---|
+{rows}
+"""
+
+
+def _section(one: Benchmark, printed: str, ending: str, seconds: float) -> str:
+    told = f"\n**{ending}**\n" if ending else ""
+    return f"## {one.question}\n\n`{one.command}` ({seconds:.0f} s)\n{told}\n```text\n{printed}\n```\n"
+
+
+def _commit() -> str:
+    found = subprocess.run(["git", "rev-parse", "--short", "HEAD"], cwd=ROOT, capture_output=True, text=True)
+    return found.stdout.strip() or "not known"
+
+
+def _processor() -> str:
+    information = Path("/proc/cpuinfo")
+    if information.exists():
+        names = [line for line in information.read_text().splitlines() if line.startswith("model name")]
+        if names:
+            return names[0].partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _memory() -> str:
+    if hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names:
+        return f"{os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 2**30:.0f} GB"
+    return "not known"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,50 @@
+"""Every command that a page shows is one that the program takes: its words, its options and what they take."""
+
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from millfrf.__main__ import app
+from millfrf.usage import commands_in, options_of_several, with_examples, with_lists_apart
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs" / "tutorials").glob("*.md"))]
+PROGRAM = with_examples(typer.main.get_command(app))
+COMMANDS: dict[str, Any] = dict(commands_in(PROGRAM))
+PARTS = re.compile(r"\[[^\]]*\]|\.\.\.")
+"""What may be left out, and "and so on": signs that a page uses, and no command knows."""
+
+
+def _shown(page: Path) -> Iterator[list[str]]:
+    """Command lines in blocks, fenced or indented, as words."""
+    lines = page.read_text(encoding="utf-8").replace("\\\n", " ").splitlines()
+    fenced = False
+    for line in lines:
+        if line.startswith("```"):
+            fenced = not fenced
+        elif fenced or line.startswith("    "):
+            typed = re.sub(r"^\s*(\$ |/\S*/)?", "", line)
+            if typed.startswith("millfrf ") and not typed.startswith("millfrf >"):
+                yield shlex.split(PARTS.sub("", typed), comments=True)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_the_program_takes_every_command_of_a_page(page: Path) -> None:
+    for typed in _shown(page):
+        words = " ".join(typed[1:3]) if " ".join(typed[1:3]) in COMMANDS else typed[1]
+        assert words in COMMANDS, f"{page.name}: there is no command {shlex.join(typed)}"
+        rest = with_lists_apart(typed[1:], options_of_several(PROGRAM, typed[1:]))[len(words.split()) :]
+        try:
+            COMMANDS[words].make_context(words, rest)
+        except Exception as error:  # whichever click typer brings along
+            message = getattr(error, "format_message", lambda error=error: repr(error))()
+            raise AssertionError(f"{page.name}: {shlex.join(typed)}: {message}") from error
+
+
+def test_pages_show_many_commands() -> None:
+    assert sum(len(list(_shown(page))) for page in PAGES) > 100
