@@ -98,7 +98,7 @@ def machine() -> list[tuple[str, str]]:
     import numpy as np
     import scipy
 
-    from millfrf.version import __version__
+    from millfrf import __version__
 
     load = f"{os.getloadavg()[0]:.1f} processes waiting" if hasattr(os, "getloadavg") else "not known"
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
