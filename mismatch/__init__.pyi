@@ -20,6 +20,7 @@ from .adapters import (
     predicted_spectrum,
     read_cut_recording,
     read_posed,
+    require_room_for_cut,
     standard_error_of,
     write_improved_cut,
 )
@@ -65,7 +66,14 @@ from .models import (
     residual,
 )
 from .physics import JointPhysics, Rig, form_of, library, rig_of
-from .records import band_of, in_deflections, measured_part, read_recording, read_recordings
+from .records import (
+    band_of,
+    in_deflections,
+    measured_part,
+    read_recording,
+    read_recordings,
+    require_room_for_comparison,
+)
 from .screening import Floor, JointSighting, SeenMotion, find_direction, linear_floor, screen_joints, seen_motion
 
 __all__ = [
@@ -141,6 +149,8 @@ __all__ = [
     "read_recording",
     "read_recordings",
     "recording_errors",
+    "require_room_for_comparison",
+    "require_room_for_cut",
     "residual",
     "rig_of",
     "screen_joints",

@@ -14,7 +14,7 @@ from .motion_quantities import (
     high_pass_corners,
     kinematic_factor,
 )
-from .reading import band_of_channels, read_band_recording
+from .reading import band_of_channels, read_band_recording, require_room_at_rate, require_room_for_band
 from .reduced_recording import BandRecording, band_recording, before_force_high_pass
 from .resampling import Resampler, needed_ratio, resampled, whole_ratio, widest_band
 from .room import require_room
@@ -43,6 +43,8 @@ __all__ = [
     "read_band_recording",
     "refuse_shared",
     "require_room",
+    "require_room_at_rate",
+    "require_room_for_band",
     "resampled",
     "whole_ratio",
     "widest_band",

@@ -8,8 +8,9 @@ from acquisition import Channel, Recording, Stream
 
 from .channel_matching import MatchedChannel, matched_channels, refuse_shared
 from .motion_quantities import DERIVATIVE_ORDERS
-from .reduced_recording import BandRecording, band_recording, before_force_high_pass, from_rest
+from .reduced_recording import BYTES_A_VALUE, BandRecording, band_recording, before_force_high_pass, from_rest
 from .resampling import needed_ratio, whole_ratio
+from .room import require_room
 
 EXCITING = ("force", "voltage")
 """Quantities that drive a structure or a transducer at a degree of freedom, where no other is named."""
@@ -62,6 +63,52 @@ def read_band_recording(
         ratio = needed_ratio(source.sample_rate, needed)
         found = _from_rest(source, forces, motions, ratio) or band_recording(source, forces, motions, ratio)
     return before_force_high_pass(found)
+
+
+def require_room_at_rate(
+    path: str | os.PathLike[str], n_channels: int, needed: float, *, stream: str | None = None
+) -> None:
+    """Refuse a recording that :func:`read_band_recording` has no memory for, before a sample is read.
+
+    Parameters
+    ----------
+    path
+        File of the recording.
+    n_channels
+        Number of channels that will be read.
+    needed
+        Sample rate that is enough, Hz.
+    stream
+        Sample clock; None: the only one.
+
+    Raises
+    ------
+    InputError
+        It is too long; the line says how long it may be.
+    """
+    with Recording(path) as recording:
+        source = recording.stream(stream)
+        require_room(source, n_channels, BYTES_A_VALUE, float(needed_ratio(source.sample_rate, needed)))
+
+
+def require_room_for_band(stream: Stream, n_channels: int, highest_frequency: float) -> None:
+    """Refuse a recording that :func:`band_of_channels` has no memory for, before a sample is read.
+
+    Parameters
+    ----------
+    stream
+        Samples of an open recording.
+    n_channels
+        Number of channels that will be read.
+    highest_frequency
+        Upper end of the band that must stay flat, Hz.
+
+    Raises
+    ------
+    InputError
+        It is too long, or the band does not fit the sample rate.
+    """
+    require_room(stream, n_channels, BYTES_A_VALUE, float(whole_ratio(stream.sample_rate, highest_frequency)))
 
 
 def _from_rest(

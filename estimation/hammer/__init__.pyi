@@ -2,7 +2,7 @@ from .agreement import Disagreement
 from .cutting_out import screened
 from .decay import Decay, answer_decay, window_for
 from .merging import MergedTaps, merge_taps
-from .screening import FoundTaps, JudgedTap, TapTest, found_taps
+from .screening import FoundTaps, JudgedTap, TapTest, found_taps, require_room_for_taps
 from .segments import TapSettings, choose_segments, placed
 from .sums import TapSums, tap_sums
 from .taps import Tap, find_taps
@@ -26,6 +26,7 @@ __all__ = [
     "found_taps",
     "merge_taps",
     "placed",
+    "require_room_for_taps",
     "screened",
     "tap_sums",
     "window_correlation",

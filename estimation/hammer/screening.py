@@ -112,6 +112,23 @@ class FoundTaps:
         return self.start_time + tap.tap.time
 
 
+def require_room_for_taps(test: TapTest) -> None:
+    """Refuse a recording whose forces :func:`found_taps` has no memory for, before a sample is read.
+
+    Parameters
+    ----------
+    test
+        The recording and its channels.
+
+    Raises
+    ------
+    InputError
+        It is too long; the line says how long it may be.
+    """
+    with Recording(test.path) as recording:
+        require_room(recording.stream(test.stream), len(test.excitations), _BYTES_A_VALUE)
+
+
 def found_taps(test: TapTest) -> FoundTaps:
     """Find the taps of a test and judge them by their force.
 
@@ -120,9 +137,9 @@ def found_taps(test: TapTest) -> FoundTaps:
     InputError
         A channel that is not there, or a force that is constant.
     """
+    require_room_for_taps(test)
     with Recording(test.path) as recording:
         stream = recording.stream(test.stream)
-        require_room(stream, len(test.excitations), _BYTES_A_VALUE)
         force = stream.read(channels=[channel.name for channel in test.excitations])
         rate, start = stream.sample_rate, stream.start_time
     quiet = at_rest(force, rate)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition import Recording, RecordingWriter, StreamDescription
 from foundation import Result, Summary, doubts_line, listed, writing_whole_file
-from mismatch import Prediction, predict, read_recording
+from mismatch import Prediction, predict, read_recording, require_room_for_comparison
 from modal_fit import ModalModel
 
 from ..gate import check_model_and_recordings, check_scales
@@ -86,6 +86,7 @@ def predict_recording(
     InputError
         A model and a recording that cannot be compared.
     """
+    require_room_for_comparison([recording_path], model, stream=stream)
     doubts = check_model_and_recordings(model_file, model, [recording_path], stream)
     recorded = read_recording(recording_path, model, stream=stream)
     result = predict(model, recorded)

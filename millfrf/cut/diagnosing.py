@@ -8,7 +8,7 @@ from pathlib import Path
 from acquisition import Recording
 from cutting import MillingProcess
 from foundation import InputError, writing_whole_folder
-from mismatch import diagnose_cut, read_cut_recording, write_diagnosis, write_improved_cut
+from mismatch import diagnose_cut, read_cut_recording, require_room_for_cut, write_diagnosis, write_improved_cut
 from modal_fit import read_modal_model
 
 from ..gate import RECORD_AGAIN, check_depth, check_one_speed, check_recordings, read_checked_cutting
@@ -82,6 +82,7 @@ def _checked(paths: Sequence[Path], process: MillingProcess, asking: Asking) -> 
         with Recording(path) as recording:
             doubts += check_one_speed(recording.path.name, recording.setup, process, asking.speed)
             kinds = {channel.quantity for channel in recording.stream(asking.stream).channels}
+        require_room_for_cut(path, process, asking.stream)
         if "force" in kinds and kinds & {"acceleration", "velocity", "displacement"}:
             judged.append(path)  # what the others lack is said where it is needed
     if not judged:

@@ -15,6 +15,7 @@ from mismatch import (
     improved_model_of,
     measured_part,
     read_recordings,
+    require_room_for_comparison,
     spindle_speed,
     write_diagnosis,
 )
@@ -118,6 +119,7 @@ def diagnose_recordings(
         A model and recordings that cannot be compared.
     """
     compared = measured_part(model, recordings, stream=stream)
+    require_room_for_comparison(recordings, compared, stream=stream, band=band)
     doubts = check_model_and_recordings(model_file, compared, recordings, stream, progress)
     trials = read_recordings(recordings, compared, stream=stream, band=band)
     with progress("diagnosing"):

@@ -18,6 +18,7 @@ from estimation import (
     found_taps,
     merge_taps,
     placed,
+    require_room_for_taps,
     screened,
     tap_sums,
     window_for,
@@ -98,6 +99,8 @@ def tap_recordings(
     if not paths:
         raise InputError("no recording given; name at least one")
     tests = tests_of(paths, options)
+    for test in tests:
+        require_room_for_taps(test)
     doubts = check_tap_recordings(paths, tests, progress)
     found = _found(tests, progress)
     settings = choose_segments(

@@ -5,6 +5,7 @@ from .cut import (
     CutFit,
     diagnose_cut,
     read_cut_recording,
+    require_room_for_cut,
     write_improved_cut,
 )
 from .robot import (
@@ -44,6 +45,7 @@ __all__ = [
     "predicted_spectrum",
     "read_cut_recording",
     "read_posed",
+    "require_room_for_cut",
     "standard_error_of",
     "write_improved_cut",
 ]

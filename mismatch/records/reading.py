@@ -6,7 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition import Recording
-from estimation import BandRecording, channel_at, family_of, quantities_of_unit, read_band_recording
+from estimation import (
+    BandRecording,
+    channel_at,
+    family_of,
+    quantities_of_unit,
+    read_band_recording,
+    require_room_at_rate,
+)
 from foundation import Band, InputError
 from modal_fit import ModalModel
 
@@ -91,17 +98,12 @@ def read_at(
     InputError
         The recording has a flaw that :func:`read_recording` refuses.
     """
-    highest = ABOVE * float(model.natural_frequencies.max())
-    if model.band is not None:
-        highest = max(highest, model.band[1])
-    if band is not None:
-        highest = max(highest, band[1])
     response, excitation = quantities_of_unit(model.unit)
     recording = read_band_recording(
         path,
         excitations,
         responses,
-        KEPT * highest,
+        _needed_rate(model, band),
         stream=stream,
         exciting=(excitation,),
         responding=family_of(response),
@@ -115,6 +117,42 @@ def read_at(
             f"{least:.3g} s, are the least"
         )
     return recording
+
+
+def _needed_rate(model: ModalModel, band: Band | None) -> float:
+    """Sample rate that a comparison needs, Hz."""
+    bands = [one for one in (model.band, band) if one is not None]
+    return KEPT * max(ABOVE * float(model.natural_frequencies.max()), *(high for _, high in bands), 0.0)
+
+
+def require_room_for_comparison(
+    paths: Sequence[str | os.PathLike[str]],
+    model: ModalModel,
+    *,
+    stream: str | None = None,
+    band: Band | None = None,
+) -> None:
+    """Refuse recordings that :func:`read_recordings` has no memory for, before a sample is read.
+
+    Parameters
+    ----------
+    paths
+        Recordings that will be compared with the model.
+    model
+        Model whose degrees of freedom and band say what is read.
+    stream
+        Name of the sample clock; None for the only one of each recording.
+    band
+        Lowest and highest frequency that are compared, Hz; None: the model's own band.
+
+    Raises
+    ------
+    InputError
+        A recording is too long; the line says how long it may be.
+    """
+    for path in paths:
+        count = len(model.excitations) + len(model.responses)
+        require_room_at_rate(path, count, _needed_rate(model, band), stream=stream)
 
 
 def read_recordings(

@@ -38,7 +38,7 @@ from ...progress import Progress, silent
 from ...provenance import sources, versions
 from .estimate_options import INSTRUMENTAL, LOCAL, TITLES, Estimate, EstimateOptions, check_options
 from .instruments import only_inputs
-from .local_estimate import band_recordings, local_frf
+from .local_estimate import band_recordings, local_frf, require_room_for_recordings
 from .spectra_of_recordings import gain_of_test, lines_of, spectra_of_tests, with_instruments, without_instruments
 
 SPECTRAL: dict[str, Callable[[CrossSpectra], Frf]] = {"h1": h1, "h2": h2, "hv": hv}
@@ -117,6 +117,7 @@ def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOp
     """Estimate by local polynomials over whole recordings; the inputs are judged by spectra as everywhere."""
     assert options.band is not None
     names = (options.excitations, options.responses)
+    require_room_for_recordings(paths, names, options.stream, options.band[1])
     doubts = check_recordings(
         paths, stream=options.stream, excitations=names[0], responses=names[1], segments=None, progress=progress
     )

@@ -11,10 +11,42 @@ from estimation import (
     band_of_channels,
     choose_channels,
     local_polynomial,
+    require_room_for_band,
 )
 from foundation import Band, InputError
 
 from ...progress import Progress
+
+
+def require_room_for_recordings(
+    paths: Sequence[str | os.PathLike[str]],
+    names: tuple[Sequence[str], Sequence[str]],
+    stream: str | None,
+    highest: float,
+) -> None:
+    """Refuse recordings that :func:`band_recordings` has no memory for, before they are looked through.
+
+    Parameters
+    ----------
+    paths
+        Recordings that will be read.
+    names
+        Names of excitations and responses; empty: chosen by quantity.
+    stream
+        Sample clock; None: the only one of each recording.
+    highest
+        Upper end of the band, Hz.
+
+    Raises
+    ------
+    InputError
+        A recording is too long, has not the channels, or the band is beyond its sample rate.
+    """
+    for path in paths:
+        with Recording(path) as recording:
+            source = recording.stream(stream)
+            forces, motions = choose_channels(source, names[0] or None, names[1] or None)
+            require_room_for_band(source, len(forces) + len(motions), highest)
 
 
 def band_recordings(

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Recording
-from estimation import BandRecording, Frf, band_of_channels, choose_channels, widest_band
+from acquisition import Recording, Stream
+from estimation import BandRecording, Frf, band_of_channels, choose_channels, require_room_for_band, widest_band
 from foundation import InputError, writing_whole_file
 from modal_fit import (
     ModalFit,
@@ -72,6 +72,8 @@ def fit_recordings(
         raise InputError(f"method {options.method!r} does not fit recordings; use {SUBSPACE}, or estimate an FRF first")
     if options.poles is not None or options.refine:
         raise InputError("--poles picks poles of an FRF; estimate one from these recordings first")
+    for path in paths:
+        _require_room(path, options)
     doubts = check_recordings(
         paths, stream=options.stream, excitations=options.excitations, responses=options.responses, progress=progress
     )
@@ -99,9 +101,21 @@ def _band_recording(
         stream = recording.stream(options.stream)
         channels = choose_channels(stream, options.excitations or None, options.responses or None)
         with progress(f"reading {Path(path).name}", stream.n_samples) as update:
-            highest = max(options.band[1], min(KEPT_ABOVE * options.band[1], widest_band(stream.sample_rate)))
-            made = band_of_channels(stream, *channels, highest, update)
+            made = band_of_channels(stream, *channels, _kept_up_to(stream, options), update)
     return made, stream.sample_rate
+
+
+def _kept_up_to(stream: Stream, options: FitOptions) -> float:
+    """Upper end of the band that stays flat, Hz: above that of the fit, where the sample rate allows it."""
+    return max(options.band[1], min(KEPT_ABOVE * options.band[1], widest_band(stream.sample_rate)))
+
+
+def _require_room(path: str | os.PathLike[str], options: FitOptions) -> None:
+    """Refuse a recording that memory has no room for, before it is looked through."""
+    with Recording(path) as recording:
+        stream = recording.stream(options.stream)
+        forces, motions = choose_channels(stream, options.excitations or None, options.responses or None)
+        require_room_for_band(stream, len(forces) + len(motions), _kept_up_to(stream, options))
 
 
 def write_fit(

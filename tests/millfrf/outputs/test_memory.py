@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import Channel, Events, Recording, RecordingWriter, StreamDescription
+from acquisition import Channel, Events, Recording, RecordingWriter, Stream, StreamDescription
 from foundation import InputError, require_memory
 from millfrf.__main__ import BAD_INPUT, DONE, run
 
@@ -87,7 +87,11 @@ def test_what_takes_too_much_memory_is_refused_before_it_starts(
 ) -> None:
     monkeypatch.chdir(inputs)
     monkeypatch.setenv("MILLFRF_MEMORY_GB", "0.00005")
+    read: list[str] = []
+    for name in ("read", "blocks"):
+        monkeypatch.setattr(Stream, name, lambda self, *words, **more: read.append(self.path.name))
     assert run(words.split()) == BAD_INPUT
+    assert not read
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert "GB are allowed" in said

@@ -1,5 +1,5 @@
 from .chatter import CutChatter, chatter_of
-from .reading import read_cut_recording
+from .reading import read_cut_recording, require_room_for_cut
 from .recording import FINE, MOST_ORDERS, CutRecording, cut_recording
 from .spindle_law import SpindleLaw, found_law, stated_law
 from .tip_motion import TipMotion
@@ -15,5 +15,6 @@ __all__ = [
     "cut_recording",
     "found_law",
     "read_cut_recording",
+    "require_room_for_cut",
     "stated_law",
 ]

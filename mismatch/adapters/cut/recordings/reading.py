@@ -2,19 +2,20 @@
 
 import os
 from fractions import Fraction
-from pathlib import Path
 
 import numpy as np
 
-from acquisition import Recording
+from acquisition import Recording, Stream
 from cutting import MillingProcess, refuse_varied
 from estimation import (
     DERIVATIVE_ORDERS,
+    MatchedChannel,
     band_recording,
     before_force_high_pass,
     channel_at,
     channels_in_words,
     high_pass_corners,
+    require_room_at_rate,
 )
 from foundation import TIP, InputError
 from modal_fit import ModalModel
@@ -59,17 +60,7 @@ def read_cut_recording(
     stated = stated_law(path, speed)
     with Recording(path) as recording:
         source = recording.stream(stream)
-        forces = [channel_at(source.channels, label, ("force",)) for label in TIP]
-        motions = [channel_at(source.channels, label, DERIVATIVE_ORDERS) for label in TIP]
-        axes = tuple(axis for axis, found in enumerate(forces) if found is not None)
-        if not {0, 1} <= set(axes):
-            there = channels_in_words(source.channels)
-            raise InputError(f"{Path(path).name}: forces at TCP:+X and TCP:+Y are needed; it has {there}")
-        wanted = (0, 1) if process.edge_angle > np.pi / 2 - 1e-6 else (0, 1, 2)
-        moving = [one for one in (motions[axis] for axis in wanted) if one is not None]
-        if len(moving) < len(wanted):
-            moving = []
-        pushing = [one for one in forces if one is not None]
+        pushing, moving, axes, wanted = _channels(source, process)
         # at its own rate: how much of it is needed depends on the speed that is found
         whole = before_force_high_pass(band_recording(source, pushing, moving, Fraction(1)))
     return cut_recording(
@@ -78,3 +69,43 @@ def read_cut_recording(
         high_passes=high_pass_corners(whole.responses),
         model=model,
     )  # fmt: skip
+
+
+def require_room_for_cut(path: str | os.PathLike[str], process: MillingProcess, stream: str | None = None) -> None:
+    """Refuse a recording of a cut that :func:`read_cut_recording` has no memory for, before a sample is read.
+
+    Parameters
+    ----------
+    path
+        Recording with forces at ``TCP``.
+    process
+        Cutter and engagement: they say which motions are read.
+    stream
+        Sample clock; None: the only one.
+
+    Raises
+    ------
+    InputError
+        A force is missing, or the recording is too long; the line says how long it may be.
+    """
+    with Recording(path) as recording:
+        source = recording.stream(stream)
+        pushing, moving, _, _ = _channels(source, process)
+        rate = source.sample_rate
+    require_room_at_rate(path, len(pushing) + len(moving), rate, stream=stream)
+
+
+def _channels(
+    source: Stream, process: MillingProcess
+) -> tuple[list[MatchedChannel], list[MatchedChannel], tuple[int, ...], tuple[int, ...]]:
+    """Channels of the forces at the tip and of all its motions, or of none; axes of the forces and of the motions."""
+    forces = [channel_at(source.channels, label, ("force",)) for label in TIP]
+    motions = [channel_at(source.channels, label, DERIVATIVE_ORDERS) for label in TIP]
+    axes = tuple(axis for axis, found in enumerate(forces) if found is not None)
+    if not {0, 1} <= set(axes):
+        there = channels_in_words(source.channels)
+        raise InputError(f"{source.path.name}: forces at TCP:+X and TCP:+Y are needed; it has {there}")
+    wanted = (0, 1) if process.edge_angle > np.pi / 2 - 1e-6 else (0, 1, 2)
+    moving = [one for one in (motions[axis] for axis in wanted) if one is not None]
+    pushing = [one for one in forces if one is not None]
+    return pushing, moving if len(moving) == len(wanted) else [], axes, wanted
