@@ -2,7 +2,7 @@
 
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -21,13 +21,17 @@ class ProgressLines:
     ----------
     expected : s
         Time that each task is believed to take, by its identity.
+    measured
+        Kinds of which earlier runs of this campaign told the time; of others it is not known before one has ended.
     """
 
     expected: Mapping[str, float]
+    measured: Collection[str] = ()
     done: int = 0
     refused: int = 0
     failed: int = 0
     _left: dict[str, float] = field(default_factory=dict)
+    _number: dict[str, float] = field(default_factory=dict)
     _believed: dict[str, float] = field(default_factory=dict)
     _taken: dict[str, float] = field(default_factory=dict)
     _started: float = field(default_factory=time.monotonic)
@@ -37,6 +41,7 @@ class ProgressLines:
     def __post_init__(self) -> None:
         for identity, seconds in self.expected.items():
             _add(self._left, identity, seconds)
+            _add(self._number, identity, 1)
 
     def ended(self, ended: Ended) -> None:
         """Count one task."""
@@ -44,6 +49,7 @@ class ProgressLines:
         self.refused += ended.status == REFUSED
         self.failed += ended.status not in (DONE, REFUSED)
         _add(self._left, ended.identity, -self.expected[ended.identity])
+        _add(self._number, ended.identity, -1)
         if ended.status == DONE:
             _add(self._believed, ended.identity, self.expected[ended.identity])
             _add(self._taken, ended.identity, ended.seconds)
@@ -57,13 +63,21 @@ class ProgressLines:
         if not workers:
             text += ", no worker is there: waiting for one"
         elif 0 < self.done < len(self.expected):
-            text += f", about {shown_time(self._seconds_left() / workers)} left"
+            text += f", {self._time_left(workers)}"
         return text
 
-    def _seconds_left(self) -> float:
-        """Time of what is left on one worker: kinds that were met at their own pace, others as they were believed."""
-        paces = {kind: self._taken[kind] / one for kind, one in self._believed.items() if one > 0}
-        return sum(max(left, 0.0) * paces.get(kind, 1.0) for kind, left in self._left.items())
+    def _time_left(self, workers: int) -> str:
+        """Time of the kinds that were met or measured before, at their pace; and the kinds that nothing is known of."""
+        paces = dict.fromkeys(self.measured, 1.0)
+        paces |= {kind: self._taken[kind] / one for kind, one in self._believed.items() if one > 0}
+        open_kinds = [kind for kind, number in self._number.items() if number > 0 and kind not in paces]
+        seconds = sum(max(left, 0.0) * paces[kind] for kind, left in self._left.items() if kind in paces)
+        beside = f"how long {', '.join(open_kinds)} will take is not known yet"
+        if not open_kinds:
+            return f"about {shown_time(seconds / workers)} left"
+        if not any(number > 0 for kind, number in self._number.items() if kind in paces):
+            return beside
+        return f"about {shown_time(seconds / workers)} left for what was met; {beside}"
 
     def show(self, workers: int) -> None:
         """Show where the run stands, if it is time to."""

@@ -196,7 +196,7 @@ def _run(opened: OpenedCampaign, state: State, executor: Executor) -> int:
     tasks = opened.plan.tasks
     left, rates = left_to_run(tasks, state.settled), measured_rates(opened.out)
     expected = {one: rates.seconds(tasks[one], opened.megabytes(tasks[one])) for one in left}
-    lines = ProgressLines(expected)
+    lines = ProgressLines(expected, rates.measured)
 
     def told(ended: Ended | None) -> None:
         if ended is not None:

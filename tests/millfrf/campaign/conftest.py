@@ -4,7 +4,9 @@ import importlib.util
 import sys
 from pathlib import Path
 
-PARTS = [Path(__file__).parent / f"{name}.py" for name in ("overhead_of_tasks", "unmeasured_postures")]
+PARTS = [
+    Path(__file__).parent / f"{name}.py" for name in ("overhead_of_tasks", "simulated_series", "unmeasured_postures")
+]
 PARTS.append(Path(__file__).parents[3] / "benchmarks" / "campaign_trial.py")
 
 for path in PARTS:

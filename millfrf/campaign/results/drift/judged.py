@@ -1,7 +1,7 @@
 """`find_drifts`: which trends are more than chance among all that were looked at, and what else they may be."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,8 @@ AS_GOOD = 4.0
 ALIKE = 0.5
 """Correlation of two labels in a pose from which one may stand for the other."""
 
-APART = 3.0
-"""Standard errors, differences between poses included, from which a pose drifts in a way of its own."""
+OWN_ALARMS = 0.05
+"""Share of campaigns that may call the drift of some pose its own where all poses drift alike but for their scatter."""
 
 RESTS, HELD = 0.3, 1.5
 """Share of a slope, and standard errors, below which it falls without the one set that it rests on."""
@@ -55,6 +55,8 @@ class Drift:
         Other labels that explain it as well, with their correlation with this one in the pose.
     rests_on
         Number of the set without which there is no trend, or None.
+    own
+        Whether the pose drifts otherwise than the other poses do, see :func:`drifts_apart`.
     """
 
     trend: Trend
@@ -62,14 +64,29 @@ class Drift:
     others: PooledTrend | None
     as_good: tuple[tuple[str, float], ...]
     rests_on: int | None
+    own: bool = False
 
-    @property
-    def own(self) -> bool:
-        """Whether the pose drifts in a way of its own: not as the other poses do on average."""
-        if self.others is None:
-            return True
-        spread = np.hypot(np.hypot(self.trend.error, self.others.error), self.others.between)
-        return bool(abs(self.trend.slope - self.others.slope) > APART * spread)
+
+def drifts_apart(trend: Trend, others: PooledTrend, among: int) -> bool:
+    """Whether a trend lies outside what the trends of the other poses lead one to expect.
+
+    ``|b - m| > t sqrt(s_b^2 + s_m^2 + tau^2)`` with slope b and error s_b of the pose, mean m of the others, its error
+    s_m and the scatter tau of slopes between them: the prediction interval of a random-effects mean (Higgins, Thompson
+    & Spiegelhalter, J. R. Stat. Soc. A 172, 2009). t has one degree of freedom less than there are others, since few
+    poses tell tau badly, and a level of :data:`OWN_ALARMS` over the number of drifts (Bonferroni).
+
+    Parameters
+    ----------
+    trend
+        Trend of the pose.
+    others
+        Mean trend of the others.
+    among
+        Number of drifts that are compared so.
+    """
+    spread = float(np.hypot(np.hypot(trend.error, others.error), others.between))
+    p_value = 2 * student.sf(abs(trend.slope - others.slope) / spread, others.poses - 1)
+    return bool(p_value <= OWN_ALARMS / among)
 
 
 @dataclass(frozen=True)
@@ -128,7 +145,7 @@ def find_drifts(series: Sequence[Series], labels: Labels) -> Drifts:
         key = _key(one.series)
         if taken and (key not in best or one.p_value < best[key][0].p_value):
             best[key] = (one, float(value))
-    drifts = [_drift(one, value, trends, labels) for one, value in best.values()]
+    drifts = _with_own([_drift(one, value, trends, labels) for one, value in best.values()])
     suspects = [one for one in trends if one.p_value < SUSPECT and _key(one.series) not in best]
     return Drifts(
         tuple(
@@ -164,6 +181,14 @@ def _drift(trend: Trend, adjusted: float, trends: Sequence[Trend], labels: Label
         and one.series.pose != trend.series.pose
     ]
     return Drift(trend, adjusted, pool(beside), _as_good(trend, trends, labels), _rests_on(trend))
+
+
+def _with_own(drifts: Sequence[Drift]) -> list[Drift]:
+    """The drifts, with the answer whether each is its pose's own; with nothing to compare with it is not told so."""
+    among = sum(one.others is not None for one in drifts)
+    return [
+        one if one.others is None else replace(one, own=drifts_apart(one.trend, one.others, among)) for one in drifts
+    ]
 
 
 def _as_good(trend: Trend, trends: Sequence[Trend], labels: Labels) -> tuple[tuple[str, float], ...]:

@@ -1,5 +1,6 @@
 """Labels as regressors: numbers that vary inside poses, time among them, and text as groups."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,6 +15,8 @@ TIME = "time"
 """Name of the time of recording as a label, in days since the first set."""
 
 DAY = 86400.0
+
+_DIGITS = re.compile(r"-?\d+(\.\d+)?", re.ASCII)
 
 MOST_GROUPS = 6
 """Values of a text that still count as groups; a text with more is a remark."""
@@ -39,7 +42,11 @@ class Labels:
 
 
 def labels_of(sets: Sequence[MeasuredSet]) -> Labels:
-    """Sort the labels of a campaign into numbers and groups; text that spells numbers counts as numbers.
+    """Sort the labels of a campaign into numbers and groups.
+
+    A label counts as a number where each of its values is one or a text of digits: session ``07`` comes after ``06``,
+    though it stays text in names of files and sets. A note says so. Other texts that Python could read as numbers
+    (``nan``, ``1e5``, ``1_0``) are texts.
 
     Parameters
     ----------
@@ -56,6 +63,8 @@ def labels_of(sets: Sequence[MeasuredSet]) -> Labels:
         column = _as_numbers(values)
         if column is not None:
             numbers[name] = column
+            if any(isinstance(value, str) for value in values):
+                notes.append(f"label {name} is text of digits, such as {_first_text(values)}: it is taken for a number")
         elif len(set(values)) <= MOST_GROUPS:
             texts[name] = tuple("" if value is None else str(value) for value in values)
         else:
@@ -92,11 +101,14 @@ def dummies(texts: Mapping[str, tuple[str, ...]], rows: Sequence[int]) -> Real:
 
 def _as_numbers(values: Sequence[str | float | None]) -> Real | None:
     """A column of numbers; None where a value spells none."""
-    try:
-        column = np.array([np.nan if value is None else float(value) for value in values])
-    except (TypeError, ValueError):
+    if any(isinstance(value, str) and _DIGITS.fullmatch(value) is None for value in values):
         return None
+    column = np.array([np.nan if value is None else float(value) for value in values])
     return column if np.isfinite(column).any() else None
+
+
+def _first_text(values: Sequence[str | float | None]) -> str:
+    return next(value for value in values if isinstance(value, str))
 
 
 def _codes(column: tuple[str, ...]) -> Real:

@@ -47,11 +47,18 @@ def verdict_sentences(
 
 
 def _drift_sentences(drifts: Drifts, sets: Sequence[SetResults]) -> list[str]:
-    """Poses that drift in a way of their own, then what all poses share, and how many poses only follow."""
-    own = [drift_words(one, sets) for one in drifts.drifts if one.own]
-    shared = len(drifts.drifts) - len(own)
-    follow = [f"{shared} trends of single poses only follow what all poses do; the section lists them."]
-    return [*own, *(pooled_words(one) for one in drifts.pooled), *(follow if shared else [])]
+    """Poses that drift while not all do, then what all poses share, and how many poses are like the others in it.
+
+    Where all poses drift in a quantity, a pose is named that differs from the others; where they do not, each.
+    """
+    common = {(one.mode, one.quantity) for one in drifts.pooled}
+    shown = [
+        one for one in drifts.drifts if one.own or (one.trend.series.mode, one.trend.series.quantity) not in common
+    ]
+    alike = len(drifts.drifts) - len(shown)
+    told = [drift_words(one, sets) for one in shown] + [pooled_words(one) for one in drifts.pooled]
+    words = "1 trend of a single pose is" if alike == 1 else f"{alike} trends of single poses are"
+    return [*told, *([f"{words} not told from what all poses do; the section lists them."] if alike else [])]
 
 
 def _cut(start: str, sentences: Sequence[str]) -> list[str]:

@@ -153,12 +153,18 @@ def test_time_left_counts_each_kind_at_its_own_pace() -> None:
     lines = ProgressLines({"check:a": 1.0, "check:b": 1.0, "fit:a": 100.0, "fit:b": 100.0})
     lines.ended(Ended("check:a", DONE, "", 10.0))
     assert "1 of 4 tasks" in lines.line(1)
-    assert lines.line(1).endswith("about 4 min left")  # 10 s of the other check, and fits as they were believed
+    assert lines.line(1).endswith("about 10 s left for what was met; how long fit will take is not known yet")
     lines.ended(Ended("fit:a", DONE, "", 10.0))
     assert lines.line(2).endswith("about 10 s left")
     lines.ended(Ended("check:b", REFUSED, "no", 0.1))
     assert "1 refused" in lines.line(1)
     assert lines.line(0).endswith("no worker is there: waiting for one")
+    lines = ProgressLines({"check:a": 1.0, "learn:all": 30.0, "report:all": 20.0})
+    lines.ended(Ended("check:a", DONE, "", 1.0))
+    assert lines.line(1).endswith("/s, 0 refused, how long learn, report will take is not known yet")
+    measured = ProgressLines({"check:a": 1.0, "learn:all": 600.0}, frozenset({"learn"}))
+    measured.ended(Ended("check:a", DONE, "", 1.0))
+    assert measured.line(2).endswith("about 5 min left")
 
 
 def test_rates_are_measured_by_earlier_runs(tmp_path: Path) -> None:

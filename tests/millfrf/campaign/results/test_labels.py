@@ -1,5 +1,7 @@
 """Labels: numbers, text that spells numbers, groups, and which of them count time."""
 
+import pytest
+
 from millfrf.campaign.results import MeasuredSet
 from millfrf.campaign.results.drift import TIME, labels_of
 
@@ -10,9 +12,18 @@ def _set(pose: str, recorded_at: float | None, **labels: str | float) -> Measure
     )
 
 
-def test_text_that_spells_numbers_is_a_number() -> None:
-    found = labels_of([_set("P1", None, session="1"), _set("P1", None, session="2")])
-    assert found.numbers["session"].tolist() == [1.0, 2.0]
+def test_text_of_digits_is_a_number_and_a_note_says_so() -> None:
+    found = labels_of([_set("P1", None, session="07"), _set("P1", None, session=10.0)])
+    assert found.numbers["session"].tolist() == [7.0, 10.0]
+    assert found.notes == ("label session is text of digits, such as 07: it is taken for a number",)
+    assert labels_of([_set("P1", None, session=1.0), _set("P1", None, session=2.0)]).notes == ()
+
+
+@pytest.mark.parametrize("text", ["nan", "inf", "1e5", "1_0", "7a", "٣"])
+def test_other_text_that_python_reads_as_a_number_is_text(text: str) -> None:
+    found = labels_of([_set("P1", None, tool=text), _set("P1", None, tool="2")])
+    assert not found.numbers
+    assert found.texts["tool"] == (text, "2")
 
 
 def test_a_session_that_rises_with_time_stands_for_time() -> None:
