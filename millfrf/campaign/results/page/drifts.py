@@ -121,8 +121,7 @@ def _trend_table(title: str, drifts: Drifts) -> Table:
 
 def _trend_row(one: Trend) -> tuple[str, ...]:
     what = mode_words(one.series.mode, one.series.frequency, one.series.quantity)
-    change = percent(one.change, one.half_width, sign=True).removesuffix(" %")
-    return one.series.pose, what, label_words(one.label), change, f"{one.p_value:.2g}"
+    return one.series.pose, what, label_words(one.label), _change(one), f"{one.p_value:.2g}"
 
 
 def _pooled_table(pooled: Sequence[PooledTrend]) -> Table:
@@ -132,7 +131,7 @@ def _pooled_table(pooled: Sequence[PooledTrend]) -> Table:
             mode_words(one.mode, one.frequency, one.quantity),
             label_words(one.label),
             str(one.poses),
-            percent(one.change, one.half_width, sign=True).removesuffix(" %"),
+            _change(one),
             f"{100 * one.between * one.span:.2g}",
             f"{one.p_value:.2g}",
         )
@@ -140,6 +139,11 @@ def _pooled_table(pooled: Sequence[PooledTrend]) -> Table:
     )
     columns = ("quantity", "label", "poses", "mean change (%)", "between poses (%)", "probability")
     return Table("Mean change over the typical span of the label in a pose, ± 95 %", columns, rows)
+
+
+def _change(one: Trend | PooledTrend) -> str:
+    """A change with its sign and half width, for a column in per cent."""
+    return percent(one.change, one.half_width, sign=True).removesuffix(" %")
 
 
 def _scatter_tables(outliers: Outliers) -> tuple[Table, ...]:

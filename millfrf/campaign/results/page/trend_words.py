@@ -69,8 +69,8 @@ def span_words(trend: Trend, sets: Sequence[SetResults]) -> str:
         times = [sets[row].measured.recorded_at for row in trend.rows]
         known = [time for time in times if time is not None]
         return f"from {as_utc(min(known))[:16]} to {as_utc(max(known))[:16]} (UTC)"
-    name, _, unit = label_words(trend.label).partition(" (")
-    return f"from {name} {low:.4g} to {high:.4g}{' ' + unit.rstrip(')') if unit else ''}"
+    name, unit = _name_and_unit(trend.label)
+    return f"from {name} {low:.4g} to {high:.4g}{unit}"
 
 
 def drift_words(drift: Drift, sets: Sequence[SetResults]) -> str:
@@ -84,9 +84,8 @@ def drift_words(drift: Drift, sets: Sequence[SetResults]) -> str:
         Sets of the campaign, for names and dates.
     """
     trend, series = drift.trend, drift.trend.series
-    verb = "falls" if trend.change < 0 else "rises"
     told = (
-        f"pose {series.pose}: {mode_words(series.mode, series.frequency, series.quantity)} {verb} by "
+        f"pose {series.pose}: {mode_words(series.mode, series.frequency, series.quantity)} {_verb(trend.change)} by "
         f"{percent(abs(trend.change), trend.half_width)} {span_words(trend, sets)}{_others(drift)}."
     )
     if drift.rests_on is not None:
@@ -121,14 +120,23 @@ def pooled_words(pooled: PooledTrend) -> str:
     pooled
         Mean trend over poses.
     """
-    verb = "falls" if pooled.change < 0 else "rises"
-    name, _, unit = label_words(pooled.label).partition(" (")
-    span = f"{pooled.span:.3g}{' ' + unit.rstrip(')') if unit else ''}"
+    name, unit = _name_and_unit(pooled.label)
     return (
-        f"all poses: {mode_words(pooled.mode, pooled.frequency, pooled.quantity)} {verb} by "
-        f"{percent(abs(pooled.change), pooled.half_width)} over {span} of {name} (mean of {pooled.poses} poses; they "
-        f"differ by {100 * pooled.between * pooled.span:.2g} %, one standard deviation)."
+        f"all poses: {mode_words(pooled.mode, pooled.frequency, pooled.quantity)} {_verb(pooled.change)} by "
+        f"{percent(abs(pooled.change), pooled.half_width)} over {pooled.span:.3g}{unit} of {name} "
+        f"(mean of {pooled.poses} poses; they differ by {100 * pooled.between * pooled.span:.2g} %, "
+        "one standard deviation)."
     )
+
+
+def _verb(change: float) -> str:
+    return "falls" if change < 0 else "rises"
+
+
+def _name_and_unit(label: str) -> tuple[str, str]:
+    """Name of a label, and its unit with a blank before it where it has one."""
+    name, bracket, unit = label_words(label).partition(" (")
+    return name, f" {unit.rstrip(')')}" if bracket else ""
 
 
 def deviation_words(deviations: Sequence[Deviation], sets: Sequence[SetResults]) -> str:

@@ -39,7 +39,7 @@ class MapPanel:
 
 
 def draw_maps(panels: Sequence[MapPanel], plane: MapPlane) -> Figure:
-    """Draw panels in rows of three.
+    """Draw panels in rows of three; fewer panels make a narrower picture.
 
     Parameters
     ----------
@@ -48,17 +48,19 @@ def draw_maps(panels: Sequence[MapPanel], plane: MapPlane) -> Figure:
     plane
         Where the poses lie.
     """
-    rows = -(-len(panels) // COLUMNS)
+    columns = min(COLUMNS, len(panels))
+    rows = -(-len(panels) // columns)
     with house_style():
         figure = new_figure(rows * ROW_MM + 4.0)
-        axes = figure.subplots(rows, COLUMNS, squeeze=False)
+        figure.set_figwidth(figure.get_figwidth() * columns / COLUMNS)
+        axes = figure.subplots(rows, columns, squeeze=False)
         for k, place in enumerate(axes.ravel()):
             if k >= len(panels):
                 place.set_visible(False)
                 continue
             _panel(figure, place, panels[k], plane)
             place.set_xlabel(plane.labels[0])
-            if k % COLUMNS == 0 and not plane.names:
+            if k % columns == 0 and not plane.names:
                 place.set_ylabel(plane.labels[1])
     return figure
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from scipy.stats import t as student
 
 from figures import COLOURS, SHADE, house_style, new_figure, panel_letter
@@ -41,7 +42,8 @@ def draw_trends(drifts: Sequence[Drift], every: Sequence[Trend], words: Sequence
                 place.set_visible(False)
                 continue
             _panel(place, shown[k].trend, every)
-            panel_letter(place, k)
+            if len(shown) > 1:
+                panel_letter(place, k)
             place.set_title(words[k][0])
             place.set_xlabel(words[k][1])
             place.set_ylabel("change from the pose's mean (%)")
@@ -63,6 +65,8 @@ def _panel(axes: Axes, trend: Trend, every: Sequence[Trend]) -> None:
     axes.plot(line, middle, color=COLOURS[2], zorder=3)
     axes.errorbar(x, y, 2 * spread, fmt="o", color="black", markersize=3.5, elinewidth=0.8, capsize=2, zorder=4)
     axes.margins(x=0.08)
+    if np.all(trend.values == np.round(trend.values)):
+        axes.xaxis.set_major_locator(MaxNLocator(6, integer=True))
 
 
 def _points(trend: Trend) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -5,13 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-SIDES = ((0.0, 7.0), (0.0, -7.0), (12.0, 0.0), (-12.0, 0.0))
-"""Middle of the text from the mark, points: above, below, right, left."""
-
 PANEL = (112.0, 95.0)
 """Room of the marks in a panel, points."""
 
-MARK, LETTER, HEIGHT = 6.0, 3.4, 6.5
+MARK, LETTER, HEIGHT = 7.0, 3.9, 6.5
 """Sizes of a mark, of a letter's width and of a line, points."""
 
 Real = NDArray[np.float64]
@@ -39,11 +36,18 @@ def free_sides(places: Real, texts: Sequence[str]) -> list[tuple[float, float] |
     for number, text in enumerate(texts):
         size = (LETTER * len(text), HEIGHT)
         others = [box for k, box in enumerate(taken) if k != number]
-        free = [side for side in SIDES if not any(_meet((*(at[number] + side), *size), box) for box in others)]
+        boxes = {side: (*(at[number] + side), *size) for side in _sides(size[0])}
+        free = [side for side, own in boxes.items() if not any(_meet(own, box) for box in others)]
         found.append(free[0] if free else None)
         if free:
             taken.append((*(at[number] + free[0]), *size))
     return found
+
+
+def _sides(width: float) -> tuple[tuple[float, float], ...]:
+    """Middle of a text from the mark, points: above, below, right, left."""
+    beside = (MARK + width) / 2 + 1.0
+    return (0.0, 7.0), (0.0, -7.0), (beside, 0.0), (-beside, 0.0)
 
 
 def _meet(one: Sequence[float], other: Sequence[float]) -> bool:

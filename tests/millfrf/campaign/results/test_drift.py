@@ -69,13 +69,15 @@ def test_a_drift_of_six_times_the_scatter_in_one_pose_is_found_and_only_there() 
     assert found >= 17
 
 
-def test_a_drift_of_three_times_the_scatter_is_found_in_four_sessions_of_six() -> None:
+@pytest.mark.parametrize(("repeats", "least"), [(4, 13), (6, 18)])
+def test_a_drift_of_three_times_the_scatter_is_found_in_four_sessions(repeats: int, least: int) -> None:
+    """Its power is 85 % with four sets a session and 98 % with six; fewer than ``least`` of 20 are a rare case."""
     found = 0
-    for seed in range(20):
-        made = Simulated(seed, repeats=6, poses=4)
+    for seed in range(700, 720):
+        made = Simulated(seed, repeats=repeats, poses=4)
         drifts = find_drifts(made.series({(3, 2): -3.4e-3 / 3 * made.session}), made.labels("session"))
         found += ("P03", 2) in _firm(drifts)
-    assert found >= 17
+    assert found >= least
 
 
 def test_a_drift_too_small_to_be_found_is_suspected() -> None:
@@ -185,19 +187,19 @@ def test_of_two_sets_that_differ_it_is_not_told_which_is_off() -> None:
 
 
 def test_two_sets_a_pose_are_judged_by_how_the_other_poses_differ() -> None:
-    # a pose measured twice has no scatter of its own: the drift must be large, and is suspected where it is not named
-    found, suspected, alarms = 0, 0, 0
-    for seed in range(10):
+    """A pose measured twice has no scatter of its own: a drift of 18 times the scatter has a power of 94 to 98 %."""
+    found, seen, alarms = 0, 0, 0
+    for seed in range(700, 720):
         made = Simulated(seed, sessions=2, repeats=1, poses=12, modes=3)
         drifts = find_drifts(made.series({(3, 1): -0.02 * made.session}), made.labels("session"))
         found += _firm(drifts) == [("P03", 1)]
-        suspected += [(one.series.pose, one.series.mode) for one in drifts.suspects] == [("P03", 1)]
+        seen += ("P03", 1) in _firm(drifts) + [(one.series.pose, one.series.mode) for one in drifts.suspects]
         made = Simulated(seed, sessions=2, repeats=1, poses=12, modes=3)
         quiet = find_drifts(made.series(), made.labels("session"))
         alarms += bool(quiet.drifts or quiet.pooled)
-    assert found + suspected == 10
-    assert found >= 7
-    assert alarms <= 1
+    assert found >= 17
+    assert seen == 20
+    assert alarms <= 2
 
 
 def test_error_bars_that_are_too_small_or_too_large_are_told_and_right_ones_are_not() -> None:
