@@ -60,7 +60,7 @@ def main() -> int:
     if options.list:
         print(*(f"{one.name:18s} {one.question}" for one in chosen), sep="\n")
         return 0
-    page, failures = [_head()], 0
+    page, failures = [_head([one for one in BENCHMARKS if one not in chosen])], 0
     for one in chosen:
         print(f"== {one.command}", flush=True)
         printed, ending, seconds = run(one)
@@ -115,7 +115,9 @@ def machine() -> list[tuple[str, str]]:
     ]
 
 
-def _head() -> str:
+def _head(left_out: list[Benchmark]) -> str:
+    """What the page is, on which machine, and which benchmarks it does not have."""
+    told = ", ".join(f"`{one.name}`" for one in left_out)
     rows = "\n".join(f"| {name} | {value} |" for name, value in machine())
     return f"""# Measured on one machine
 
@@ -126,7 +128,7 @@ the longer trials.
 | | |
 |---|---|
 {rows}
-"""
+""" + (f"\nNot run this time: {told}.\n" if told else "")
 
 
 def _section(one: Benchmark, printed: str, ending: str, seconds: float) -> str:

@@ -41,7 +41,8 @@ def _text(name: str) -> str:
     return (DOCS / f"{name}.md").read_text(encoding="utf-8")
 
 
-RUN = ("first_ten_minutes", "python", "own_recordings", "modal_report")
+ROBOT_PAGES = ("robot_beams", "robot_planar", "robot_drilling")
+RUN = ("first_ten_minutes", "python", "own_recordings", "modal_report", *ROBOT_PAGES)
 
 
 def test_every_page_with_blocks_is_run_or_says_where_or_why_not() -> None:
@@ -102,3 +103,23 @@ def test_modal_report(demo: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert run_page(_text("modal_report"), names) == 3
     assert len(names["cmif"].peaks())
     assert names["shapes"].assurance.shape == (3, 3)
+
+
+CUT = """[cutting]
+teeth = 2
+diameter_m = 0.012
+immersion = "slot"
+ktc_pa = 7e8
+krc = 0.3
+kac = 0.1
+feed_per_tooth_m = 1e-4
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROBOT_PAGES)
+def test_pages_of_robots_that_come_along(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    for file in ("cut.toml", "slot.toml"):
+        (tmp_path / file).write_text(CUT)
+    assert run_page(_text(name)) >= 1
