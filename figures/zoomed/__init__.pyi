@@ -1,4 +1,4 @@
-from .chart import zoomed_chart
+from .chart import picking_chart, zoomed_chart
 from .frf import EntryCurves, zoomed_frfs
 from .indicators import zoomed_indicators
 from .limits import zoomed_limits
@@ -10,6 +10,7 @@ __all__ = [
     "EntryCurves",
     "ZoomedPlot",
     "browser_library",
+    "picking_chart",
     "zoomed_chart",
     "zoomed_frfs",
     "zoomed_indicators",

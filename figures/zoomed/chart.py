@@ -34,6 +34,43 @@ def zoomed_chart(chart: StabilisationChart, frf: Frf | None = None, model: Modal
         Modal model whose modes are marked.
     """
     from bokeh.layouts import column
+
+    orders, damping = _panels(chart, frf, _dampings(model))
+    if model is not None:
+        _mark(orders, damping, model)
+    legend_above(orders)
+    return as_plot(column(orders, damping, sizing_mode="stretch_width"))
+
+
+def picking_chart(chart: StabilisationChart, frf: Frf | None = None) -> ZoomedPlot:
+    """The chart on which poles are picked: the choice is a source ``chosen``, which the page fills.
+
+    Its panels are named ``orders`` and ``damping``, the range of orders ``top``.
+
+    Parameters
+    ----------
+    chart
+        Stabilisation chart of a fit.
+    frf
+        FRF whose summed magnitude is drawn behind the chart.
+    """
+    from bokeh.layouts import column
+    from bokeh.models import ColumnDataSource, Range1d
+
+    orders, damping = _panels(chart, frf, [0.1])
+    orders.name, damping.name = "orders", "damping"
+    orders.y_range = Range1d(0.0, 1.05 * float(chart.orders.max(initial=1)), name="top")
+    chosen = ColumnDataSource({"f": [], "zeta": [], "low": [], "high": []}, name="chosen")
+    look: dict[str, Any] = {"line_color": FITTED, "line_width": 2, "line_dash": [6, 3], "legend_label": "chosen"}
+    orders.segment(x0="f", y0="low", x1="f", y1="high", source=chosen, **look)
+    marks: dict[str, Any] = {"marker": "diamond", "size": 14, "color": FITTED, "fill_alpha": 0.0, "line_width": 2}
+    damping.scatter("f", "zeta", source=chosen, **marks)
+    legend_above(orders)
+    return as_plot(column(orders, damping, sizing_mode="stretch_width"))
+
+
+def _panels(chart: StabilisationChart, frf: Frf | None, dampings: list[float]) -> tuple[Any, Any]:
+    """Poles over order, and those that are stable over damping, without marks of a choice."""
     from bokeh.models import ColumnDataSource
 
     band = shared_range(chart.band)
@@ -51,13 +88,10 @@ def zoomed_chart(chart: StabilisationChart, frf: Frf | None = None, model: Modal
         hover(orders, drawn, told)
         if kind >= 2:
             hover(damping, [damping.scatter("f", "zeta", source=source, **marks)], told)
-    if model is not None:
-        _mark(orders, damping, model)
     stable = 100 * chart.damping_ratios[chart.stability >= 2]
     top = float(np.percentile(stable, 95)) if len(stable) else 5.0
-    damping.y_range.start, damping.y_range.end = 0.0, 1.3 * max(top, *_dampings(model))
-    legend_above(orders)
-    return as_plot(column(orders, damping, sizing_mode="stretch_width"))
+    damping.y_range.start, damping.y_range.end = 0.0, 1.3 * max(top, *dampings)
+    return orders, damping
 
 
 def _dampings(model: ModalModel | None) -> list[float]:

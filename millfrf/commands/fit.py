@@ -34,11 +34,18 @@ def fit(
     candidates: Annotated[
         Path | None, typer.Option("--candidates", metavar="FILE.json", help="Write candidate poles for a picker.")
     ] = None,
+    pick: Annotated[
+        Path | None,
+        typer.Option(
+            "--pick", metavar="FILE.toml", help="Pick poles in the browser; the file is a choice for --poles."
+        ),
+    ] = None,
 ) -> None:
     """Fit poles, vectors and residuals in a band, with error bars and a stabilisation chart that reports show.
 
     Recordings are fitted as they are, tests stacked, without windows or leakage; that is the more accurate way for
-    heavily damped modes. --poles fits exactly the poles that a file names; --candidates writes the poles to pick from.
+    heavily damped modes. --poles fits exactly the poles that a file names; --candidates writes the poles to pick from;
+    --pick shows them in the browser, and writes such a file.
     """
     from modal_fit import ModalFit
 
@@ -52,6 +59,7 @@ def fit(
         write_fit,
     )
     from ..face import fit as fit_model
+    from ..picking import check_pick, pick_in_browser
     from ..progress import bar
     from ..tables import error_table, mode_table, show
 
@@ -61,6 +69,9 @@ def fit(
     check_band(band)
     if modes is not None and modes < 1:
         raise InputError(f"--modes {modes}: give 1 or more, or leave it out to keep all that are found")
+    if pick is not None:
+        check_pick(pick, out, poles, candidates, files)
+        poles = pick_in_browser(pick, files[0], FitOptions(band, max_order=max_order, n_modes=modes), bar)
     channels = (names(excitation), names(response))
     result = fit_model(
         *files,

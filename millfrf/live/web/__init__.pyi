@@ -1,4 +1,6 @@
-from .guard import Guard, Limits
+from .connections import CountedServer
+from .guard import Guard, Limits, hosts_of
+from .handlers import Guarded, Missing
 from .server import LOOPBACK, LiveServer
 
-__all__ = ["LOOPBACK", "Guard", "Limits", "LiveServer"]
+__all__ = ["LOOPBACK", "CountedServer", "Guard", "Guarded", "Limits", "LiveServer", "Missing", "hosts_of"]

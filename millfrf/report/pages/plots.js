@@ -30,6 +30,13 @@
     range.setv({ start: middle + half * (shift - scale), end: middle + half * (shift + scale) });
   }
 
+  function untabbed(root) {  // what bokeh draws has nothing for the keyboard: the buttons beside it do
+    for (const one of root.querySelectorAll("*")) {
+      if (one.hasAttribute("tabindex")) one.tabIndex = -1;
+      if (one.shadowRoot) untabbed(one.shadowRoot);
+    }
+  }
+
   async function draw(figure) {
     const image = figure.querySelector("img");
     const item = JSON.parse(figure.querySelector("script.plot").textContent);
@@ -43,6 +50,7 @@
     figure.prepend(tools, place);
     figure.classList.add("zoomed");
     const views = await Bokeh.embed.embed_item(item, place);
+    untabbed(place);
     const model = [...views][0].model;
     const root = { find: name => [...model.references()].find(one => one.name === name) };
     const ranges = [...model.references()].filter(one => one.type === "Range1d" && ["frequency", "spindle speed"].includes(one.name));

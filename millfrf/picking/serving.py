@@ -1,0 +1,146 @@
+"""The page on which poles are picked, served to this computer alone until something is saved."""
+
+import asyncio
+import json
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from foundation import InputError, MillfrfError
+
+from ..live import LOOPBACK, CountedServer, Guard, Guarded, Limits, Missing, hosts_of
+from .session import PickSession, Pole, checked_choice, drawn_page, fitted_answer
+
+_FOLDER = Path(__file__).parent
+_KINDS = {".js": "text/javascript", ".css": "text/css", ".json": "application/json"}
+
+
+def pick_poles(
+    session: PickSession, say: Callable[[str], None], show: Callable[[str], object] | None = None
+) -> list[Pole]:
+    """Serve the page until a choice is saved, and give the choice.
+
+    The server listens on this computer only, under a path that holds a token; it answers requests with its own name
+    (``Host``) and from its own page (``Origin``), as the live page does.
+
+    Parameters
+    ----------
+    session
+        FRF and automatic fit.
+    say
+        Takes a line with the page's address.
+    show
+        Opens the address in a browser; None: the one of this computer.
+
+    Returns
+    -------
+    list of (float, float)
+        Frequency (Hz) and damping ratio of each chosen pole.
+
+    Raises
+    ------
+    MillfrfError
+        The page was left without a choice.
+    """
+    chosen = asyncio.run(_served(session, say, show or webbrowser.open))
+    if chosen is None:
+        raise MillfrfError("no poles were saved on the page: nothing is written")
+    return chosen
+
+
+async def _served(session: PickSession, say: Callable[[str], None], show: Callable[[str], object]) -> list[Pole] | None:
+    from tornado.netutil import bind_sockets
+    from tornado.web import Application
+
+    [socket] = bind_sockets(0, LOOPBACK)
+    port = socket.getsockname()[1]
+    guard = Guard(hosts_of(LOOPBACK, port, True))
+    ended: asyncio.Future[list[Pole] | None] = asyncio.get_running_loop().create_future()
+    application = Application(
+        [
+            (r"/(?P<token>[^/]*)/(?P<name>fit|save|leave)", _handler("Answer")),
+            (r"/(?P<token>[^/]*)/(?P<name>[^/]*)", _handler("File")),
+        ],
+        default_handler_class=Missing,
+        log_function=lambda _: None,  # a request's path holds the token
+        guard=guard,
+        content=_content(session),
+        session=session,
+        ended=ended,
+    )
+    server = CountedServer.with_limits(application, Limits())
+    server.add_sockets([socket])
+    url = f"http://{LOOPBACK}:{port}/{guard.token}/"
+    say(f"pick poles at {url}")
+    show(url)
+    try:
+        return await ended
+    finally:
+        await asyncio.sleep(0.2)  # the answer to the last request is on its way
+        server.stop()
+        await server.close_all_connections()
+
+
+def _content(session: PickSession) -> dict[str, tuple[bytes, str]]:
+    from figures import browser_library
+
+    own = {name: (_FOLDER / name).read_bytes() for name in ("page.js", "page.css")}
+    made = {"page.json": drawn_page(session).encode(), "bokeh.min.js": browser_library().encode()}
+    files = {name: (body, _KINDS[Path(name).suffix]) for name, body in (own | made).items()}
+    return files | {"": ((_FOLDER / "page.html").read_bytes(), "text/html; charset=utf-8")}
+
+
+def _handler(kind: str) -> Any:
+    """Handlers of tornado, made when a page is served: the command line starts without it."""
+    from tornado.web import HTTPError
+
+    class File(Guarded):
+        """A file of the page."""
+
+        def get(self, token: str, name: str) -> None:
+            del token
+            if name not in self.application.settings["content"]:
+                raise HTTPError(404)
+            body, of_kind = self.application.settings["content"][name]
+            self.set_header("Content-Type", of_kind)
+            self.write(body)
+
+    class Answer(Guarded):
+        """An answer to the page: a choice is fitted, or saved, or the page is left."""
+
+        def prepare(self) -> None:
+            super().prepare()
+            if not self._guard.origin_is_ours(self.request.headers.get_list("Origin")):
+                raise HTTPError(403)
+
+        async def post(self, token: str, name: str) -> None:
+            del token
+            settings = self.application.settings
+            try:
+                asked = json.loads(self.request.body or b"{}")
+            except (ValueError, RecursionError) as error:
+                raise HTTPError(400) from error
+            if name == "fit":
+                loop = asyncio.get_running_loop()
+                self.write(await loop.run_in_executor(None, fitted_answer, settings["session"], asked))
+                return
+            self.write(_ended(settings["session"], settings["ended"], asked if name == "save" else None))
+
+    return {"File": File, "Answer": Answer}[kind]
+
+
+def _ended(session: PickSession, ended: "asyncio.Future[list[Pole] | None]", asked: object) -> dict[str, str]:
+    """End with a choice that can be fitted, or without one; what the page is told."""
+    chosen: list[Pole] | None = None
+    if asked is not None:
+        answer = fitted_answer(session, asked)
+        if "error" in answer:
+            return {"error": str(answer["error"])}
+        try:
+            chosen = checked_choice(asked, 10**9)[0]
+        except InputError as error:
+            return {"error": str(error)}
+    if not ended.done():
+        ended.set_result(chosen)
+    return {"done": "saved" if chosen else "left"}
