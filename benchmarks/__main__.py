@@ -9,12 +9,16 @@ import os
 import platform
 import subprocess
 import sys
+import textwrap
 import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+WIDEST = 115
+"""Characters of a line of the page at most; longer ones are folded."""
+
 LIMIT = 1800.0
 """Seconds after which a benchmark is stopped."""
 
@@ -133,7 +137,8 @@ the longer trials.
 
 def _section(one: Benchmark, printed: str, ending: str, seconds: float) -> str:
     told = f"\n**{ending}**\n" if ending else ""
-    return f"## {one.question}\n\n`{one.command}` ({seconds:.0f} s)\n{told}\n```text\n{printed}\n```\n"
+    folded = "\n".join(textwrap.fill(line, WIDEST, subsequent_indent="    ") for line in printed.splitlines())
+    return f"## {one.question}\n\n`{one.command}` ({seconds:.0f} s)\n{told}\n```text\n{folded}\n```\n"
 
 
 def _commit() -> str:

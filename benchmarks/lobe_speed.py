@@ -1,4 +1,4 @@
-"""Stability on a grid and traced, against a plain semi-discretisation: `python benchmarks/lobe_speed.py`.
+"""Stability on a grid and traced, against a plain semi-discretisation: `python -m benchmarks.lobe_speed`.
 
 The 1-DOF milling benchmark (922 Hz, two teeth), a/D = 1 and 0.05 down-milling, 200 speeds x 100 depths. The baseline is
 first-order semi-discretisation in plain numpy (`plain_semi_discretisation.py`), all depths of a speed in one batch,
@@ -19,8 +19,8 @@ from math import acos, pi
 from typing import Any
 
 import numpy as np
-from plain_semi_discretisation import spectral_radii
 
+from benchmarks.plain_semi_discretisation import spectral_radii
 from cutting import MillingProcess
 from modal_fit import ModalModel
 from replay_data import table_one_model

@@ -29,10 +29,10 @@ def _mend_pages(app: Any, exception: Exception | None) -> None:
 def mended(page: str) -> str:
     """The page with names for what had none.
 
-    The search button is named by what it shows, switches of the navigation say what they do, links over pictures of the
-    gallery carry their title, and an empty cell is no heading of a column.
+    The name of the search button holds all that it shows, switches of the navigation say what they do, links over
+    pictures of the gallery carry their title, and an empty cell is no heading of a column.
     """
-    page = _SEARCH.sub(r"\1", page)
+    page = _SEARCH.sub(r'\1 title="Search" aria-label="Search Ctrl+K"', page)
     page = _TOGGLE.sub('<summary aria-label="pages below this one"><span class="toctree-toggle"', page)
     page = _THUMBNAIL.sub(r'<a class="reference internal"\1 aria-label="\2"></a></p>\n<div', page)
     return _EMPTY_HEAD.sub("<td></td>", page)

@@ -23,11 +23,11 @@ PARTS = re.compile(r"\[[^\]]*\]|\.\.\.")
 def _shown(page: Path) -> Iterator[list[str]]:
     """Command lines in blocks, fenced or indented, as words."""
     lines = page.read_text(encoding="utf-8").replace("\\\n", " ").splitlines()
-    fenced = False
+    fence = ""
     for line in lines:
         if line.startswith("```"):
-            fenced = not fenced
-        elif fenced or line.startswith("    "):
+            fence = "" if fence else line
+        elif fence not in ("", "```text") or (not fence and line.startswith("    ")):
             typed = re.sub(r"^\s*(\$ |/\S*/)?", "", line)
             if typed.startswith("millfrf ") and not typed.startswith("millfrf >"):
                 yield shlex.split(PARTS.sub("", typed), comments=True)
