@@ -6,7 +6,7 @@ from .cutting_data import check_cutting, read_checked_cutting
 from .frfs import check_frf, check_frf_for_fit
 from .hammer import check_tap_recordings, check_taps_found, check_taps_used, check_window_damping, doubts_of_taps
 from .inputs import check_band_recordings, check_inputs, driven_lines
-from .lobes_band import check_band_of_lobes
+from .lobes_band import check_band_of_lobes, limits_inside_band
 from .local_lines import check_local_frf
 from .looking import doubts_of
 from .model_and_recordings import check_model_and_recordings
@@ -74,6 +74,7 @@ __all__ = [
     "join_judged",
     "judge_recording",
     "level_table",
+    "limits_inside_band",
     "look",
     "lowest_frequency",
     "missing_concerns",

@@ -9,7 +9,14 @@ from cutting import MillingProcess
 from estimation import Frf
 from foundation import Band, InputError
 from modal_fit import ModalModel
-from stability import LimitSensitivity, StabilityLobes, limit_sensitivities, zero_order
+from stability import (
+    LimitSensitivity,
+    StabilityLobes,
+    known_lines,
+    limit_sensitivities,
+    with_residual_flexibility,
+    zero_order,
+)
 
 DECIDES = 4.0
 """Limit over the lowest of all speeds from which a mode outside the band may decide: one with a quarter of the dynamic
@@ -20,6 +27,10 @@ N_SPEEDS, N_LINES = 48, 400
 UNKNOWN = 0.1
 """Flexibility that a structure may have just outside its band, as a share of the largest inside; beyond it falls with
 the square of the frequency, as that of a mass does."""
+
+EDGE, AMPLIFIED = 0.05, 25.0
+"""Share of the band at its upper end, and how much softer than there a mode beyond it may be: a mode of 2 % damping
+leaves ``2 zeta`` of its largest flexibility below its resonance, where the band would show it."""
 
 MOVED = 0.05
 """Relative shift of a limit by so much unknown flexibility, from which on it is said. In the demonstration, whose
@@ -44,7 +55,8 @@ def check_band_of_lobes(structure: Frf | ModalModel, lobes: StabilityLobes, proc
     """Say at which speeds the limits rest on dynamics outside the band that was measured.
 
     Three things can be outside: the chatter frequency itself; harmonics of the tooth passing about it, where a tenth of
-    the largest flexibility there would move the limit by more than a twentieth; and the passing of the teeth, at speeds
+    the largest flexibility there, or as much as the upper end of the band allows, would move the limit by more than a
+    twentieth; and the passing of the teeth, at speeds
     where the limit is so high (four times the lowest that the structure has at any speed, or none) that a stiffer mode
     at an unmeasured frequency would lower it.
 
@@ -62,13 +74,14 @@ def check_band_of_lobes(structure: Frf | ModalModel, lobes: StabilityLobes, proc
     list of str
         Doubts: sentences for a warning; empty where nothing is odd.
     """
+    if isinstance(structure, Frf):
+        structure, _ = known_lines(structure)
     band = band_of_structure(structure)
     if band is None:
         return []
     rpm, chatter = lobes.spindle_speeds_rpm, lobes.chatter_frequencies
     doubts = []
-    with np.errstate(invalid="ignore"):
-        outside = np.isfinite(chatter) & ((chatter < band[0]) | (chatter > band[1]))
+    outside = _chatter_outside(lobes, band)
     if outside.any():
         doubts.append(
             f"at {_speeds(rpm, outside)} the chatter frequency ({_span(chatter[outside])} Hz) lies outside the "
@@ -76,8 +89,7 @@ def check_band_of_lobes(structure: Frf | ModalModel, lobes: StabilityLobes, proc
             "measure a wider band"
         )
     passing = process.teeth * rpm / 60
-    lowest = _lowest_limit(structure, process, band)
-    decided = (passing > band[1]) & ~outside & ~(lobes.depth_limits < DECIDES * lowest)
+    decided = _decided_beyond(structure, lobes, process, band) & ~outside
     if decided.any():
         doubts.append(
             f"at {_speeds(rpm, decided)} the teeth pass at {_span(passing[decided])} Hz, beyond the {band[0]:g} to "
@@ -87,33 +99,75 @@ def check_band_of_lobes(structure: Frf | ModalModel, lobes: StabilityLobes, proc
     return doubts + _moved_from_outside(structure, lobes, process, band, np.isfinite(chatter) & ~outside)
 
 
+def limits_inside_band(structure: Frf | ModalModel, lobes: StabilityLobes, process: MillingProcess) -> StabilityLobes:
+    """The limits that rest on what was measured; at the other speeds they are not known (NaN).
+
+    Parameters
+    ----------
+    structure
+        Receptance at the tool tip; without a band all limits stay.
+    lobes
+        Depth limits of that structure.
+    process
+        The cut they are for.
+    """
+    if isinstance(structure, Frf):
+        structure, _ = known_lines(structure)
+    band = band_of_structure(structure)
+    if band is None:
+        return lobes
+    unknown = _chatter_outside(lobes, band) | _decided_beyond(structure, lobes, process, band)
+    return replace(lobes, depth_limits=np.where(unknown, np.nan, lobes.depth_limits))
+
+
+def _chatter_outside(lobes: StabilityLobes, band: Band) -> NDArray[np.bool_]:
+    """Speeds at which the chatter frequency lies outside the band."""
+    chatter = lobes.chatter_frequencies
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.isfinite(chatter) & ((chatter < band[0]) | (chatter > band[1])))
+
+
+def _decided_beyond(
+    structure: Frf | ModalModel, lobes: StabilityLobes, process: MillingProcess, band: Band
+) -> NDArray[np.bool_]:
+    """Speeds at which the teeth pass beyond the band and the limit is so high that a mode there may decide."""
+    passing = process.teeth * lobes.spindle_speeds_rpm / 60
+    if not (passing > band[1]).any():
+        return np.zeros(len(passing), dtype=bool)
+    lowest = _lowest_limit(structure, process, band)
+    return np.asarray((passing > band[1]) & ~(lobes.depth_limits < DECIDES * lowest))
+
+
 def _moved_from_outside(
     structure: Frf | ModalModel, lobes: StabilityLobes, process: MillingProcess, band: Band, inside: NDArray[np.bool_]
 ) -> list[str]:
     """A doubt where harmonics outside the band would move limits whose chatter lies inside.
 
-    The shift is ``sum_q |weights[q]| UNKNOWN max |H| (edge / f_q)^2`` over the lines f_q of the motion outside the
-    band, with the weights of :class:`stability.LimitSensitivity`. Averaged coefficients have no such lines.
+    The shift is ``sum_q |weights[q]| u (edge / f_q)^2`` over the lines f_q of the motion outside the band, with the
+    weights of :class:`stability.LimitSensitivity`. Below the band the unknown flexibility u is a share of the largest
+    inside, above it no more than the upper end of the band allows. Averaged coefficients have no such lines.
     """
     if lobes.method in AVERAGED:
         return []
     places = np.flatnonzero(inside)
     chosen = places[np.linspace(0, len(places) - 1, min(ASKED, len(places))).astype(int)]
-    largest = _largest_flexibility(structure, band)
+    largest, at_edge = _flexibilities(structure, band)
+    above, below = min(UNKNOWN * largest, AMPLIFIED * at_edge), UNKNOWN * largest
     shifts = []
     for found, depth in zip(_sensitivities(structure, process, lobes, chosen), lobes.depth_limits[chosen], strict=True):
         if found is not None:
             lines = np.abs(found.lines)
-            fall = np.where(lines > band[1], (band[1] / np.maximum(lines, band[1])) ** 2, lines < band[0])
-            size = np.linalg.norm(found.weights, axis=(1, 2))
-            shifts.append(float(size @ fall) * UNKNOWN * largest / float(depth))
+            beyond = np.where(lines > band[1], above * (band[1] / np.maximum(lines, band[1])) ** 2, 0.0)
+            unknown = np.where(lines < band[0], below, beyond)
+            shifts.append(float(np.linalg.norm(found.weights, axis=(1, 2)) @ unknown) / float(depth))
     moved = np.array(shifts) > MOVED
     if not moved.any():
         return []
     return [
-        f"at {int(moved.sum())} of {len(moved)} speeds asked, harmonics of the tooth passing outside the "
-        f"{band[0]:g} to {band[1]:g} Hz in which the structure was measured have a say: with {100 * UNKNOWN:.0f} % of "
-        f"its largest flexibility there, limits would shift by up to {100 * max(shifts):.0f} %; measure a wider band"
+        f"at {int(moved.sum())} of the {len(moved)} speeds that were looked at, harmonics of the tooth passing outside "
+        f"the {band[0]:g} to {band[1]:g} Hz in which the structure was measured have a say: a mode there that is as "
+        f"soft as {100 * above / largest:.2g} % of the largest flexibility inside would shift limits by up to "
+        f"{100 * max(shifts):.0f} % (to first order); measure and fit a wider band to exclude it"
     ]
 
 
@@ -135,16 +189,19 @@ def _sensitivities(
         return [None] * len(chosen)
 
 
-def _largest_flexibility(structure: Frf | ModalModel, band: Band) -> float:
-    """Largest Frobenius norm of the receptance inside the band, m/N."""
+def _flexibilities(structure: Frf | ModalModel, band: Band) -> tuple[float, float]:
+    """Largest Frobenius norm of the receptance inside the band, and the median at its upper end, m/N."""
     if isinstance(structure, ModalModel):
         natural = structure.natural_frequencies
         peaks = natural[(natural >= band[0]) & (natural <= band[1])]
         lines = np.unique(np.concatenate([np.linspace(max(band[0], 1e-3 * band[1]), band[1], N_LINES), peaks]))
-        values = structure.receptance(lines)
+        values = with_residual_flexibility(structure).receptance(lines)
     else:
-        values = structure.values[structure.valid & (structure.frequencies > 0)]
-    return float(np.linalg.norm(values, axis=(1, 2)).max())
+        inside = structure.valid & (structure.frequencies > 0)
+        lines, values = structure.frequencies[inside], structure.values[inside]
+    size = np.linalg.norm(values, axis=(1, 2))
+    end = size[lines >= band[1] - EDGE * (band[1] - band[0])]
+    return float(size.max()), float(np.median(end))
 
 
 def _lowest_limit(structure: Frf | ModalModel, process: MillingProcess, band: Band) -> float:

@@ -13,6 +13,7 @@ from replay_data import Settling, settle
 from stability import (
     LimitBand,
     RecommendedCut,
+    StabilityLobes,
     certified_cut,
     certified_lobes,
     delay_system,
@@ -21,7 +22,7 @@ from stability import (
     lowered,
 )
 
-from ..gate import check_band_of_lobes
+from ..gate import check_band_of_lobes, limits_inside_band
 from .lobes_check import CheckedLobes
 
 CONFIDENCE, DRIFT = 0.95, 0.02
@@ -29,6 +30,10 @@ CONFIDENCE, DRIFT = 0.95, 0.02
 
 LESS, TIMES = 0.9, 4
 """Share to which a cut that does not settle is lowered, and how often."""
+
+
+NO_LIMIT = 0.999
+"""Share of the largest depth from which it was that depth that ended the search, and no limit."""
 
 
 @dataclass(frozen=True)
@@ -64,17 +69,31 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
         band = limit_band(structure, process, lobes, 1.5 * deepest)
     except InputError as error:
         return Recommendation(sentences=(f"No band and no recommended cut: {error}.",))
+    known = limits_inside_band(structure, lobes, process)
     try:
-        cut = certified_cut(structure, process, lobes, errors, confidence=CONFIDENCE, drift=DRIFT, max_depth=deepest)
+        cut = certified_cut(structure, process, known, errors, confidence=CONFIDENCE, drift=DRIFT, max_depth=deepest)
     except InputError as error:
-        return Recommendation(band, None, (f"No recommended cut: {error}.",))
+        return Recommendation(band, None, (f"No recommended cut: {error}.", *_left_out(known, lobes)))
     tried, runs = _tried(structure, process, cut)
     if tried is None:
         told = f"The recommended cut is withdrawn: the limits allow {_cut(cut)}, but simulated {_ran(runs[-1])}."
         return Recommendation(band, None, (told,), (told,))
-    sentences = [_recommended(tried, name, process), *_simulated(tried, cut, runs)]
+    sentences = [_recommended(tried, name, process), *_simulated(tried, cut, runs), *_left_out(known, lobes)]
+    if tried.depth >= NO_LIMIT * deepest:
+        sentences.append(f"No limit was met up to the {1e3 * deepest:g} mm that were looked at; the cutter decides.")
     warnings = _outside_band(structure, process, tried, name)
     return Recommendation(band, tried, tuple(sentences), warnings)
+
+
+def _left_out(known: StabilityLobes, lobes: StabilityLobes) -> list[str]:
+    """What is said of speeds at which the limits do not rest on what was measured."""
+    count = int(np.isnan(known.depth_limits).sum() - np.isnan(lobes.depth_limits).sum())
+    if not count:
+        return []
+    return [
+        f"{count} of {len(lobes.spindle_speeds)} speeds are left out of this choice: chatter, or the passing of the "
+        "teeth, lies outside the band in which the structure was measured, and nothing is known there."
+    ]
 
 
 def simulable(model: ModalModel, process: MillingProcess) -> ModalModel:

@@ -12,6 +12,7 @@ from foundation import DegreeOfFreedom, InputError
 from modal_fit import ModalModel
 
 from .beyond_band import with_residual_flexibility
+from .measured_lines import known_lines
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -45,7 +46,8 @@ class ToolReceptance:
 def tool_receptance(structure: Frf | ModalModel, *, node: str | None = None) -> ToolReceptance:
     """Take X, Y, Z of one node from a measured FRF or a modal model, signs and order put right.
 
-    A measured FRF is interpolated linearly in real and imaginary part between its valid lines; a modal model is
+    A measured FRF is interpolated linearly in real and imaginary part between its valid lines, those inside its band
+    that are no noise (:func:`known_lines`); a modal model is
     evaluated where it is asked, from a twentieth of its lowest to three times its highest natural frequency.
 
     Parameters
@@ -60,12 +62,14 @@ def tool_receptance(structure: Frf | ModalModel, *, node: str | None = None) -> 
     InputError
         No common direction at the node, no receptance, or too few valid lines.
     """
+    said: tuple[str, ...] = ()
     if isinstance(structure, Frf):
-        structure = to_receptance(structure)
+        structure, said = known_lines(to_receptance(structure))
     placed = tool_directions(structure, node).place
     if isinstance(structure, ModalModel):
         return _from_model(with_residual_flexibility(structure), placed)
-    return _from_frf(structure, placed)
+    found = _from_frf(structure, placed)
+    return replace(found, warnings=(*said, *found.warnings))
 
 
 @dataclass(frozen=True)

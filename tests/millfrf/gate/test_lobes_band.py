@@ -10,6 +10,7 @@ from cutting import write_cutting_process
 from foundation import Band
 from millfrf.__main__ import DONE, run
 from millfrf.chain import compute_lobes, speed_axis
+from millfrf.gate import limits_inside_band
 from modal_fit import ModalModel, write_modal_model
 from replay_data import ACETAL_CUTTER, default_structure, tip_model
 from stability import read_lobes
@@ -79,3 +80,15 @@ def test_the_doubt_reaches_terminal_file_and_reader(tmp_path: Path, capsys: pyte
     assert code == DONE
     assert "warning: at 2 of 2 speeds (5800 to 6000 rpm) the teeth pass" in capsys.readouterr().err
     assert any("the teeth pass at" in text for text in read_lobes(out).warnings)
+
+
+def test_speeds_whose_teeth_pass_beyond_the_band_allow_no_advice() -> None:
+    model = fitted((12.0, 24.0))
+    speeds = speed_axis(600, 6600, 3)
+    lobes = compute_lobes(model, ACETAL_CUTTER, speeds, 0.05)
+    known = limits_inside_band(model, lobes, ACETAL_CUTTER).depth_limits
+    assert known[0] == lobes.depth_limits[0]
+    # the teeth pass at 120 and 220 Hz, and a limit there is far above the lowest or none at all
+    assert np.isnan(known[1:]).all()
+    whole = replace(model, band=None)
+    np.testing.assert_array_equal(limits_inside_band(whole, lobes, ACETAL_CUTTER).depth_limits, lobes.depth_limits)
