@@ -28,11 +28,14 @@ from .measurement import (
     time_figure,
 )
 from .modes import (
+    MovingShapes,
     assurance_figure,
     compass_figure,
     draw_model,
     indicator_figure,
     mode_figure,
+    moving_shapes,
+    shapes_figure,
     stabilisation_figure,
     synthesis_figure,
 )
@@ -79,6 +82,7 @@ __all__ = [
     "FrfCurves",
     "GalleryEntry",
     "LobesBand",
+    "MovingShapes",
     "ShownCut",
     "SmallSvg",
     "StableAbove",
@@ -112,6 +116,7 @@ __all__ = [
     "line_style",
     "lobes_figure",
     "mode_figure",
+    "moving_shapes",
     "new_figure",
     "panel_letter",
     "picking_chart",
@@ -120,6 +125,7 @@ __all__ = [
     "robot_evidence_figure",
     "robot_spectra_figure",
     "save_figure",
+    "shapes_figure",
     "spectra_figure",
     "stabilisation_figure",
     "synthesis_figure",

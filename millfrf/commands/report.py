@@ -19,6 +19,10 @@ def report(
     reference: Annotated[
         Path | None, typer.Option("--reference", metavar="MODEL.json", help="Known dynamics to draw beside the fit.")
     ] = None,
+    geometry: Annotated[
+        Path | None,
+        typer.Option("--geometry", metavar="FILE", help="Places of the points, for mode shapes: .toml, .uff or .csv."),
+    ] = None,
     figures: Figures = None,
     figure_format: FigureFormat = "svg",
 ) -> None:
@@ -27,7 +31,7 @@ def report(
     from ..report import ReportOptions, asked_figures, write_report
 
     check_output(out, (".html", ".htm"), files)
-    options = ReportOptions(title, check_band(band), reference, asked_figures(figures, figure_format))
+    options = ReportOptions(title, check_band(band), reference, asked_figures(figures, figure_format), geometry)
     for doubt in write_report(out, files, options, bar):
         say(f"warning: {doubt}")
     say(f"wrote {out}" + ("" if figures is None else f" and its figures in {figures}"))

@@ -8,13 +8,13 @@ from typing import Any
 
 from acquisition import Recording
 from cutting import MillingProcess
-from estimation import Frf, read_frf
+from estimation import Frf, Geometry, read_frf, read_geometry
 from foundation import InputError
 from modal_fit import ModalModel, read_modal_model
 from stability import StabilityLobes, read_lobes
 
 from ..chain import KeptCut, read_cuts
-from ..file_kinds import CHATTER, CUTTING, FRF, LOBES, MODEL, RECORDING, kind_of
+from ..file_kinds import CHATTER, CUTTING, FRF, GEOMETRY, LOBES, MODEL, RECORDING, kind_of
 from ..gate import Given, check_belonging, read_checked_cutting
 from ..provenance import read_provenance, sha256
 
@@ -58,6 +58,8 @@ class Collected:
         All files, in the order given.
     recordings, frfs, models, lobes, cutting, chatter
         Contents by kind, each with the file it came from.
+    geometries
+        Places of the points, each with the file it came from.
     doubts
         Files that do not belong together, and FRFs that look wrong; one sentence each.
     """
@@ -70,6 +72,7 @@ class Collected:
     cutting: tuple[tuple[SourceFile, MillingProcess], ...] = field(default=())
     doubts: tuple[str, ...] = ()
     chatter: tuple[tuple[SourceFile, tuple[KeptCut, ...]], ...] = ()
+    geometries: tuple[tuple[SourceFile, Geometry], ...] = ()
 
     def model_of(self, file: SourceFile, frf: Frf) -> tuple[SourceFile, ModalModel] | None:
         """The model fitted to an FRF, or else one of the same degrees of freedom."""
@@ -122,6 +125,7 @@ def collect(paths: Sequence[str | os.PathLike[str]]) -> Collected:
         tuple((file, read_checked_cutting(file.path)[0]) for file in chosen(CUTTING)),
         tuple(doubts),
         tuple((file, read_cuts(file.path)) for file in chosen(CHATTER)),
+        tuple((file, read_geometry(file.path)) for file in chosen(GEOMETRY)),
     )
 
 

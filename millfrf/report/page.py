@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from estimation import read_geometry
 from modal_fit import ModalModel, read_modal_model
 
-from ..file_kinds import MODEL
+from ..file_kinds import GEOMETRY, MODEL
 from ..gate import (
     check_frf,
     check_model,
@@ -51,6 +52,9 @@ class ReportOptions:
         Frequency axis of its figures; None: chosen by the fit.
     reference
         Model file with known dynamics to draw beside the measured ones.
+    geometry
+        File of a geometry on which mode shapes are drawn: TOML, UFF (datasets 15, 2411, 82) or CSV; a TOML may stand
+        among the other files as well.
     figures
         Folder and format in which each figure is written as a file too; None: no files.
     """
@@ -59,6 +63,7 @@ class ReportOptions:
     band: tuple[float, float] | None = None
     reference: str | os.PathLike[str] | None = None
     figures: FigureFiles | None = None
+    geometry: str | os.PathLike[str] | None = None
 
 
 def write_report(
@@ -79,7 +84,8 @@ def write_report(
     InputError
         A file that cannot be used; nothing is written.
     """
-    collected, chosen = collect(paths), options or ReportOptions()
+    chosen = options or ReportOptions()
+    collected = _with_geometry(collect(paths), chosen)
     page, sections = report_page(collected, chosen, progress)
     write_results_page(path, page, sections, chosen.figures)
     return list(collected.doubts)
@@ -118,6 +124,16 @@ def report_page(
         clear="No warning from estimation, fit or channel levels.",
     )
     return page, sections
+
+
+def _with_geometry(collected: Collected, options: ReportOptions) -> Collected:
+    """The geometry of the options before those among the files."""
+    if options.geometry is None:
+        return collected
+    geometry, path = read_geometry(options.geometry), Path(options.geometry)
+    file = SourceFile(path, GEOMETRY, sha256(path), {})
+    geometries = ((file, geometry), *collected.geometries)
+    return replace(collected, files=(*collected.files, file), geometries=geometries)
 
 
 def _with_reference(collected: Collected, options: ReportOptions, reference: ModalModel | None) -> Collected:

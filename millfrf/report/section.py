@@ -5,7 +5,7 @@ from typing import Literal
 
 from matplotlib.figure import Figure
 
-from figures import SmallSvg, ZoomedPlot, as_data_uri
+from figures import MovingShapes, SmallSvg, ZoomedPlot, as_data_uri
 
 from ..tables import Table
 
@@ -26,6 +26,8 @@ class Picture:
         The drawing itself, from which files in other formats are made.
     zoomed
         The same for the screen, to zoom and to point at; None: the picture alone.
+    moving
+        The same for the screen, to turn and to play; None: it does not move.
     """
 
     uri: str
@@ -33,6 +35,7 @@ class Picture:
     alternative: str
     figure: Figure | SmallSvg = field(repr=False, compare=False)
     zoomed: ZoomedPlot | None = None
+    moving: MovingShapes | None = None
 
 
 def picture_of(
@@ -42,6 +45,7 @@ def picture_of(
     *,
     kind: Literal["svg", "png"] = "svg",
     zoomed: ZoomedPlot | None = None,
+    moving: MovingShapes | None = None,
 ) -> Picture:
     """A figure as a picture of a page.
 
@@ -53,11 +57,11 @@ def picture_of(
         As in :class:`Picture`.
     kind
         ``svg``, or ``png`` for figures of very many points.
-    zoomed
+    zoomed, moving
         As in :class:`Picture`.
     """
     uri = figure.uri() if isinstance(figure, SmallSvg) else as_data_uri(figure, kind=kind)
-    return Picture(uri, caption, alternative, figure, zoomed)
+    return Picture(uri, caption, alternative, figure, zoomed, moving)
 
 
 @dataclass(frozen=True)

@@ -72,9 +72,12 @@ def page_text(page: ResultsPage, sections: Sequence[Section]) -> str:
     )
     environment.globals["of_numbers"] = of_numbers
     environment.filters["in_script"] = _in_script
+    pictures = list(pictures_of(sections))
     scripts = [_own("report.js")]
-    if any(picture.zoomed for picture in pictures_of(sections)):
-        scripts = [browser_library(), _own("report.js") + _own("plots.js")]
+    if any(picture.moving for picture in pictures):
+        scripts.append(_own("shapes.js"))
+    if any(picture.zoomed for picture in pictures):
+        scripts += [browser_library(), _own("plots.js")]
     return environment.get_template("page.html.j2").render(
         page=page,
         style=_own("report.css"),

@@ -63,7 +63,9 @@ def mode_section(collected: Collected) -> Section:
             shown, peaks = _indicators(collected, file, model)
             pictures += shown
             sentences += peaks
-        shape_tables, shape_pictures, shape_sentences = shape_part(file.path.name, model)
+        shape_tables, shape_pictures, shape_sentences = shape_part(
+            file.path.name, model, [(known.path.name, geometry) for known, geometry in collected.geometries]
+        )
         tables += shape_tables
         pictures += shape_pictures
         sentences += shape_sentences

@@ -1,6 +1,9 @@
 """Mode shapes in a report: table, auto-MAC with MPC and MPD, and every vector in the complex plane."""
 
-from figures import assurance_figure, compass_figure, mode_figure
+from collections.abc import Sequence
+
+from estimation import Geometry
+from figures import assurance_figure, compass_figure, mode_figure, moving_shapes, shapes_figure
 from modal_fit import ModalModel, ModeShapes
 
 from ...tables import Table, shape_table, shapes_of
@@ -16,7 +19,9 @@ ALIKE = 0.9
 """MAC from which two modes are told as alike."""
 
 
-def shape_part(name: str, model: ModalModel) -> tuple[tuple[Table, ...], tuple[Picture, ...], tuple[str, ...]]:
+def shape_part(
+    name: str, model: ModalModel, geometries: Sequence[tuple[str, Geometry]] = ()
+) -> tuple[tuple[Table, ...], tuple[Picture, ...], tuple[str, ...]]:
     """Give tables, pictures and sentences on the shapes of a model, empty where it has none.
 
     Parameters
@@ -25,6 +30,8 @@ def shape_part(name: str, model: ModalModel) -> tuple[tuple[Table, ...], tuple[P
         Name of the model's file.
     model
         Modal model with at least two degrees of freedom on one side.
+    geometries
+        Name of the file, and places of the points, of each geometry; the first that knows a point is drawn.
     """
     shapes, table = shapes_of(model), shape_table(model, f"{name}: mode shapes")
     if shapes is None or table is None:
@@ -36,7 +43,33 @@ def shape_part(name: str, model: ModalModel) -> tuple[tuple[Table, ...], tuple[P
         pictures.append(_right_and_left(name, model))
     elif len(model.poles) <= MOST:
         pictures.append(_compasses(name, model, shapes))
-    return (table,), tuple(pictures), _alike(name, model, shapes)
+    moving, missing = _moving(name, model, shapes, geometries)
+    return (table,), (*moving, *pictures), (*_alike(name, model, shapes), *missing)
+
+
+def _moving(
+    name: str, model: ModalModel, shapes: ModeShapes, geometries: Sequence[tuple[str, Geometry]]
+) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
+    """Shapes on the first geometry that knows a point of the model, and a sentence on what does not move."""
+    for file, geometry in geometries:
+        moving = moving_shapes(geometry, model, shapes)
+        if moving is None:
+            continue
+        nodes = list(dict.fromkeys(dof.split(":")[0] for dof in shapes.dofs))
+        unknown = [node for node in nodes if node not in geometry.nodes]
+        still = len(geometry.nodes) - int(moving.measured.sum())
+        told = [f"{still} of its {len(geometry.nodes)} nodes were not measured and do not move"] if still else []
+        told += [f"{', '.join(unknown[:5])} stand in no geometry and are not drawn"] if unknown else []
+        caption = (
+            f"{name}: mode shapes ({shapes.side} vectors) on {file}. Grey: at rest; blue: displaced, dots where it was "
+            "measured. Only measured directions move."
+        )
+        words = f"Mode shapes of {name} on the geometry of {file}"
+        picture = picture_of(shapes_figure(moving), caption, words, moving=moving)
+        return (picture,), tuple(f"{name} on {file}: {one}." for one in told)
+    if not geometries:
+        return (), ()
+    return (), (f"{name}: no geometry has one of its points; its shapes are not drawn in place.",)
 
 
 def _assurance(name: str, model: ModalModel, shapes: ModeShapes) -> Picture:

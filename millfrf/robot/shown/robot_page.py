@@ -20,9 +20,8 @@ from robot_model import (
 )
 
 from ...options import check_output
-from ..mode_page import Fact, mode_page
-from ..picture import skeleton
 from ..postures import Asked, posture_of, spatial
+from .page_of_modes import Fact, mode_page
 
 Real = NDArray[np.float64]
 
@@ -45,7 +44,7 @@ def show_robot(robot: str, asked: Asked, out: Path, browser: bool = False) -> li
     modes = modes_at(case.robot, q) if len(result.frequencies) else empty
     facts = (_joint_facts(case, q), _posture_facts(case, driven, q, result))
     with writing_whole_file(out) as unfinished:
-        unfinished.write_text(mode_page(case.name, modes, skeleton(modes), facts, result.warnings), encoding="utf-8")
+        unfinished.write_text(mode_page(case.name, modes, facts, result.warnings), encoding="utf-8")
     if browser and not webbrowser.open(out.resolve().as_uri()):
         raise InputError(f"no browser was found; open {out} in one")
     return [*(f"warning: {warning}" for warning in result.warnings), f"wrote {out}: open it in a browser"]

@@ -24,9 +24,10 @@ def test_the_page_needs_no_network_and_tells_the_joints(tmp_path: Path, robot: s
     page = tmp_path / "r.html"
     assert run(["robot", "show", robot, "--out", str(page)]) == DONE
     text = page.read_text()
-    assert "http" not in text
+    assert "http://" not in text
+    assert "https://" not in text
     assert "stiffness along its motion" in text
-    assert ('class="warning"' in text) == bool(in_posture(*_case(robot)).warnings)
+    assert ('class="warnings"' in text) == bool(in_posture(*_case(robot)).warnings)
 
 
 def _case(robot: str):  # type: ignore[no-untyped-def]
