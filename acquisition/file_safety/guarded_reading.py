@@ -35,7 +35,7 @@ _rehearsed: set[tuple[str, int, int]] = set()
 
 
 def read_guarded(path: Path, job: Literal["mat", "arrays"]) -> dict[str, Any]:
-    """Arrays and texts of a file by name; what is neither is an empty array of objects.
+    """Arrays and texts of a file by name; a cell of texts is an array of texts, what else there is an empty array.
 
     Raises
     ------
@@ -49,6 +49,8 @@ def read_guarded(path: Path, job: Literal["mat", "arrays"]) -> dict[str, Any]:
         for entry in json.loads((folder / "index.json").read_text(encoding="utf-8")):
             if "text" in entry:
                 fields[entry["name"]] = entry["text"]
+            elif "texts" in entry:
+                fields[entry["name"]] = np.array(entry["texts"], dtype=str)
             elif "file" in entry:
                 fields[entry["name"]] = np.load(folder / entry["file"], allow_pickle=False)
             else:

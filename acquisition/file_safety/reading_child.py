@@ -22,6 +22,8 @@ _CPU_SECONDS = 5.0
 _BYTES_A_SECOND = 20e6
 _LARGEST_RATIO = 1100.0
 """No compression that HDF5 files use shrinks by more (deflate: 1032)."""
+_LONGEST_CELL = 4096
+"""Texts in a list of names or units."""
 
 
 def limit(size: int) -> None:
@@ -83,13 +85,32 @@ def read_arrays(path: Path, folder: Path) -> None:
     def visit(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset) and not name.startswith("#"):
             _look_at(name, item)
-            text = item.attrs.get("MATLAB_class") == b"char"
-            value = _as_complex(np.asarray(item[()]))
-            fields[name.replace("/", ".")] = "".join(map(chr, value.reshape(-1).astype(int))) if text else value
+            fields[name.replace("/", ".")] = _cell_of_references(item) or _of_dataset(item)
 
     with h5py.File(path, "r") as file:
         file.visititems(visit)
     _hand_over(fields, folder)
+
+
+def _of_dataset(item: Any) -> Any:
+    value = _as_complex(np.asarray(item[()]))
+    if item.attrs.get("MATLAB_class") != b"char" or value.dtype.kind not in "iu":
+        return value
+    if item.attrs.get("MATLAB_empty"):
+        return ""
+    if value.ndim == 2 and min(value.shape) > 1:
+        return ["".join(map(chr, row)).strip() for row in value.T.astype(int)]
+    return "".join(map(chr, value.reshape(-1).astype(int)))
+
+
+def _cell_of_references(item: Any) -> list[Any]:
+    """Members of a MATLAB cell (version 7.3 keeps references to them); empty where it is none, or too long."""
+    if item.attrs.get("MATLAB_class") != b"cell" or not 0 < item.size <= _LONGEST_CELL:
+        return []
+    members = [item.file[reference] for reference in item[()].reshape(-1)]
+    for member in members:
+        _look_at(member.name, member)
+    return [_of_dataset(one) if isinstance(one, h5py.Dataset) else None for one in members]
 
 
 def _as_complex(value: Any) -> Any:
@@ -124,11 +145,32 @@ def _hand_over(fields: dict[str, Any], folder: Path) -> None:
         entry: dict[str, Any] = {"name": name}
         if isinstance(value, str):
             entry["text"] = value
+        elif texts := _texts(value):
+            entry["texts"] = texts
         elif isinstance(value, np.ndarray) and not value.dtype.hasobject and not value.dtype.names:
             entry["file"] = f"{number}.npy"
             np.save(folder / entry["file"], value, allow_pickle=False)
         index.append(entry)
     (folder / "index.json").write_text(json.dumps(index), encoding="utf-8")
+
+
+def _texts(value: Any) -> list[str]:
+    """Texts of a cell or a string array that holds nothing else; empty where it does."""
+    cell = isinstance(value, np.ndarray) and value.dtype.hasobject and not value.dtype.names
+    members = list(value.reshape(-1)) if cell and value.size <= _LONGEST_CELL else value
+    if not isinstance(members, list):
+        return []
+    texts = [_text(one) for one in members]
+    return [one for one in texts if one is not None] if None not in texts else []
+
+
+def _text(member: Any) -> str | None:
+    """A text, the empty one of MATLAB (an array without entries) included; None where it is something else."""
+    if isinstance(member, bytes):
+        return member.decode("utf-8", "replace")
+    if isinstance(member, np.ndarray) and (member.dtype.kind == "U" or member.size == 0) and member.size <= 1:
+        return str(member.reshape(-1)[0]).strip() if member.size else ""
+    return member.strip() if isinstance(member, str) else None
 
 
 JOBS = {"rehearsal": rehearse, "arrays": read_arrays, "mat": read_mat}

@@ -26,6 +26,7 @@ _AFTER_WORD, _AFTER_LETTER = r"[\s_.-]*[xyz]?[\s_.-]*\d*", r"[ _]?[xyz]\d*"
 
 _TRIED = ("force", "acceleration", "velocity", "displacement", "moment", "voltage", "angular_velocity", "angle")
 _PLACED = ("force", "moment", "acceleration", "velocity", "displacement")
+_AXIS_ASKED = Question("along which axis does it count positive, such as +X, and at which node; else no FRF has it")
 _COUNTS = "; its values are whole numbers: of a converter's counts give sensitivity (counts per unit) and offset too"
 
 
@@ -104,7 +105,7 @@ def _place(name: str, quantity: str) -> dict[str, Any]:
     axes = {axis for word in words if (axis := _axis(word))}
     places = {_PLACES[word] for word in words if word in _PLACES}
     if len(axes) != 1 or len(places) > 1 or not (places or quantity in _PLACED):
-        return {}
+        return {"direction": _AXIS_ASKED} if quantity in _PLACED else {}
     axis = axes.pop()
     node = places.pop() if places else "TCP" if quantity in ("force", "moment") else "HOUSING"
     if re.search(rf"-\w*{axis}(?![A-Za-z])", name, re.IGNORECASE) or any(word in _TURNED for word in words):

@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 
 from .questions import Question
 
-_RATES = ("fs", "samplerate", "sample_rate", "samplingrate", "sampling_rate", "srate", "f_s", "rate")
+_RATES = {
+    *("fs", "samplerate", "samplingrate", "srate", "rate", "samplefrequency", "samplingfrequency"),
+    *("samplefreq", "samplingfreq", "abtastrate", "abtastfrequenz"),
+}
+"""Names of rates, without their underscores."""
+
+_LIKE_RATES = re.compile(r"freq|rate|sampl|abtast|hz|^f_?s|^dt$|^ts$|delta_?t|interval", re.IGNORECASE)
 _TIME = re.compile(r"(?:t|time|times|zeit|timestamp)(?:[\s_]?(?:s|ms|us|\d+))?")
 _TIME_UNITS = {"s": "s", "sec": "s", "ms": "ms", "us": "us", "µs": "us", "μs": "us"}
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
@@ -79,7 +85,7 @@ def guessed_clock(times: Sequence[TimeColumn], fields: Mapping[str, Any], beside
         if LEAST_RATE <= rate <= LARGEST_RATE:
             return {"sample_rate": name}
         return {"sample_rate": Question(f"the file says {name} = {rate:g}: how many samples a second are that")}
-    return {"sample_rate": Question(f"how many samples a second{beside}")}
+    return {"sample_rate": Question(f"how many samples a second{_candidates(fields) or beside}")}
 
 
 def _of_time(time: TimeColumn) -> dict[str, Any]:
@@ -103,9 +109,27 @@ def _unit_of_name(name: str) -> str:
 
 
 def _is_rate(name: str, values: Any) -> bool:
-    plain = re.sub(r"[\s-]", "_", re.split(r"[./]", name)[-1].lower())
-    numeric = np.issubdtype(np.asarray(values).dtype, np.number)
-    return plain in _RATES and np.size(values) == 1 and numeric and bool(np.isfinite(np.ravel(values)[0]))
+    plain = re.sub(r"[\s_-]", "", re.split(r"[./]", name)[-1].lower())
+    return plain in _RATES and _is_number(values)
+
+
+def _is_number(values: Any) -> bool:
+    numeric = np.issubdtype(np.asarray(values).dtype, np.number) and not np.iscomplexobj(values)
+    return np.size(values) == 1 and numeric and bool(np.isfinite(np.ravel(values)[0]))
+
+
+def _candidates(fields: Mapping[str, Any]) -> str:
+    """Single numbers whose name or size is that of a rate or a step of time, as a hint behind the question."""
+    shown = []
+    for name, values in fields.items():
+        number = float(np.ravel(values)[0]) if _is_number(values) else 0.0
+        if number <= 0 or not _LIKE_RATES.search(re.split(r"[./]", name)[-1]):
+            continue
+        if LEAST_RATE <= number <= LARGEST_RATE:
+            shown.append(f"{name} = {number:.10g}?")
+        elif LEAST_RATE <= 1 / number <= LARGEST_RATE:
+            shown.append(f"1/{name} = {1 / number:.10g}?")
+    return f"; {', '.join(shown)}" if shown else ""
 
 
 def even_step(values: Any) -> float:

@@ -133,10 +133,11 @@ def _head(lines: list[str], kept: list[int], way: _Writing) -> int:
 
 def _are_headings(cells: list[str]) -> bool:
     """Whether the lowest row of texts is headings: most of its cells are neither units nor missing."""
-    return sum(not _is_unit(cell.strip("[]()")) for cell in cells) > len(cells) / 2
+    return sum(not is_unit(cell.strip("[]()")) for cell in cells) > len(cells) / 2
 
 
-def _is_unit(cell: str) -> bool:
+def is_unit(cell: str) -> bool:
+    """Whether a text is a unit, or stands for none or a missing one."""
     return cell in _OTHER_UNITS or any(_fits(quantity, cell) for quantity in SI_UNITS)
 
 

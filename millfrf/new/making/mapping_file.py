@@ -18,6 +18,7 @@ from ...toml_files import described_tables, toml_files
 from .channel_guesses import guessed_channel, split_heading
 from .clock_guesses import TimeColumn, even_step, guessed_clock, is_time
 from .csv_look import seen_csv_options
+from .file_texts import column_texts, notes, texts_of
 from .questions import Question
 from .template import FILL_IN, Row, template
 
@@ -65,9 +66,12 @@ def mapping_for(path: Path) -> NewMapping:
         f"Quantities, nodes and directions are guessed from names: check each. Places marked {FILL_IN} are open.",
         f"The file holds {_listed(opened)}.",
         *_left_out(opened, columns),
+        *_said_of_columns(opened, columns),
+        *_noted(opened),
     ]
-    text = template("\n".join(lines), described_tables(kind), rows)
-    return NewMapping(text, len(channels), text.count(FILL_IN) - 1)
+    title = "\n".join(lines)
+    text = template(title, described_tables(kind), rows)
+    return NewMapping(text, len(channels), text.count(FILL_IN) - title.count(FILL_IN))
 
 
 @dataclass(frozen=True)
@@ -96,9 +100,11 @@ def _columns(opened: ArrayFile) -> Iterator[_Column]:
         if table.shape[1] == 1 and not opened.headings:
             yield _Column(array, re.split(r"[./]", name)[-1], opened.array_units.get(name, ""), table[:, 0])
             continue
+        told = column_texts(opened.fields, name, table.shape[1])
+        units = opened.units or tuple(one.strip("[]()") for one in told.units)
         for number in range(table.shape[1]):
-            heading = opened.headings[number] if opened.headings else _numbered(name, number, table.shape[1])
-            unit = opened.units[number] if opened.units else ""
+            heading = (opened.headings or told.names or _numbered(name, table.shape[1]))[number]
+            unit = units[number] if units else ""
             once = bool(opened.headings) and bool(heading) and opened.headings.count(heading) == 1
             place = {**array, "column": heading if once else number + 1}
             yield _Column(place, heading or f"column {number + 1}", unit, table[:, number])
@@ -111,10 +117,23 @@ def _columns_last(values: NDArray[Any]) -> NDArray[Any]:
     return values if values.shape[0] >= values.shape[1] else values.T
 
 
-def _numbered(name: str, number: int, count: int) -> str:
-    """Name of an array's column; three of them are taken for X, Y and Z."""
+def _numbered(name: str, count: int) -> list[str]:
+    """Names of an array's columns; three of them are taken for X, Y and Z."""
     short = re.split(r"[./]", name)[-1]
-    return f"{short}_{'xyz'[number]}" if count == 3 else f"{short} {number + 1}"
+    return [f"{short}_{'xyz'[number]}" if count == 3 else f"{short} {number + 1}" for number in range(count)]
+
+
+def _said_of_columns(opened: ArrayFile, columns: Sequence[_Column]) -> list[str]:
+    """A line for each array whose columns get names or units from other fields of the file."""
+    counts = Counter(str(one.place["array"]) for one in columns if "array" in one.place)
+    said = [] if opened.headings else [column_texts(opened.fields, name, counts[name]).said for name in counts]
+    return [line for line in said if line]
+
+
+def _noted(opened: ArrayFile) -> list[str]:
+    """What the file says beside its samples, for whoever fills the mapping in."""
+    said = [] if opened.headings else list(notes(opened.fields))
+    return ["It says beside them:", *said] * bool(said)
 
 
 def _channel(column: _Column) -> dict[str, Any]:
@@ -212,7 +231,17 @@ def _length(values: Any) -> int:
 
 
 def _listed(opened: ArrayFile) -> str:
+    """What the file holds: arrays with their sizes, and lists of texts."""
     if opened.headings:
         return f"columns {', '.join(opened.headings)}"
-    shapes = [f"{name} {'x'.join(map(str, np.shape(values)))}" for name, values in opened.fields.items()]
-    return f"arrays {', '.join(shapes)}" if shapes else "no arrays"
+    listed = [f"{name} {_size(values)}" for name, values in opened.fields.items() if not _is_single(values)]
+    return f"arrays {', '.join(listed or opened.fields)}" if opened.fields else "no arrays"
+
+
+def _is_single(values: Any) -> bool:
+    return isinstance(values, str) or np.size(values) == 1
+
+
+def _size(values: Any) -> str:
+    texts = texts_of(values)
+    return f"({len(texts)} texts)" if texts else "x".join(map(str, np.shape(values)))

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...toml_files import DescribedTable, TomlFile, described_tables, toml_files
+from .questions import Question
 from .template import FILL_IN, Row, template
 
 
@@ -14,6 +15,7 @@ def cut_text(teeth: int | None, diameter: float | None, *, plan: bool) -> str:
         given["teeth"] = teeth
     if diameter is not None:
         given["diameter_m"] = diameter
+    given |= _engagement(diameter)
     tables = [*described_tables(_kind("cut")), *(described_tables(_kind("plan")) if plan else ())]
     rows: dict[str, Sequence[Row]] = {"[cutting]": [given], "[plan]": [{}]}
     title = (
@@ -21,6 +23,16 @@ def cut_text(teeth: int | None, diameter: float | None, *, plan: bool) -> str:
         "The engagement is start_angle_deg and exit_angle_deg, or immersion (with radial_depth_m)."
     )
     return template(title, tables, rows)
+
+
+def _engagement(diameter: float | None) -> dict[str, Question]:
+    """What is asked of the engagement; ``diameter`` in m."""
+    half = "diameter_m / 2" if diameter is None else f"{diameter / 2:g}"
+    return {
+        "start_angle_deg": Question("give this and exit_angle_deg only instead of immersion", open=False),
+        "immersion": Question('"up", "down", "central" or "slot"; or both angles above'),
+        "radial_depth_m": Question(f"width of cut; half immersion, up or down: {half}; not for a slot or with angles"),
+    }
 
 
 def session_text(driver: str, n_channels: int) -> str:

@@ -13,7 +13,10 @@ class Question:
         The question, without a mark at its end.
     refused
         TOML value that the reading command refuses, for keys that it would otherwise fill in itself; empty: none.
+    open
+        Whether it must be answered; a key that may stay out carries the text without the mark.
     """
 
     text: str
     refused: str = ""
+    open: bool = True

@@ -85,7 +85,8 @@ def _line(key: DescribedKey, row: Row, *, marked: bool) -> str:
     """Key and value; as a comment where there is none, with the question where there is one."""
     asked = row.get(key.name)
     if isinstance(asked, Question):
-        return f"{f'{key.name} = {asked.refused}' if asked.refused else f'# {key.name} ='}    # {FILL_IN}: {asked.text}"
+        place = f"{key.name} = {asked.refused}" if asked.refused else f"# {key.name} ="
+        return f"{place}    # {f'{FILL_IN}: ' if asked.open else ''}{asked.text}"
     if key.name in row:
         return f"{key.name} = {tomlkit.item(row[key.name]).as_string()}"
     mark = f"    # {FILL_IN}" if marked and key.default is None else ""
