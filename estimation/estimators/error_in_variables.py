@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from ..frf_matrix import Frf, FrfCovariance, frf_quantity
-from ..spectra import RANK_TOLERANCE, CrossSpectra, input_independence, multiple_coherence
+from ..spectra import RANK_TOLERANCE, CrossSpectra, input_independence, multiple_coherence, spectral_width
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -189,4 +189,5 @@ def _frf(spectra: CrossSpectra, values: Complex, valid: NDArray[np.bool_], drivi
         valid,
         multiple_coherence(spectra),
         covariance,
+        spectral_width=spectral_width(spectra.settings, spectra.sample_rate),
     )

@@ -8,7 +8,15 @@ from numpy.typing import NDArray
 from foundation import InputError
 
 from ..frf_matrix import Frf, FrfCovariance, frf_quantity
-from ..spectra import CrossSpectra, check_stackable, independent_lines, lines_of, multiple_coherence, sum_tests
+from ..spectra import (
+    CrossSpectra,
+    check_stackable,
+    independent_lines,
+    lines_of,
+    multiple_coherence,
+    spectral_width,
+    sum_tests,
+)
 
 
 def h1(spectra: CrossSpectra) -> Frf:
@@ -87,6 +95,7 @@ def _frf(
         valid,
         coherence,
         covariance,
+        spectral_width=spectral_width(spectra.settings, spectra.sample_rate),
     )
 
 

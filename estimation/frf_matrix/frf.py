@@ -73,6 +73,9 @@ class Frf(Result):
         window. The values then stand on the line ``s = i w + 1/tau`` beside the imaginary axis (:attr:`laplace`), where
         every pole seems ``1/tau`` further away: an FRF that is read as it stands shows too much damping. A fit takes it
         back.
+    spectral_width : Hz, or None
+        Standard width of the segments' window in frequency, over which each line is an average of its neighbours. A
+        resonance as narrow as that seems wider than it is. None: no segments, or not known.
 
     Raises
     ------
@@ -94,6 +97,7 @@ class Frf(Result):
     coherence: NDArray[np.float64] | None = None
     averages: NDArray[np.int64] | None = None
     exponential_time_constant: float | None = None
+    spectral_width: float | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "band", checked_band(self.band, "FRF"))

@@ -22,9 +22,9 @@ def write_frf(path: str | os.PathLike[str], frf: Frf, *, title: str = "", proven
     """Write an FRF whole.
 
     Root attributes ``format, format_version, title, provenance, quantity, unit, responses, excitations`` (JSON
-    lists), and where known ``band_hz`` (two numbers) and ``exponential_time_constant_s``; datasets ``frequencies``
-    (Hz), ``values`` (complex), ``valid``, and where known ``multiple_coherence``, ``covariance/response``,
-    ``covariance/excitation``, ``coherence`` (of each entry) and ``averages`` (of each entry).
+    lists), and where known ``band_hz`` (two numbers), ``exponential_time_constant_s`` and ``spectral_width_hz``;
+    datasets ``frequencies`` (Hz), ``values`` (complex), ``valid``, and where known ``multiple_coherence``,
+    ``covariance/response``, ``covariance/excitation``, ``coherence`` (of each entry) and ``averages`` (of each entry).
 
     Raises
     ------
@@ -56,6 +56,8 @@ def _image(frf: Frf, described: Mapping[str, str]) -> bytes:
             file.attrs["band_hz"] = list(frf.band)
         if frf.exponential_time_constant is not None:
             file.attrs["exponential_time_constant_s"] = frf.exponential_time_constant
+        if frf.spectral_width is not None:
+            file.attrs["spectral_width_hz"] = frf.spectral_width
         for name in ("multiple_coherence", "coherence", "averages"):
             if getattr(frf, name) is not None:
                 file[name] = getattr(frf, name)
@@ -106,7 +108,7 @@ def _read(file: h5py.File) -> Frf:
     covariance = None
     if "covariance" in file:
         covariance = FrfCovariance(file["covariance/response"][:], file["covariance/excitation"][:])
-    time_constant = file.attrs.get("exponential_time_constant_s")
+    time_constant, width = (file.attrs.get(name) for name in ("exponential_time_constant_s", "spectral_width_hz"))
     return Frf(
         np.asarray(file["frequencies"][:], dtype=float),
         np.asarray(file["values"][:], dtype=complex),
@@ -121,6 +123,7 @@ def _read(file: h5py.File) -> Frf:
         _optional(file, "coherence", float),
         _optional(file, "averages", np.int64),
         None if time_constant is None else float(time_constant),
+        None if width is None else float(width),
     )
 
 

@@ -7,7 +7,7 @@ from .spectral_accumulator import SpectralAccumulator
 from .spectral_matrix import CrossSpectra, SpectralSettings, lines_of
 from .stacking import check_stackable, join_parts, sum_tests
 from .trusted_samples import OVERLOAD, usable_samples
-from .windows import effective_averages, settings_for
+from .windows import effective_averages, settings_for, spectral_width
 
 __all__ = [
     "EXCITING",
@@ -35,6 +35,7 @@ __all__ = [
     "principal_inputs",
     "settings_for",
     "spectra_for_judging",
+    "spectral_width",
     "spectrogram",
     "sum_tests",
     "track_order",

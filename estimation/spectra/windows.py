@@ -87,3 +87,33 @@ def effective_averages(settings: SpectralSettings, n_segments: int) -> float:
         rho = float(window[m * hop :] @ window[: len(window) - m * hop]) / energy
         correlated += (1 - m / n_segments) * rho**2
     return n_segments / (1 + 2 * correlated)
+
+
+def spectral_width(settings: SpectralSettings, sample_rate: float) -> float | None:
+    """Standard width of a window's spectrum, over which each line of an averaged spectrum mixes its neighbours.
+
+    ``s^2 = int f^2 |W|^2 df / int |W|^2 df = int w'(t)^2 dt / (4 pi^2 int w(t)^2 dt)``; of a Hann window of length T it
+    is ``1 / (sqrt(3) T)`` (Bendat & Piersol, Random Data, 4th ed., section 8.5: smearing bias).
+
+    Parameters
+    ----------
+    settings
+        Length and window of the segments.
+    sample_rate
+        Sample rate, Hz.
+
+    Returns
+    -------
+    float or None
+        Width, Hz; None for a window that ends in a jump, whose width is not finite.
+
+    Examples
+    --------
+    >>> round(8.0 * spectral_width(SpectralSettings(800, window="hann"), 100.0), 3)
+    0.577
+    """
+    if settings.window != "hann":
+        return None
+    window = window_samples(settings)
+    slopes = np.diff(window, append=window[:1]) * sample_rate
+    return float(np.sqrt(np.sum(slopes**2) / np.sum(window**2)) / (2 * np.pi))

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from estimation import Frf
 from foundation import InputError
 from modal_fit import ModalModel
 
@@ -106,6 +107,39 @@ def fit_doubts(chi_square: float | None, error: NDArray[np.float64] | None, said
     if error is not None and error.max() > MISFIT and not any("% only" in text for text in said):
         doubts.append(f"an entry of the FRF is fitted to {100 * error.max():.0f} % only")
     return doubts
+
+
+def smearing_doubts(model: ModalModel, frf: Frf) -> list[str]:
+    """Doubt damping ratios that the window of an FRF's segments makes too large by more than their stated error.
+
+    Each line of an averaged spectrum mixes its neighbours over the width s of the window. A resonance
+    ``1 / (i (f - f_n) + b)`` of half width ``b = zeta f_n`` becomes ``1 / x - s^2 / x^3``, as if b were ``b + s^2 / b``
+    (least squares over all lines; less where lines at the peak are noisier): damping ratios are too large by up to
+    about ``(s / b)^2`` (Bendat & Piersol, Random Data, 4th ed., section 8.5).
+
+    Parameters
+    ----------
+    model
+        Modes that were fitted to the FRF.
+    frf
+        The FRF; without a known width nothing is said.
+    """
+    errors = model.standard_errors()
+    if frf.spectral_width is None or errors is None:
+        return []
+    seen = np.abs(model.poles.real) / (2 * np.pi)
+    half_width = (seen + np.sqrt(np.maximum(seen**2 - 4 * frf.spectral_width**2, 0.0))) / 2
+    excess = seen / half_width - 1
+    beyond = excess * model.damping_ratios > errors[1]
+    if not beyond.any():
+        return []
+    worst = int(np.argmax(np.where(beyond, excess, 0.0)))
+    return [
+        f"the window of the FRF's segments widens resonances: {int(beyond.sum())} of {len(excess)} damping ratios are "
+        f"too large by up to about {100 * excess[worst]:.2g} % of themselves (most at "
+        f"{model.natural_frequencies[worst]:.4g} Hz), and their error bars do not hold it; fit the recordings "
+        "themselves, or estimate with longer segments"
+    ]
 
 
 def _lines(model: ModalModel) -> NDArray[np.float64]:

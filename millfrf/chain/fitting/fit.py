@@ -18,7 +18,7 @@ from modal_fit import (
     write_modal_model,
 )
 
-from ...gate import check_band_recordings, check_frf_for_fit, check_recordings, fit_doubts
+from ...gate import check_band_recordings, check_frf_for_fit, check_recordings, fit_doubts, smearing_doubts
 from ...progress import Progress, silent
 from ...provenance import add_to_json, sources, versions
 from .fit_options import (
@@ -53,7 +53,8 @@ def fit_model(frf: Frf, options: FitOptions, progress: Progress = silent, name: 
         else:
             fit = fit_picked(frf, options)
     poor = fit_doubts(fit.reduced_chi_square, fit.relative_error, fit.warnings)
-    return replace(fit, warnings=(*doubts, *fit.warnings, *poor))
+    smeared = smearing_doubts(fit.model, frf)
+    return replace(fit, warnings=(*doubts, *fit.warnings, *poor, *smeared))
 
 
 def fit_recordings(
