@@ -1,5 +1,6 @@
 from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom
 from .errors import DiskFull, FileFormatError, InputError, MillfrfError, MillfrfWarning, TooLarge
+from .foreign_files import conversion_advice
 from .memory import allowed_bytes, require_memory
 from .noted_table import WARNING, apart, warning_lines
 from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library, same_values
@@ -39,6 +40,7 @@ __all__ = [
     "apart",
     "checked_band",
     "checked_toml",
+    "conversion_advice",
     "counted",
     "doubts_line",
     "drawing",

@@ -98,7 +98,8 @@ def _explain(error: Exception, arguments: Sequence[str]) -> int:
         return _fail(str(error), FAILED)
     usage = getattr(error, "format_message", None)  # a wrong option, whichever click typer brings along
     if callable(usage):
-        return _fail(usage_in_words(str(usage()), arguments), BAD_INPUT)
+        command = getattr(getattr(error, "ctx", None), "command_path", "millfrf")
+        return _fail(usage_in_words(str(usage()), arguments, command), BAD_INPUT)
     if os.environ.get("MILLFRF_TRACEBACK"):
         raise error
     if is_disk_full(error):

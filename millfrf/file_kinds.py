@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 
 from estimation import is_geometry_table
-from foundation import FileFormatError, InputError
+from foundation import FileFormatError, InputError, conversion_advice
 
 RECORDING, FRF, MODEL, LOBES, CUTTING = "recording", "frf", "modal model", "lobes", "cutting data"
 GEOMETRY, CHATTER, POLES, DIAGNOSIS = "geometry", "chatter verdicts", "picked poles", "diagnosis"
@@ -45,9 +45,10 @@ def kind_of(path: str | os.PathLike[str]) -> str:
         raise InputError(f"no file {file}; check the name")
     kind = _hdf5_kind(file) if h5py.is_hdf5(file) else _text_kind(file)
     if kind is None:
+        general = "turn files of other programs into one of them with 'millfrf convert'"
         raise FileFormatError(
             f"{file} is no recording, FRF, modal model, table of lobes, cutting file, geometry or chatter verdicts; "
-            "turn files of other programs into one of them with 'millfrf convert'"
+            f"{conversion_advice(file) or general}"
         )
     return kind
 

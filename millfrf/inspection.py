@@ -104,7 +104,8 @@ def _recording(path: str | os.PathLike[str], progress: Progress) -> Findings:
             concerns += [*clock_concerns(recording, stream.name), *missing_concerns(recording, stream.name)]
             notes += repeats_in_words(stream)
         title = recording.title or "untitled"
-        summary = f"recording, {title}, {recording.recorded_at or 'no date'}"
+        when = f"recorded at {recording.recorded_at}" if recording.recorded_at else "time of recording not known"
+        summary = f"recording, {title}, {when}"
         if recording.events:
             rows = tuple((name, str(len(series.read()[0]))) for name, series in recording.events.items())
             tables.append(Table("events", ("name", "values"), rows))

@@ -92,7 +92,7 @@ def _self_described(source: Path) -> Content:
     fields = {} if source.suffix.lower() in (".csv", ".txt", ".npy") else open_arrays(source).fields
     if "format" not in fields:
         raise FileFormatError(
-            f"{source} does not say what its channels are; give a mapping file as mapping_path (--map), with "
-            "[[channels]] of a recording or [frf] of FRFs"
+            f"{source} does not say what its channels are; give a mapping file (--map map.toml), which this command "
+            f"begins: millfrf new mapping {source.name} --out map.toml (for FRFs: one with [frf])"
         )
     return from_fields(fields, source)

@@ -1,12 +1,13 @@
 """`RecordingMapping`: which array or column of a file is which channel; a TOML file checked where it enters."""
 
+import datetime
 import os
 from collections import Counter
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from foundation import SI_UNITS, InputError, checked_toml, si_factor
 
@@ -138,6 +139,21 @@ class CsvOptions(BaseModel):
     encoding: str = "utf-8-sig"
 
 
+def _checked_time(text: str) -> str:
+    """A date, or a time with its zone: a time without one may be hours off."""
+    if not text:
+        return text
+    try:
+        moment = datetime.datetime.fromisoformat(text)
+    except ValueError as error:
+        raise ValueError(
+            f"{text!r} is no time as ISO 8601 writes it; write such as 2026-03-02T09:30:00Z, or the date, 2026-03-02"
+        ) from error
+    if moment.tzinfo is None and len(text) > len("2026-03-02"):
+        raise ValueError(f"{text!r} has no zone; add it, such as {text}+01:00, or Z for UTC, or give the date alone")
+    return text
+
+
 class RecordingMapping(BaseModel):
     """The whole mapping file.
 
@@ -161,7 +177,8 @@ class RecordingMapping(BaseModel):
     setup
         Set-up of the recording as TOML text (tool, cut, pose).
     recorded_at
-        Time of the recording, ISO 8601 with zone, such as ``2026-03-02T09:30:00Z``.
+        Time of the recording, ISO 8601 with zone, such as ``2026-03-02T09:30:00Z``, or its date alone, such as
+        ``2026-03-02``; left out: not known.
     stream
         Name of the sample clock in the recording.
     time
@@ -180,7 +197,7 @@ class RecordingMapping(BaseModel):
     channels: Annotated[tuple[ChannelMapping, ...], Field(min_length=1)]
     title: str = ""
     setup: str = ""
-    recorded_at: str = ""
+    recorded_at: Annotated[str, AfterValidator(_checked_time)] = ""
     stream: Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")] = "main"
     sample_rate: float | str | None = None
     time: str | None = None

@@ -60,7 +60,7 @@ def _write_h5(content: Content, path: Path, progress: Progress) -> None:
         setup=content.setup,
         dtype=dtype,
         event_axes={name: EventAxis(texts=name in content.event_texts) for name in content.events},
-        recorded_at=content.recorded_at or None,
+        recorded_at=content.recorded_at,
         provenance=content.provenance,
         overwrite=True,
         spare_bytes=SPARE_BYTES,

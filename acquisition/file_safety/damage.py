@@ -6,7 +6,7 @@ from pathlib import Path
 
 import h5py
 
-from foundation import FileFormatError, InputError
+from foundation import FileFormatError, InputError, conversion_advice
 
 from .durability import is_being_written
 from .guarded_reading import rehearse
@@ -79,6 +79,8 @@ def open_for_reading(path: Path, *, accept_cut: bool = False) -> h5py.File:
             return _without_loose_texts(h5py.File(UnclosedFile(path), "r"), path)
     except (OSError, ValueError, RuntimeError) as error:
         raise FileFormatError(f"{path} is damaged beyond what a killed writer leaves; take a copy of it") from error
+    if advice := conversion_advice(path):
+        raise FileFormatError(f"{path} is a file of another program; {advice}")
     raise FileFormatError(
         f"{path} is not an HDF5 file, or it was cut short or damaged; give a whole recording, or try millfrf recover"
     )

@@ -96,7 +96,7 @@ class Recording:
 
     @property
     def recorded_at(self) -> str:
-        """Date and time of the recording, ISO 8601 in UTC."""
+        """Date, or date and time, of the recording, ISO 8601; empty where it is not known."""
         return self._text("recorded_at")
 
     @property
@@ -255,7 +255,8 @@ class Recording:
             return Summary(f"Recording: {self.path.name}, closed")
         state = "" if self.complete is True else ", not closed in order"
         parts = [stream.summary() for stream in self.streams.values()]
-        said = [text for text in (self.title, self.recorded_at) if text]
+        when = self.recorded_at or "time of recording not known"
+        said = [text for text in (self.title, when) if text]
         lines = [part.headline for part in parts] if len(parts) > 1 else [parts[0].headline, *parts[0].lines]
         if len(lines) > 2:
             lines = [lines[0], f"and {len(lines) - 1} more streams"]

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from foundation import FileFormatError, InputError
+from foundation import FileFormatError, InputError, conversion_advice
 
 from ..channel import Channel
 from ..sources import StreamDescription
@@ -36,7 +36,8 @@ def check_format(attributes: Any, path: object) -> None:
     found = text_attribute(attributes, "format")
     if found != FORMAT:
         raise FileFormatError(
-            f"{path} is not a recording: its format is {found or 'not given'!r}, expected {FORMAT!r}; convert it first"
+            f"{path} is not a recording: its format is {found or 'not given'!r}, expected {FORMAT!r}; "
+            f"{conversion_advice(str(path)) or 'convert it first'}"
         )
     version = attributes.get("format_version")
     if not isinstance(version, (int, np.integer)) or int(version) not in READ_VERSIONS:

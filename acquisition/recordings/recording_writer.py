@@ -47,7 +47,7 @@ class RecordingWriter:
     event_axes
         The same for series whose times are told by another clock.
     recorded_at
-        ISO 8601 UTC; None: now.
+        ISO 8601 UTC, empty where it is not known; None: now.
     provenance
         Where the recording comes from, as JSON text: files with hashes, options, versions.
     overwrite
@@ -93,7 +93,8 @@ class RecordingWriter:
             raise
         self._tables: dict[str, Tables] = {}
         self._event_axes = dict.fromkeys(event_names, SAMPLES_AXIS) | dict(event_axes or {})
-        stamp = recorded_at or datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+        now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+        stamp = now if recorded_at is None else recorded_at
         self._write_texts({"title": title, "recorded_at": stamp, "setup": setup, "provenance": provenance})
         for stream in streams:
             self._tables[f"signals/{stream.name}"] = make_stream(self._file, stream, dtype, block_length)

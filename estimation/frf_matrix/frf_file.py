@@ -10,7 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from foundation import FileFormatError, InputError, writing_whole_file
+from foundation import FileFormatError, InputError, conversion_advice, writing_whole_file
 
 from .frf import Frf, FrfCovariance
 
@@ -82,6 +82,8 @@ def read_frf(path: str | os.PathLike[str]) -> Frf:
     try:
         file = h5py.File(path, "r")
     except OSError as error:
+        if advice := conversion_advice(path):
+            raise FileFormatError(f"{path} is a file of another program; {advice}") from error
         raise FileFormatError(f"{path} is not an HDF5 file or is damaged; give an FRF file made here") from error
     with file:
         _check(file.attrs, path)

@@ -7,7 +7,7 @@ from itertools import pairwise
 _INVALID = re.compile(r"Invalid value for '(?P<option>--[\w-]+)[^:]*: (?P<said>.*)", re.DOTALL)
 
 
-def usage_in_words(said: str, arguments: Sequence[str]) -> str:
+def usage_in_words(said: str, arguments: Sequence[str], command: str = "millfrf") -> str:
     """Say in one line why a command line was not understood.
 
     Parameters
@@ -16,22 +16,26 @@ def usage_in_words(said: str, arguments: Sequence[str]) -> str:
         Message of the parser.
     arguments
         The words of the command line as they were typed.
+    command
+        Command that did not understand them, such as ``millfrf robot modes``; its help is named.
 
     Examples
     --------
-    >>> usage_in_words("Invalid value for '--modes': Input should be a valid integer", ["fit", "--modes", "2.5"])
-    "--modes 2.5 is not understood: give a whole number. Try 'millfrf --help'."
+    >>> said = "Invalid value for '--modes': Input should be a valid integer"
+    >>> usage_in_words(said, ["fit", "--modes", "2.5"], "millfrf fit")
+    "--modes 2.5 is not understood: give a whole number. Try 'millfrf fit --help'."
     """
+    help_of_it = f"Try '{command} --help'."
     if "unexpected extra argument" in said and _number_behind_force(arguments):
         return "--force takes no number: it replaces files that are there; the force on a robot's tip is --tip-force N."
     found = _INVALID.match(said)
     if found is None or not re.search(r"Input should|is not a valid", found["said"]):
-        return f"{said} Try 'millfrf --help'."
+        return f"{said} {help_of_it}"
     option = found["option"]
     typed = " ".join([option, *_values(option, arguments)])
     number = "integer" in found["said"]
     wanted = "a whole number" if number and len(typed.split()) == 2 else "a whole number for N" if number else "numbers"
-    return f"{typed} is not understood: give {wanted}. Try 'millfrf --help'."
+    return f"{typed} is not understood: give {wanted}. {help_of_it}"
 
 
 def _number_behind_force(arguments: Sequence[str]) -> bool:

@@ -1,5 +1,6 @@
 """Kind of a conversion by its files and its mapping: recordings, FRFs, modal models, a geometry."""
 
+import datetime
 import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -59,7 +60,8 @@ def convert_files(
         )
     if mapping is None and is_uff_conversion(sources[0], target):
         return [target], convert_uff(sources[0], target)
-    origin = made("convert", [sources[0], *([] if mapping is None else [mapping])], {"span_s": span})
+    now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+    origin = made("convert", [sources[0], *([] if mapping is None else [mapping])], {"span_s": span, "at": now})
     written = convert_recording(sources[0], target, mapping, progress=progress, span=span, provenance=origin)
     doubts = tuple(doubt for path in written for doubt in doubts_of_rate(path))
     return written, Told((), doubts)

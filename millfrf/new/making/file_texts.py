@@ -13,6 +13,7 @@ _NAMES = re.compile(
     r"name|label|channel|kanal|kan\u00e4le|kanaele|signal|sensor|bezeichn|column|spalte|head", re.IGNORECASE
 )
 _UNITS = re.compile(r"unit|einheit|unidad|eu$", re.IGNORECASE)
+_DATES = re.compile(r"date|datum|recorded|start_?time|zeitstempel", re.IGNORECASE)
 _LONGEST_TEXT, _MOST_NOTES, _FEW = 60, 24, 6
 """Characters of a text, notes, and numbers of an array that are shown in a mapping's first lines."""
 
@@ -77,6 +78,12 @@ def notes(fields: Mapping[str, Any]) -> Iterator[str]:
     yield from lines[:_MOST_NOTES]
     if len(lines) > _MOST_NOTES:
         yield f"  and {len(lines) - _MOST_NOTES} more"
+
+
+def dates(fields: Mapping[str, Any]) -> str:
+    """Texts of a file whose name says that they are a date or time, as ``Hdr.date = 2026-03-11``."""
+    told = [f"{name} = {_shown(value)}" for name, value in fields.items() if _DATES.search(name.rpartition(".")[2])]
+    return ", ".join(one for one in told if any(sign.isdigit() for sign in one.partition(" = ")[2]))
 
 
 def _shown(value: Any) -> str:

@@ -18,7 +18,7 @@ from ...toml_files import described_tables, toml_files
 from .channel_guesses import guessed_channel, split_heading
 from .clock_guesses import TimeColumn, even_step, guessed_clock, is_time
 from .csv_look import seen_csv_options
-from .file_texts import column_texts, notes, texts_of
+from .file_texts import column_texts, dates, notes, texts_of
 from .questions import Question
 from .template import FILL_IN, Row, template
 
@@ -56,7 +56,7 @@ def mapping_for(path: Path) -> NewMapping:
     if not channels:
         raise InputError(f"{path} holds no array of samples; it has {_listed(opened)}")
     rows: dict[str, Sequence[Row]] = {
-        "": [_clock(opened, columns)],
+        "": [{"recorded_at": _asked_time(opened), **_clock(opened, columns)}],
         "[[channels]]": _named_once([_channel(column) for column in channels]),
         **_axes(opened),
         **({"[csv]": [written]} if written else {}),
@@ -169,6 +169,12 @@ def _clock(opened: ArrayFile, columns: Sequence[_Column]) -> dict[str, Any]:
     rising = [(one.heading, step) for one in columns if (step := even_step(one.values)) > 0]
     beside = f"; {rising[0][0]} rises evenly by {rising[0][1]:.6g}" if rising and not times else ""
     return guessed_clock(times, opened.fields, beside)
+
+
+def _asked_time(opened: ArrayFile) -> Question:
+    """The time of recording is never guessed; what the file says of a date stands beside it."""
+    said = dates(opened.fields)
+    return Question(f"when was it recorded?{f' The file says {said}.' if said else ''} Left out: not known", open=False)
 
 
 def _array(column: _Column, opened: ArrayFile) -> str:

@@ -39,7 +39,7 @@ def setup_section(collected: Collected) -> Section:
     stated: list[tuple[str, dict[str, str]]] = []
     for file in collected.recordings:
         with Recording(file.path) as recording:
-            entries = {"recorded at": recording.recorded_at or "not stated", "title": recording.title or "untitled"}
+            entries = {"recorded at": recording.recorded_at or "not known", "title": recording.title or "untitled"}
             stated.append((file.path.stem, entries | _flat(recording.setup)))
     if not stated:
         return Section("Set-up")

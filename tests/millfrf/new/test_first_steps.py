@@ -1,0 +1,100 @@
+"""First steps with files of other programs: messages name the next command, and no time of recording is made up."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+
+from acquisition import Recording
+from millfrf.__main__ import run
+from millfrf.inspection import inspect_file
+from millfrf.new.making import mapping_for
+
+ROWS = [f"{k / 500:.3f},{a:.5f},{b:.5f}" for k, (a, b) in enumerate(np.random.default_rng(1).standard_normal((400, 2)))]
+
+
+def csv(folder: Path) -> Path:
+    path = folder / "cut.csv"
+    path.write_text("\n".join(["t [s],Fx [N],ax [g]", *ROWS]) + "\n")
+    return path
+
+
+def said(words: list[object], capsys: pytest.CaptureFixture[str]) -> str:
+    """The one line that ends a command in vain."""
+    capsys.readouterr()
+    assert run([str(word) for word in words]) == 2
+    return capsys.readouterr().err
+
+
+@pytest.mark.parametrize("suffix", ["csv", "mat"])
+def test_a_file_of_another_program_is_told_the_way_in(
+    suffix: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = csv(tmp_path)
+    if suffix == "mat":
+        path = tmp_path / "cut.mat"
+        savemat(path, {"F": np.ones((400, 3))})
+    way = f"millfrf new mapping cut.{suffix} --out map.toml, then millfrf convert cut.{suffix} cut.h5 --map map.toml"
+    assert way in said(["inspect", path], capsys)
+    assert way in said(["estimate", path, "--out", tmp_path / "frf.h5"], capsys)
+    assert way in said(["fit", path, "--band", "5", "50", "--out", tmp_path / "model.json"], capsys)
+    assert "millfrf new mapping" in said(["convert", path, tmp_path / "rec.h5"], capsys)
+
+
+@pytest.mark.parametrize(
+    ("words", "command"),
+    [
+        (["fit", "x.h5", "--out", "m.json"], "millfrf fit"),
+        (["lobes", "m.json"], "millfrf lobes"),
+        (["robot", "modes"], "millfrf robot modes"),
+        (["new", "cut"], "millfrf new cut"),
+        (["unknown"], "millfrf"),
+    ],
+)
+def test_a_wrong_command_line_names_the_help_of_its_command(
+    words: list[str], command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert f"Try '{command} --help'." in said(words, capsys)
+
+
+def converted(folder: Path, recorded_at: str) -> Path:
+    path, mapping, out = csv(folder), folder / "map.toml", folder / "rec.h5"
+    line = f'recorded_at = "{recorded_at}"\n' if recorded_at else ""
+    mapping.write_text(line + mapping_for(path).text)
+    assert run(["convert", str(path), str(out), "--map", str(mapping)]) == 0
+    return out
+
+
+def test_a_time_of_recording_that_nobody_states_stays_unknown(tmp_path: Path) -> None:
+    out = converted(tmp_path, "")
+    with Recording(out) as recording:
+        assert recording.recorded_at == ""
+        assert "time of recording not known" in repr(recording)
+        assert json.loads(recording.provenance)["options"]["at"].startswith("20")
+    assert "time of recording not known" in inspect_file(out).summary
+    again = tmp_path / "again.npz"
+    assert run(["convert", str(out), str(again)]) == 0
+    assert run(["convert", str(again), str(tmp_path / "back.h5")]) == 0
+    with Recording(tmp_path / "back.h5") as recording:
+        assert recording.recorded_at == ""
+
+
+@pytest.mark.parametrize("stated", ["2026-03-11", "2026-03-02T09:30:00Z", "2026-03-02T09:30:00+01:00"])
+def test_a_date_and_a_time_with_its_zone_are_kept(tmp_path: Path, stated: str) -> None:
+    with Recording(converted(tmp_path, stated)) as recording:
+        assert recording.recorded_at == stated
+
+
+@pytest.mark.parametrize(("stated", "why"), [("2026-03-02T09:30:00", "has no zone"), ("11.03.2026", "is no time")])
+def test_other_times_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], stated: str, why: str) -> None:
+    path, mapping = csv(tmp_path), tmp_path / "map.toml"
+    mapping.write_text(f'recorded_at = "{stated}"\n' + mapping_for(path).text)
+    assert why in said(["convert", path, tmp_path / "rec.h5", "--map", mapping], capsys)
+
+
+def test_the_time_is_asked_with_the_date_that_the_file_says(tmp_path: Path) -> None:
+    path = tmp_path / "cut.mat"
+    savemat(path, {"F": np.ones((400, 3)), "Hdr": {"date": "2026-03-11", "fs": 1000.0}})
+    assert "# recorded_at =    # when was it recorded? The file says Hdr.date = 2026-03-11." in mapping_for(path).text
