@@ -12,7 +12,7 @@ from .diagnosis import (
     spectra_figure,
     time_map_figure,
 )
-from .embed import as_data_uri, save_figure
+from .embed import as_data_uri, as_png, save_figure
 from .measurement import (
     ENTRIES_PER_PAGE,
     FrfCurves,
@@ -89,6 +89,7 @@ __all__ = [
     "TriedCut",
     "ZoomedPlot",
     "as_data_uri",
+    "as_png",
     "assurance_figure",
     "behaviour_figure",
     "browser_library",

@@ -28,6 +28,21 @@ def as_data_uri(figure: Figure, *, kind: str = "svg") -> str:
     return f"data:image/{'svg+xml' if kind == 'svg' else 'png'};base64,{text}"
 
 
+def as_png(figure: Figure | SmallSvg) -> bytes:
+    """A figure, or a page of small panels, as PNG of 200 dpi.
+
+    Parameters
+    ----------
+    figure
+        Figure of matplotlib, or page of small panels.
+    """
+    buffer = io.BytesIO()
+    drawn = redrawn(figure) if isinstance(figure, SmallSvg) else figure
+    with house_style():
+        drawn.savefig(buffer, format="png", dpi=200)
+    return buffer.getvalue()
+
+
 def save_figure(figure: Figure | SmallSvg, path: str | os.PathLike[str]) -> None:
     """Write a figure, or a page of small panels, by suffix: ``.svg``, ``.png`` (200 dpi) or ``.pdf``.
 

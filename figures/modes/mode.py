@@ -50,4 +50,4 @@ def _draw(axes: PolarAxes, vector: NDArray[np.complex128], labels: tuple[str, ..
     axes.set_yticks([0.5, 1.0])
     axes.set_yticklabels(["0.5", ""])
     axes.set_rlabel_position(315)
-    axes.set_xticks(np.radians([0, 90, 180, 270]))
+    axes.set_xticks(np.radians([0, 90, 180, 270]), ["0°", "", "180°", "270°"])  # the title stands at 90°

@@ -23,6 +23,9 @@ def report(
         Path | None,
         typer.Option("--geometry", metavar="FILE", help="Places of the points, for mode shapes: .toml, .uff or .csv."),
     ] = None,
+    pdf: Annotated[
+        Path | None, typer.Option("--pdf", metavar="FILE.pdf", help="The same report as PDF, beside the page.")
+    ] = None,
     figures: Figures = None,
     figure_format: FigureFormat = "svg",
 ) -> None:
@@ -31,7 +34,10 @@ def report(
     from ..report import ReportOptions, asked_figures, write_report
 
     check_output(out, (".html", ".htm"), files)
-    options = ReportOptions(title, check_band(band), reference, asked_figures(figures, figure_format), geometry)
+    if pdf is not None:
+        check_output(pdf, (".pdf",), files)
+    options = ReportOptions(title, check_band(band), reference, asked_figures(figures, figure_format), geometry, pdf)
     for doubt in write_report(out, files, options, bar):
         say(f"warning: {doubt}")
-    say(f"wrote {out}" + ("" if figures is None else f" and its figures in {figures}"))
+    written = [str(one) for one in (out, pdf) if one is not None]
+    say(f"wrote {' and '.join(written)}" + ("" if figures is None else f"; the figures in {figures}"))

@@ -1,7 +1,15 @@
 from .collection import Collected, collect
 from .diagnoses import write_cut_report, write_diagnosis_report, write_robot_report
 from .page import ReportOptions, write_report
-from .pages import FigureFiles, ResultsPage, asked_figures, page_text, write_figures, write_results_page
+from .pages import (
+    FigureFiles,
+    ResultsPage,
+    asked_figures,
+    page_text,
+    write_figures,
+    write_results_page,
+    write_results_pdf,
+)
 from .section import Fold, Picture, Section, picture_of
 
 __all__ = [
@@ -21,5 +29,6 @@ __all__ = [
     "write_figures",
     "write_report",
     "write_results_page",
+    "write_results_pdf",
     "write_robot_report",
 ]

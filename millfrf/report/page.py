@@ -21,7 +21,7 @@ from ..gate import (
 from ..progress import Progress, silent
 from ..provenance import sha256, versions
 from .collection import Collected, SourceFile, collect
-from .pages import FigureFiles, ResultsPage, write_results_page
+from .pages import FigureFiles, ResultsPage, write_results_page, write_results_pdf
 from .section import Section
 from .sections import (
     channel_section,
@@ -55,6 +55,8 @@ class ReportOptions:
     geometry
         File of a geometry on which mode shapes are drawn: TOML, UFF (datasets 15, 2411, 82) or CSV; a TOML may stand
         among the other files as well.
+    pdf
+        The same report as PDF; None: no such file.
     figures
         Folder and format in which each figure is written as a file too; None: no files.
     """
@@ -64,6 +66,7 @@ class ReportOptions:
     reference: str | os.PathLike[str] | None = None
     figures: FigureFiles | None = None
     geometry: str | os.PathLike[str] | None = None
+    pdf: str | os.PathLike[str] | None = None
 
 
 def write_report(
@@ -88,6 +91,9 @@ def write_report(
     collected = _with_geometry(collect(paths), chosen)
     page, sections = report_page(collected, chosen, progress)
     write_results_page(path, page, sections, chosen.figures)
+    if chosen.pdf is not None:
+        with progress("PDF"):
+            write_results_pdf(chosen.pdf, page, [section for section in sections if not section.empty])
     return list(collected.doubts)
 
 
