@@ -122,7 +122,8 @@ def test_wheel(scratch: Path, source: Path, wheel: Path) -> None:
     """From a folder that has no package: doctests of all packages, and a part of the tests."""
     say("the wheel, installed elsewhere, in an empty folder")
     installed = Environment(scratch / "installed")
-    installed.pip("--only-binary", ":all:", f"{wheel}[live,notebook]", "pytest", "hypothesis")
+    installed.pip("--only-binary", ":all:", f"{wheel}[live,notebook]")
+    installed.pip("pytest", "hypothesis", "sdypy-EMA")  # a peer that reads our files
     empty = scratch / "empty"
     empty.mkdir()
     installed.run("millfrf", "--version", cwd=empty)
