@@ -17,7 +17,7 @@ class ChannelKeys(BaseModel):
         ``angular_velocity``, ``voltage``, ``temperature`` or ``dimensionless``.
     node
         Point of the machine where the sensor sits: ``TCP`` is the tool's tip, ``HOUSING`` the spindle's housing, others
-        are free.
+        are free. Motions measured at the tip are ``TCP`` and need no ``calibrate``; those at ``HOUSING`` do.
     direction
         Axis and sense in which the sensor counts positive, such as ``+X`` or ``-Z``.
     high_pass_hz : Hz

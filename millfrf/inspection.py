@@ -204,7 +204,7 @@ def _lobes(path: str | os.PathLike[str]) -> Findings:
     counts = [f"{lobes.status.count(name)} {name}" for name in STATUSES if name in lobes.status]
     summary += f"; {', '.join(counts)}"
     concerns = ("no depth limit at any speed",) if not np.isfinite(depths).any() else ()
-    return Findings(LOBES, summary, concerns=concerns)
+    return Findings(LOBES, summary, concerns=(*concerns, *lobes.warnings))
 
 
 def _chatter(path: str | os.PathLike[str]) -> Findings:

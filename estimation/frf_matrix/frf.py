@@ -170,10 +170,13 @@ class Frf(Result):
         response: str | None = None,
         excitation: str | None = None,
         part: str = "magnitude",
+        quantity: str | None = None,
         **line: Any,
     ) -> "Axes":
         """Draw entries over frequency and return the axes; see :func:`figures.draw_frf` for the parameters."""
-        return drawing("draw_frf")(self, axes, response=response, excitation=excitation, part=part, **line)
+        return drawing("draw_frf")(
+            self, axes, response=response, excitation=excitation, part=part, quantity=quantity, **line
+        )
 
     def to_xarray(self) -> "xarray.Dataset":
         """Values and quality as a data set with the axes ``frequency`` (Hz), ``response`` and ``excitation``.

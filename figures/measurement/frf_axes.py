@@ -1,13 +1,15 @@
 """An FRF drawn into axes: one part of chosen entries over frequency."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from estimation import Frf
+from estimation import FRF_ORDERS, Frf, to_receptance
 from foundation import InputError
 
 from ..axes import given_or_new, legend_beside
@@ -32,6 +34,7 @@ def draw_frf(
     response: str | None = None,
     excitation: str | None = None,
     part: str = "magnitude",
+    quantity: str | None = None,
     **line: Any,
 ) -> Axes:
     """Entries of an FRF over frequency; lines that are not valid are gaps.
@@ -46,14 +49,18 @@ def draw_frf(
         Degrees of freedom to draw; None: all, of more than nine entries the first nine.
     part
         ``magnitude`` (logarithmic), ``phase``, ``real`` or ``imaginary``.
+    quantity
+        ``receptance``, ``mobility`` or ``accelerance`` to draw; None: what the given axes show, by their label, else
+        the FRF's own.
     line
         Settings of matplotlib's lines, such as ``color`` or ``label``.
 
     Raises
     ------
     InputError
-        A degree of freedom or a part that is not there.
+        A degree of freedom, a part or a quantity that is not there.
     """
+    frf = in_quantity(frf, quantity or _shown_in(axes))
     if part not in PARTS:
         raise InputError(f"unknown part {part!r} of an FRF; use one of {', '.join(PARTS)}")
     entries = chosen_entries(frf, response, excitation)
@@ -74,6 +81,33 @@ def draw_frf(
         few = None if len(entries) <= MOST_ENTRIES else f"{MOST_ENTRIES} of {len(entries)} entries"
         legend_beside(shown, few)
     return shown
+
+
+def _shown_in(axes: Axes | None) -> str | None:
+    """The quantity that the label of axes with something in them names."""
+    if axes is None or not axes.has_data():
+        return None
+    return next((name for name in FRF_ORDERS if re.search(rf"\b{name}\b", axes.get_ylabel())), None)
+
+
+def in_quantity(frf: Frf, quantity: str | None) -> Frf:
+    """An FRF of motion over force as receptance, mobility or accelerance: ``s^n`` times the receptance.
+
+    None, and a ``transfer``, which has no other form, leave it as it is.
+
+    Raises
+    ------
+    InputError
+        No such quantity.
+    """
+    if quantity is None or quantity == frf.quantity or frf.quantity not in FRF_ORDERS:
+        return frf
+    if quantity not in FRF_ORDERS:
+        raise InputError(f"unknown quantity {quantity!r} of an FRF; use one of {', '.join(FRF_ORDERS)}")
+    receptance, order = to_receptance(frf), FRF_ORDERS[quantity]
+    unit = receptance.unit.replace("m/", f"m/{('', 's/', 's^2/')[order]}", 1)
+    factor = (receptance.laplace**order)[:, None, None]
+    return replace(receptance, values=receptance.values * factor, quantity=quantity, unit=unit, covariance=None)
 
 
 def chosen_entries(frf: Frf, response: str | None, excitation: str | None) -> list[tuple[int, int]]:

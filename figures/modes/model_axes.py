@@ -24,6 +24,7 @@ def draw_model(
     response: str | None = None,
     excitation: str | None = None,
     part: str = "magnitude",
+    quantity: str | None = None,
     **line: Any,
 ) -> Axes:
     """Entries of the FRF that a model gives; thin vertical lines stand at its natural frequencies.
@@ -37,7 +38,7 @@ def draw_model(
     frequencies : (n_frequencies,), Hz
         None: those that the given axes show, else the model's band, else from half the lowest natural frequency to one
         and a half times the highest.
-    response, excitation, part, line
+    response, excitation, part, quantity, line
         As in :func:`figures.draw_frf`.
 
     Raises
@@ -53,7 +54,9 @@ def draw_model(
             label = "natural frequencies" if number == 0 and not drawn_over else None
             shown.axvline(frequency, color="#777777", linewidth=0.7, linestyle=(0, (1, 1.5)), label=label, zorder=1)
         style = {**look, **line}
-        draw_frf(model.frf(grid), shown, response=response, excitation=excitation, part=part, **style)
+        draw_frf(
+            model.frf(grid), shown, response=response, excitation=excitation, part=part, quantity=quantity, **style
+        )
         if axes is None:
             shown.set_xlim(grid[0], grid[-1])
     return shown

@@ -166,7 +166,9 @@ class ModalModel(Result):
         return drawing("draw_model")(self, axes, **choices)
 
     def to_frame(self) -> "pandas.DataFrame":
-        """One row a mode: natural frequency (Hz), damping ratio and, where they are known, their standard errors.
+        """One row a mode: natural frequency (Hz), damping ratio and, where they are known, one standard error of each.
+
+        Summaries and reports show two of them.
 
         Raises
         ------
@@ -176,7 +178,7 @@ class ModalModel(Result):
         columns = {"natural_frequency_hz": self.natural_frequencies, "damping_ratio": self.damping_ratios}
         errors = self.standard_errors()
         if errors is not None:
-            columns |= {"natural_frequency_error_hz": errors[0], "damping_ratio_error": errors[1]}
+            columns |= {"natural_frequency_standard_error_hz": errors[0], "damping_ratio_standard_error": errors[1]}
         pd = optional_library("pandas", "ModalModel.to_frame")
         return pd.DataFrame(columns, index=pd.RangeIndex(1, len(self.poles) + 1, name="mode"))
 

@@ -76,7 +76,10 @@ class StabilityLimits:
         status = np.where(bounded, "lower-bound", "not-verified").tolist()
         warnings = self.warnings
         if bounded.any():
-            warnings += (f"at {bounded.sum()} of {len(depths)} speeds the search could not resolve what lies deeper",)
+            warnings += (
+                f"at {bounded.sum()} of the {len(depths)} speeds that this search had what lies deeper "
+                "than the depth given could not be resolved",
+            )
             kinds = ["none" if here else kind for here, kind in zip(bounded, kinds, strict=True)]
         return StabilityLobes(
             self.spindle_speeds, depths, frequencies, tuple(kinds), self.method, warnings, tuple(status)

@@ -108,7 +108,10 @@ def delay_system(model: ModalModel, process: MillingProcess, *, node: str | None
     if residuals is not None:
         upper = residuals.upper
         if residuals.lower.any():
-            warnings = ("the residual inertia of modes below the band is left out of the time-periodic solution",)
+            warnings = (
+                "what modes below the fitted band add (the residual inertia) is not in the limits: those whose chatter "
+                "frequency is near the band's lower end may be off; fit from a lower frequency",
+            )
         if (share := lost_inside(model)) > LOST:
             warnings += (
                 f"modes just outside the fitted band make {100 * share:.0f} % of the FRF at the resonances inside it, "

@@ -122,7 +122,7 @@ def tool_directions(structure: Frf | ModalModel, node: str | None = None) -> Too
     if not rows or not columns:
         raise InputError(
             f"no response at the tool: excited at {node}, responses at {', '.join(structure.responses)}; "
-            "calibrate the model to the tip first"
+            "calibrate the model to the tip first, or, if the sensor sat at the tip, name its node TCP in the mapping"
         )
     return ToolDirections(rows, row_axes, row_signs, columns, column_axes, column_signs)
 

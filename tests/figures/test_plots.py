@@ -112,6 +112,28 @@ def test_plots_take_axes_and_give_them_back() -> None:
     assert phase.get_lines()[0].get_color() == "red"
 
 
+def test_a_model_takes_the_quantity_of_the_axes() -> None:
+    """The fit of an accelerance is a receptance: into one pair of axes goes one quantity, whoever is first."""
+    model, entry = _model(), {"response": "TCP:+X", "excitation": "TCP:+X"}
+    grid = np.linspace(10.0, 30.0, 41)
+    receptance = model.frf(grid)
+    values = receptance.values * (-((2 * np.pi * grid) ** 2))[:, None, None]
+    accelerance = replace(receptance, values=values, quantity="accelerance", unit="m/s^2/N")
+    axes = model.plot(accelerance.plot(**entry), frequencies=grid, **entry)
+    assert axes.get_ylabel() == "Magnitude of accelerance (m/s²/N)"
+    measured, *_, fitted = (line for line in axes.get_lines() if len(line.get_xdata()) == len(grid))
+    np.testing.assert_allclose(fitted.get_ydata(), measured.get_ydata(), rtol=1e-9)
+    over = accelerance.plot(model.plot(frequencies=grid, **entry), **entry)
+    assert over.get_ylabel() == "Magnitude of receptance (m/N)"
+    np.testing.assert_allclose(over.get_lines()[-1].get_ydata(), np.abs(receptance.values[:, 0, 0]), rtol=1e-9)
+    mobility = model.plot(frequencies=grid, quantity="mobility", **entry)
+    assert mobility.get_ylabel() == "Magnitude of mobility (m/s/N)"
+    moved = np.abs(receptance.values[:, 0, 0]) * 2 * np.pi * grid
+    np.testing.assert_allclose(mobility.get_lines()[-1].get_ydata(), moved, rtol=1e-9)
+    with pytest.raises(InputError, match="unknown quantity 'inertance'"):
+        model.plot(quantity="inertance")
+
+
 def test_lobes_are_drawn_in_mm_over_rpm_with_gaps() -> None:
     axes = _lobes().plot(label="mine")
     line = axes.get_lines()[0]

@@ -23,5 +23,5 @@ def of_numbers(table: Table) -> list[bool]:
 
 
 def _numbers(cells: list[str]) -> bool:
-    told = [cell for cell in cells if cell.strip() not in _NONE]
+    told = [cell for cell in cells if cell.strip() not in _NONE and not cell.startswith("none up to")]
     return bool(cells) and all(_NUMBER.match(cell) for cell in told)

@@ -11,6 +11,7 @@ from foundation import InputError
 from stability import StabilityLobes
 
 from ...chain import stable_above
+from ...provenance import read_provenance
 from ...tables import Table
 from ..collection import Collected
 from ..lobes_check import CheckedLobes, checked_lobes, lobes_warnings
@@ -49,7 +50,7 @@ def stability_findings(collected: Collected) -> StabilityFindings:
     advised = recommendation(checked[0])
     sentences = [_cutter(file.path.name, process) for file, process in collected.cutting]
     sentences += [_method(one) for one in checked] + list(advised.sentences)
-    tables = [_lobes_table(curves)]
+    tables = [lobes_table(curves, {one.headline[0]: _deepest(one) for one in checked})]
     (first_name, first), *others = curves.items()
     for name, lobes in others:
         table = advice_table(first, lobes, first_name, name)
@@ -157,28 +158,63 @@ def _cutter(name: str, p: MillingProcess) -> str:
     )
 
 
-def _lobes_table(curves: dict[str, StabilityLobes], most: int = 12) -> Table:
-    """Depth limits at up to twelve speeds of the first curve, the others at the same speeds."""
+def lobes_table(curves: dict[str, StabilityLobes], deepest: dict[str, float], most: int = 12) -> Table:
+    """Depth limits at some speeds of the first curve, the others at the same speeds.
+
+    Parameters
+    ----------
+    curves
+        Lobes by name.
+    deepest : m
+        Largest depth that was looked at, by the same names; 0: not known.
+    most
+        Number of evenly spaced speeds; the lowest limit and both sides of each change of type stand beside them.
+    """
     first = next(iter(curves.values()))
     rpm = first.spindle_speeds_rpm
-    chosen = np.unique(np.linspace(0, len(rpm) - 1, min(most, len(rpm))).round().astype(int))
+    even = np.linspace(0, len(rpm) - 1, min(most, len(rpm))).round().astype(int)
+    chosen = sorted({*even.tolist(), *_telling(first, 2 * most)})
     columns = ["spindle speed (rpm)"]
     columns += [f"{name} (mm)" for name in curves]
     columns += ["chatter frequency (Hz)", "type", "status"]
     rows = []
     for k in chosen:
-        depths = [_depth_at(lobes.spindle_speeds_rpm, lobes.depth_limits, rpm[k]) for lobes in curves.values()]
+        depths = [
+            _depth_at(one.spindle_speeds_rpm, one.depth_limits, rpm[k], deepest[name]) for name, one in curves.items()
+        ]
         frequency = first.chatter_frequencies[k]
         shown = f"{frequency:.2f}" if np.isfinite(frequency) else ""
         rows.append((f"{rpm[k]:.0f}", *depths, shown, first.bifurcations[k], first.status[k]))
     return Table("", tuple(columns), tuple(rows))
 
 
-def _depth_at(rpm: np.ndarray, depths: np.ndarray, wanted: float) -> str:
+def _deepest(checked: CheckedLobes) -> float:
+    """Largest depth that was looked at, m: by the check where that leads, else by the file; 0: not known."""
+    if checked.certified is not None and checked.wrong:
+        return checked.max_depth
+    asked = read_provenance(checked.file.path).get("options", {})
+    stated = asked.get("max_depth_m", 0.0) if isinstance(asked, dict) else 0.0
+    return float(stated) if isinstance(stated, int | float) else 0.0
+
+
+def _telling(lobes: StabilityLobes, most: int) -> set[int]:
+    """Numbers of the lowest limit, and of the speeds on both sides of changes of type, of which there are at most
+    ``most``."""
+    known = np.isfinite(lobes.depth_limits)
+    lowest = {int(np.where(known, lobes.depth_limits, np.inf).argmin())} if known.any() else set()
+    kinds = lobes.bifurcations
+    changes = [k for k in range(1, len(kinds)) if kinds[k] != kinds[k - 1]]
+    sides = {k for change in changes for k in (change - 1, change)}
+    return lowest | (sides if len(sides) <= most else set())
+
+
+def _depth_at(rpm: np.ndarray, depths: np.ndarray, wanted: float, max_depth: float) -> str:
     """Depth in mm at the nearest speed, empty where none is near."""
     nearest = int(np.argmin(np.abs(rpm - wanted)))
     if abs(rpm[nearest] - wanted) > 0.5:
         return ""
     if np.isnan(depths[nearest]):
         return "not resolved"
-    return f"{1e3 * depths[nearest]:.3f}" if np.isfinite(depths[nearest]) else "no limit"
+    if np.isfinite(depths[nearest]):
+        return f"{1e3 * depths[nearest]:.3f}"
+    return f"none up to {1e3 * max_depth:.3g} mm" if max_depth > 0 else "no limit"

@@ -11,6 +11,7 @@ from acquisition import Recording
 from millfrf.__main__ import run
 from millfrf.inspection import inspect_file
 from millfrf.new.making import mapping_for
+from stability import StabilityLobes, write_lobes
 
 ROWS = [f"{k / 500:.3f},{a:.5f},{b:.5f}" for k, (a, b) in enumerate(np.random.default_rng(1).standard_normal((400, 2)))]
 
@@ -98,3 +99,11 @@ def test_the_time_is_asked_with_the_date_that_the_file_says(tmp_path: Path) -> N
     path = tmp_path / "cut.mat"
     savemat(path, {"F": np.ones((400, 3)), "Hdr": {"date": "2026-03-11", "fs": 1000.0}})
     assert "# recorded_at =    # when was it recorded? The file says Hdr.date = 2026-03-11." in mapping_for(path).text
+
+
+def test_a_look_at_lobes_shows_the_warnings_in_the_file(tmp_path: Path) -> None:
+    speeds = np.array([100.0, 110.0])
+    doubt = "at 1 of 2 speeds the limit rests on noise"
+    made = StabilityLobes(speeds, np.full(2, 1e-3), np.full(2, 18.0), ("hopf", "hopf"), "zero-order", (doubt,))
+    write_lobes(tmp_path / "lobes.csv", made)
+    assert doubt in inspect_file(tmp_path / "lobes.csv").concerns

@@ -4,7 +4,8 @@ from math import pi
 
 import numpy as np
 
-from millfrf.report.sections.stability import advice_table
+from millfrf.report.pages.table_columns import of_numbers
+from millfrf.report.sections.stability import advice_table, lobes_table
 from stability import StabilityLobes
 
 
@@ -35,3 +36,28 @@ def test_same_advice_gives_no_row_and_no_limit_is_said() -> None:
     free = np.where(rpm > 1900, np.inf, base)
     [row] = advice_table(lobes(base, rpm), lobes(free, rpm), "a", "b").rows
     assert row[3:] == ("no limit", "no limit")
+
+
+def test_the_table_of_limits_has_the_lowest_one_and_both_sides_of_each_change() -> None:
+    """Twelve even speeds of 141 miss a narrow pocket and the ends of the range without a limit."""
+    rpm = np.arange(600.0, 2001.0, 10)
+    depth = np.full(len(rpm), 2e-3)
+    depth[rpm == 1010] = 1e-3
+    depth[(rpm >= 1470) & (rpm <= 1530)] = np.inf
+    table = lobes_table({"milled": lobes(depth, rpm)}, {"milled": 0.012})
+    rows = {row[0]: row for row in table.rows}
+    assert rows["1010"][1] == "1.000"
+    assert [rows[speed][1] for speed in ("1460", "1470", "1530", "1540")] == [
+        "2.000",
+        *["none up to 12 mm"] * 2,
+        "2.000",
+    ]
+    assert list(rows) == sorted(rows, key=float)
+    assert of_numbers(table)[1]
+    assert "no limit" in {row[1] for row in lobes_table({"milled": lobes(depth, rpm)}, {"milled": 0.0}).rows}
+
+
+def test_many_changes_of_type_do_not_flood_the_table() -> None:
+    rpm = np.arange(600.0, 2001.0, 10)
+    table = lobes_table({"milled": lobes(np.where(np.arange(len(rpm)) % 2, np.inf, 2e-3), rpm)}, {"milled": 0.01})
+    assert len(table.rows) <= 13
