@@ -63,7 +63,7 @@ def mode_table(model: ModalModel, title: str = "Modes", band: tuple[float, float
                 f"{peak:.3g} {model.unit}",
             )
         )
-    columns = ("mode", "frequency (Hz)", "damping ratio (%)", "largest resonant term")
+    columns = ("mode", "frequency (Hz)", "damping ratio (%)", "peak in largest entry")
     note = " (± 2 standard errors)" if errors is not None else ""
     return Table(title + note, columns, tuple(rows))
 
@@ -77,8 +77,8 @@ def error_table(model: ModalModel, title: str = "Standard errors by source") -> 
     for r, frequency in enumerate(model.natural_frequencies):
         cells = [f"{part[r, 0]:.2g} / {100 * part[r, 1]:.2g}" if np.isfinite(part[r, 0]) else "-" for part in parts]
         rows.append((str(r + 1), f"{frequency:.3f}", *cells))
-    columns = ("mode", "frequency (Hz)", "noise", "points left out", "band edges", "out-of-band terms", "total")
-    return Table(f"{title} (Hz / % damping)", columns, tuple(rows))
+    columns = ("mode", "frequency (Hz)", "noise", "a sensor left out", "band edges", "out-of-band terms", "total")
+    return Table(f"{title} (Hz / % damping; -: cannot be told from this fit)", columns, tuple(rows))
 
 
 def show(table: Table) -> None:
