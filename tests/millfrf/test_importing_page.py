@@ -89,7 +89,8 @@ def test_every_command_of_the_page_does_what_it_says(
     h = accelerance()
     found: dict[str, np.ndarray] = {}
     for line in commands():
-        assert run(line) == 0, (line, capsys.readouterr().err)
+        again = [] if line[0] == "inspect" else ["--force"]  # the page's examples stand apart, here in one folder
+        assert run([*line, *again]) == 0, (line, capsys.readouterr().err)
         if line[0] == "convert" and "frf.h5" in line:
             frf = read_frf("frf.h5")
             assert (frf.quantity, frf.unit) == ("accelerance", "m/s^2/N")
