@@ -78,7 +78,7 @@ def recommendation(checked: CheckedLobes) -> Recommendation:
     if tried is None:
         told = f"The recommended cut is withdrawn: the limits allow {_cut(cut)}, but simulated {_ran(runs[-1])}."
         return Recommendation(band, None, (told,), (told,))
-    sentences = [_recommended(tried, name, process), *_simulated(tried, cut, runs), *_left_out(known, lobes)]
+    sentences = [_recommended(tried, name, checked), *_simulated(tried, cut, runs), *_left_out(known, lobes)]
     if tried.depth >= NO_LIMIT * deepest:
         sentences.append(f"No limit was met up to the {1e3 * deepest:g} mm that were looked at; the cutter decides.")
     warnings = _outside_band(structure, process, tried, name)
@@ -131,18 +131,18 @@ def _ran(run: Settling) -> str:
     )
 
 
-def _recommended(cut: RecommendedCut, name: str, process: MillingProcess) -> str:
+def _recommended(cut: RecommendedCut, name: str, checked: CheckedLobes) -> str:
     basis = f"certified limits of {name} less their errors, computed inside the drift"
     if cut.draws:
         basis += f", tried with {cut.draws} structures and coefficients drawn from their errors"
     known = (
         "with the errors of the cutting coefficients"
-        if any(process.coefficient_errors)
+        if checked.process is not None and any(checked.process.coefficient_errors)
         else "the cutting file gives no errors of the coefficients (ktc_std_pa, krc_std, kac_std): they are not in it"
     )
     return (
-        f"Most material at {100 * CONFIDENCE:.0f} % confidence of stability, the speed drifting by "
-        f"{100 * DRIFT:.0f} %: {_cut(cut)} ({basis}; {known})."
+        f"{checked.file.path.name}: most material at {100 * CONFIDENCE:.0f} % confidence of stability, the speed "
+        f"drifting by {100 * DRIFT:.0f} %: {_cut(cut)} ({basis}; {known})."
     )
 
 
