@@ -18,7 +18,7 @@ from .commands import COMMANDS
 from .cut import cut_app
 from .new import new_app
 from .robot import robot_app
-from .terminal import printable, say
+from .terminal import manner, printable, say
 from .usage import framed, options_of_several, usage_in_words, with_examples, with_lists_apart
 from .version import __version__
 
@@ -85,7 +85,8 @@ def run(arguments: Sequence[str]) -> int:
 def _say_in_one_line(usual: Callable[..., None], message: object, category: type[Warning], *where: Any) -> None:
     """Print what was removed as a note; other warnings go their usual way."""
     if issubclass(category, LeftoverRemoved):
-        print(f"note: {printable(str(message))}", file=sys.stderr)
+        if not manner().quiet:
+            print(f"note: {printable(str(message))}", file=sys.stderr)
     else:
         usual(message, category, *where)
 

@@ -1,7 +1,7 @@
 """Files that were there before stay as they are, for as long as somebody says so."""
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -13,23 +13,28 @@ from .leftovers import is_unfinished
 
 @dataclass(frozen=True)
 class _Keeping:
-    """What to advise where a file is in the way, and the files that appeared meanwhile, which may be replaced."""
+    """What to advise where a file is in the way (None: it may be replaced), and the files that appeared meanwhile."""
 
-    remedy: str
-    made: set[Path] = field(default_factory=set)
+    remedy: str | None
+    made: dict[Path, Path] = field(default_factory=dict)
 
 
 _kept: ContextVar[_Keeping | None] = ContextVar("kept", default=None)
 
 
 @contextmanager
-def keeping_files(remedy: str) -> Iterator[None]:
+def keeping_files(remedy: str | None) -> Iterator[Callable[[], list[Path]]]:
     """Refuse to replace, within the block, a file that was there before it; files that the block made may change.
 
     Parameters
     ----------
     remedy
-        What a user can do about it; it ends the line that names the file.
+        What a user can do about it; it ends the line that names the file. None: files may be replaced.
+
+    Yields
+    ------
+    Callable
+        Gives the files that the block has made so far, as they were named, in their order.
 
     Examples
     --------
@@ -44,16 +49,18 @@ def keeping_files(remedy: str) -> Iterator[None]:
     ...     print(str(error).replace(str(place), "a.txt"), "|", place.read_text())
     a.txt exists; choose another name | mine
     """
-    token = _kept.set(_Keeping(remedy))
+    keeping = _Keeping(remedy)
+    token = _kept.set(keeping)
     try:
-        yield
+        yield lambda: [named for real, named in keeping.made.items() if real.is_file()]
     finally:
         _kept.reset(token)
 
 
 def keeps_files() -> bool:
     """Whether files that are there must stay."""
-    return _kept.get() is not None
+    keeping = _kept.get()
+    return keeping is not None and keeping.remedy is not None
 
 
 def refuse_replacing(path: str | os.PathLike[str]) -> None:
@@ -65,7 +72,9 @@ def refuse_replacing(path: str | os.PathLike[str]) -> None:
         With the path and the remedy.
     """
     keeping, place = _kept.get(), Path(path)
-    if keeping is None or not place.exists() or _real(place) in keeping.made or is_unfinished(place):
+    if keeping is None or keeping.remedy is None or is_unfinished(place):
+        return
+    if not place.exists() or _real(place) in keeping.made:
         return
     if place.is_dir() and not any(place.iterdir()):
         return
@@ -76,7 +85,7 @@ def note_made(paths: Iterable[Path]) -> None:
     """Remember files that have just appeared: whoever made them may complete them."""
     keeping = _kept.get()
     if keeping is not None:
-        keeping.made.update(map(_real, paths))
+        keeping.made.update({_real(path): path for path in paths if not is_unfinished(path)})
 
 
 def free_name(path: Path) -> Path:

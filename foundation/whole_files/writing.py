@@ -63,7 +63,7 @@ def writing_whole_file(path: str | os.PathLike[str]) -> Iterator[Path]:
             _sync(temporary)
         refuse_replacing(path)  # it may have come up meanwhile
         _put_in_place(temporary, target)
-        note_made([target])
+        note_made([Path(path)])
         if not nested:
             _sync(target.parent)
 
@@ -107,7 +107,7 @@ def writing_whole_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
         temporary.mkdir()
         yield temporary
         _sync_all(temporary)
-        places = [target / file.relative_to(temporary) for file in temporary.rglob("*") if not file.is_dir()]
+        places = [Path(path) / file.relative_to(temporary) for file in temporary.rglob("*") if not file.is_dir()]
         for place in places:
             refuse_replacing(place)
         if target.is_dir():

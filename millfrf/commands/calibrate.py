@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import Output, check_output, echo_warnings
-from ..terminal import say
+from ..terminal import say, tell
 
 
 def calibrate(
@@ -16,6 +16,7 @@ def calibrate(
     out: Output,
 ) -> None:
     """Carry an in-process model from the sensor to the tool tip by two hammer FRFs."""
+    from ..answers import model_answer
     from ..chain import write_calibration
     from ..face import calibrate as calibrate_to_tip
     from ..progress import bar
@@ -25,5 +26,6 @@ def calibrate(
     result = calibrate_to_tip(model, tip, sensor, progress=bar)
     write_calibration(out, result, [model, tip, sensor])
     echo_warnings(result.warnings)
+    tell(lambda: model_answer(result.model))
     show(mode_table(result.model))
     say(f"wrote {out}")

@@ -31,19 +31,22 @@ def campaign(
     Results are kept by the content of their inputs: a second run computes only what is new or was left. What fails is
     listed with its reason and hides nothing else; exit code 1 says that tasks are left which the next run tries again.
     """
+    from ..answers import tables_answer
     from ..campaign import RunOptions, dry_run_lines, run_campaign
     from ..progress import bar
     from ..tables import show
-    from ..terminal import say
+    from ..terminal import say, tell
 
     options = RunOptions(out or campaign.with_name(f"{campaign.stem}_results"), scheduler, workers, retry)
     if dry_run:
         table, lines = dry_run_lines(campaign, options, bar)
+        tell(lambda: {"tasks": tables_answer([table]), "lines": lines})
         show(table)
         for line in lines:
             say(line)
         return
     found = run_campaign(campaign, options, bar)
+    tell(lambda: {"tasks_run": found.ran, "tasks_settled": found.state.settled, "failures": found.failures})
     for line in found.failures:
         say(f"failed: {line}")
     for line in found.doubts:

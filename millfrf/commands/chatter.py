@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import Stream, check_output, names
-from ..terminal import say
+from ..terminal import say, tell
 
 
 def chatter(
@@ -39,6 +39,7 @@ def chatter(
 
     from modal_fit import read_modal_model
 
+    from ..answers import cuts_answer
     from ..chain import (
         CutOptions,
         doubts_of_cuts,
@@ -65,6 +66,7 @@ def chatter(
     cuts = judge_recordings(recordings, options, bar)
     for doubt in doubts:
         say(f"warning: {doubt}")
+    tell(lambda: cuts_answer(cuts))
     show(verdict_table(cuts))
     if any(cut.verdict.foreign for cut in cuts):
         show(tone_table(cuts))

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import check_output
-from ..terminal import say
+from ..terminal import say, tell
 
 
 def convert(
@@ -51,6 +51,7 @@ def convert(
         check_output(target, (*FRF_SUFFIXES, ".json", ".toml"), sources)
     with bar(f"converting {sources[0].name}") as update:
         written, told = convert_files(sources, target, mapping, update, span)
+    tell(lambda: {"inferred": told.inferred})
     for text in told.inferred:
         say(f"note: {text}")
     for text in told.doubts:

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..terminal import say
+from ..terminal import note, say
 
 DEFAULT = Path("millfrf-demo")
 FILES = {
@@ -52,7 +52,7 @@ def demo(
     from ..progress import bar
     from ..tables import show
 
-    result = run_demo(DemoOptions(out, noise, 0 if seed is None else seed), bar, typer.echo)
+    result = run_demo(DemoOptions(out, noise, 0 if seed is None else seed), bar, note)
     for table in comparison_tables(result):
         show(table)
     say(f"report: {result.report.resolve()}")
@@ -74,7 +74,7 @@ def _concealed(out: Path, noise: float, seed: int | None) -> None:
     from ..progress import bar
     from ..tables import show
 
-    result = run_concealed(ConcealOptions(out, noise, seed), bar, typer.echo)
+    result = run_concealed(ConcealOptions(out, noise, seed), bar, note)
     show(concealment_table(result))
     say(f"the diagnosis: {(out / 'diagnosis').resolve()}; {result.seconds:.0f} s in all")
 

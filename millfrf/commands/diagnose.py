@@ -8,7 +8,7 @@ import typer
 from foundation import InputError
 
 from ..options import FigureFormat, Figures, check_band, check_shares
-from ..terminal import say
+from ..terminal import say, tell
 
 
 def diagnose(
@@ -45,6 +45,7 @@ def diagnose(
     """Locate where a model and recordings disagree, name the physics left out, model it, show that the fit improves."""
     from mismatch import LabError, Settings
 
+    from ..answers import stored_answer
     from ..gate import read_checked_cutting
     from ..progress import bar
     from ..report import asked_figures
@@ -77,6 +78,7 @@ def diagnose(
         figures=drawn,
         progress=bar,
     )
+    tell(lambda: {"diagnosis": stored_answer(result.written[0])})
     for line in result.summary:
         say(line)
     say(f"wrote {', '.join(str(path) for path in result.written)}")

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import Band, Output, Responding, Stream, check_band, check_output, echo_warnings, names, size_of
-from ..terminal import say
+from ..terminal import say, tell
 
 
 def estimate(
@@ -42,6 +42,7 @@ def estimate(
     and, by feedback, the force; --instrument names what it does not reach. local-polynomial: whole records instead of
     segments, without leakage, for short records and forces that are rough in frequency.
     """
+    from ..answers import frf_answer
     from ..chain import write_estimate
     from ..face import estimate as estimate_frf
     from ..progress import bar
@@ -65,4 +66,5 @@ def estimate(
     write_estimate(out, result, recordings)
     echo_warnings(result.warnings)
     frf = result.frf
+    tell(lambda: frf_answer(frf))
     say(f"wrote {out}: {size_of(frf)}, {frf.frequencies[0]:g} to {frf.frequencies[-1]:g} Hz")

@@ -8,7 +8,7 @@ import typer
 from foundation import InputError
 
 from ..options import Output, Stream, check_band, check_output, echo_warnings, names
-from ..terminal import say
+from ..terminal import say, tell
 
 
 def fit(
@@ -49,6 +49,7 @@ def fit(
     """
     from modal_fit import ModalFit
 
+    from ..answers import model_answer
     from ..chain import (
         POLYREFERENCE,
         SUBSPACE,
@@ -90,6 +91,7 @@ def fit(
     used = FitOptions(band, used_method, max_order, modes, *channels, stream, poles, refine)
     write_fit(out, result, files, used)
     echo_warnings(result.warnings)
+    tell(lambda: {"method": used_method, **model_answer(result.model)})
     show(mode_table(result.model))
     by_source = error_table(result.model)
     if by_source is not None:

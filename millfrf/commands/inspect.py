@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..terminal import answer, say
+from ..terminal import answer, say, tell
 
 
 def inspect(
@@ -17,11 +17,13 @@ def inspect(
 
     Where forces repeat: their period, the noise between periods, and distortion.
     """
+    from ..answers import inspected
     from ..inspection import inspect_file
     from ..progress import bar
     from ..tables import show
 
     findings = inspect_file(file, bar)
+    tell(lambda: inspected(file, findings))
     say(f"{file.name}: {findings.summary}")
     for table in findings.tables:
         show(table)

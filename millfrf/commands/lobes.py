@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import Output, check_output, echo_warnings
-from ..terminal import say
+from ..terminal import say, tell
 
 
 def lobes(
@@ -34,6 +34,7 @@ def lobes(
     from modal_fit import read_modal_model
     from stability import write_lobes
 
+    from ..answers import lobes_answer
     from ..chain import draw_lobes_of, lobes_summary, mode_coupling_line
     from ..face import lobes as lobes_of
     from ..file_kinds import MODEL, kind_of
@@ -49,6 +50,7 @@ def lobes(
     if picture is not None:
         draw_lobes_of(dynamics, cutting, result, max_depth, picture)
     echo_warnings(result.warnings)
+    tell(lambda: {"max_depth_m": max_depth, **lobes_answer(result)})
     say(f"wrote {out}{'' if picture is None else f' and {picture}'}: {lobes_summary(result, max_depth)}")
     if kind_of(dynamics) == MODEL:
         say(mode_coupling_line(read_modal_model(dynamics), read_cutting_process(cutting), max_depth))

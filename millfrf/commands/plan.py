@@ -5,18 +5,20 @@ from typing import Annotated
 
 import typer
 
-from ..terminal import say
+from ..terminal import say, tell
 
 
 def plan(
     session: Annotated[Path, typer.Argument(metavar="SESSION.toml", help="File with tables [cutting] and [plan].")],
 ) -> None:
     """Propose three speed sweeps whose forces are independent, long enough for the FRF error that is wanted."""
+    from ..answers import plan_answer
     from ..chain import plan_from_file, plan_tables
     from ..tables import show
 
     found, doubts = plan_from_file(session)
     for doubt in doubts:
         say(f"warning: {doubt}")
+    tell(lambda: plan_answer(found))
     for table in plan_tables(found):
         show(table)

@@ -1,12 +1,15 @@
 """`millfrf predict`: the responses a model gives for recorded forces."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..options import Output, check_output, echo_warnings
-from ..terminal import say
+from ..terminal import say, tell
+
+if TYPE_CHECKING:
+    from ..chain import Predicted
 
 
 def predict(
@@ -23,6 +26,19 @@ def predict(
     found = predict_responses(model, recording, stream=stream)
     write_prediction(out, found, model, recording)
     echo_warnings(found.warnings)
+    tell(lambda: _errors(found))
     for line in prediction_lines(found):
         say(line)
     say(f"wrote {out}")
+
+
+def _errors(found: "Predicted") -> dict[str, object]:
+    """How far each response is off, for a script."""
+    predicted = found.prediction
+    names = [channel.name for channel in found.description.channels]
+    return {
+        "error_share": predicted.total_error,
+        "error_shares": dict(zip(names, predicted.error, strict=True)),
+        "band_hz": predicted.band,
+        "run_in_s": found.run_in,
+    }

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..terminal import answer, say
+from ..terminal import answer, say, tell
 
 if TYPE_CHECKING:
     from acquisition import Recovered
@@ -35,9 +35,25 @@ def recover(
     with bar(f"recovering {recording.name}") as update:
         origin = made("recover", [recording])
         back = recover_file(recording, target, progress=update, provenance=origin, overwrite=force)
+    tell(lambda: _recovered(back))
     for line in recovered_lines(back):
         answer(line)
     say(f"wrote {back.path}")
+
+
+def _recovered(back: "Recovered") -> dict[str, object]:
+    """What came back, for a script."""
+    damaged = {
+        name: [{"first_sample": one.first, "end_sample": one.end, "reason": one.reason} for one in rows]
+        for name, rows in back.damaged.items()
+    }
+    return {
+        "samples": back.samples,
+        "damaged_samples": damaged,
+        "events": back.events,
+        "damaged_values": back.damaged_values,
+        "has_checksums": back.has_checksums,
+    }
 
 
 def recovered_lines(back: "Recovered") -> list[str]:

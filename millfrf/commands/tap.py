@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import Band, Output, Responding, Stream, check_band, check_output, echo_warnings, names, size_of
-from ..terminal import say
+from ..terminal import say, tell
 
 
 def tap(
@@ -49,6 +49,7 @@ def tap(
     one point are averaged; files that hit or measure different points become columns and rows of one matrix. Which
     point was hit is taken from --points, --point, the recording's set-up, or the force channel.
     """
+    from ..answers import frf_answer
     from ..face import tap as frf_of_taps
     from ..progress import bar
     from ..tables import show
@@ -70,6 +71,7 @@ def tap(
         progress=bar,
     )
     write_taps(out, result, recordings)
+    tell(lambda: {**frf_answer(result.frf), "segment_s": result.settings.duration})
     for table in tap_tables(result):
         show(table)
     echo_warnings(result.warnings)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ..options import FigureFormat, Figures
-from ..terminal import say
+from ..terminal import say, tell
 from ..usage import framed
 
 cut_app = typer.Typer(
@@ -48,6 +48,7 @@ def diagnose(
     figure_format: FigureFormat = "svg",
 ) -> None:
     """Which physics does the computed cutting force leave out: runout, regenerative feedback, process damping?"""
+    from ..answers import stored_answer
     from ..report import asked_figures
     from .diagnosing import Asking, diagnose_cut_files
 
@@ -55,6 +56,7 @@ def diagnose(
     drawn = asked_figures(figures, figure_format)
     for line in diagnose_cut_files(cutting, recordings, out, asking, drawn):
         say(line)
+    tell(lambda: {"diagnosis": stored_answer(out / "diagnosis.json")})
 
 
 cut_app.command("diagnose")(framed("cut diagnose", diagnose))

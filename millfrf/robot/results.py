@@ -27,11 +27,12 @@ from robot_model import (
     write_compensated_path,
 )
 
+from ..answers import model_answer
 from ..options import check_band, check_output
 from ..progress import bar
 from ..provenance import add_comment, add_to_json, origin
 from ..tables import Table, show
-from ..terminal import say
+from ..terminal import say, tell
 from .asked_loads import Loads, check_near, check_positive
 from .postures import Asked, mechanism_of, posture_of, spatial, start_of_path
 from .update_bands import deviation_sentence, with_errors
@@ -54,7 +55,9 @@ def show_modes(robot: str, asked: Asked, count: int, picture: Path | None, links
     kept = {f"{f:.6f}": f"{100 * z:.2f}" for f, z in zip(model.natural_frequencies, model.damping_ratios, strict=True)}
     shown = [(f, kept.get(f"{f:.6f}", "overdamped")) for f in result.frequencies[:count]]
     rows = tuple((str(i + 1), f"{f:.3f}", ratio) for i, (f, ratio) in enumerate(shown))
-    title = f"Modes in the posture {shown_values(mechanism_of(case), driven)}"
+    posture = shown_values(mechanism_of(case), driven)
+    title = f"Modes in the posture {posture}"
+    tell(lambda: _modes_told(result, posture, count))
     show(Table(title, ("mode", "frequency (Hz)", "damping ratio (%)"), rows))
     warn(result)
     if picture is not None:
@@ -62,6 +65,14 @@ def show_modes(robot: str, asked: Asked, count: int, picture: Path | None, links
 
         draw_modes(picture, spatial(case), driven)
         say(f"wrote {picture}")
+
+
+def _modes_told(result: PostureResult, posture: str, count: int) -> dict[str, Any]:
+    """Natural frequencies and damping in a posture for a script; overdamped modes have no ratio."""
+    model = result.known_model()
+    ratios = dict(zip(model.natural_frequencies.round(6), model.damping_ratios, strict=True))
+    modes = [{"frequency_hz": f, "damping_ratio": ratios.get(round(f, 6))} for f in result.frequencies[:count]]
+    return {"posture": posture, "modes": modes}
 
 
 def write_receptance(
@@ -105,6 +116,7 @@ def write_receptance(
     told = origin("robot frf", [robot], {"posture": provenance["posture"]})
     _draw_receptance(result, np.linspace(*band, lines), drawn, told)
     warn(result)
+    tell(lambda: {"posture": provenance["posture"], **model_answer(model)})
     say(f"wrote {out}: {len(model.poles)} modes from {model.natural_frequencies.min():.2f} Hz")
 
 

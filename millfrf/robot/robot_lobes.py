@@ -12,12 +12,13 @@ from modal_fit import ModalModel, Residuals
 from robot_model import SpatialCase, in_posture, read_robot, shown_values
 from stability import StabilityLobes, judge_mode_coupling, with_residual_flexibility, write_lobes
 
+from ..answers import lobes_answer
 from ..chain import compute_lobes, lobes_summary, speed_axis
 from ..gate import check_depth, check_speed, check_speeds, lowest_frequency, read_checked_cutting
 from ..options import check_output
 from ..progress import bar
 from ..provenance import add_comment, made, origin
-from ..terminal import say
+from ..terminal import say, tell
 from .depth_maps import depth_over_redundancy, write_posture_map
 from .postures import Asked, cut_place, mechanism_of, posture_of, spatial
 from .results import RPM, say_doubts
@@ -86,6 +87,7 @@ def write_lobes_in_posture(
     for warning in found.warnings:
         say(f"warning: {warning}")
     say(coupling)
+    tell(lambda: {"max_depth_m": max_depth, "mode_coupling": coupling, **lobes_answer(found)})
     say(f"wrote {out}: {lobes_summary(found, max_depth)}")
     if band is not None:
         say(f"wrote {write_band(out, band)}: 95 % intervals from the update's covariance")

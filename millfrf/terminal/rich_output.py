@@ -1,22 +1,11 @@
 """The terminal: the one place where text of files and users meets rich, which would read `[x]` in it as markup."""
 
 import sys
-import unicodedata
 from collections.abc import Sequence
 from typing import Any
 
-_REPLACED = "\N{REPLACEMENT CHARACTER}"
-
-
-def printable(text: str) -> str:
-    """Text without what moves a terminal's cursor or paints it; tab and line feed stay.
-
-    Examples
-    --------
-    >>> printable("ax \\x1b[31m[g]")
-    'ax �[31m[g]'
-    """
-    return "".join(_REPLACED if unicodedata.category(c) == "Cc" and c not in "\t\n" else c for c in text)
+from .control_characters import printable
+from .manners import manner
 
 
 def as_it_stands(text: str) -> Any:
@@ -45,7 +34,8 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]
         drawn.add_column(as_it_stands(heading), justify="left" if number == 0 else "right")
     for row in rows:
         drawn.add_row(*map(as_it_stands, row))
-    Console(width=None if sys.stdout.isatty() else 120, emoji=False).print(drawn)
+    stream = sys.stderr if manner().as_json else sys.stdout
+    Console(file=stream, width=None if stream.isatty() else 120, emoji=False).print(drawn)
 
 
 def progress_bar() -> Any:
@@ -54,7 +44,7 @@ def progress_bar() -> Any:
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
-    if not console.is_terminal:
+    if not console.is_terminal or manner().quiet:
         return None
     described = TextColumn("{task.description:<28}", markup=False)
     return Progress(

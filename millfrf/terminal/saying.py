@@ -1,23 +1,35 @@
-"""`say`, `answer`: lines of a command, as they stand; names from files cannot move the cursor or paint the screen."""
+"""`say`, `answer`, `note`: lines of a command, as they stand; names from files cannot move the cursor."""
+
+from pathlib import Path
 
 import typer
 
-from .rich_output import printable
+from .control_characters import printable
+from .manners import Manner, document, manner
 
-_WARNING = "warning: "
+_WARNING, _NOTE, _WROTE = "warning: ", "note: ", "wrote "
 
 
 def say(text: str = "") -> None:
     """Print text on standard output, and a line that begins with `warning: ` on standard error.
 
-    Control characters are replaced, because the text may hold names of files and channels.
+    Control characters are replaced, because the text may hold names of files and channels. A quiet command leaves out
+    lines that begin with `note: ` and, of lines that tell what it wrote, all but what follows the colon. A command
+    that answers in JSON prints all lines on standard error.
 
     Examples
     --------
     >>> say("wrote a\\x1b[2Jb.h5")
     wrote a�[2Jb.h5
     """
-    typer.echo(printable(text), err=text.startswith(_WARNING))
+    now = manner()
+    if text.startswith(_WARNING):
+        now.warnings.append(printable(text.removeprefix(_WARNING)))
+    elif now.quiet:
+        if text.startswith(_NOTE) or (text.startswith(_WROTE) and ": " not in text):
+            return
+        text = text.removeprefix(_WROTE)
+    typer.echo(printable(text), err=now.as_json or text.startswith(_WARNING))
 
 
 def answer(text: str) -> None:
@@ -28,4 +40,25 @@ def answer(text: str) -> None:
     >>> answer("warning: ax is dead")
     warning: ax is dead
     """
-    typer.echo(printable(text))
+    now = manner()
+    if text.startswith(_WARNING):
+        now.warnings.append(printable(text.removeprefix(_WARNING)))
+    typer.echo(printable(text), err=now.as_json)
+
+
+def note(text: str) -> None:
+    """Tell what is going on; a quiet command does not.
+
+    Examples
+    --------
+    >>> note("milling three sweeps ...")
+    milling three sweeps ...
+    """
+    now = manner()
+    if not now.quiet:
+        typer.echo(printable(text), err=now.as_json)
+
+
+def print_document(command: str, chosen: Manner, written: list[Path]) -> None:
+    """Print the one JSON document of a command, see `document`."""
+    typer.echo(document(command, chosen, written))

@@ -1,9 +1,10 @@
 from .examples import EXAMPLES, commands_in, with_examples
-from .framing import FOLDERS, OWN_FOLDER, WRITING, framed, option_names
+from .framing import ANSWERING, FOLDERS, OWN_FOLDER, WRITING, framed, option_names
 from .number_lists import options_of_several, with_lists_apart
 from .parser_words import usage_in_words
 
 __all__ = [
+    "ANSWERING",
     "EXAMPLES",
     "FOLDERS",
     "OWN_FOLDER",

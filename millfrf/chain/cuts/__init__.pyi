@@ -1,4 +1,4 @@
-from .chatter import CutOptions, doubts_of_cuts, judge_recordings, stated_runout, tone_table, verdict_table
+from .chatter import CutOptions, JudgedCut, doubts_of_cuts, judge_recordings, stated_runout, tone_table, verdict_table
 from .chatter_file import KeptCut, read_cuts, write_cuts
 from .chatter_spectra import keep_spectra
 from .islands import draw_lobes_of, stable_above
@@ -8,6 +8,7 @@ __all__ = [
     "CERTIFIED",
     "LOBE_METHODS",
     "CutOptions",
+    "JudgedCut",
     "KeptCut",
     "compute_lobes",
     "doubts_of_cuts",

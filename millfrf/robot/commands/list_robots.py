@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from ...terminal import say
+from ...terminal import say, tell
 
 
 def list_robots(
@@ -14,10 +14,13 @@ def list_robots(
     from robot_model import assumptions, named_posture, read_robot, robot_names
 
     if robot is None:
+        tell(lambda: {"robots": [{"name": name, "assumed": assumptions(name)} for name in robot_names()]})
         for name in robot_names():
             say(f"{name}: {len(assumptions(name))} assumed tables")
         return
     case = read_robot(robot)
-    say(f"postures: {', '.join(case.poses) or 'none'}; {len(named_posture(case, None))} driven joints")
+    driven = len(named_posture(case, None))
+    tell(lambda: {"postures": tuple(case.poses), "driven_joints": driven, "assumed": assumptions(robot)})
+    say(f"postures: {', '.join(case.poses) or 'none'}; {driven} driven joints")
     for line in assumptions(robot):
         say(line)

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from ...options import FigureFormat, Figures, check_shares
-from ...terminal import say
+from ...terminal import say, tell
 
 
 def diagnose(
@@ -45,6 +45,7 @@ def diagnose(
     """Which is wrong in a robot's model: joint stiffness, link flexibility, payload, tool, posture, damping?"""
     from mismatch import LabError
 
+    from ...answers import stored_answer
     from ...report import asked_figures
     from .diagnosing import Asking, diagnose_robot_files
 
@@ -53,3 +54,4 @@ def diagnose(
     drawn = asked_figures(figures, figure_format)
     for line in diagnose_robot_files(robot, recordings, out, asking, figures=drawn):
         say(line)
+    tell(lambda: {"diagnosis": stored_answer(out / "robot_diagnosis.json")})

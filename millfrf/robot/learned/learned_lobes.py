@@ -9,12 +9,13 @@ import numpy as np
 from foundation import InputError, refuse_replacing, warning_lines, writing_whole_file
 from stability import StabilityLobes, write_lobes
 
+from ...answers import lobes_answer
 from ...chain import compute_lobes, lobes_summary, speed_axis
 from ...gate import check_depth, check_speeds, lowest_frequency, read_checked_cutting
 from ...options import check_output
 from ...progress import bar
 from ...provenance import add_comment, made, origin
-from ...terminal import say
+from ...terminal import say, tell
 from ..postures import Asked
 from .band_figure import draw_depth_band
 from .depth_band import SAMPLES, DepthBand, depth_band
@@ -72,6 +73,7 @@ def write_learned_lobes(
     for warning in lobes.warnings:
         say(f"warning: {warning}")
     lowest = int(np.argmin(band.low))
+    tell(lambda: {"max_depth_m": max_depth, **lobes_answer(lobes)})
     say(f"wrote {out}: {lobes_summary(lobes, max_depth)}")
     say(
         f"wrote {beside}: at {axis[lowest] / RPM:.0f} rpm the limit lies between {1e3 * band.low[lowest]:.3g} and "

@@ -12,11 +12,12 @@ from foundation import TIP, InputError, warning_lines, writing_whole_file
 from modal_fit import write_modal_model
 from robot_model import PredictedPosture, predict_posture, read_learned_postures, read_robot, shown_values
 
+from ...answers import model_answer
 from ...options import check_band, check_output
 from ...progress import bar
 from ...provenance import add_comment, add_to_json, origin
 from ...tables import Table, show
-from ...terminal import say
+from ...terminal import say, tell
 from ..asked_loads import check_positive
 from ..postures import Asked, posture_of, spatial
 
@@ -67,6 +68,7 @@ def write_learned_receptance(
         with writing_whole_file(out) as temporary:
             _write_band(temporary, axis, found)
             add_comment(temporary, provenance)
+    tell(lambda: {"posture": posture, **model_answer(found.model)})
     show(_table(found, posture))
     for warning in found.warnings:
         say(f"warning: {warning}")

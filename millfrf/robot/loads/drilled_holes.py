@@ -4,6 +4,7 @@ import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,7 +34,7 @@ from robot_model import (
 from ...options import check_output
 from ...provenance import add_comment, origin
 from ...tables import Table, show
-from ...terminal import say
+from ...terminal import say, tell
 from ..asked_loads import Loads, check_axis, check_places, check_positive
 from ..postures import spatial
 from ..results import say_doubts
@@ -175,7 +176,9 @@ def show_deviation(
     for hole in np.flatnonzero(found.reached):
         needed[hole] = position_tolerance(float(radial[hole]), holes.budget(int(hole)).work)
     _show_position(holes, weight, needed)
-    warnings = holes.warnings(int(np.nanargmax(needed)))
+    worst = int(np.nanargmax(needed))
+    tell(lambda: _told(holes, needed, worst))
+    warnings = holes.warnings(worst)
     for warning in warnings:
         say(f"warning: {warning}")
     if out is not None:
@@ -189,6 +192,21 @@ def show_deviation(
         unknown = holes.budget(int(np.nanargmax(needed))).unknown
         draw_deviation(picture, found, (area.x[2], area.y[2]), needed, "at least " if unknown else "")
         say(f"wrote {picture}")
+
+
+def _told(holes: _Holes, needed: Real, worst: int) -> dict[str, Any]:
+    """Deviations and tolerances over the area, for a script."""
+    found = holes.found
+    return {
+        "thrust_n": holes.load.thrust,
+        "torque_n_m": holes.load.torque,
+        "holes": len(found.reached),
+        "holes_reached": found.reached.sum(),
+        "largest_deviation_m": np.nanmax(np.linalg.norm(found.deviations, axis=1)),
+        "largest_position_tolerance_m": needed[worst],
+        "smallest_position_tolerance_m": np.nanmin(needed),
+        "unknown": holes.budget(worst).unknown,
+    }
 
 
 def _radial(thrust: Real, weight: Real) -> tuple[Real, Real]:

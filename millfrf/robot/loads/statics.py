@@ -14,7 +14,7 @@ from robot_model import PlanarCase, PostureResult, SpatialCase, in_posture, read
 from ...options import check_output
 from ...provenance import origin
 from ...tables import Table, show
-from ...terminal import say
+from ...terminal import say, tell
 from ..asked_loads import Loads, check_positive
 from ..postures import Asked, mechanism_of, posture_of
 from ..results import check_drawn, warn
@@ -59,14 +59,15 @@ def show_stiffness(
         say(f"largest deflection under weight and {force:g} N together: {1e3 * together:.3f} mm")
     warn(result)
     _draw(case, (driven, axes), result, force, drawn, origin("robot stiffness", [robot], {"posture": posture}))
-    if out is None:
-        return
     found = {
         "largest_deflection_m": float(force * values[-1]),
         "deflection_under_m_rad": {what: moved.tolist() for what, moved in parts_of_sag},
         "largest_deflection_together_m": float(together),
     }
-    _write(out, robot, posture, result, force, found)
+    numbers = _numbers(robot, posture, result, force, found)
+    tell(lambda: numbers)
+    if out is not None:
+        _write(out, robot, result, numbers)
 
 
 def _draw(
@@ -113,16 +114,22 @@ def _show_sags(parts: list[tuple[str, Real]], names: list[str], size: int) -> Re
     return np.sum([moved for _, moved in parts], axis=0) if parts else np.zeros(size)
 
 
-def _write(out: Path, robot: str, posture: str, result: PostureResult, force: float, found: dict[str, object]) -> None:
-    content = {
-        "format": "millfrf.robot_stiffness",
-        "format_version": 1,
+def _numbers(robot: str, posture: str, result: PostureResult, force: float, found: dict[str, object]) -> dict[str, Any]:
+    return {
         "robot": robot,
         "posture": posture,
         "degrees_of_freedom": list(result.labels),
         "compliance": result.compliance.tolist(),
         "force_n": force,
         **found,
+    }
+
+
+def _write(out: Path, robot: str, result: PostureResult, numbers: dict[str, Any]) -> None:
+    content = {
+        "format": "millfrf.robot_stiffness",
+        "format_version": 1,
+        **numbers,
         "warnings": list(result.warnings),
         "provenance": origin("robot stiffness", [robot]),
     }

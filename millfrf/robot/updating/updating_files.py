@@ -11,7 +11,7 @@ from robot_model import numbered_robot_text, read_robot, update_robot, updated_d
 from ...options import check_output
 from ...progress import bar
 from ...provenance import add_comment, add_to_json, origin
-from ...terminal import say
+from ...terminal import say, tell
 from ..postures import spatial
 from .asking import Asking
 from .measured_files import read_measured
@@ -52,6 +52,7 @@ def update_robot_file(robot: str, paths: Sequence[Path], out: Path, report: Path
     measured = read_measured(case, paths, asking)
     with bar("updating"):
         found = update_robot(case.robot, measured, case.poses)
+    tell(lambda: {"update": as_json(found)})
     lines = summary(found, case.robot.mechanism)
     made = origin("robot update", [robot, *paths], asdict(asking))
     if report is not None:

@@ -1,0 +1,180 @@
+"""`--quiet` leaves warnings and the answer; `--json` prints one document, with everything else on standard error."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+
+from estimation import write_frf
+from foundation import writing_whole_file
+from millfrf.__main__ import app, run
+from millfrf.terminal import answer, note, plain, say, speaking, tell
+from millfrf.usage import ANSWERING, commands_in, framed
+from modal_fit import ModalModel, write_modal_model
+
+CUT = """[cutting]
+teeth = 2
+diameter_m = 0.0127
+ktc_pa = 119e6
+krc = 0.17
+kac = 0.33
+start_angle_deg = 90.0
+exit_angle_deg = 180.0
+"""
+UNITS = re.compile(r"_(hz|m|s|n|rad|deg|rpm|n_m|m_per_n|m_rad)$")
+
+
+@pytest.fixture
+def model() -> ModalModel:
+    """Two modes of the tip."""
+    f, zeta = np.array([20.0, 33.0]), np.array([0.03, 0.05])
+    poles = 2 * np.pi * f * (-zeta + 1j * np.sqrt(1 - zeta**2))
+    right = np.array([[1.0, 0.2, 0.1], [0.1, 1.0, 0.3]], dtype=complex)
+    left = right / (2j * poles.imag[:, None] * 20.0)
+    places = ("TCP:+X", "TCP:+Y", "TCP:+Z")
+    return ModalModel(poles, right, left, places, places, "receptance", "m/N", band=(10.0, 60.0))
+
+
+@pytest.fixture
+def bench(tmp_path: Path, model: ModalModel, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A model, its FRF and a cutting file."""
+    write_modal_model(tmp_path / "model.json", model)
+    write_frf(tmp_path / "frf.h5", model.frf(np.linspace(10.0, 60.0, 201)))
+    (tmp_path / "cut.toml").write_text(CUT)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def _document(text: str) -> Any:
+    def refuse(constant: str) -> None:
+        raise AssertionError(f"{constant} is no JSON")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+LOBES = "lobes model.json --cutting cut.toml --speeds 600 1200 3 --max-depth 0.01 --method zero-order --out l.csv"
+COMMANDS = {
+    "inspect": "inspect model.json",
+    "inspect frf": "inspect frf.h5",
+    "lobes": LOBES,
+    "fit": "fit frf.h5 --band 12 50 --out fitted.json",
+    "convert": "convert frf.h5 frf.uff",
+    "robot list": "robot list",
+    "robot modes": "robot modes staubli_rx170 --count 2",
+    "robot frf": "robot frf staubli_rx170 --lines 20 --out tip.json",
+    "robot stiffness": "robot stiffness staubli_rx170",
+}
+
+
+@pytest.mark.parametrize("words", COMMANDS)
+def test_one_document_and_nothing_else_on_standard_output(
+    words: str, bench: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run([*COMMANDS[words].split(), "--json"]) == 0
+    said = capsys.readouterr()
+    told = _document(said.out)
+    assert (told["format"], told["format_version"]) == ("millfrf.answer", 1)
+    assert COMMANDS[words].startswith(told["command"])
+    assert all(f"warning: {one}" in said.err + "\n" for one in told["warnings"])
+    assert all((bench / name).is_file() for name in told["written"])
+    assert len(told) > 5, "no answer of its own"
+
+
+def test_numbers_are_those_of_the_files(bench: Path, capsys: pytest.CaptureFixture[str], model: ModalModel) -> None:
+    assert run([*LOBES.split(), "--json"]) == 0
+    told = _document(capsys.readouterr().out)
+    rows = [line.split(",") for line in (bench / "l.csv").read_text().splitlines() if line[0].isdigit()]
+    assert [f"{one['spindle_speed_rpm']:.10g}" for one in told["limits"]] == [row[0] for row in rows]
+    assert told["lowest_depth_limit_m"] == pytest.approx(min(float(row[1]) for row in rows), rel=1e-6)
+    assert told["written"] == ["l.csv"]
+    assert run(["inspect", "model.json", "--json"]) == 0
+    modes = _document(capsys.readouterr().out)["modes"]
+    assert [one["frequency_hz"] for one in modes] == pytest.approx(model.natural_frequencies.tolist())
+    assert [one["damping_ratio"] for one in modes] == pytest.approx([0.03, 0.05])
+
+
+def test_a_refusal_prints_no_document(bench: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["inspect", "missing.h5", "--json"]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.startswith("millfrf: ")
+
+
+def test_quiet_leaves_warnings_and_the_answer(bench: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(LOBES.split()) == 0
+    loud = capsys.readouterr()
+    assert run([*LOBES.split(), "--quiet", "--force"]) == 0
+    quiet = capsys.readouterr()
+    assert quiet.out == loud.out.replace("wrote l.csv: ", "l.csv: ")
+    assert [line for line in quiet.err.splitlines() if line.startswith("warning")] == loud.err.splitlines()
+    assert run(["convert", "frf.h5", "out.uff", "--quiet"]) == 0
+    assert capsys.readouterr().out == ""
+
+
+def test_every_command_can_be_quiet_and_those_of_the_list_answer_in_json() -> None:
+    commands = dict(commands_in(typer.main.get_command(app)))
+    options = {words: {name for one in command.params for name in one.opts} for words, command in commands.items()}
+    assert [words for words, names in options.items() if "--quiet" not in names] == []
+    assert {words for words, names in options.items() if "--json" in names} == set(ANSWERING)
+
+
+def test_lines_of_each_kind(capsys: pytest.CaptureFixture[str]) -> None:
+    def speak() -> tuple[str, str]:
+        for line in ("note: a", "wrote b", "wrote c: d", "warning: e", "f"):
+            say(line)
+        answer("warning: g")
+        note("h ...")
+        said = capsys.readouterr()
+        return said.out, said.err
+
+    assert speak() == ("note: a\nwrote b\nwrote c: d\nf\nwarning: g\nh ...\n", "warning: e\n")
+    with speaking(quiet=True):
+        assert speak() == ("c: d\nf\nwarning: g\n", "warning: e\n")
+    with speaking(as_json=True) as manner:
+        out, shown = speak()
+        assert out == ""
+        assert "wrote c: d" in shown
+        assert manner.warnings == ["e", "g"]
+        tell(lambda: {"depth_m": np.float64(np.nan)})
+        assert plain(manner.answers) == {"depth_m": None}
+    tell(lambda: pytest.fail("made though nobody asked"))
+
+
+def test_what_ends_with_a_code_still_answers(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    def plan() -> None:
+        with writing_whole_file(tmp_path / "a.txt") as temporary:
+            temporary.write_text("a")
+        tell(lambda: {"left": 2})
+        raise typer.Exit(1)
+
+    with pytest.raises(typer.Exit):
+        framed("plan", plan)(as_json=True)
+    told = _document(capsys.readouterr().out)
+    assert told["left"] == 2
+    assert told["written"] == [str(tmp_path / "a.txt")]
+
+
+@pytest.mark.parametrize("words", ["inspect", "lobes", "fit", "robot modes", "robot stiffness"])
+def test_keys_of_numbers_end_in_their_unit_or_have_none(
+    words: str, bench: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run([*COMMANDS[words].split(), "--json"]) == 0
+    plain_numbers = {"format_version", "damping_ratio", "damping_ratio_standard_error", "compliance", "torque_n_m"}
+
+    def check(key: str, value: Any) -> None:
+        if isinstance(value, dict):
+            for name, one in value.items():
+                check(name, one)
+        elif isinstance(value, list):
+            for one in value:
+                check(key, one)
+        elif isinstance(value, float):
+            assert UNITS.search(key) or key in plain_numbers, key
+
+    for key, value in _document(capsys.readouterr().out).items():
+        if key != "deflection_under_m_rad":
+            check(key, value)
