@@ -5,7 +5,7 @@ Run it: `python examples/robot_diagnosis.py FOLDER [CHANGE] [POSTURES]`. CHANGE 
 model in question has rigid links); POSTURES 1 to 3. The simulated cell mills porous plastic with a sweeping spindle;
 an accelerometer sits on the housing. The same command reads recordings of a real robot:
 
-    millfrf robot diagnose ROBOT.toml A.h5 B.h5 --pose DEG,DEG,... --pose DEG,DEG,... --sensor X Y Z --out DIR
+    millfrf robot diagnose ROBOT.toml A.h5 B.h5 --pose DEG,DEG,... --pose DEG,DEG,... --sensor-at X Y Z --out DIR
 """
 
 import sys
@@ -70,7 +70,7 @@ def main(folder: Path, change: str = "joint-3", postures: int = 3, duration: flo
         files.append(str(path))
         poses += ["--pose", posture]
     place = [str(value) for value in SENSOR]
-    options = ["--sensor", *place, "--band", "5", "45", *truth.options]
+    options = ["--sensor-at", *place, "--band", "5", "45", *truth.options]
     out = ["--out", str(folder / "diagnosis"), "--force"]
     return run(["robot", "diagnose", ROBOT, *files, *poses, *options, *out])
 

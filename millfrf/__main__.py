@@ -19,7 +19,7 @@ from .cut import cut_app
 from .new import new_app
 from .robot import robot_app
 from .terminal import manner, printable, say
-from .usage import framed, options_of_several, usage_in_words, with_examples, with_lists_apart
+from .usage import framed, options_of_several, usage_in_words, with_examples, with_lists_apart, with_names_of_today
 from .version import __version__
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -71,7 +71,8 @@ def run(arguments: Sequence[str]) -> int:
             warnings.simplefilter("ignore", MillfrfWarning)  # each command prints the doubts of its result
             warnings.simplefilter("always", LeftoverRemoved)
             warnings.showwarning = partial(_say_in_one_line, warnings.showwarning)
-            words = with_lists_apart(arguments, options_of_several(command, arguments))
+            words = _as_today(arguments)
+            words = with_lists_apart(words, options_of_several(command, words))
             result = command.main(args=words, prog_name="millfrf", standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         return _fail(STOPPED, FAILED)
@@ -80,6 +81,14 @@ def run(arguments: Sequence[str]) -> int:
     if result == INTERRUPTED:
         return _fail(STOPPED, FAILED)
     return result if isinstance(result, int) else DONE
+
+
+def _as_today(arguments: Sequence[str]) -> list[str]:
+    """The words with the names that options have now; a note tells what has changed."""
+    words, notes = with_names_of_today(arguments)
+    for one in [] if "--quiet" in words else notes:
+        print(f"note: {printable(one)}", file=sys.stderr)
+    return words
 
 
 def _say_in_one_line(usual: Callable[..., None], message: object, category: type[Warning], *where: Any) -> None:

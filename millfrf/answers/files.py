@@ -61,7 +61,7 @@ def stored_answer(path: Path) -> dict[str, Any]:
     Parameters
     ----------
     path
-        The file.
+        Path of the JSON file.
     """
     content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     return content

@@ -44,7 +44,7 @@ def cuts_answer(cuts: Sequence[JudgedCut]) -> dict[str, Any]:
     Parameters
     ----------
     cuts
-        Judged cuts.
+        Cuts with their verdicts, in the order of the recordings.
     """
     return {
         "cuts": [

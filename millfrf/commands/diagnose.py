@@ -25,13 +25,13 @@ def diagnose(
     ] = None,
     band: Annotated[
         tuple[float, float] | None,
-        typer.Option("--band", metavar="LOW,HIGH", help="Band that is compared, Hz; without it that of the model."),
+        typer.Option("--band", metavar="LO HI", help="Band that is compared, Hz; without it that of the model."),
     ] = None,
     lab_error: Annotated[
         tuple[float, float, float],
         typer.Option(
             "--lab-error",
-            metavar="F,D,S",
+            metavar="F D S",
             help="What a lab's own fit is off, as shares: frequency, damping, shapes; one number stands for all.",
         ),
     ] = (0.01, 0.12, 0.03),
@@ -60,7 +60,7 @@ def diagnose(
     if simulated is not None:
         if band is None:
             raise InputError(
-                "--simulated needs --band LOW,HIGH, the band in which the nominal model is fitted and compared"
+                "--simulated needs --band LO HI, the band in which the nominal model is fitted and compared"
             )
         model = nominal_from_simulation(simulated, band, out, stream=stream, progress=bar)
     process, doubts = read_checked_cutting(cutting) if cutting is not None else (None, [])

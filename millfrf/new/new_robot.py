@@ -17,7 +17,7 @@ def new_robot(
         str | None, typer.Option("--dh", metavar="standard|modified", help="Convention of a table in CSV.")
     ] = None,
     tip: Annotated[
-        str | None, typer.Option("--tip", metavar="LINK", help="URDF link at the flange; its z points to the tool.")
+        str | None, typer.Option("--flange", metavar="LINK", help="URDF link at the flange; its z points to the tool.")
     ] = None,
     name: Annotated[str | None, typer.Option("--name", help="Name of the robot; default: that of the file.")] = None,
     joint_stiffness: Annotated[

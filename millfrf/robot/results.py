@@ -47,7 +47,7 @@ def show_modes(robot: str, asked: Asked, count: int, picture: Path | None, links
     if picture is not None:
         check_output(picture, (".png", ".pdf", ".html"))
     if count < 1:
-        raise InputError(f"--count {count}: give 1 or more modes")
+        raise InputError(f"--modes {count}: give 1 or more modes")
     case = read_robot(robot)
     driven, axes = posture_of(case, asked)
     result = in_posture(case, driven, axes, links=links)
@@ -97,7 +97,7 @@ def write_receptance(
     result = in_posture(case, driven, axes, links=links)
     model = result.known_model()
     if sensor is not None:
-        check_near("sensor", sensor)
+        check_near("sensor-at", sensor)
         model = cell_structure_at(spatial(case).robot, driven, np.array(sensor), axes=axes)
     provenance = {
         "command": "robot frf",

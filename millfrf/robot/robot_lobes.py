@@ -61,7 +61,7 @@ def write_lobes_in_posture(
     if picture is not None:
         check_output(picture, (".png", ".pdf", ".svg"))
     if speeds is None:
-        raise InputError("give --speeds LO HI N for lobes, or --angles LO HI N with --speed RPM for a posture map")
+        raise InputError("give --speeds LO HI N for lobes, or --turns LO HI N with --speed RPM for a posture map")
     case = read_robot(robot)
     driven, axes = posture_of(case, asked)
     result = in_posture(case, driven, axes, links=links)

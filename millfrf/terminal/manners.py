@@ -49,8 +49,10 @@ def speaking(*, quiet: bool = False, as_json: bool = False) -> Iterator[Manner]:
 
     Parameters
     ----------
-    quiet, as_json
-        See `Manner`.
+    quiet
+        Whether progress and notes are left out.
+    as_json
+        Whether one JSON document is the only thing on standard output.
     """
     chosen = Manner(quiet, as_json)
     token = _manner.set(chosen)

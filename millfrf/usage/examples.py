@@ -39,7 +39,7 @@ EXAMPLES: dict[str, str] = {
     "new mapping": "millfrf new mapping cut1.mat --out channels.toml",
     "new cut": "millfrf new cut --teeth 2 --diameter 0.0127 --out cut.toml",
     "new session": "millfrf new session --driver ni --channels 6 --out session.toml",
-    "new robot": "millfrf new robot robot.urdf --tip flange --out robot.toml",
+    "new robot": "millfrf new robot robot.urdf --flange flange --out robot.toml",
     "new campaign": "millfrf new campaign 'recordings/*.h5' --robot kuka_kr90_r3100 --out campaign.toml",
     "new schemas": "millfrf new schemas --out schemas",
     "cut diagnose": "millfrf cut diagnose cut.toml low.h5 high.h5 --depth 0.001 --out found",

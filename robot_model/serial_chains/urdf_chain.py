@@ -55,7 +55,7 @@ def read_urdf(path: str | os.PathLike[str], tip: str | None = None) -> ReadChain
     row = tree.joints_to(last)
     moving = [joint for joint in row if joint.type in ("revolute", "continuous", "prismatic")]
     if not moving:
-        raise InputError(f"{path}: no moving joint between {tree.root} and {last}; give another --tip LINK")
+        raise InputError(f"{path}: no moving joint between {tree.root} and {last}; give another --flange LINK")
     _refuse_coupled(tree, moving, last, tip is not None)
     notes: list[str] = []
     placed = _placed_links(tree, {joint.name for joint in moving}, notes)
@@ -88,7 +88,7 @@ def _refuse_coupled(tree: UrdfTree, moving: list[Any], last: str, chosen: bool) 
         if not chosen and joint.mimic is not None and joint.mimic.joint in names:
             raise InputError(
                 f"joint {joint.name} beside the way to {last} follows joint {joint.mimic.joint} (mimic): a "
-                "parallelogram or a linkage; choose --tip LINK to leave its stiffness out and carry its masses along"
+                "parallelogram or a linkage; choose --flange LINK to leave its stiffness out and carry its masses along"
             )
 
 

@@ -94,7 +94,7 @@ def chosen_tip(tree: UrdfTree, tip: str | None) -> str:
     """
     if tip is not None:
         if tip not in tree.links:
-            raise InputError(f"--tip {tip}: there is no such link; the links are {', '.join(tree.links)}")
+            raise InputError(f"--flange {tip}: there is no such link; the links are {', '.join(tree.links)}")
         return tip
     parents = {joint.parent for joint in tree.joints.values()}
     ends = [name for name in tree.links if name not in parents]
@@ -109,11 +109,11 @@ def chosen_tip(tree: UrdfTree, tip: str | None) -> str:
             why = f" (joint {pair.name} follows {pair.mimic.joint}: a parallelogram, a linkage or a gripper)"
         raise InputError(
             f"the joints branch{why}: ends {', '.join([longest, *rows])}; choose the branch that carries the tool with "
-            "--tip LINK: the masses of the others are then carried along, but their stiffness is not; a closed loop is "
+            "--flange LINK: the masses of the others are then carried along, not their stiffness; a closed loop is "
             "described with [[closures]] (docs/robot_files.md)"
         )
     last = [end for end in ends if behind[end] == behind[longest]]
     named = [name for name in _TIPS if name in last]
     if len(last) == 1 or named:
         return named[0] if named else last[0]
-    raise InputError(f"the last body has several ends: {', '.join(last)}; choose the tool's with --tip LINK")
+    raise InputError(f"the last body has several ends: {', '.join(last)}; choose the tool's with --flange LINK")

@@ -95,7 +95,7 @@ def test_frf_and_model_files(tmp_path: Path) -> None:
 
 def test_a_robot_mills_in_the_simulated_cell(tmp_path: Path) -> None:
     out = tmp_path / "cell.json"
-    place = ["--at", "1.5", "0.1", "0.7", "--sensor", "0.06", "-0.04", "0.25"]
+    place = ["--at", "1.5", "0.1", "0.7", "--sensor-at", "0.06", "-0.04", "0.25"]
     assert run(["robot", "frf", "kuka_kr90_r3100", *place, "--out", str(out)]) == DONE
     structure = read_modal_model(out)
     step = 2 * np.real(np.einsum("rp,rq->pq", structure.right, structure.left))
@@ -158,17 +158,17 @@ def test_lobes_and_posture_map(tmp_path: Path, cut: str) -> None:
     common += ["--out", str(out), "--force"]
     assert run(["robot", "lobes", *common, "--speeds", "2500", "3000", "3"]) == DONE
     assert len(read_lobes(out).depth_limits) == 3
-    assert run(["robot", "lobes", *common, "--angles", "-20", "20", "3", "--speed", "3000"]) == DONE
+    assert run(["robot", "lobes", *common, "--turns", "-20", "20", "3", "--speed", "3000"]) == DONE
     with out.open() as stream:
         rows = list(csv.DictReader(line for line in stream if not line.startswith("#")))
     assert [float(row["angle_deg"]) for row in rows] == pytest.approx([-20, 0, 20])
     picture = tmp_path / "map.png"
-    drawn = ["--angles", "-20", "20", "3", "--speed", "3000", "--picture", str(picture), "--depth", "0.002"]
+    drawn = ["--turns", "-20", "20", "3", "--speed", "3000", "--picture", str(picture), "--depth", "0.002"]
     assert run(["robot", "lobes", *common, *drawn]) == DONE
     assert picture.stat().st_size > 10_000
     assert run(["robot", "lobes", *common, *drawn[:-1], "-1"]) == BAD_INPUT
     assert run(["robot", "lobes", *common]) == BAD_INPUT
-    assert run(["robot", "lobes", *common, "--angles", "-20", "20", "3"]) == BAD_INPUT
+    assert run(["robot", "lobes", *common, "--turns", "-20", "20", "3"]) == BAD_INPUT
 
 
 def test_lobes_of_a_planar_robot_are_rigid_across(tmp_path: Path, cut: str) -> None:

@@ -101,7 +101,7 @@ def _read(path: Path, asked: Asked) -> ReadChain:
         if asked.dh is None:
             raise InputError(f"{path}: say what the table means: --dh standard, or --dh modified (Craig, Khalil)")
         if asked.tip is not None:
-            raise InputError("--tip names a link of a URDF; a table ends at its last frame: use --tool")
+            raise InputError("--flange names a link of a URDF; a table ends at its last frame: use --tool")
         return read_dh(path, asked.dh)
     if path.suffix.lower() not in (".urdf", ".xml"):
         raise InputError(f"{path}: give a .urdf, or a .csv of Denavit-Hartenberg parameters")

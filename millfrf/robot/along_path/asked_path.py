@@ -75,7 +75,7 @@ class AskedPath:
             raise InputError(f"--singularity-margin {self.singularity_margin:g}: give a singular value, from 0 to 1")
         if self.table is None and (self.table_at is not None or self.table_about is not None):
             raise InputError(
-                "--table-at and --table-about say where a rotary table is: give its range too, --table LO HI N"
+                "--table-at and --table-about say where a rotary table is: give its range too, --table-turns LO HI N"
             )
         if self.table_at is not None:
             for value in self.table_at:

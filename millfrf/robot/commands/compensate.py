@@ -18,7 +18,7 @@ def compensate(
     payload_at: PayloadAt = None,
     weight: Weight = "all",
     picture: Annotated[
-        Path | None, typer.Option("--picture", metavar="FILE.png", help="Deviation along the path, before and after.")
+        Path | None, typer.Option("--picture", metavar="FILE", help="Deviation along the path, before and after.")
     ] = None,
 ) -> None:
     """Move a tool path against the deflection that its forces, the robot's weight and a payload will cause."""

@@ -32,10 +32,11 @@ def deviation(
         typer.Option("--position-tolerance", metavar="MM", help="Of the drawing (ISO 1101): does it hold?"),
     ] = None,
     force_error: Annotated[
-        float, typer.Option("--force-error", metavar="PERCENT", help="Standard error of the forces; 5 is assumed.")
+        float,
+        typer.Option("--force-uncertainty", metavar="PERCENT", help="Standard error of the forces; 5 is assumed."),
     ] = 5.0,
     stiffness_error: Annotated[
-        float, typer.Option("--stiffness-error", metavar="PERCENT", help="Of joint stiffnesses; 10 is assumed.")
+        float, typer.Option("--stiffness-uncertainty", metavar="PERCENT", help="Of joint stiffnesses; 10 is assumed.")
     ] = 10.0,
     runout: Annotated[
         float | None,
@@ -44,11 +45,9 @@ def deviation(
     overhang: Annotated[
         float | None, typer.Option("--overhang", metavar="MM", help="Drill out of its holder, with --runout.")
     ] = None,
-    spindle_speed: Annotated[
-        float | None, typer.Option("--spindle-speed", metavar="RPM", help="With --runout.")
-    ] = None,
+    spindle_speed: Annotated[float | None, typer.Option("--speed", metavar="RPM", help="With --runout.")] = None,
     out: Annotated[Path | None, typer.Option("--out", metavar="FILE.csv", help="Deviation of every hole.")] = None,
-    picture: Annotated[Path | None, typer.Option("--picture", metavar="FILE.png", help="Map of the deviation.")] = None,
+    picture: Annotated[Path | None, typer.Option("--picture", metavar="FILE", help="Map of the deviation.")] = None,
 ) -> None:
     """Deviation of drilled holes over a work area (vertical drill, aluminium), and the position tolerance they need."""
     from math import pi

@@ -26,7 +26,7 @@ def frf(
     lines: Annotated[int, typer.Option("--lines", help="Frequency lines.")] = 1000,
     sensor: Annotated[
         tuple[float, float, float] | None,
-        typer.Option("--sensor", metavar="X Y Z", help="Housing sensor, m from the tip: its motion too (.json)."),
+        typer.Option("--sensor-at", metavar="X Y Z", help="Housing sensor, m from the tip: its motion too (.json)."),
     ] = None,
     learned: Learned = None,
     picture: Picture = None,
@@ -41,7 +41,7 @@ def frf(
 
         if sensor is not None or links or picture is not None or table is not None:
             raise InputError(
-                "--sensor, --links, --picture and --table have no place beside --learned, which knows the tip of "
+                "--sensor-at, --links, --picture and --table have no place beside --learned, which knows the tip of "
                 "robots in space"
             )
         write_learned_receptance(robot, learned, asked, out, band, lines)

@@ -21,7 +21,8 @@ def learn(
         typer.Option("--pose", metavar="POSE", help="Posture of each model in turn: a name, or DEG,DEG,..."),
     ] = None,
     feed: Annotated[
-        float | None, typer.Option("--feed", metavar="DEG", help="Channel X from the base's x; Z up. Default: base.")
+        float | None,
+        typer.Option("--channels-turned", metavar="DEG", help="Channel X from the base's x; Z up. Default: base."),
     ] = None,
     next_postures: Annotated[
         int | None, typer.Option("--next", metavar="N", help="Say which N postures are most worth measuring next.")

@@ -10,7 +10,7 @@ from .options import Feed, Robot, Speed
 
 def map_command(
     robot: Robot,
-    picture: Annotated[Path | None, typer.Option("--picture", metavar="FILE.png", help="Map over the area.")] = None,
+    picture: Annotated[Path | None, typer.Option("--picture", metavar="FILE", help="Map over the area.")] = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE.csv", help="Frequency, limit, status, joints of every place.")
     ] = None,

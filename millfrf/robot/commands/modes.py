@@ -17,7 +17,7 @@ def modes(
     turn: Turn = 0.0,
     redundancy: Redundancy = "tool",
     links: Links = False,
-    count: Annotated[int, typer.Option("--count", help="Modes to show.")] = 10,
+    count: Annotated[int, typer.Option("--modes", help="Modes to show.")] = 10,
     picture: Annotated[
         Path | None, typer.Option("--picture", metavar="FILE", help=".png or .pdf, or .html: a page to turn and play.")
     ] = None,

@@ -6,7 +6,9 @@ from typing import Annotated
 import typer
 
 Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file (.toml), or a name that `robot list` shows.")]
-Pose = Annotated[str | None, typer.Option("--pose", help="Posture named in the robot's file; default: its first.")]
+Pose = Annotated[
+    str | None, typer.Option("--pose", metavar="POSE", help="Posture named in the robot's file; default: its first.")
+]
 Joints = Annotated[
     str | None,
     typer.Option("--joints", metavar="V,V,...", help="Driven joints: degrees; metres of prismatic ones."),

@@ -29,7 +29,7 @@ def path_command(
     ] = (-180.0, 165.0, 24),
     table: Annotated[
         tuple[float, float, int] | None,
-        typer.Option("--table", metavar="LO HI N", help="Rotary table that carries the work, degrees."),
+        typer.Option("--table-turns", metavar="LO HI N", help="Rotary table that carries the work, degrees."),
     ] = None,
     table_at: Annotated[
         tuple[float, float, float] | None,

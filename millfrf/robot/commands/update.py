@@ -22,14 +22,15 @@ def update(
         Path | None, typer.Option("--report", metavar="FILE.json", help="All numbers, errors and directions.")
     ] = None,
     feed: Annotated[
-        float | None, typer.Option("--feed", metavar="DEG", help="Channel X from the base's x; Z up. Default: base.")
+        float | None,
+        typer.Option("--channels-turned", metavar="DEG", help="Channel X from the base's x; Z up. Default: base."),
     ] = None,
     band: Annotated[
         tuple[float, float] | None, typer.Option("--band", metavar="LO HI", help="Hz; default: about the first modes.")
     ] = None,
     sensor: Annotated[
         tuple[float, float, float] | None,
-        typer.Option("--sensor", metavar="X Y Z", help="Housing sensor, m from the tip in the channels' axes."),
+        typer.Option("--sensor-at", metavar="X Y Z", help="Housing sensor, m from the tip in the channels' axes."),
     ] = None,
     stream: Annotated[str | None, typer.Option("--stream", help="Sample clock of recordings.")] = None,
 ) -> None:

@@ -18,14 +18,15 @@ def diagnose(
         typer.Option("--pose", metavar="POSE", help="Posture of each recording in turn: a name, or DEG,DEG,..."),
     ] = None,
     feed: Annotated[
-        float | None, typer.Option("--feed", metavar="DEG", help="Channel X from the base's x; Z up. Default: base.")
+        float | None,
+        typer.Option("--channels-turned", metavar="DEG", help="Channel X from the base's x; Z up. Default: base."),
     ] = None,
     band: Annotated[
         tuple[float, float] | None, typer.Option("--band", metavar="LO HI", help="Hz; default: about the first modes.")
     ] = None,
     sensor: Annotated[
         tuple[float, float, float] | None,
-        typer.Option("--sensor", metavar="X Y Z", help="Housing sensor, m from the tip in the channels' axes."),
+        typer.Option("--sensor-at", metavar="X Y Z", help="Housing sensor, m from the tip in the channels' axes."),
     ] = None,
     payload_at: Annotated[
         tuple[float, float, float] | None,

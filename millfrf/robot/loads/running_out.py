@@ -35,7 +35,7 @@ class RunningOut:
         InputError
             With the option and the remedy.
         """
-        given = {"runout": self.runout, "overhang": self.overhang, "spindle-speed": self.speed}
+        given = {"runout": self.runout, "overhang": self.overhang, "speed": self.speed}
         if all(value is None for value in given.values()):
             return
         missing = [f"--{name}" for name, value in given.items() if value is None]
@@ -43,7 +43,7 @@ class RunningOut:
             raise InputError(f"a drill that runs out of true: give {', '.join(missing)} too")
         check_positive("runout", 1e6 * (self.runout or 0.0), "micrometres", 1000)
         check_positive("overhang", 1e3 * (self.overhang or 0.0), "millimetres", 1e3 * LONGEST)
-        check_positive("spindle-speed", (self.speed or 0.0) * 30 / np.pi, "rpm", 1e5)
+        check_positive("speed", (self.speed or 0.0) * 30 / np.pi, "rpm", 1e5)
 
 
 def show_running_out(robot: SpatialRobot, diameter: float, feed: float, found: DeviationMap, asked: RunningOut) -> None:

@@ -75,7 +75,7 @@ def test_deviation_and_both_choose_what_they_say(inputs: Path, capsys: pytest.Ca
 
 def test_a_table_adds_to_the_turn_about_the_tool(inputs: Path) -> None:
     """Its axis runs along this path: tips stay, tool axes turn about x by what the table says, depth doubles."""
-    more = ("--turns", "-90", "-60", "2", "--table", "-30", "0", "2")
+    more = ("--turns", "-90", "-60", "2", "--table-turns", "-30", "0", "2")
     assert run(command("kuka_kr90_angled", *more, "--out", "out")) == 0
     rows = table(inputs / "out" / "path.csv")
     turned = np.radians([float(row["table_turn_deg"]) for row in rows])
@@ -119,7 +119,7 @@ def test_weight_counts_from_the_first_point_where_the_change_is_asked(inputs: Pa
     [
         (("--optimise", "speed"), "is none of depth, deviation, both"),
         (("--balance", "2"), "from 0 to 1"),
-        (("--table-at", "1", "0", "0"), "--table LO HI N"),
+        (("--table-at", "1", "0", "0"), "--table-turns LO HI N"),
         (("--limit-margin", "120"), "from 0 to 90"),
         (("--limit-margin", "80"), "in no posture that keeps the margins"),
         (("--joint-step", "0.01", "--turns", "-90", "-90", "1"), "no continuous sequence"),

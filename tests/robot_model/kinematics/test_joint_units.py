@@ -110,17 +110,17 @@ def test_values_that_no_joint_has_are_refused(
 
 
 def test_commands_show_and_take_metres(rail: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["robot", "modes", str(rail), "--joints", "2.0,0,-10,100,0,90,0", "--count", "2"]) == DONE
+    assert run(["robot", "modes", str(rail), "--joints", "2.0,0,-10,100,0,90,0", "--modes", "2"]) == DONE
     captured = capsys.readouterr()
     assert "2.000 m, 0.0 deg, -10.0 deg" in " ".join(captured.out.split())
     assert "outside" not in captured.err
-    assert run(["robot", "modes", str(rail), "--joints", "7.5,0,-10,100,0,90,0", "--count", "2"]) == DONE
+    assert run(["robot", "modes", str(rail), "--joints", "7.5,0,-10,100,0,90,0", "--modes", "2"]) == DONE
     assert "joint rail = 7.5 is outside 0 to 6 m" in capsys.readouterr().err
     assert run(["robot", "stiffness", str(rail), "--at", "1.5", "-2", "0.9"]) == DONE
 
 
 def test_radians_are_suspected(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["robot", "modes", "kuka_kr90_r3100", "--joints", "0,-0.1745,1.745,0,1.571,0", "--count", "1"]) == DONE
+    assert run(["robot", "modes", "kuka_kr90_r3100", "--joints", "0,-0.1745,1.745,0,1.571,0", "--modes", "1"]) == DONE
     assert "radians" in capsys.readouterr().err
 
 

@@ -138,11 +138,11 @@ def test_a_turning_force_moves_a_mass_on_springs_as_the_textbook_says() -> None:
 def test_runout_on_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     area = ["--drill", "8", "--x", "1.4", "1.8", "2", "--y", "0", "0.2", "2", "--z", "0.7"]
     asked = ["robot", "deviation", "kuka_kr90_r3100", *area, "--runout", "20", "--overhang", "50"]
-    assert run([*asked, "--spindle-speed", "2500"]) == DONE
+    assert run([*asked, "--speed", "2500"]) == DONE
     printed = " ".join(capsys.readouterr().out.split())
     assert "up to 18.6 N across the drill turn at 41.7 Hz" in printed
     assert "moves no hole's axis" in printed
     assert run(asked) == BAD_INPUT
-    assert "give --spindle-speed too" in capsys.readouterr().err
-    assert run([*asked[:-2], "--overhang", "50000", "--spindle-speed", "2500"]) == BAD_INPUT
+    assert "give --speed too" in capsys.readouterr().err
+    assert run([*asked[:-2], "--overhang", "50000", "--speed", "2500"]) == BAD_INPUT
     assert "give millimetres" in capsys.readouterr().err

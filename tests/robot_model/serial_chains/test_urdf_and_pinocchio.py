@@ -96,11 +96,11 @@ def test_a_parallelogram_is_refused_unless_the_branch_is_chosen(
     assert run(common) == BAD_INPUT
     said = capsys.readouterr().err
     assert "follows joint_3" in said
-    assert "--tip LINK" in said
+    assert "--flange LINK" in said
     assert not out.exists()
-    assert run([*common, "--tip", "plink_1"]) == BAD_INPUT  # this way leads over a joint that follows another
+    assert run([*common, "--flange", "plink_1"]) == BAD_INPUT  # this way leads over a joint that follows another
     assert "parallelogram" in capsys.readouterr().err
-    assert run([*common, "--tip", "tool0"]) == DONE
+    assert run([*common, "--flange", "tool0"]) == DONE
     said = capsys.readouterr().err
     assert "its stiffness is left out" in said
     assert "pjoint_1" in out.read_text()
