@@ -13,7 +13,7 @@ from foundation import keeping_files, refuse_replacing
 
 from ..terminal import print_document, speaking
 
-WRITING = ("--out", "--picture", "--table", "--report", "--candidates", "--figures")
+WRITING = ("--out", "--picture", "--table", "--report", "--candidates", "--figures", "--pdf", "--pick")
 """Options that name a file or folder to write."""
 
 FOLDERS: Mapping[str, tuple[str, ...]] = {
