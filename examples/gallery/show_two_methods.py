@@ -60,6 +60,6 @@ for place, fitted in enumerate((of_recordings, of_frf)):
     right.bar(place + np.array([-0.2, 0.2]), off, 0.35, color=("0.7", "0.3"), edgecolor="0.0")
     print(names[place].replace("\n", " "), "damping off by", np.round(off, 3), "%")
 right.set_xticks((0, 1), names)
-right.set(ylabel="error of the damping (%)", title="light: 16.99 Hz, dark: 18.48 Hz")
+right.set(xlabel="method of the fit", ylabel="error of the damping (%)", title="light: 16.99 Hz, dark: 18.48 Hz")
 right.axhline(0, color="0.0", linewidth=1)
 plt.show()
