@@ -133,8 +133,8 @@ def mode_coupling_line(model: ModalModel, process: MillingProcess, max_depth: fl
     """One sentence on whether two modes couple at any depth up to ``max_depth`` (m) if no tooth cuts into waves."""
     if model.residuals is not None and model.residuals.upper.any():
         return (
-            "mode coupling in a cut without regeneration: not computed apart, since the model has a residual "
-            "flexibility; the depth limits contain it, their modes couple"
+            "mode coupling in a cut without regeneration: not computed, since the model has a residual flexibility; "
+            "the depth limits hold where a tooth cuts into the waves of the one before"
         )
     return f"mode coupling in a cut without regeneration: {_coupling(mode_coupling_limit(model, process, max_depth))}"
 
