@@ -3,6 +3,7 @@ from .errors import DiskFull, FileFormatError, InputError, MillfrfError, Millfrf
 from .foreign_files import conversion_advice
 from .memory import allowed_bytes, require_memory
 from .noted_table import WARNING, apart, warning_lines
+from .notices import notice, notices_to
 from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library, same_values
 from .table_mistakes import mistake_in_words, shown
 from .toml_tables import checked_toml
@@ -50,6 +51,8 @@ __all__ = [
     "keeps_files",
     "listed",
     "mistake_in_words",
+    "notice",
+    "notices_to",
     "optional_library",
     "refuse_replacing",
     "remove_leftovers",

@@ -30,7 +30,7 @@ STOPPED = "stopped; unfinished files were removed"
 app = typer.Typer(
     name="millfrf",
     help="FRFs of machining robots measured while they mill, their modal fit and stability lobes.",
-    add_completion=False,
+    add_completion=True,
     no_args_is_help=False,
     rich_markup_mode=None,
 )

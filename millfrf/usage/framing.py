@@ -1,6 +1,7 @@
 """What all commands have in common: `--force`, `--quiet`, `--json`, and one place that takes care of them."""
 
 import inspect
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import wraps
 from pathlib import Path
@@ -9,9 +10,9 @@ from typing import Annotated, Any, get_args, get_type_hints
 import typer
 from typer.models import OptionInfo
 
-from foundation import keeping_files, refuse_replacing
+from foundation import keeping_files, notices_to, refuse_replacing
 
-from ..terminal import print_document, speaking
+from ..terminal import manner, print_document, printable, speaking
 
 WRITING = ("--out", "--picture", "--table", "--report", "--candidates", "--figures", "--pdf", "--pick")
 """Options that name a file or folder to write."""
@@ -85,7 +86,11 @@ def framed(words: str, function: Callable[..., None]) -> Callable[..., None]:
     def command(force: bool = False, quiet: bool = False, as_json: bool = False, **given: Any) -> None:
         ended: typer.Exit | None = None
         remedy = REMEDY if "force" in common and not force else None
-        with speaking(quiet=quiet, as_json=as_json) as manner, keeping_files(remedy) as written:
+        with (
+            speaking(quiet=quiet, as_json=as_json) as chosen,
+            notices_to(_note),
+            keeping_files(remedy) as written,
+        ):
             for path in _named(words, writing, given):
                 refuse_replacing(path)
             try:
@@ -93,11 +98,17 @@ def framed(words: str, function: Callable[..., None]) -> Callable[..., None]:
             except typer.Exit as exit_with_code:
                 ended = exit_with_code
             if as_json:
-                print_document(words, manner, written())
+                print_document(words, chosen, written())
         if ended is not None:
             raise ended
 
     return _with_options(command, function, common)
+
+
+def _note(text: str) -> None:
+    """Tell a notice of a deep part where it is in nobody's way."""
+    if not manner().quiet:
+        print(f"note: {printable(text)}", file=sys.stderr)
 
 
 def _with_options(

@@ -77,8 +77,8 @@ class StabilityLimits:
         warnings = self.warnings
         if bounded.any():
             warnings += (
-                f"at {bounded.sum()} of the {len(depths)} speeds that this search had what lies deeper "
-                "than the depth given could not be resolved",
+                f"at {bounded.sum()} of {len(depths)} speeds of this search, what lies deeper than the depth given "
+                "could not be resolved",
             )
             kinds = ["none" if here else kind for here, kind in zip(bounded, kinds, strict=True)]
         return StabilityLobes(

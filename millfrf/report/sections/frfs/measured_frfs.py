@@ -80,17 +80,23 @@ def _large(
     shown = shown_frf(frf, model)
     known = reference if reference is not None and knows(reference, shown) else None
     curves = FrfCurves(shown, band or axis_of(shown, fit_band), model, known, fit_band)
-    caption = _frf_caption(file, found, known, spread=shown.entry_variance() is not None)
-    words = f"FRF magnitude, phase and coherence of {file.path.name}"
+    coherence = "coherence" if frf.multiple_coherence is None else "multiple coherence"
+    caption = _frf_caption(file, found, known, coherence, spread=shown.entry_variance() is not None)
+    words = f"FRF magnitude, phase and {coherence} of {file.path.name}"
     first, *others = frf_figures(curves)
     zoomed = picture_of(first, caption, words, zoomed=zoomed_matrix(curves))  # every entry, whatever the page
     return (zoomed, *(picture_of(figure, caption, words) for figure in others))
 
 
 def _frf_caption(
-    file: SourceFile, model: tuple[SourceFile, ModalModel] | None, reference: ModalModel | None, *, spread: bool
+    file: SourceFile,
+    model: tuple[SourceFile, ModalModel] | None,
+    reference: ModalModel | None,
+    coherence: str,
+    *,
+    spread: bool,
 ) -> str:
-    text = f"{file.path.name}: magnitude and phase, and coherence of each response with the excitations."
+    text = f"{file.path.name}: magnitude and phase, and {coherence} of each response with the excitations."
     if model is not None:
         fitted = model[0].made_from(file) and model[0].provenance.get("step") == "fit"
         text += f" Dashed: model {model[0].path.name}" + (", fitted to these lines." if fitted else ".")
