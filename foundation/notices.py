@@ -13,7 +13,7 @@ def notice(text: str) -> None:
     Parameters
     ----------
     text
-        One sentence.
+        What is to be known, as one sentence without a full stop.
     """
     listener = _listener.get()
     if listener is not None:

@@ -23,6 +23,7 @@ ELSEWHERE = {
     "picking_poles": "tests/modal_fit",
     "cutting_diagnosis": "tests/millfrf/test_cut_command.py",
     "robot_files": "docs/tutorials/robots.md",
+    "scripts": "tests/millfrf/test_quiet_and_json.py",
 }
 """Pages whose commands, with names for the reader's own files, are run there on files of those names or of others."""
 
