@@ -46,6 +46,18 @@ def answer(text: str) -> None:
     typer.echo(printable(text), err=now.as_json)
 
 
+def aside(text: str) -> None:
+    """Tell on standard error why one waits; a quiet command does not.
+
+    Parameters
+    ----------
+    text
+        What is to be known, as one sentence without a full stop.
+    """
+    if not manner().quiet:
+        typer.echo(printable(f"{_NOTE}{text}"), err=True)
+
+
 def note(text: str) -> None:
     """Tell what is going on; a quiet command does not.
 

@@ -1,7 +1,6 @@
 """What all commands have in common: `--force`, `--quiet`, `--json`, and one place that takes care of them."""
 
 import inspect
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import wraps
 from pathlib import Path
@@ -12,7 +11,7 @@ from typer.models import OptionInfo
 
 from foundation import keeping_files, notices_to, refuse_replacing
 
-from ..terminal import manner, print_document, printable, speaking
+from ..terminal import aside, print_document, speaking
 
 WRITING = ("--out", "--picture", "--table", "--report", "--candidates", "--figures", "--pdf", "--pick")
 """Options that name a file or folder to write."""
@@ -88,7 +87,7 @@ def framed(words: str, function: Callable[..., None]) -> Callable[..., None]:
         remedy = REMEDY if "force" in common and not force else None
         with (
             speaking(quiet=quiet, as_json=as_json) as chosen,
-            notices_to(_note),
+            notices_to(aside),
             keeping_files(remedy) as written,
         ):
             for path in _named(words, writing, given):
@@ -103,12 +102,6 @@ def framed(words: str, function: Callable[..., None]) -> Callable[..., None]:
             raise ended
 
     return _with_options(command, function, common)
-
-
-def _note(text: str) -> None:
-    """Tell a notice of a deep part where it is in nobody's way."""
-    if not manner().quiet:
-        print(f"note: {printable(text)}", file=sys.stderr)
 
 
 def _with_options(
