@@ -2,21 +2,20 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
 
-_listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", default=None)
+_listeners: list[Callable[[str], None]] = []
+"""Of the whole process: what is told in a thread of a computation reaches the command that began it."""
 
 
 def notice(text: str) -> None:
-    """Tell something to the listener of the code at hand; without one nothing is told.
+    """Tell something to the listener of the command at hand; without one nothing is told.
 
     Parameters
     ----------
     text
         What is to be known, as one sentence without a full stop.
     """
-    listener = _listener.get()
-    if listener is not None:
+    for listener in _listeners[-1:]:
         listener(text)
 
 
@@ -35,8 +34,8 @@ def notices_to(listener: Callable[[str], None]) -> Iterator[None]:
     ...     notice("compiling, once")
     compiling, once
     """
-    token = _listener.set(listener)
+    _listeners.append(listener)
     try:
         yield
     finally:
-        _listener.reset(token)
+        _listeners.remove(listener)

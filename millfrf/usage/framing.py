@@ -87,7 +87,7 @@ def framed(words: str, function: Callable[..., None]) -> Callable[..., None]:
         remedy = REMEDY if "force" in common and not force else None
         with (
             speaking(quiet=quiet, as_json=as_json) as chosen,
-            notices_to(aside),
+            notices_to(_unheard if quiet else aside),
             keeping_files(remedy) as written,
         ):
             for path in _named(words, writing, given):
@@ -102,6 +102,11 @@ def framed(words: str, function: Callable[..., None]) -> Callable[..., None]:
             raise ended
 
     return _with_options(command, function, common)
+
+
+def _unheard(text: str) -> None:
+    """Let a quiet command tell nothing."""
+    del text
 
 
 def _with_options(
