@@ -4,7 +4,7 @@ import math
 
 from mismatch import COEFFICIENTS, AcceptedCause, CutDiagnosis
 
-from ..tables import with_error
+from ..tables import evidence_in_words, with_error
 
 UNITS = {"radial_offset_m": ("µm", 1e6), "angle_rad": ("deg", 180 / math.pi), "coefficient_n_per_m": ("kN/m", 1e-3)}
 """How numbers are told to a reader: unit and factor from SI."""
@@ -46,7 +46,7 @@ def describe(cause: AcceptedCause) -> str:
         numbers = [f"{name} {cause.parameters[name]:.4g} ± {cause.standard_errors[name]:.2g}" for name in names]
     else:
         numbers = [told(name, value, cause.standard_errors[name]) for name, value in cause.parameters.items()]
-    return f"{cause.name}: {', '.join(numbers)}; evidence {cause.evidence:.0f}"
+    return f"{cause.name}: {', '.join(numbers)}; {evidence_in_words(cause.evidence)}"
 
 
 def told(name: str, value: float, error: float) -> str:

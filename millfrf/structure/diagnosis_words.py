@@ -2,6 +2,8 @@
 
 from mismatch import AcceptedCause, StructureDiagnosis, joint_in_words, tip_axes
 
+from ..tables import evidence_in_words
+
 
 def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
     """A few lines for the terminal: verdict, causes with numbers, error before and after.
@@ -49,7 +51,7 @@ def _cause_line(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
     )
     axes = tip_axes(diagnosis.details.final.hypothesis.model)[2] if "direction" in cause.location else ()
     place = joint_in_words(cause.location, axes) or ", ".join(f"{key} {value}" for key, value in cause.location.items())
-    return f"{cause.name}{f' ({place})' if place else ''}: {numbers}; evidence {cause.evidence:.0f}"
+    return f"{cause.name}{f' ({place})' if place else ''}: {numbers}; {evidence_in_words(cause.evidence)}"
 
 
 def _error_line(diagnosis: StructureDiagnosis) -> str:

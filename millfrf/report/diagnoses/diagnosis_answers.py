@@ -8,6 +8,7 @@ import numpy as np
 from foundation import DegreeOfFreedom
 from mismatch import AcceptedCause, StructureDiagnosis, form_of, joint_in_words, rig_of, tip_axes
 
+from ...tables import odds_in_words
 from .next_tests import next_test
 
 
@@ -187,8 +188,8 @@ def what(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
 def how_sure(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     """Evidence, and what it is worth on data that was held out."""
     said = [
-        f"{first_word(cause.name)}: evidence {cause.evidence:.0f} (twice the logarithm of the odds; 20 is the "
-        "least that is accepted)."
+        f"{first_word(cause.name)}: odds {odds_in_words(cause.evidence)} against its absence (evidence "
+        f"{cause.evidence:.0f}; each 4.6 more make the odds ten times as large, and 20 is the least that is accepted)."
         for cause in diagnosis.physics
     ]
     said.append(_errors(diagnosis))

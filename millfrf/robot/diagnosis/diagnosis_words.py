@@ -13,7 +13,7 @@ from mismatch import (
     standard_error_of,
 )
 
-from ...tables import with_error
+from ...tables import evidence_in_words, with_error
 
 UNITS = {"rad": ("deg", 180 / np.pi), "m/N": ("µm/N", 1e6), "m": ("m", 1.0)}
 """How numbers are told to a reader: unit and factor from SI."""
@@ -82,7 +82,7 @@ def describe(cause: AcceptedCause) -> str:
     number, unit = told_number(cause)
     what = f"times {number}" if not unit else f"{number} {unit}"
     lighter = " (lighter than modelled)" if cause.location["kind"] == "payload" and number_of(cause) < 0 else ""
-    return f"{cause.name}: {what}{lighter}; evidence {cause.evidence:.0f}"
+    return f"{cause.name}: {what}{lighter}; {evidence_in_words(cause.evidence)}"
 
 
 def told_number(cause: AcceptedCause | Candidate) -> tuple[str, str]:
