@@ -154,13 +154,19 @@ def _with_reference(collected: Collected, options: ReportOptions, reference: Mod
 def _in_brief(collected: Collected) -> list[str]:
     """The modes in a sentence."""
     sentences = []
-    for file, model in collected.models[-1:]:
+    for file, model in _leading_models(collected):
         modes = ", ".join(
             f"{frequency:.2f} Hz ({100 * zeta:.2f} %)"
             for frequency, zeta in zip(model.natural_frequencies, model.damping_ratios, strict=True)
         )
         sentences.append(f"{file.path.name} has {len(model.poles)} modes: {modes}.")
     return sentences
+
+
+def _leading_models(collected: Collected) -> list[tuple[SourceFile, ModalModel]]:
+    """The model that stands at the head: the last that lobes were made from, else the last given."""
+    drawn = [one for one in collected.models if any(lobes.made_from(one[0]) for lobes, _ in collected.lobes)]
+    return (drawn or list(collected.models))[-1:]
 
 
 def _warnings(collected: Collected, concerns: Sequence[str]) -> list[str]:

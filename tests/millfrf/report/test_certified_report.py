@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from cutting import MillingProcess, write_cutting_process
+from millfrf.provenance import of_lobes
 from millfrf.report import ReportOptions, collect, page_text
 from millfrf.report.lobes_check import checked_lobes
 from millfrf.report.page import report_page
@@ -89,3 +90,16 @@ def test_a_file_of_another_structure_is_doubted(tmp_path: Path) -> None:
     paths = files(tmp_path, ("certified",))
     write_cutting_process(paths[1], replace(HALF, ktc=2 * HALF.ktc))
     assert any("could not be checked" in line for line in stability_findings(collect(paths)).warnings)
+
+
+def test_the_model_of_the_lobes_stands_at_the_head(tmp_path: Path) -> None:
+    """Another model that is given after it does not."""
+    tip, cut, lobes = files(tmp_path, ("certified",))
+    other = tmp_path / "other.json"
+    write_modal_model(other, replace(structure(), poles=1.1 * structure().poles))
+    solved = certified_lobes(structure(), HALF, np.array([30000.0, 31000.0]) * RPM, 12e-3)
+    write_lobes(lobes, solved, provenance=of_lobes([tip, cut], {}))
+    head, _ = report_page(collect([tip, other, cut, lobes]), ReportOptions())
+    said = " ".join(head.verdict)
+    assert "tip.json has 1 modes: 922.00 Hz" in said
+    assert "other.json has" not in said
