@@ -13,6 +13,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 import argparse
 import json
 import shlex
+import shutil
 import subprocess
 import sys
 import time
@@ -34,7 +35,9 @@ def run_case(spec: CaseSpec, out: Path, tool: list[str], timeout: float, keep: b
     """Simulate, seal, diagnose and predict one case; return a line for the screen."""
     name = case_name(spec.index)
     folder, answers = write_case(spec, out), out / "answers" / name
-    answers.mkdir(parents=True, exist_ok=True)
+    # a trial that was stopped here may have left some of the answer, which the tool does not replace
+    shutil.rmtree(answers, ignore_errors=True)
+    answers.mkdir(parents=True)
     given = [str(folder / file) for file in GIVEN if (folder / file).exists()]
     began = time.perf_counter()
     command = [*tool, "diagnose", str(folder / "nominal.json"), *given, "--out", str(answers)]
