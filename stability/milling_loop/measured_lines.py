@@ -19,6 +19,10 @@ UNSEEN = 1 / 3
 MOSTLY = 0.7
 """Share of the lines from the lowest on that must be such noise: a coarse resonance looks rough at a few lines."""
 
+ROUGHEST = 1.5
+"""Roughness over its median in the band beyond which it is the structure's: a resonance between two lines is rough at
+a few lines, noise of a sensor at all."""
+
 WINDOW = 9
 """Lines over which noise and receptance are averaged."""
 
@@ -29,12 +33,13 @@ FEWEST = 8
 def known_lines(frf: Frf) -> tuple[Frf, tuple[str, ...]]:
     """The receptance without the lines at which it is not known, and a sentence on what was left out.
 
-    A receptance is the accelerance over ``-w^2``: noise of an accelerometer that is flat over the frequency becomes a
-    huge flexibility at the lowest lines, and lobes take it for a structure that chatters below 1 Hz. The noise of a
-    line is the standard error that the FRF states or, where that is larger, the roughness of the accelerance A,
-    ``|A[k-1] - 2 A[k] + A[k+1]| / sqrt(6)``, which is the standard deviation of independent errors of equal size.
-    Lines are left out up to the highest one below which most are such noise. Lines outside the band that the FRF
-    states are left out, too.
+    A receptance is the accelerance over ``-w^2``: noise of an accelerometer that is flat over the frequency becomes
+    a huge flexibility at the lowest lines, and lobes take it for a structure that chatters below 1 Hz. The noise of
+    a line is the standard error that the FRF states or, where that is larger, the roughness of the accelerance A,
+    ``|A[k-1] - 2 A[k] + A[k+1]| / sqrt(6)``, which is the standard deviation of independent errors of equal size. A
+    resonance that few lines resolve is rough as well, and must not be lost: roughness counts up to one and a half
+    times its median in the band. Lines are left out up to the highest one below which most are such noise. Lines
+    outside the band that the FRF states are left out, too.
 
     Parameters
     ----------
@@ -97,11 +102,13 @@ def _inside(frf: Frf) -> NDArray[np.bool_]:
 def _noise(frf: Frf, inside: NDArray[np.bool_], values: NDArray[np.complex128], squares: Real) -> Real:
     """Noise of the accelerance at each line, Frobenius norm over the entries."""
     bent = np.linalg.norm(values[:-2] - 2 * values[1:-1] + values[2:], axis=(1, 2)) / np.sqrt(6)
-    rough = _averaged(np.concatenate([bent[:1], bent, bent[-1:]]))
+    rough = np.minimum(_averaged(np.concatenate([bent[:1], bent, bent[-1:]])), ROUGHEST * np.median(bent))
     variance = frf.entry_variance()
     if variance is None:
-        return rough
-    stated = np.sqrt(np.where(np.isfinite(variance[inside]), variance[inside], 0.0).sum(axis=(1, 2)))
+        return np.asarray(rough)
+    # an entry without coherence is noise as a whole, and no more than itself; NaN: not known
+    size = np.abs(values) / squares[:, None, None]
+    stated = np.sqrt(np.minimum(np.nan_to_num(variance[inside], nan=0.0, posinf=np.inf), size**2).sum(axis=(1, 2)))
     return np.asarray(np.maximum(rough, stated * squares))
 
 

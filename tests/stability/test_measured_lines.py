@@ -67,6 +67,38 @@ def test_a_coarse_resonance_is_no_noise() -> None:
     assert known_lines(frf) == (frf, ())
 
 
+@pytest.mark.parametrize(
+    ("mode", "damping", "lowest", "spacing"),
+    [(12, 0.01, 11.5, 0.5), (12, 0.01, 10, 1.0), (17, 0.005, 16, 1.0), (12, 0.01, 5, 1.0), (3, 0.02, 2, 0.5)],
+)
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_coarse_resonance_at_the_begin_of_the_band_is_kept(
+    mode: float, damping: float, lowest: float, spacing: float, noise: float
+) -> None:
+    """Without it the structure would seem stiffer than it is, and limits would be unsafe."""
+    frequencies = np.arange(lowest, 200.0, spacing)
+    values = 1e-6 / (1 - (frequencies / mode) ** 2 + 2j * damping * frequencies / mode)
+    values += 3e-7 / (1 - (frequencies / 60) ** 2 + 2j * 0.02 * frequencies / 60)
+    accelerances = values * (2 * np.pi * frequencies) ** 2
+    drawn = np.random.default_rng(3).normal(size=(2, len(frequencies)))
+    accelerances += noise * np.median(np.abs(accelerances)) * (drawn[0] + 1j * drawn[1])
+    values = accelerances / (2 * np.pi * frequencies) ** 2
+    frf = Frf(frequencies, values[:, None, None], ("T:+X",), ("T:+X",), "receptance", "m/N", frequencies > 0)
+    used, said = known_lines(frf)
+    assert used.frequencies[used.valid][0] == frequencies[0]
+    assert said == ()
+
+
+def test_lines_without_coherence_are_noise() -> None:
+    measured = accelerance(tip_model(default_structure()), 1e-9)
+    coherence = np.ones(measured.values.shape)
+    coherence[measured.frequencies < 4.0] = 0.0
+    values = measured.values.copy()
+    values[measured.frequencies < 4.0] = 100.0
+    stated = replace(measured, values=values, coherence=coherence, averages=np.full((3, 3), 20))
+    assert tool_receptance(stated).span[0] == 4.0
+
+
 def test_lines_outside_the_stated_band_are_not_used() -> None:
     measured = replace(accelerance(tip_model(default_structure()), 1e-9), band=(5.0, 60.0))
     assert tool_receptance(measured).span == (5.0, 60.0)

@@ -80,7 +80,7 @@ def write_figures(where: FigureFiles, sections: Sequence[Section]) -> list[Path]
     Returns
     -------
     list of Path
-        The files.
+        Paths of the files that were written, in the order of the figures.
 
     Raises
     ------
