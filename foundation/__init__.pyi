@@ -1,4 +1,4 @@
-from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom
+from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom, checked_names
 from .errors import DiskFull, FileFormatError, InputError, MillfrfError, MillfrfWarning, TooLarge
 from .foreign_files import conversion_advice
 from .memory import allowed_bytes, require_memory
@@ -40,6 +40,7 @@ __all__ = [
     "allowed_bytes",
     "apart",
     "checked_band",
+    "checked_names",
     "checked_toml",
     "conversion_advice",
     "counted",

@@ -1,6 +1,7 @@
 """A degree of freedom is a node and a signed direction: ``TCP:+X``."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from .errors import InputError
@@ -66,3 +67,29 @@ class DegreeOfFreedom:
 
     def __str__(self) -> str:
         return f"{self.node}:{self.direction}"
+
+
+def checked_names(names: Sequence[object], owner: str) -> tuple[str, ...]:
+    """Give the names of degrees of freedom as they are, if each is a text.
+
+    Parameters
+    ----------
+    names
+        Names along an axis of a matrix, as a file gave them.
+    owner
+        What carries the axis, for the message: ``FRF``, ``modal model``.
+
+    Raises
+    ------
+    InputError
+        A name that is no text, such as a number or a missing value.
+
+    Examples
+    --------
+    >>> checked_names(["TCP:+X"], "FRF")
+    ('TCP:+X',)
+    """
+    for name in names:
+        if not isinstance(name, str):
+            raise InputError(f"{owner}: degree of freedom {name!r} is no text; write node:direction, such as TCP:+X")
+    return tuple(map(str, names))

@@ -58,7 +58,7 @@ class RecordingWriter:
     Raises
     ------
     InputError
-        The file exists, its folder does not, there is no room, or streams share a name.
+        The file exists, its folder does not, there is no room, streams share a name, or a text holds a zero character.
     """
 
     def __init__(
@@ -83,6 +83,10 @@ class RecordingWriter:
             raise InputError(
                 f"a recording needs streams of different names, got {[s.name for s in streams]}; name each once"
             )
+        for name, text in {"title": title, "setup": setup, "recorded_at": recorded_at or ""}.items():
+            # HDF5 cannot hold it
+            if (place := text.find("\0")) >= 0:
+                raise InputError(f"the recording's {name} holds a zero character at place {place}; leave it out")
         self._file = self._create(overwrite)
         self._spare: SpareSpace | None = None
         try:

@@ -6,11 +6,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import Band, InputError, Result, Summary, checked_band, counted, drawing, listed, optional_library
+from foundation import (
+    Band,
+    InputError,
+    Result,
+    Summary,
+    checked_band,
+    checked_names,
+    counted,
+    drawing,
+    listed,
+    optional_library,
+)
 
 if TYPE_CHECKING:
     import xarray
     from matplotlib.axes import Axes
+
+
+QUANTITIES = ("receptance", "mobility", "accelerance", "transfer")
+"""Quantities that an FRF may be of."""
 
 
 @dataclass(frozen=True)
@@ -80,8 +95,8 @@ class Frf(Result):
     Raises
     ------
     InputError
-        Shapes that do not agree, values that are not finite on valid lines, a coherence outside 0 to 1, or a time
-        constant that is not positive.
+        A quantity that is not known, degrees of freedom that are no text, shapes that do not agree, values that are
+        not finite on valid lines, a coherence outside 0 to 1, or a time constant that is not positive.
     """
 
     frequencies: NDArray[np.float64]
@@ -101,6 +116,10 @@ class Frf(Result):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "band", checked_band(self.band, "FRF"))
+        if self.quantity not in QUANTITIES:
+            raise InputError(f"FRF quantity {self.quantity!r} is not known; give one of {', '.join(QUANTITIES)}")
+        for axis in (self.responses, self.excitations):
+            checked_names(axis, "FRF")
         expected = (len(self.frequencies), len(self.responses), len(self.excitations))
         if self.values.shape != expected:
             raise InputError(

@@ -83,18 +83,19 @@ def read_diagnosis(path: str | os.PathLike[str]) -> Diagnosis[None]:
         content = json.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise FileFormatError(f"{name} cannot be read as a diagnosis: {error}") from error
-    kind = content.get("format") if isinstance(content, dict) else None
+    kind = str(content.get("format")) if isinstance(content, dict) else None
     newest = {FORMAT: FORMAT_VERSION, OLD_ROBOT_FORMAT: 1}
-    if kind not in newest or content.get("format_version", 0) > newest[kind]:
-        said = f"{kind!r} version {content.get('format_version')}" if isinstance(content, dict) else "no JSON object"
+    version = content.get("format_version", 0) if isinstance(content, dict) else None
+    if kind not in newest or not isinstance(version, int) or version > newest[kind]:
+        said = f"{kind!r} version {version!r}" if isinstance(content, dict) else "no JSON object"
         raise FileFormatError(f"{name} is {said}; wanted is {FORMAT!r} up to version {FORMAT_VERSION}")
     try:
         if kind == OLD_ROBOT_FORMAT:
             content = _of_old_robot(content)
-        elif content.get("format_version", 0) < 2:
+        elif version < 2:
             content = _of_version_1(content)
         return _diagnosis(content)
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise FileFormatError(f"{name} lacks a part of a diagnosis: {error}; diagnose again") from error
 
 

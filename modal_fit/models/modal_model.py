@@ -7,7 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf
-from foundation import Band, InputError, Result, Summary, checked_band, counted, drawing, listed, optional_library
+from foundation import (
+    Band,
+    InputError,
+    Result,
+    Summary,
+    checked_band,
+    checked_names,
+    counted,
+    drawing,
+    listed,
+    optional_library,
+)
 
 from .mode_errors import ModeErrors
 from .residuals import Residuals
@@ -55,7 +66,8 @@ class ModalModel(Result):
     Raises
     ------
     InputError
-        Shapes that do not agree, values that are not finite, or a pole in the lower half plane.
+        Degrees of freedom that are no text, shapes that do not agree, values that are not finite, or a pole in the
+        lower half plane.
     """
 
     poles: NDArray[np.complex128]
@@ -74,6 +86,8 @@ class ModalModel(Result):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "band", checked_band(self.band, "modal model"))
+        for axis in (self.responses, self.excitations):
+            checked_names(axis, "modal model")
         n_modes = len(self.poles)
         if self.delay and self.quantity != "transfer":
             raise InputError(

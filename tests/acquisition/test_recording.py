@@ -104,6 +104,13 @@ os._exit(9)
         np.testing.assert_array_equal(recording.stream().read()[::1000, 0], np.arange(7.0))
 
 
+def test_a_text_that_hdf5_cannot_hold_is_named_and_leaves_no_file(tmp_path: Path) -> None:
+    stream = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))
+    with pytest.raises(InputError, match="setup holds a zero character at place 2"):
+        RecordingWriter(tmp_path / "a.h5", [stream], setup="ab\0c")
+    assert not (tmp_path / "a.h5").exists()
+
+
 def test_replay_gives_back_the_recording_and_can_be_paced(tmp_path: Path) -> None:
     samples = np.random.default_rng(1).standard_normal((300, 2))
     record(ArraySource(samples, 64), tmp_path / "a.h5", dtype="float64")

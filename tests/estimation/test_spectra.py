@@ -3,6 +3,7 @@
 from itertools import pairwise
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import given
@@ -242,6 +243,10 @@ def test_frf_files_round_trip_and_refuse_what_they_are_not(tmp_path: Path) -> No
         writer.append("main", np.hstack([force, motion]))
     with pytest.raises(FileFormatError, match=r"'millfrf.recording'"):
         read_frf(tmp_path / "r.h5")
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        file.attrs["quantity"] = "recepta"
+    with pytest.raises(FileFormatError, match="quantity 'recepta' is not known"):
+        read_frf(tmp_path / "a.h5")
     with Recording(tmp_path / "r.h5") as recording:
         from_file = cross_spectra(recording, SpectralSettings(64, 0.5, "hann"))
         np.testing.assert_allclose(h1(from_file).values, frf.values, rtol=1e-4, atol=1e-5)

@@ -85,6 +85,7 @@ def test_table_1_peaks_as_evaluated_independently() -> None:
         ({"format_version": 7}, "format_version 7"),
         ({"poles_rad_per_s": None}, "poles_rad_per_s"),
         ({"right": [[[1.0, 0.0]]]}, "a field has not the shape"),
+        ({"responses": [1e308, 0.0, 0.0]}, "degree of freedom 1e\\+308 is no text"),
         ({"left": "text"}, "field left holds something that is no number"),
         ({"poles_rad_per_s": [[-1.0, -100.0], [-1.0, 100.0]]}, "negative imaginary part"),
     ],

@@ -208,6 +208,9 @@ def test_the_robots_older_format_is_read(tmp_path: Path) -> None:
     [
         (OLD_STRUCTURE | {"format_version": 3}, "version 3; wanted is 'millfrf.diagnosis' up to version 2"),
         (OLD_STRUCTURE | {"format": "millfrf.frf"}, "'millfrf.frf'"),
+        (OLD_STRUCTURE | {"format_version": ""}, "version ''"),
+        (OLD_STRUCTURE | {"format": []}, "'[]'"),
+        (OLD_STRUCTURE | {"physics": 3}, "lacks a part of a diagnosis"),
         ([1, 2], "no JSON object"),
         ("{", "cannot be read as a diagnosis"),
         ({"format": "millfrf.diagnosis", "format_version": 2, "verdict": "none"}, "lacks a part of a diagnosis"),
