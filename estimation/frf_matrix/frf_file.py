@@ -86,10 +86,12 @@ def read_frf(path: str | os.PathLike[str]) -> Frf:
             raise FileFormatError(f"{path} is a file of another program; {advice}") from error
         raise FileFormatError(f"{path} is not an HDF5 file or is damaged; give an FRF file made here") from error
     with file:
-        _check(file.attrs, path)
         try:
+            _check(file.attrs, path)
             return _read(file)
-        except (KeyError, json.JSONDecodeError, TypeError, OSError) as error:
+        except FileFormatError:
+            raise
+        except (KeyError, TypeError, ValueError, AttributeError, OSError, RuntimeError) as error:
             raise FileFormatError(f"{path}: a field is missing or damaged ({error}); estimate anew") from error
         except InputError as error:
             raise FileFormatError(f"{path}: {error}") from error

@@ -36,11 +36,24 @@ def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
         )
     if diagnosis.details.behaviour is not None:
         lines.append(f"behaviour by level: {diagnosis.details.behaviour.sentence}")
+    lines += free_form_in_words(diagnosis)
     lines.append(_error_line(diagnosis))
     offered = diagnosis.content.get("improved_model", {}).get("sentence")
     lines += [offered] if offered else []
     lines += [one["sentence"] for one in diagnosis.content.get("noise", ())]
     return lines
+
+
+def free_form_in_words(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
+    """What a joint's force is where its form is free; empty where the recordings ask for no free form.
+
+    Parameters
+    ----------
+    diagnosis
+        The diagnosis of a structure.
+    """
+    found = diagnosis.content.get("free_form")
+    return (found["sentence"],) if found else ()
 
 
 def _cause_line(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:

@@ -233,6 +233,8 @@ class VerdictSettings(Thresholds, shares=("explained", "partly", "halves")):
         Error in any recording over that of modes that are refitted to it alone, above which what is left is no noise.
     most_not_noise
         Share of the response that must so be known to be no noise.
+    most_over_free
+        Error held out over that of the same law in a free form, above which the law's name is not the whole.
     """
 
     noise_like: float = 0.05
@@ -245,6 +247,7 @@ class VerdictSettings(Thresholds, shares=("explained", "partly", "halves")):
     most_left: float = 0.1
     most_over_alone: float = 1.5
     most_not_noise: float = 0.1
+    most_over_free: float = 2.0
 
 
 @dataclass(frozen=True)

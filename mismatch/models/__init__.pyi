@@ -1,8 +1,8 @@
 from .derivatives import jacobian
 from .fitting import ENOUGH, Fit, fit, modes_are_odd, plain_fit, residual
+from .freed_laws import EVERYTHING, with_free_forms, with_linear_part
 from .hypothesis import Cause, Hypothesis, held_values, line_response, location_of, predict_lines, surround
 from .linear_lines import response_to_joint
-from .linear_part import with_linear_part
 from .lines import receptance_at
 from .misfit import known_noise, least_misfit, levels, outdoes_noise, shares_left, through_structure, whitened
 from .model_shape import ModelShape
@@ -11,6 +11,7 @@ from .refinement import believed, following_all, gives_one_up, settled, with_cha
 
 __all__ = [
     "ENOUGH",
+    "EVERYTHING",
     "Cause",
     "Fit",
     "Hypothesis",
@@ -41,5 +42,6 @@ __all__ = [
     "through_structure",
     "whitened",
     "with_chain",
+    "with_free_forms",
     "with_linear_part",
 ]

@@ -1,5 +1,6 @@
 """Causes as the terms of a modal model file, and back: what `improved_model.json` holds beside its modes."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -10,7 +11,19 @@ from modal_fit import ModalModel
 
 from ..inference import LabError
 from ..joints import JointMotion, axis_location, axis_of
-from ..physics import ChainPhysics, JointPhysics, ModePhysics, Physics, Rig, in_units, library, rig_of
+from ..physics import (
+    FREE_FORM,
+    ChainPhysics,
+    FreeForm,
+    JointPhysics,
+    ModePhysics,
+    Physics,
+    Rig,
+    in_units,
+    library,
+    rig_of,
+)
+from .freed_laws import EVERYTHING
 from .hypothesis import Cause, Hypothesis
 from .model_shape import ModelShape
 
@@ -33,6 +46,8 @@ def improved_model(hypothesis: Hypothesis, faults: tuple[dict[str, Any], ...] = 
         location: dict[str, Any] = {"place": cause.place}
         if cause.axis is not None and cause.motion is not None:
             location = {**axis_location(cause.axis), "motion": asdict(cause.motion)}
+        if isinstance(cause.physics, FreeForm):
+            location |= {"law": cause.physics.law_of.name, "families": cause.physics.kinds}
         values = {name: float(value) for name, value in zip(names, cause.values, strict=True)}
         terms.append({"name": cause.physics.name, "location": location, "parameters": values})
     return replace(hypothesis.model, physics=(*terms, *faults))
@@ -51,9 +66,7 @@ def hypothesis_of(model: ModalModel, causes: dict[str, Physics] | None = None) -
     found = []
     for term in model.physics:
         name = term.get("name")
-        if name not in known:
-            raise FileFormatError(f"the model has a term of unknown physics {name!r}; known are {', '.join(known)}")
-        physics = known[name]
+        physics = _physics_of(term, known)
         if not isinstance(physics, ChainPhysics | JointPhysics):
             continue
         try:
@@ -68,3 +81,20 @@ def hypothesis_of(model: ModalModel, causes: dict[str, Physics] | None = None) -
             raise FileFormatError(f"the model's term {name} is incomplete: {error}; diagnose again") from error
     shape = ModelShape(replace(model, physics=()), LabError())
     return Hypothesis(shape, np.zeros(shape.size), tuple(found))
+
+
+def _physics_of(term: Mapping[str, Any], known: Mapping[str, Physics]) -> Physics:
+    """The cause of a term, or a law of free form."""
+    name, location = term.get("name"), term.get("location")
+    free = name == FREE_FORM and isinstance(location, Mapping)
+    law = location.get("law") if free and isinstance(location, Mapping) else name
+    if law not in known:
+        raise FileFormatError(f"the model has a term of unknown physics {law!r}; known are {', '.join(known)}")
+    physics = known[law]
+    if not free:
+        return physics
+    kinds = str(location.get("families")) if isinstance(location, Mapping) else ""
+    if not isinstance(physics, JointPhysics) or not kinds or set(kinds) - set(EVERYTHING):
+        raise FileFormatError(f"the model's term {FREE_FORM} of {law} and families {kinds!r} is no law; diagnose again")
+    freed: Any = FreeForm(physics, kinds)
+    return freed

@@ -5,6 +5,8 @@ import pkgutil
 from collections.abc import Collection
 
 from .clipping import PHYSICS as CLIPPING
+from .free_form import FREE_FORM, FreeForm, families
+from .linear_part import WithLinearPart
 from .modal_parameters import PHYSICS as MODAL_PARAMETERS
 from .protocol import (
     BeliefPhysics,
@@ -25,6 +27,7 @@ from .unmeasured_excitation import PHYSICS as UNMEASURED_EXCITATION
 
 __all__ = [
     "CLIPPING",
+    "FREE_FORM",
     "MODAL_PARAMETERS",
     "UNMEASURED_EXCITATION",
     "BeliefPhysics",
@@ -32,6 +35,7 @@ __all__ = [
     "ChainPhysics",
     "FaultPhysics",
     "FormedPhysics",
+    "FreeForm",
     "JointPhysics",
     "LimitedPhysics",
     "ModePhysics",
@@ -39,7 +43,9 @@ __all__ = [
     "Physics",
     "Rig",
     "TwinPhysics",
+    "WithLinearPart",
     "answer_name",
+    "families",
     "form_of",
     "in_units",
     "is_fault",

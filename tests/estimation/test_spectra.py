@@ -247,6 +247,11 @@ def test_frf_files_round_trip_and_refuse_what_they_are_not(tmp_path: Path) -> No
         file.attrs["quantity"] = "recepta"
     with pytest.raises(FileFormatError, match="quantity 'recepta' is not known"):
         read_frf(tmp_path / "a.h5")
+    image = (tmp_path / "a.h5").read_bytes()
+    # the signature of a table of names: HDF5 finds the damage when it looks a name up
+    (tmp_path / "b.h5").write_bytes(image.replace(b"SNOD", b"SNOX"))
+    with pytest.raises(FileFormatError, match="missing or damaged"):
+        read_frf(tmp_path / "b.h5")
     with Recording(tmp_path / "r.h5") as recording:
         from_file = cross_spectra(recording, SpectralSettings(64, 0.5, "hann"))
         np.testing.assert_allclose(h1(from_file).values, frf.values, rtol=1e-4, atol=1e-5)

@@ -11,10 +11,9 @@ from estimation import WindowedSpectrum, windowed_spectrum
 from mismatch import Cause, LabError, ModelShape, band_of, fit
 from mismatch.inference import EvidenceSettings
 from mismatch.joints import JointAxis, JointLaw, JointMotion
-from mismatch.models import Fit, Hypothesis, predict_lines
-from mismatch.physics import JointPhysics, Parameter, library
+from mismatch.models import Fit, Hypothesis, predict_lines, with_free_forms
+from mismatch.physics import JointPhysics, Parameter, families, library
 from mismatch.screening import Gains, gains_beside_laws
-from mismatch.screening.beside_laws import families, with_free_forms
 
 LEVELS = (20.0, 40.0)
 RIG = Rig()
@@ -102,10 +101,10 @@ def test_a_free_form_begins_as_the_law_it_frees() -> None:
     lines = _recorded(_Hidden(falls=0.3, softens=0.1))
     fitted = _with_friction(lines)
     for kinds in ("", "xvmt"):
-        free = with_free_forms(fitted, kinds)
-        assert free.hypothesis.size > fitted.hypothesis.size
+        free = with_free_forms(fitted.hypothesis, kinds)
+        assert free.size > fitted.hypothesis.size
         for one in lines:
-            seen, same = (predict_lines(each.hypothesis, one).response for each in (fitted, free))
+            seen, same = (predict_lines(each, one).response for each in (fitted.hypothesis, free))
             np.testing.assert_allclose(same, seen, atol=1e-9 * float(np.abs(seen).max()))
 
 

@@ -16,7 +16,7 @@ from ...faults import repair_faults
 from ...inference import Diagnosis, EvidenceSettings, Progress, Settings, search
 from ...location import SpindleSpeed, StructureDetails, StructureDiagnosis, located, residual_view
 from ...models import Fit, Hypothesis, ModelShape, fit, known_noise, outdoes_noise, through_structure
-from ...physics import library, offered
+from ...physics import is_fault, library, offered
 from ...records import (
     ComparedBand,
     compared_band,
@@ -30,6 +30,7 @@ from ...remainder import beyond_model, leftover
 from .answer import Answer, answer_of
 from .comparison import StructureComparison
 from .confirmation import confirmed
+from .free_forms import freed_answer
 from .held_out import recordings_of
 from .prediction import OfferedModel, offered_model
 
@@ -118,6 +119,9 @@ def _diagnosed(
     found, held_out = confirmed(comparison, both, found, faults)
     progress("what is left")
     answer = answer_of(comparison, both, found, held_out, faults, decay)
+    progress("form of the law")
+    freed = freed_answer(answer, comparison, both, [one for one in answer.causes if is_fault(one.name)])
+    answer = freed.answer
     found = answer.found
     progress("where the mismatch sits")
     band = max(bands, key=lambda band: band.high)
@@ -139,11 +143,16 @@ def _diagnosed(
         answer.left,
         located(view, speeds),
         replace(details, view=view, behaviour=behaviour),
-        doubts=(*beyond_model(base.hypothesis, mended), *(one.sentence for one in answer.no_noise)),
+        doubts=(
+            *beyond_model(base.hypothesis, mended),
+            *(one.sentence for one in answer.no_noise),
+            *([freed.doubt] if freed.doubt else []),
+        ),
         content={
             "compared_band": asdict(band),
             "not_asked_for": list(left_out),
             "behaviour": behaviour.content(),
+            "free_form": freed.content(),
             "noise": _noise_of(answer.final, measured),
             "improved_model": _offered(answer, measured).content(),
         },

@@ -136,9 +136,11 @@ def offered_model(
     worse += [unseen] if unseen.ratio >= 1 else []
     if worse:
         worst = max(worse, key=lambda one: one.ratio)
-        said = f"The improved model is the nominal model: {worst.sentence('refitted modes leave')}."
+        refitted = "refitted modes with a force of free form leave" if final.laws else "refitted modes leave"
+        said = f"The improved model is the nominal model: {worst.sentence(refitted)}."
         return OfferedModel(True, pairs, said)
-    said = f"The improved model holds refitted modes and no law: {unseen.sentence('they leave')}."
+    held = "a joint's force of free form" if final.laws else "no law"
+    said = f"The improved model holds refitted modes and {held}: {unseen.sentence('they leave')}."
     return OfferedModel(False, pairs, said)
 
 

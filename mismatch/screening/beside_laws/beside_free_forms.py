@@ -6,17 +6,16 @@ nuisance numbers): a cause of its own keeps most of its gain, one that mends a f
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from estimation import WindowedSpectrum
 
-from ...models import Cause, Fit
+from ...models import EVERYTHING, Cause, Fit, with_free_forms
 from ...physics import ChainPhysics, JointPhysics, ModePhysics
 from ..chain_screening import gain_of_chain
 from ..joint_screening import screen_joints
 from ..missing_mode import find_mode
 from ..whitened_residual import Floor, noise_floor
-from .free_form import EVERYTHING, with_free_forms
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ def gains_beside_laws(lines: list[WindowedSpectrum], current: Fit, causes: Seque
         return []
     kinds = ["" if isinstance(one.physics, JointPhysics) else EVERYTHING for one in causes]
     held = noise_floor(current, lines)
-    free = {kind: with_free_forms(current, kind) for kind in kinds}
+    free = {kind: replace(current, hypothesis=with_free_forms(current.hypothesis, kind)) for kind in kinds}
     floors = {kind: noise_floor(one, lines) for kind, one in free.items()}
     return [
         Gains(_gain(held, current, one), _gain(floors[kind], free[kind], one))

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..joints import JointLaw, JointMotion
-from ..physics import JointPhysics, Parameter
-from .hypothesis import Cause
+from .protocol import JointPhysics, Parameter
 
 Real = NDArray[np.float64]
 
@@ -56,14 +55,6 @@ class WithLinearPart:
             speed=speed,
             damping=_sloped(plain.damping, speed, float(values[-1])),
         )
-
-
-def with_linear_part(cause: Cause) -> Cause:
-    """A joint's cause with a spring and a damper of zero strength beside its law."""
-    assert cause.motion is not None
-    assert isinstance(cause.physics, JointPhysics)
-    physics = WithLinearPart(cause.physics, cause.motion)
-    return replace(cause, physics=physics, values=np.append(cause.values, [0.0, 0.0]))
 
 
 def _sloped(table: Real, reach: float, slope: float) -> Real:

@@ -6,17 +6,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...joints import JointLaw, JointMotion, saturated
-from ...models import Cause, Fit, held_values
-from ...physics import JointPhysics, Parameter
+from ..joints import JointLaw, JointMotion, saturated
+from .protocol import JointPhysics, Parameter, answer_name
 
 Real = NDArray[np.float64]
-
-EVERYTHING = "xvmt"
-"""All families: deflection (x), velocity (v), memory (m), time (t)."""
-
-OF_FAMILY = {"x": "x", "v": "vm", "m": "vm", "t": "t"}
-"""Families whose shapes may mend a law of each family: dry friction gives way elastically before it slides."""
 
 KNEES = (0.2, 0.5, 1.0, 2.0)
 """Knees of springs that saturate, in typical deflections."""
@@ -37,11 +30,19 @@ UNIT = 0.01
 """Force of a shape's unit, over that of the structure's static stiffness at the typical deflection."""
 
 
+SHAPES = {"x": len(KNEES) + 5, "v": len(SPEEDS) + 3, "m": len(YIELDS), "t": 2}
+"""Number of shapes of each family."""
+
+FREE_FORM = "free_form"
+"""Name under which a law of free form stands in a model's file."""
+
+
 @dataclass(frozen=True)
 class FreeForm:
     """A law with shapes that are added to it, each with a factor of its own: ``g + sum_k c_k s_k(x, v, memory, t)``.
 
-    The shapes only serve to see what a change of the form could explain; nothing is simulated far from ``c = 0``.
+    It is no cause of its own: it shows what a change of a law's form could explain, and predicts where a law is found
+    whose textbook form is not quite the true one.
 
     Parameters
     ----------
@@ -49,17 +50,25 @@ class FreeForm:
         The law whose form is free.
     kinds
         Families of the shapes, letters of ``xvmt``.
-    parameters
-        Numbers of the law, then one factor for each shape.
     """
 
     law_of: JointPhysics
     kinds: str
-    parameters: tuple[Parameter, ...]
-    name: str = "free_form"
+    name: str = FREE_FORM
     equation: str = "g + sum_k c_k s_k"
     source: str = "Worden & Tomlinson, Nonlinearity in Structural Dynamics, section 7"
     confusable_with: tuple[str, ...] = ()
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Numbers of the law, then one factor for each shape."""
+        count = sum(SHAPES[kind] for kind in self.kinds)
+        return (*self.law_of.parameters, *(Parameter(f"shape_{k + 1}", "", 1.0) for k in range(count)))
+
+    @property
+    def answers_as(self) -> str:
+        """Name of the law whose form is free."""
+        return answer_name(self.law_of)
 
     def starts(self, motion: JointMotion) -> tuple[Real, ...]:
         """Return no start: the form is freed where a law was fitted."""
@@ -92,21 +101,6 @@ class FreeForm:
         return replace(law, **changes)
 
 
-def with_free_forms(fitted: Fit, kinds: str = "") -> Fit:
-    """A fit in which the form of each joint's law is free; its prediction is the same.
-
-    Parameters
-    ----------
-    fitted
-        A fit with laws of joints.
-    kinds
-        Families of the shapes; empty: for each law those that may mend one of its family.
-    """
-    hypothesis = fitted.hypothesis
-    causes = tuple(one if one.axis is None else _freed(one, kinds) for one in hypothesis.causes)
-    return replace(fitted, hypothesis=replace(hypothesis, causes=causes))
-
-
 def families(law: JointLaw) -> str:
     """Families that a law is of, letters of ``xvmt``.
 
@@ -125,18 +119,6 @@ def families(law: JointLaw) -> str:
         return "t"
     has = {"x": len(law.stiffness), "v": len(law.damping), "m": len(law.springs)}
     return "".join(kind for kind, there in has.items() if there)
-
-
-def _freed(cause: Cause, kinds: str) -> Cause:
-    """The law of a cause with shapes of factor zero."""
-    assert isinstance(cause.physics, JointPhysics)
-    mending = "".join(OF_FAMILY[one] for one in families(cause.law()))
-    kinds = "".join(kind for kind in EVERYTHING if kind in (kinds or mending))
-    count = sum({"x": len(KNEES) + 5, "v": len(SPEEDS) + 3, "m": len(YIELDS), "t": 2}[kind] for kind in kinds)
-    factors = tuple(Parameter(f"shape_{k + 1}", "", 1.0) for k in range(count))
-    # a protocol's attributes can be set, those of a frozen record cannot
-    physics: Any = FreeForm(cause.physics, kinds, (*cause.physics.parameters, *factors))
-    return replace(cause, physics=physics, values=np.concatenate([held_values(cause), np.zeros(count)]))
 
 
 def _over_deflection(x: Real) -> list[Real]:

@@ -1,0 +1,126 @@
+"""An answer whose laws are given a free form where held-out data ask for it, in words and in its improved model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ....inference import AcceptedCause, Proposal
+from ....models import Fit
+from ....records import Recordings
+from ....remainder import leftover
+from ..acceptance import possible_gains
+from ..answer import Answer
+from ..comparison import StructureComparison
+from .freed_laws_proved import FreedLaws, freed_from_named, freed_from_nothing
+
+
+@dataclass(frozen=True)
+class FreedAnswer:
+    """An answer, and the laws of free form with which it predicts.
+
+    Parameters
+    ----------
+    answer
+        The answer; its final fit and its errors are those of the free form where there is one.
+    freed
+        Laws of free form; None where held-out data ask for none.
+    sentence
+        What the free form says; empty where there is none.
+    doubt
+        Why the answer is no longer whole; empty where it stands.
+    """
+
+    answer: Answer
+    freed: FreedLaws | None = None
+    sentence: str = ""
+    doubt: str = ""
+
+    def content(self) -> dict[str, Any] | None:
+        """What the file of a diagnosis says of it; None where there is no free form."""
+        return None if self.freed is None else {**self.freed.content(), "sentence": self.sentence}
+
+
+def freed_answer(
+    answer: Answer, comparison: StructureComparison, recordings: Recordings, faults: Sequence[AcceptedCause]
+) -> FreedAnswer:
+    """Give the laws of an answer a free form; where no law was proved, the likeliest one.
+
+    A named law keeps its name. Where a free form of it leaves far less, the name is not the whole: ``explained``
+    becomes ``partly explained``. Where no law was proved, the verdict stays ``unexplained`` and no name is told, but
+    the force is, by what it follows, and the improved model predicts with it.
+
+    Parameters
+    ----------
+    answer
+        The answer with textbook laws, or with none.
+    comparison
+        The comparison that was searched.
+    recordings
+        The recordings, mended and as measured.
+    faults
+        Faults of the recordings that are told.
+    """
+    settings, base = comparison.settings, answer.found.base
+    if answer.verdict == "unexplained":
+        begun = _likeliest_law(answer, comparison)
+        if begun is None:
+            return FreedAnswer(answer)
+        freed = freed_from_nothing(
+            recordings, begun.fitted, answer.held_out, faults, settings, base=base, places=[begun.location]
+        )
+        return (
+            FreedAnswer(answer) if freed is None else FreedAnswer(_with(answer, freed, recordings), freed, _new(freed))
+        )
+    places = [one.location for one in answer.found.accepted if one.fitted.hypothesis.causes[-1].axis is not None]
+    freed = freed_from_named(recordings, answer.final, answer.held_out, faults, settings, base=base, places=places)
+    if freed is None:
+        return FreedAnswer(answer)
+    again, doubt = _with(answer, freed, recordings), ""
+    if answer.verdict == "explained" and freed.ratio > settings.verdict.most_over_free:
+        again = replace(again, verdict="partly explained")
+        doubt = f"a force of free form leaves {1 / freed.ratio:.2g} of what the named law leaves: its name is not all"
+    return FreedAnswer(again, freed, _beside(freed), doubt)
+
+
+def _likeliest_law(answer: Answer, comparison: StructureComparison) -> Proposal[Fit] | None:
+    """The joint's law that gained most alone; None where none gained enough to count."""
+    rounds = answer.found.rounds[:1]
+    laws = [one for each in rounds for one in each.proposals if one.name in comparison.laws]
+    alone = [one for one in laws if len(one.fitted.hypothesis.causes) == 1]
+    best = possible_gains(alone, comparison.settings.evidence)
+    return best[0] if best else None
+
+
+def _with(answer: Answer, freed: FreedLaws, recordings: Recordings) -> Answer:
+    """The answer that predicts with the free form."""
+    left = leftover(freed.fitted.hypothesis, recordings.mended)
+    return replace(answer, final=freed.fitted, held_out=freed.held_out, left=left)
+
+
+def _beside(freed: FreedLaws) -> str:
+    """What the free form of named laws says."""
+    parts = [
+        f"the force of {name}{f' {place}' if place else ''} differs from the textbook law by "
+        f"{100 * form.distance:.2g} % of its size"
+        for (name, place), form in zip(freed.names, freed.forms, strict=True)
+    ]
+    return f"Free form: {', and '.join(parts)}; {_errors(freed, 'the textbook law')}."
+
+
+def _new(freed: FreedLaws) -> str:
+    """What a free form says where no law was proved."""
+    (name, place), form = freed.names[0], freed.forms[0]
+    return (
+        f"Free form: no law of the library is proved, but a joint's force of free form{f' {place}' if place else ''} "
+        f"is ({form.kind}; nearest to {name}, from which it differs by {100 * form.distance:.2g} % of its size); "
+        f"{_errors(freed, 'a model of modes alone')}."
+    )
+
+
+def _errors(freed: FreedLaws, rival: str) -> str:
+    """What the free form and its rival leave of what was held out."""
+    after, before = freed.held_out.everywhere.after, freed.beside.after
+    return (
+        f"it leaves {100 * after:.3g} % of what was held out, {rival} {100 * before:.3g} % "
+        f"(chance that this is no gain: {freed.chance:.2g}); the improved model holds it"
+    )

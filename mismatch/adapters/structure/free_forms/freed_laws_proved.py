@@ -1,0 +1,228 @@
+"""Laws of joints with a free form, kept where data that no fit saw prove them.
+
+A textbook law is a special case. The law that was named is given shapes over deflection, velocity and memory, each with
+a factor of its own, and everything is fitted anew with the structure simulated freely. Shapes of the law's own family
+count first, and all of them where these gain much more. Either is kept only where it lowers the error of what was held
+out, by a test over blocks of time.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ....faults import residual_lines
+from ....inference import AcceptedCause, Improvement, Settings, in_processes
+from ....joints import joint_in_words, tip_axes
+from ....models import Fit, Hypothesis, fit, through_structure, with_free_forms
+from ....physics import answer_name, families
+from ....records import Recordings
+from ..held_out import HeldOut, chance_of_no_gain, held_out_improvement
+from .distance_from_law import FormOfLaw, form_of_law
+
+STEPS = 25
+"""Steps at most of a fit with free forms."""
+
+MORE = 0.05
+"""Share of the evidence of all causes that shapes beyond a law's own family must gain over those of its family."""
+
+ALL_SHAPES = "xvm"
+"""Shapes over deflection, velocity and memory."""
+
+
+@dataclass(frozen=True)
+class FreedLaws:
+    """Laws whose form is free, and what they are worth.
+
+    Parameters
+    ----------
+    fitted
+        The fit with laws of free form.
+    held_out
+        What it is worth on data that were held out.
+    beside
+        Errors of what it is compared with: the named laws, or refitted modes alone.
+    chance
+        p-value over blocks of time that the free form is no better there.
+    evidence
+        Gain in score over what it is compared with.
+    names
+        Name of the law that each joint's form began with, and its place in words.
+    forms
+        How far each joint's force lies from that law, and what it follows.
+    """
+
+    fitted: Fit
+    held_out: HeldOut
+    beside: Improvement
+    chance: float
+    evidence: float
+    names: tuple[tuple[str, str], ...]
+    forms: tuple[FormOfLaw, ...]
+
+    @property
+    def ratio(self) -> float:
+        """Error held out of what it is compared with over its own."""
+        return self.beside.after / max(self.held_out.everywhere.after, 1e-300)
+
+    def content(self) -> dict[str, Any]:
+        """What the file of a diagnosis says of it."""
+        rows = [
+            {
+                "law": name,
+                "place": place,
+                "distance": form.distance,
+                "by_deflection": form.by_deflection,
+                "by_velocity": form.by_velocity,
+                "power_lost": form.lost,
+                "kind": form.kind,
+            }
+            for (name, place), form in zip(self.names, self.forms, strict=True)
+        ]
+        errors = {"compared": self.beside.after, "free_form": self.held_out.everywhere.after}
+        return {"laws": rows, "held_out": errors, "chance_of_no_gain": self.chance, "evidence": self.evidence}
+
+
+def freed_from_named(
+    recordings: Recordings,
+    named: Fit,
+    held_out: HeldOut,
+    faults: Sequence[AcceptedCause],
+    settings: Settings,
+    *,
+    base: Fit,
+    places: Sequence[Mapping[str, Any]],
+) -> FreedLaws | None:
+    """Free the form of the laws of an answer; None where the data held out do not ask for it.
+
+    Parameters
+    ----------
+    recordings
+        The recordings, mended and as measured.
+    named
+        The fit with the named laws.
+    held_out
+        What that fit is worth on what was held out.
+    faults
+        Faults of the recordings.
+    settings
+        Thresholds of the diagnosis.
+    base
+        The fit without any cause: a hundredth of the evidence of all causes is asked.
+    places
+        Location of each law, as a diagnosis states it.
+    """
+    if not named.hypothesis.laws or not recordings.tested:
+        return None
+    whole = base.score - named.score
+    needed = max(settings.evidence.least, settings.evidence.small * whole)
+    own, everything = _fitted(recordings, named)
+    better = everything is not None and everything.score < own.score - MORE * whole
+    for freed in (everything, own) if better else (own,):
+        if freed is None or not freed.score < named.score - needed:
+            continue
+        there = held_out_improvement(
+            recordings, freed.hypothesis, freed.noises, faults, settings.proof, held_out.linear
+        )
+        chance = _chance(recordings, named, (held_out.improved, there.improved), settings)
+        if _less(there, held_out) and chance < settings.proof.significance:
+            return _told(recordings, (named, freed), there, (held_out.everywhere, chance), places)
+    return None
+
+
+def freed_from_nothing(
+    recordings: Recordings,
+    begun: Fit,
+    held_out: HeldOut,
+    faults: Sequence[AcceptedCause],
+    settings: Settings,
+    *,
+    base: Fit,
+    places: Sequence[Mapping[str, Any]],
+) -> FreedLaws | None:
+    """Free the form of a law that was not proved; None where that leaves more than half of what modes alone leave.
+
+    Parameters
+    ----------
+    recordings
+        The recordings, mended and as measured.
+    begun
+        The fit with the law at which the form begins.
+    held_out
+        What modes alone are worth on what was held out.
+    faults
+        Faults of the recordings.
+    settings
+        Thresholds of the diagnosis.
+    base
+        The fit of modes alone.
+    places
+        Location of the law, as a diagnosis states it.
+    """
+    if not recordings.tested:
+        return None
+    best: FreedLaws | None = None
+    fitted = begun
+    for kinds in ("", ALL_SHAPES):
+        tried = fit(recordings.mended, with_free_forms(begun.hypothesis, kinds), begun.noises, iterations=STEPS)
+        if not np.isfinite(tried.score) or tried.score >= fitted.score - settings.evidence.least:
+            continue
+        worth = held_out_improvement(
+            recordings, tried.hypothesis, tried.noises, faults, settings.proof, held_out.linear
+        )
+        gain, whole = worth.improvement, worth.everywhere
+        sure = gain.evidence > settings.proof.gain and gain.p_value < settings.proof.significance
+        least = (1 - settings.verdict.partly) * min(whole.refitted, whole.before) ** 2
+        if not sure or whole.after**2 > least or gain.after > min(gain.refitted, gain.before):
+            continue
+        if best is None or whole.after < best.held_out.everywhere.after:
+            beside = replace(whole, after=min(whole.refitted, whole.before))
+            told = _told(recordings, (begun, tried), worth, (beside, gain.p_value), places)
+            best = None if told is None else replace(told, evidence=base.score - tried.score)
+            fitted = tried
+    return best
+
+
+def _fitted(recordings: Recordings, named: Fit) -> tuple[Fit, Fit | None]:
+    """Fits with shapes of each law's own family, and with all shapes; a drift alone has no others."""
+    drifts = all(families(cause.law()) == "t" for cause in named.hypothesis.laws)
+    starts = [with_free_forms(named.hypothesis, kinds) for kinds in (("",) if drifts else ("", ALL_SHAPES))]
+    found = in_processes([partial(fit, recordings.mended, one, named.noises, iterations=STEPS) for one in starts])
+    return found[0], found[1] if len(found) > 1 else None
+
+
+def _less(there: HeldOut, before: HeldOut) -> bool:
+    """Whether one leaves less of what was held out than the other, where it is told and everywhere."""
+    pairs = (there.improvement, before.improvement), (there.everywhere, before.everywhere)
+    return all(one.after < other.after for one, other in pairs)
+
+
+def _chance(recordings: Recordings, named: Fit, both: tuple[Hypothesis, Hypothesis], settings: Settings) -> float:
+    """Chance that the second of two hypotheses predicts what was held out no better than the first."""
+    here = recordings.held_out(recordings.mended)
+    noise = named.noises[recordings.held_out_place]
+    covariance = noise.covariance(here.frequencies, through_structure(named.hypothesis, here))
+    rival, final = (residual_lines(one, here) for one in both)
+    return chance_of_no_gain(here, covariance, rival, final, settings.proof)
+
+
+def _told(
+    recordings: Recordings,
+    fits: tuple[Fit, Fit],
+    worth: HeldOut,
+    beside: tuple[Improvement, float],
+    places: Sequence[Mapping[str, Any]],
+) -> FreedLaws | None:
+    """A fit of free form with its distance from the laws; None where a joint would feed the motion with power."""
+    named, freed = fits
+    laws = freed.hypothesis.laws
+    forms = tuple(form_of_law(freed.hypothesis, named.hypothesis, k, recordings.mended) for k in range(len(laws)))
+    if any(cause.law().loses_energy and form.lost < 0 for cause, form in zip(laws, forms, strict=True)):
+        return None
+    directed = any("direction" in one for one in places)
+    axes = tip_axes(freed.hypothesis.model)[2] if directed else ()
+    words = [joint_in_words(one, axes if "direction" in one else ()) for one in places]
+    names = tuple((answer_name(one.physics), place) for one, place in zip(laws, words, strict=True))
+    return FreedLaws(freed, worth, *beside, named.score - freed.score, names, forms)
