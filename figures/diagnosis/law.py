@@ -14,14 +14,22 @@ def law_figure(found: FreeFormLaw) -> Figure:
     """Force against deflection, moving forth and back, and against velocity with what depends on deflection taken off.
 
     Symbols are means in bins with bands of two standard errors; lines are the accepted law driven by the same motion
-    and averaged alike.
+    and averaged alike. Where the accepted law has a free form, dotted lines are the library's.
     """
     law = found.name.replace("_", " ")
+    named = law.capitalize() if found.forward.textbook is not None else f"Law ({law})"
     with house_style():
         figure = new_figure(82.0, None)
         left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.24})
-        _draw(left, found.forward, ("o", COLOURS[0]), "Measured, deflection rising", (f"Law ({law}), rising", "-"), 1e6)
-        _draw(left, found.backward, ("v", COLOURS[2]), "Measured, falling", ("Law, falling", (0, (5, 1.5))), 1e6)
+        _draw(left, found.forward, ("o", COLOURS[0]), "Measured, deflection rising", (f"{named}, rising", "-"), 1e6)
+        _draw(
+            left,
+            found.backward,
+            ("v", COLOURS[2]),
+            "Measured, falling",
+            (("Free form, falling" if named[:4] == "Free" else "Law, falling"), (0, (5, 1.5))),
+            1e6,
+        )
         _draw(right, found.damping, ("o", COLOURS[0]), "", ("", "-"), 1e3)
         left.set_xlabel(f"Deflection along the joint (µ{found.deflection_unit})")
         right.set_xlabel(f"Velocity along the joint (m{found.deflection_unit}/s)")
@@ -49,6 +57,8 @@ def _draw(
     at = scale * bins.at
     axes.fill_between(at, bins.force - 2 * bins.error, bins.force + 2 * bins.error, color=SHADE, linewidth=0, zorder=1)
     axes.plot(at, bins.law, color=marks[1], linestyle=law[1], linewidth=1.0, label=law[0] or None)
+    if bins.textbook is not None:
+        axes.plot(at, bins.textbook, color=marks[1], linestyle=":", linewidth=1.2, label=law[0] and "Textbook law")
     filled = "white" if marks[0] == "o" else marks[1]
     axes.plot(
         at, bins.force, marks[0], color=marks[1], markerfacecolor=filled, markersize=3.8, label=label or None, zorder=3

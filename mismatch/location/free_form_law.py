@@ -8,12 +8,12 @@ from scipy.fft import irfft, rfft
 
 from estimation import WindowedSpectrum
 
-from ..joints import JointAxis, driven_force
+from ..joints import JointAxis, JointLaw, driven_force
 from ..models import Cause, Fit, Hypothesis, predict_lines, through_structure
 from ..noise import whitening
-from ..physics import answer_name, rig_of
+from ..physics import FreeForm, answer_name, rig_of
 from ..screening import FloorRecord, SeenMotion, seen_motion
-from .structure_details import StructureDiagnosis
+from .structure_details import StructureDetails, StructureDiagnosis
 
 Real = NDArray[np.float64]
 
@@ -35,12 +35,16 @@ class BinnedForce:
         Mean measured force and its standard error, from the scatter between pieces of the records.
     law : (n,), N
         Force of the accepted law under the same motion, filtered and averaged alike.
+    textbook : (n,), N, or None
+        The same of the library's law, where the accepted one has a free form, with the linear spring and damper that
+        bring it nearest: they cannot be told from the structure's own.
     """
 
     at: Real
     force: Real
     error: Real
     law: Real
+    textbook: Real | None = None
 
 
 @dataclass(frozen=True)
@@ -76,12 +80,13 @@ class FreeFormLaw:
 
 @dataclass(frozen=True)
 class _Sample:
-    """Samples of all recordings in one band: deflection, velocity, force, the law's force and number of the piece."""
+    """Samples of all recordings in one band: deflection, velocity, force, laws' forces and number of the piece."""
 
     x: Real
     v: Real
     force: Real
     law: Real
+    textbook: Real
     piece: NDArray[np.int64]
 
 
@@ -93,42 +98,67 @@ def free_form_laws(diagnosis: StructureDiagnosis) -> tuple[FreeFormLaw, ...]:
 
 
 def _measured(diagnosis: StructureDiagnosis, cause: Cause) -> FreeFormLaw:
-    final = diagnosis.details.final.hypothesis
+    details, final = diagnosis.details, diagnosis.details.final.hypothesis
     assert cause.axis is not None
     bare = replace(final, causes=tuple(one for one in final.causes if one is not cause))
-    details = diagnosis.details
-    samples = _joined([_seen(details.final, bare, cause, k, one) for k, one in enumerate(details.recordings)])
-    up = samples.v > 0
-    ends = _edges(samples.x)
-    elastic = _mean_at(samples.x, samples.force, ends), _mean_at(samples.x, samples.law, ends)
-    rest = replace(samples, force=samples.force - elastic[0], law=samples.law - elastic[1])
+    joint = cause.axis, (cause.law(), _library_law(details, cause).law())
+    samples = _joined([_seen(details.final, bare, joint, k, one) for k, one in enumerate(details.recordings)])
+    forward, backward, damping = _bins(replace(samples, textbook=_nearest(samples)), details.textbook is not None)
     share = 1 - float(np.mean((samples.force - samples.law) ** 2) / np.mean(samples.force**2))
-    rig = rig_of(diagnosis.details.final.hypothesis.model)
-    return FreeFormLaw(
-        answer_name(cause.physics),
-        cause.axis,
+    free = "free form of " if isinstance(cause.physics, FreeForm) else ""
+    name, rig = free + answer_name(cause.physics), rig_of(final.model)
+    return FreeFormLaw(name, cause.axis, forward, backward, damping, share, rig.force_unit, rig.deflection_unit)
+
+
+def _library_law(details: StructureDetails, cause: Cause) -> Cause:
+    """The law of the library from which a law's form was freed; the law itself where it was not."""
+    if details.textbook is None:
+        return cause
+    place = next(k for k, one in enumerate(details.final.hypothesis.laws) if one is cause)
+    return details.textbook.laws[place]
+
+
+def _bins(samples: _Sample, freed: bool) -> list[BinnedForce]:
+    """Forces over a rising and a falling deflection, and what is left of them over the velocity."""
+    up, ends = samples.v > 0, _edges(samples.x)
+    force, law, textbook = (
+        one - _mean_at(samples.x, one, ends) for one in (samples.force, samples.law, samples.textbook)
+    )
+    rest = replace(samples, force=force, law=law, textbook=textbook)
+    found = [
         _binned(samples, samples.x, ends, up),
         _binned(samples, samples.x, ends, ~up),
         _binned(rest, samples.v, _edges(samples.v), np.ones(len(up), dtype=bool)),
-        share,
-        rig.force_unit,
-        rig.deflection_unit,
-    )
+    ]
+    return found if freed else [replace(one, textbook=None) for one in found]
 
 
-def _seen(final: Fit, bare: Hypothesis, cause: Cause, number: int, lines: WindowedSpectrum) -> _Sample:
-    """Return motion and force along the joint in one recording, and the law's force for that motion."""
-    assert cause.axis is not None
+def _nearest(samples: _Sample) -> Real:
+    """The library's law with the spring and damper that bring it nearest to the accepted one."""
+    linear = np.stack([samples.x / np.std(samples.x), samples.v / np.std(samples.v)], axis=1)
+    parts = np.linalg.lstsq(linear, samples.law - samples.textbook, rcond=None)[0]
+    return np.asarray(samples.textbook + linear @ parts)
+
+
+def _seen(
+    final: Fit,
+    bare: Hypothesis,
+    joint: tuple[JointAxis, tuple[JointLaw, JointLaw]],
+    number: int,
+    lines: WindowedSpectrum,
+) -> _Sample:
+    """Return motion and force along the joint in one recording, and the forces of both laws for that motion."""
+    axis, laws = joint
     through = through_structure(bare, lines)
     covariance = final.noises[number].covariance(lines.frequencies, through)
     rest = lines.measured - predict_lines(bare, lines).response
     record = FloorRecord(lines, rest, through, whitening(covariance), np.zeros((0, 0)), np.zeros(0))
-    seen: SeenMotion = seen_motion(record, bare, cause.axis)
-    law = driven_force(lines, seen.deflection, seen.velocity, cause.law())
-    kept = slice(lines.start, len(law) - max(int(lines.recording.rate), 1))
-    force, given = _in_band(seen.force, lines)[kept], _in_band(law, lines)[kept]
+    seen: SeenMotion = seen_motion(record, bare, axis)
+    kept = slice(lines.start, len(seen.force) - max(int(lines.recording.rate), 1))
+    given = [driven_force(lines, seen.deflection, seen.velocity, law) for law in laws]
+    force, law, textbook = (_in_band(one, lines)[kept] for one in (seen.force, *given))
     piece = np.arange(len(force)) // max(int(BLOCK * lines.recording.rate), 1)
-    return _Sample(seen.deflection[kept], seen.velocity[kept], force, given, piece)
+    return _Sample(seen.deflection[kept], seen.velocity[kept], force, law, textbook, piece)
 
 
 def _in_band(signal: Real, lines: WindowedSpectrum) -> Real:
@@ -142,8 +172,9 @@ def _joined(parts: list[_Sample]) -> _Sample:
     for part in parts:
         pieces.append(part.piece + count)
         count += int(part.piece[-1]) + 1
-    x, v, force, law = (np.concatenate([getattr(part, name) for part in parts]) for name in ("x", "v", "force", "law"))
-    return _Sample(x, v, force, law, np.concatenate(pieces))
+    names = ("x", "v", "force", "law", "textbook")
+    x, v, force, law, textbook = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
+    return _Sample(x, v, force, law, textbook, np.concatenate(pieces))
 
 
 def _edges(values: Real) -> Real:
@@ -174,6 +205,8 @@ def _binned(samples: _Sample, values: Real, edges: Real, chosen: NDArray[np.bool
     good = total >= LEAST_SAMPLES
     left = (all_sums - sums) / np.maximum(total - held, 1)
     error = np.sqrt((count - 1) / count * np.sum((left - left.mean(axis=0)) ** 2, axis=0))
-    law = np.bincount(place, samples.law[inside], BINS) / np.maximum(total, 1)
+    law, textbook = (
+        np.bincount(place, one[inside], BINS) / np.maximum(total, 1) for one in (samples.law, samples.textbook)
+    )
     at = np.bincount(place, values[inside], BINS) / np.maximum(total, 1)
-    return BinnedForce(at[good], (all_sums / np.maximum(total, 1))[good], error[good], law[good])
+    return BinnedForce(at[good], (all_sums / np.maximum(total, 1))[good], error[good], law[good], textbook[good])

@@ -38,6 +38,8 @@ class StructureDetails:
         Delay of the measuring chain that the nominal model states, s: it was taken out of the recordings.
     behaviour
         What modes do with the level, whatever law stands behind it; None where it was not asked for.
+    textbook
+        The hypothesis with laws as the library has them, where those of ``final`` have a free form; else None.
     """
 
     base: Fit
@@ -50,6 +52,7 @@ class StructureDetails:
     view: "ResidualView | None" = None
     delay: float = 0.0
     behaviour: Behaviour | None = None
+    textbook: Hypothesis | None = None
 
     @property
     def tested(self) -> bool:

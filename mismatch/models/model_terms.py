@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -85,16 +85,21 @@ def hypothesis_of(model: ModalModel, causes: dict[str, Physics] | None = None) -
 
 def _physics_of(term: Mapping[str, Any], known: Mapping[str, Physics]) -> Physics:
     """The cause of a term, or a law of free form."""
-    name, location = term.get("name"), term.get("location")
-    free = name == FREE_FORM and isinstance(location, Mapping)
-    law = location.get("law") if free and isinstance(location, Mapping) else name
-    if law not in known:
-        raise FileFormatError(f"the model has a term of unknown physics {law!r}; known are {', '.join(known)}")
-    physics = known[law]
-    if not free:
-        return physics
-    kinds = str(location.get("families")) if isinstance(location, Mapping) else ""
+    if term.get("name") != FREE_FORM:
+        return _known(str(term.get("name")), known)
+    place = term.get("location")
+    location: Mapping[str, Any] = place if isinstance(place, Mapping) else {}
+    physics, kinds = _known(str(location.get("law")), known), str(location.get("families", ""))
     if not isinstance(physics, JointPhysics) or not kinds or set(kinds) - set(EVERYTHING):
-        raise FileFormatError(f"the model's term {FREE_FORM} of {law} and families {kinds!r} is no law; diagnose again")
+        said = f"{FREE_FORM} of {physics.name} and families {kinds!r}"
+        raise FileFormatError(f"the model's term {said} is no law; diagnose again")
+    # a protocol's attributes can be set, those of a frozen record cannot
     freed: Any = FreeForm(physics, kinds)
-    return freed
+    return cast("Physics", freed)
+
+
+def _known(name: str, known: Mapping[str, Physics]) -> Physics:
+    """A cause of the library."""
+    if name not in known:
+        raise FileFormatError(f"the model has a term of unknown physics {name!r}; known are {', '.join(known)}")
+    return known[name]

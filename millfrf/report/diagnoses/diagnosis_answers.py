@@ -57,7 +57,9 @@ def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
     if diagnosis.verdict == "none":
         return f"Nothing is missing: {next_test('none').meaning}."
     if diagnosis.verdict == "unexplained":
-        return f"Unexplained: {next_test('unexplained').meaning}; no law is named for it. The model leaves {left}."
+        form = "a force of free form says how it behaves (below)" if diagnosis.content.get("free_form") else ""
+        known = f"no law is named for it{f', but {form}' if form else ''}"
+        return f"Unexplained: {next_test('unexplained').meaning}; {known}. The model leaves {left}."
     several = len(diagnosis.physics) > 1
     fall = (
         f"; with {'them' if several else 'it'}, the error on the held-out recording falls from "
@@ -172,6 +174,8 @@ def what(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
         physics = form_of(cause.name, cause.parameters, rig_of(diagnosis.details.final.hypothesis.model))
         equation = f": {physics.equation} ({physics.source})" if physics is not None else ""
         said.append(f"{first_word(cause.name)}{equation}.")
+    free = diagnosis.content.get("free_form")
+    said += [free["sentence"]] if free else []
     growth = diagnosis.located.get("growth", {})
     found = growth.get("effect") or growth.get("residual")
     if found and found["exponent"] is not None:

@@ -98,6 +98,11 @@ def law_section(diagnosis: StructureDiagnosis) -> Section:
         "errors; (a) against deflection, rising and falling; (b) against velocity. Lines: the accepted law, driven by "
         "the same motion and averaged alike."
     )
+    if diagnosis.details.textbook is not None:
+        caption += (
+            " Dotted: the library's law, with the linear spring and damper that bring it nearest, as they cannot be "
+            "told from the structure's own."
+        )
     pictures = tuple(_picture(law_figure(found), caption, f"Force of the joint: {words(found.name)}") for found in laws)
     return Section(title, sentences, (), pictures)
 

@@ -142,7 +142,7 @@ def _diagnosed(
         before,
         answer.left,
         located(view, speeds),
-        replace(details, view=view, behaviour=behaviour),
+        replace(details, view=view, behaviour=behaviour, textbook=freed.textbook),
         doubts=(
             *beyond_model(base.hypothesis, mended),
             *(one.sentence for one in answer.no_noise),

@@ -4,13 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from ....inference import AcceptedCause, Proposal
-from ....models import Fit
+from ....models import Fit, Hypothesis
 from ....records import Recordings
 from ....remainder import leftover
 from ..acceptance import possible_gains
 from ..answer import Answer
 from ..comparison import StructureComparison
+from ..rounds import likeliest_seen
 from .freed_laws_proved import FreedLaws, freed_from_named, freed_from_nothing
 
 
@@ -34,6 +37,11 @@ class FreedAnswer:
     freed: FreedLaws | None = None
     sentence: str = ""
     doubt: str = ""
+
+    @property
+    def textbook(self) -> Hypothesis | None:
+        """The hypothesis with laws as the library has them; None where no law was given a free form."""
+        return None if self.freed is None else self.freed.begun
 
     def content(self) -> dict[str, Any] | None:
         """What the file of a diagnosis says of it; None where there is no free form."""
@@ -62,12 +70,13 @@ def freed_answer(
     """
     settings, base = comparison.settings, answer.found.base
     if answer.verdict == "unexplained":
-        begun = _likeliest_law(answer, comparison)
-        if begun is None:
-            return FreedAnswer(answer)
-        freed = freed_from_nothing(
-            recordings, begun.fitted, answer.held_out, faults, settings, base=base, places=[begun.location]
-        )
+        tried = [
+            freed_from_nothing(
+                recordings, one.fitted, answer.held_out, faults, settings, base=base, places=[one.location]
+            )
+            for one in _likely_laws(answer, comparison)
+        ]
+        freed = min((one for one in tried if one is not None), key=lambda one: one.fitted.score, default=None)
         return (
             FreedAnswer(answer) if freed is None else FreedAnswer(_with(answer, freed, recordings), freed, _new(freed))
         )
@@ -82,13 +91,19 @@ def freed_answer(
     return FreedAnswer(again, freed, _beside(freed), doubt)
 
 
-def _likeliest_law(answer: Answer, comparison: StructureComparison) -> Proposal[Fit] | None:
-    """The joint's law that gained most alone; None where none gained enough to count."""
-    rounds = answer.found.rounds[:1]
-    laws = [one for each in rounds for one in each.proposals if one.name in comparison.laws]
-    alone = [one for one in laws if len(one.fitted.hypothesis.causes) == 1]
-    best = possible_gains(alone, comparison.settings.evidence)
-    return best[0] if best else None
+def _likely_laws(answer: Answer, comparison: StructureComparison) -> list[Proposal[Fit]]:
+    """Laws at which a free form may begin: the one that gained most alone, and the likeliest on the motion seen.
+
+    What the free simulation makes of a law says little where its form is wrong; the seen motion knows its family.
+    """
+    if not answer.found.rounds:
+        return []
+    first = answer.found.rounds[0]
+    laws = [one for one in first.proposals if one.name in comparison.laws and np.isfinite(one.fitted.score)]
+    alone = sorted((one for one in laws if len(one.fitted.hypothesis.causes) == 1), key=lambda one: -one.evidence)
+    best = possible_gains(alone, comparison.settings.evidence)[:1]
+    seen = likeliest_seen(first.candidates, comparison.laws)
+    return best + [one for one in alone if one.name == seen and all(one is not other for other in best)][:1]
 
 
 def _with(answer: Answer, freed: FreedLaws, recordings: Recordings) -> Answer:
@@ -112,7 +127,7 @@ def _new(freed: FreedLaws) -> str:
     (name, place), form = freed.names[0], freed.forms[0]
     return (
         f"Free form: no law of the library is proved, but a joint's force of free form{f' {place}' if place else ''} "
-        f"is ({form.kind}; nearest to {name}, from which it differs by {100 * form.distance:.2g} % of its size); "
+        f"is ({form.kind}; begun at {name}, from which it differs by {100 * form.distance:.2g} % of its size); "
         f"{_errors(freed, 'a model of modes alone')}."
     )
 

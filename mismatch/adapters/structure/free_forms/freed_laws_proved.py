@@ -40,6 +40,8 @@ class FreedLaws:
     ----------
     fitted
         The fit with laws of free form.
+    begun
+        The hypothesis with laws as the library has them, from which the forms were freed.
     held_out
         What it is worth on data that were held out.
     beside
@@ -55,6 +57,7 @@ class FreedLaws:
     """
 
     fitted: Fit
+    begun: Hypothesis
     held_out: HeldOut
     beside: Improvement
     chance: float
@@ -225,4 +228,4 @@ def _told(
     axes = tip_axes(freed.hypothesis.model)[2] if directed else ()
     words = [joint_in_words(one, axes if "direction" in one else ()) for one in places]
     names = tuple((answer_name(one.physics), place) for one, place in zip(laws, words, strict=True))
-    return FreedLaws(freed, worth, *beside, named.score - freed.score, names, forms)
+    return FreedLaws(freed, named.hypothesis, worth, *beside, named.score - freed.score, names, forms)

@@ -1,0 +1,154 @@
+"""A law of free form: it mends what the textbook law lacks where held-out data ask for it, and predicts from a file."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from one_mode_rig import Real, Rig
+from scipy.fft import irfft
+
+from estimation import WindowedSpectrum, windowed_spectrum
+from foundation import FileFormatError
+from mismatch import Cause, LabError, ModelShape, Settings, band_of, fit
+from mismatch.adapters.structure.free_forms import FreedLaws, form_of_law, freed_from_named, freed_from_nothing
+from mismatch.adapters.structure.held_out import held_out_improvement, recordings_of
+from mismatch.joints import JointAxis, JointLaw, JointMotion
+from mismatch.models import Fit, Hypothesis, hypothesis_of, improved_model, predict_lines, with_free_forms
+from mismatch.physics import FreeForm, JointPhysics, Parameter, library
+from modal_fit import read_modal_model, write_modal_model
+
+LEVELS = (10.0, 20.0, 40.0)
+RIG = Rig()
+MOTION = JointMotion(1e-3, 0.06, 1e-2, 0.6, RIG.stiffness)
+FRICTION = 3.0
+PLACES = [{"direction": [1.0]}]
+
+
+@dataclass
+class _Slip:
+    """Friction that falls with the speed by a share (Stribeck)."""
+
+    falls: float
+    name: str = "slip"
+    equation: str = ""
+    source: str = ""
+    parameters: tuple[Parameter, ...] = ()
+    confusable_with: tuple[str, ...] = ()
+
+    def starts(self, motion: JointMotion) -> tuple[Real, ...]:
+        return ()
+
+    def law(self, values: Real, motion: JointMotion) -> JointLaw:
+        v = motion.velocities
+        force = FRICTION * np.tanh(v / 2e-3) * (1 - self.falls + self.falls * np.exp(-((v / 0.03) ** 2)))
+        return JointLaw(speed=motion.speed, damping=force)
+
+
+def _law(name: str) -> JointPhysics:
+    found = library()[name]
+    assert isinstance(found, JointPhysics)
+    return found
+
+
+def _with(physics: JointPhysics, values: Real) -> Hypothesis:
+    shape = ModelShape(RIG.model, LabError())
+    return Hypothesis(shape, np.zeros(shape.size)).with_cause(Cause(physics, values, "", JointAxis(np.ones(1)), MOTION))
+
+
+def _recorded(falls: float) -> list[WindowedSpectrum]:
+    """Three recordings of a rig with friction, 1 % noise."""
+    band, shown, truth = band_of(RIG.model, RIG.rate), [], _slip(falls)
+    for seed, one in enumerate(RIG.recordings(LEVELS)):
+        lines = windowed_spectrum(one, band, 1.0)
+        moved = irfft(predict_lines(truth, lines).spectrum, n=lines.padded, axis=0)[: len(one.force)]
+        moved += 0.01 * moved.std() * np.random.default_rng(seed).normal(size=moved.shape)
+        shown.append(windowed_spectrum(replace(one, response=moved), band, 1.0))
+    return shown
+
+
+def _slip(falls: float) -> Hypothesis:
+    return _with(_Slip(falls), np.zeros(0))
+
+
+def _over_velocity(hypothesis: Hypothesis) -> Real:
+    """Force of the law over speeds that are met often, without its linear part; memory has yielded."""
+    law, v = hypothesis.laws[0].law(), np.linspace(-0.12, 0.12, 24)
+    force = np.interp(v, np.linspace(-law.speed, law.speed, len(law.damping)), law.damping)
+    force = force + np.sign(v) * float(law.springs @ law.yields)
+    return np.asarray(force - v * (force @ v) / (v @ v))
+
+
+def _freed(falls: float, *, named: bool = True) -> tuple[Fit, FreedLaws | None]:
+    """Dry friction fitted to friction that may fall with speed, and its free form; ``named``: as if it was proved."""
+    lines = _recorded(falls)
+    shape = ModelShape(RIG.model, LabError())
+    base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=15)
+    dry = fit(lines, _with(_law("coulomb_friction"), np.array([FRICTION, 2e-3])), iterations=15)
+    both, settings = recordings_of(lines, lines, base.hypothesis), Settings()
+    if named:
+        worth = held_out_improvement(both, dry.hypothesis, dry.noises, (), settings.proof)
+        return dry, freed_from_named(both, dry, worth, (), settings, base=base, places=PLACES)
+    worth = held_out_improvement(both, base.hypothesis, base.noises, (), settings.proof)
+    return dry, freed_from_nothing(both, dry, worth, (), settings, base=base, places=PLACES)
+
+
+def test_friction_that_falls_with_speed_gets_its_own_form() -> None:
+    dry, found = _freed(0.6)
+    assert found is not None
+    assert found.chance < 0.01
+    assert found.ratio > 1.5
+    assert found.names == (("coulomb_friction", "along +1.000 X"),)
+    (form,) = found.forms
+    assert 0.1 < form.distance < 0.9
+    assert form.kind.startswith("dissipative")
+    assert found.content()["held_out"]["free_form"] == found.held_out.everywhere.after
+    # the force that was found is the force that was there, up to a damper that the structure's own may hold
+    truth, free, named = (_over_velocity(one) for one in (_slip(0.6), found.fitted.hypothesis, dry.hypothesis))
+    assert np.std(free - truth) < 0.5 * np.std(named - truth)
+
+
+def test_friction_as_in_the_textbook_keeps_its_form() -> None:
+    assert _freed(0.0)[1] is None
+
+
+def test_a_form_is_told_where_no_law_was_proved() -> None:
+    found = _freed(0.6, named=False)[1]
+    assert found is not None
+    assert found.ratio > 2.0
+    assert found.evidence > 1000
+
+
+def test_a_free_form_predicts_from_a_file(tmp_path: Path) -> None:
+    free = with_free_forms(_with(_law("coulomb_friction"), np.array([FRICTION, 2e-3])), "xvm")
+    cause = free.causes[0]
+    values = cause.values + np.append(np.zeros(2), np.random.default_rng(1).normal(size=len(cause.values) - 2))
+    free = replace(free, causes=(replace(cause, values=values),))
+    write_modal_model(tmp_path / "model.json", improved_model(free))
+    again = hypothesis_of(read_modal_model(tmp_path / "model.json"))
+    assert isinstance(again.causes[0].physics, FreeForm)
+    lines = windowed_spectrum(RIG.recordings((20.0,))[0], band_of(RIG.model, RIG.rate), 1.0)
+    seen, same = (predict_lines(one, lines).response for one in (free, again))
+    np.testing.assert_allclose(same, seen, atol=1e-9 * float(np.abs(seen).max()))
+
+
+@pytest.mark.parametrize("location", [{"law": "friction"}, {"law": "coulomb_friction", "families": "q"}, {}])
+def test_a_term_of_free_form_that_is_none_is_refused(location: dict[str, str]) -> None:
+    model = replace(RIG.model, physics=({"name": "free_form", "location": location, "parameters": {}},))
+    with pytest.raises(FileFormatError, match=r"unknown physics|is no law"):
+        hypothesis_of(model)
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("stiffness_hardening", "elastic"), ("coulomb_friction", "dissipative"), ("hysteresis", "one with")],
+)
+def test_what_a_force_follows(name: str, kind: str) -> None:
+    law = _law(name)
+    (start, *_) = law.starts(MOTION)
+    size = 2.0 if name == "coulomb_friction" else 0.1 * RIG.stiffness
+    one = _with(law, np.array([size, *start[1:]]))
+    lines = [windowed_spectrum(RIG.recordings((20.0,))[0], band_of(RIG.model, RIG.rate), 1.0)]
+    form = form_of_law(one, one, 0, lines)
+    assert form.distance < 1e-6
+    assert form.kind.startswith(kind)
