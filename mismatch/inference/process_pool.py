@@ -1,8 +1,10 @@
 """Independent work in copies of this process, one for each core: threads would wait for the interpreter's lock."""
 
+import ctypes
 import multiprocessing
 import os
 import pickle
+import signal
 import sys
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection, wait
@@ -10,6 +12,9 @@ from multiprocessing.sharedctypes import Synchronized
 from typing import Any, TypeVar
 
 Result = TypeVar("Result")
+
+PR_SET_PDEATHSIG = 1
+"""Number of Linux's request for a signal at the parent's death (prctl, linux/prctl.h)."""
 
 
 def in_processes(tasks: Sequence[Callable[[], Result]]) -> list[Result]:
@@ -48,7 +53,7 @@ def _in_copies(tasks: Sequence[Callable[[], Result]], workers: int) -> dict[int,
     copies = []
     for _ in range(workers):
         here, there = context.Pipe(duplex=False)
-        copy = context.Process(target=_work, args=(tasks, turn, there), daemon=True)
+        copy = context.Process(target=_work, args=(tasks, turn, there, (*pipes, here), os.getpid()), daemon=True)
         copy.start()
         there.close()
         pipes.append(here)
@@ -80,8 +85,18 @@ def _received(pipes: list[Connection]) -> dict[int, Any]:
     return found
 
 
-def _work(tasks: Sequence[Callable[[], Any]], turn: "Synchronized[int]", pipe: Connection) -> None:
-    """Take the next task until none is left; runs in a copy."""
+def _work(
+    tasks: Sequence[Callable[[], Any]],
+    turn: "Synchronized[int]",
+    pipe: Connection,
+    inherited: Sequence[Connection],
+    parent: int,
+) -> None:
+    """Take the next task until none is left; runs in a copy, which does not outlive the process ``parent``."""
+    _die_with(parent)
+    # a reading end that stays open here would let a sibling wait for ever to be read
+    for one in inherited:
+        one.close()
     while True:
         with turn.get_lock():
             number = turn.value
@@ -93,3 +108,11 @@ def _work(tasks: Sequence[Callable[[], Any]], turn: "Synchronized[int]", pipe: C
         except Exception:
             # it is run again by the caller, whose traceback then tells
             continue
+
+
+def _die_with(parent: int) -> None:
+    """Let Linux end this process when the thread of ``parent`` that made it has ended, however it was killed."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    # it may have ended before it was asked for
+    if os.getppid() != parent:
+        os._exit(1)

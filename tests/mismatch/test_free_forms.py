@@ -10,9 +10,21 @@ from scipy.fft import irfft
 
 from estimation import WindowedSpectrum, windowed_spectrum
 from foundation import FileFormatError
-from mismatch import Cause, LabError, ModelShape, Settings, band_of, fit
+from millfrf.structure.diagnosis_words import diagnosis_lines
+from mismatch import (
+    Cause,
+    LabError,
+    ModelShape,
+    Settings,
+    StructureDiagnosis,
+    band_of,
+    diagnose,
+    fit,
+    improved_model_of,
+)
 from mismatch.adapters.structure.free_forms import FreedLaws, form_of_law, freed_from_named, freed_from_nothing
 from mismatch.adapters.structure.held_out import held_out_improvement, recordings_of
+from mismatch.inference import VerdictSettings
 from mismatch.joints import JointAxis, JointLaw, JointMotion
 from mismatch.models import Fit, Hypothesis, hypothesis_of, improved_model, predict_lines, with_free_forms
 from mismatch.physics import FreeForm, JointPhysics, Parameter, library
@@ -152,3 +164,33 @@ def test_what_a_force_follows(name: str, kind: str) -> None:
     form = form_of_law(one, one, 0, lines)
     assert form.distance < 1e-6
     assert form.kind.startswith(kind)
+
+
+def _diagnosed(falls: float, settings: Settings | None = None) -> StructureDiagnosis:
+    return diagnose(RIG.model, [one.recording for one in _recorded(falls)], settings)
+
+
+def test_the_name_stays_and_the_model_holds_the_free_form() -> None:
+    # any gain of the free form is more than this verdict allows
+    found = _diagnosed(0.3, replace(Settings(), verdict=VerdictSettings(most_over_free=1.0)))
+    assert [one.name for one in found.physics] == ["coulomb_friction"]
+    free = found.content["free_form"]
+    assert free["held_out"]["free_form"] < free["held_out"]["compared"]
+    assert found.improvement.after < 1.4 * found.improvement.noise_floor
+    (term,) = improved_model_of(found).physics
+    assert term["name"] == "free_form"
+    assert term["location"]["law"] in ("coulomb_friction", "presliding_friction")
+    assert any(line.startswith("Free form: the force of coulomb_friction") for line in diagnosis_lines(found))
+    assert found.verdict == "partly explained"
+    assert any("its name is not all" in one for one in found.doubts)
+
+
+def test_a_law_that_nobody_listed_has_no_name_and_predicts() -> None:
+    found = _diagnosed(0.6)
+    assert found.verdict == "unexplained"
+    assert not found.physics
+    assert found.improvement.after < 0.1 * found.improvement.refitted
+    assert found.content["improved_model"]["model"] == "final"
+    assert [one["name"] for one in improved_model_of(found).physics] == ["free_form"]
+    (said,) = (line for line in diagnosis_lines(found) if line.startswith("Free form: no law"))
+    assert "dissipative" in said

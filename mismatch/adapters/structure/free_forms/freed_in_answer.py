@@ -115,7 +115,7 @@ def _with(answer: Answer, freed: FreedLaws, recordings: Recordings) -> Answer:
 def _beside(freed: FreedLaws) -> str:
     """What the free form of named laws says."""
     parts = [
-        f"the force of {name}{f' {place}' if place else ''} differs from the textbook law by "
+        f"the force of {name}{f' ({place})' if place else ''} differs from the textbook law by "
         f"{100 * form.distance:.2g} % of its size"
         for (name, place), form in zip(freed.names, freed.forms, strict=True)
     ]
@@ -126,8 +126,8 @@ def _new(freed: FreedLaws) -> str:
     """What a free form says where no law was proved."""
     (name, place), form = freed.names[0], freed.forms[0]
     return (
-        f"Free form: no law of the library is proved, but a joint's force of free form{f' {place}' if place else ''} "
-        f"is ({form.kind}; begun at {name}, from which it differs by {100 * form.distance:.2g} % of its size); "
+        f"Free form: no law of the library is proved, but the force of a joint{f' ({place})' if place else ''} is: "
+        f"{form.kind}. Begun at {name}, from which it differs by {100 * form.distance:.2g} % of its size, "
         f"{_errors(freed, 'a model of modes alone')}."
     )
 
