@@ -1,3 +1,4 @@
+from .child_processes import end_with, process_pool
 from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom, checked_names
 from .errors import DiskFull, FileFormatError, InputError, MillfrfError, MillfrfWarning, TooLarge
 from .foreign_files import conversion_advice
@@ -46,6 +47,7 @@ __all__ = [
     "counted",
     "doubts_line",
     "drawing",
+    "end_with",
     "free_name",
     "is_disk_full",
     "keeping_files",
@@ -55,6 +57,7 @@ __all__ = [
     "notice",
     "notices_to",
     "optional_library",
+    "process_pool",
     "refuse_replacing",
     "remove_leftovers",
     "require_memory",

@@ -20,7 +20,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from foundation import FileFormatError
+from foundation import FileFormatError, end_with
 
 from .reading_child import attempt
 
@@ -88,7 +88,7 @@ def _rehearse_in_copy(path: Path) -> None:
     """Rehearse in a copy of this process, which has loaded the libraries: a twentieth of the time of a new one."""
     context = multiprocessing.get_context("fork")
     here, there = context.Pipe(duplex=False)
-    copy = context.Process(target=_report_attempt, args=(path, there), daemon=True)
+    copy = context.Process(target=_report_attempt, args=(path, there, os.getpid()), daemon=True)
     copy.start()
     there.close()
     copy.join(_longest(path))
@@ -104,8 +104,9 @@ def _rehearse_in_copy(path: Path) -> None:
         raise FileFormatError(f"{path} is damaged: {wrong}; take a copy of it")
 
 
-def _report_attempt(path: Path, pipe: Connection) -> None:
+def _report_attempt(path: Path, pipe: Connection, parent: int) -> None:
     """Runs in the copy, whose libraries may write to standard error when they crash."""
+    end_with(parent)
     faulthandler.disable()
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     pipe.send_bytes(attempt("rehearsal", path, path.parent)[:_LONGEST_REPORT].encode())

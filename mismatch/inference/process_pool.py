@@ -1,20 +1,17 @@
 """Independent work in copies of this process, one for each core: threads would wait for the interpreter's lock."""
 
-import ctypes
 import multiprocessing
 import os
 import pickle
-import signal
 import sys
 from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection, wait
 from multiprocessing.sharedctypes import Synchronized
 from typing import Any, TypeVar
 
-Result = TypeVar("Result")
+from foundation import end_with
 
-PR_SET_PDEATHSIG = 1
-"""Number of Linux's request for a signal at the parent's death (prctl, linux/prctl.h)."""
+Result = TypeVar("Result")
 
 
 def in_processes(tasks: Sequence[Callable[[], Result]]) -> list[Result]:
@@ -93,7 +90,7 @@ def _work(
     parent: int,
 ) -> None:
     """Take the next task until none is left; runs in a copy, which does not outlive the process ``parent``."""
-    _die_with(parent)
+    end_with(parent)
     # a reading end that stays open here would let a sibling wait for ever to be read
     for one in inherited:
         one.close()
@@ -108,11 +105,3 @@ def _work(
         except Exception:
             # it is run again by the caller, whose traceback then tells
             continue
-
-
-def _die_with(parent: int) -> None:
-    """Let Linux end this process when the thread of ``parent`` that made it has ended, however it was killed."""
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    # it may have ended before it was asked for
-    if os.getppid() != parent:
-        os._exit(1)

@@ -18,6 +18,10 @@ Real = NDArray[np.float64]
 INSTANTS_PER_PERIOD = 20.0
 """Instants of the simulation in one period of the highest mode."""
 
+FINEST = 20
+"""Instants for each sample at most: of a mode beyond the sampling rate, which a fit may try, nothing is recorded. It
+follows the joint's force without delay, and each step of the simulation is exact for a force that runs straight."""
+
 
 @dataclass(frozen=True)
 class JointResponse:
@@ -38,7 +42,8 @@ class JointResponse:
 
 def fineness(model: ModalModel, rate: float) -> int:
     """Instants of the simulation for each sample of the recording."""
-    return max(4, int(np.ceil(INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate)))
+    wanted = INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate
+    return int(np.clip(np.ceil(min(wanted, FINEST)), 4, FINEST))
 
 
 def substeps(model: ModalModel, rate: float, fine: int) -> int:

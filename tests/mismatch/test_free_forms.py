@@ -16,18 +16,27 @@ from mismatch import (
     LabError,
     ModelShape,
     Settings,
-    StructureDiagnosis,
     band_of,
     diagnose,
     fit,
     improved_model_of,
 )
-from mismatch.adapters.structure.free_forms import FreedLaws, form_of_law, freed_from_named, freed_from_nothing
+from mismatch.adapters.structure.answer import Answer
+from mismatch.adapters.structure.comparison import StructureComparison
+from mismatch.adapters.structure.free_forms import (
+    FreedAnswer,
+    FreedLaws,
+    form_of_law,
+    freed_answer,
+    freed_from_named,
+    freed_from_nothing,
+)
 from mismatch.adapters.structure.held_out import held_out_improvement, recordings_of
-from mismatch.inference import VerdictSettings
+from mismatch.inference import Proposal, Search, VerdictSettings
 from mismatch.joints import JointAxis, JointLaw, JointMotion
 from mismatch.models import Fit, Hypothesis, hypothesis_of, improved_model, predict_lines, with_free_forms
 from mismatch.physics import FreeForm, JointPhysics, Parameter, library
+from mismatch.remainder import leftover
 from modal_fit import read_modal_model, write_modal_model
 
 LEVELS = (10.0, 20.0, 40.0)
@@ -166,27 +175,41 @@ def test_what_a_force_follows(name: str, kind: str) -> None:
     assert form.kind.startswith(kind)
 
 
-def _diagnosed(falls: float, settings: Settings | None = None) -> StructureDiagnosis:
-    return diagnose(RIG.model, [one.recording for one in _recorded(falls)], settings)
+def _answered(falls: float, most: float) -> FreedAnswer:
+    """What becomes of an answer that names dry friction, where it may leave ``most`` times what its free form does."""
+    lines = _recorded(falls)
+    shape = ModelShape(RIG.model, LabError())
+    base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=15)
+    dry = fit(lines, _with(_law("coulomb_friction"), np.array([FRICTION, 2e-3])), iterations=15)
+    both, settings = (
+        recordings_of(lines, lines, base.hypothesis),
+        Settings(verdict=VerdictSettings(most_over_free=most)),
+    )
+    worth = held_out_improvement(both, dry.hypothesis, dry.noises, (), settings.proof)
+    found = Search((base, dry), (Proposal("coulomb_friction", PLACES[0], dry, base.score - dry.score),))
+    before = leftover(base.hypothesis, lines)
+    answer = Answer("explained", (), dry, found, leftover(dry.hypothesis, lines), worth)
+    return freed_answer(answer, StructureComparison(lines, library(), settings, before), both, ())
 
 
-def test_the_name_stays_and_the_model_holds_the_free_form() -> None:
-    # any gain of the free form is more than this verdict allows
-    found = _diagnosed(0.3, replace(Settings(), verdict=VerdictSettings(most_over_free=1.0)))
-    assert [one.name for one in found.physics] == ["coulomb_friction"]
-    free = found.content["free_form"]
-    assert free["held_out"]["free_form"] < free["held_out"]["compared"]
-    assert found.improvement.after < 1.4 * found.improvement.noise_floor
-    (term,) = improved_model_of(found).physics
-    assert term["name"] == "free_form"
-    assert term["location"]["law"] in ("coulomb_friction", "presliding_friction")
-    assert any(line.startswith("Free form: the force of coulomb_friction") for line in diagnosis_lines(found))
-    assert found.verdict == "partly explained"
-    assert any("its name is not all" in one for one in found.doubts)
+def test_an_answer_keeps_its_name_and_predicts_with_the_free_form() -> None:
+    found = _answered(0.3, 100.0)
+    assert found.answer.verdict == "explained"
+    assert not found.doubt
+    assert found.sentence.startswith("Free form: the force of coulomb_friction (along +1.000 X) differs")
+    assert found.textbook is not None
+    (term,) = improved_model(found.answer.final.hypothesis).physics
+    assert (term["name"], term["location"]["law"]) == ("free_form", "coulomb_friction")
+
+
+def test_a_name_that_leaves_far_more_than_its_free_form_is_not_the_whole() -> None:
+    found = _answered(0.6, 1.5)
+    assert found.answer.verdict == "partly explained"
+    assert "its name is not all" in found.doubt
 
 
 def test_a_law_that_nobody_listed_has_no_name_and_predicts() -> None:
-    found = _diagnosed(0.6)
+    found = diagnose(RIG.model, [one.recording for one in _recorded(0.6)])
     assert found.verdict == "unexplained"
     assert not found.physics
     assert found.improvement.after < 0.1 * found.improvement.refitted

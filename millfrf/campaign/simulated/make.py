@@ -1,13 +1,12 @@
 """`make_campaign`: a campaign as a laboratory would have it, without hardware."""
 
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from foundation import InputError, writing_whole_folder
+from foundation import InputError, process_pool, writing_whole_folder
 from robot_model import named_posture, read_spatial_robot
 
 from ...progress import Progress, silent
@@ -78,7 +77,7 @@ def make_campaign(options: SimulatedCampaign, progress: Progress = silent) -> No
     with writing_whole_folder(options.out) as folder:
         for name in ("recordings", "taps", "idle"):
             (folder / name).mkdir()
-        with progress("milling", len(planned)) as update, ProcessPoolExecutor(WORKERS) as pool:
+        with progress("milling", len(planned)) as update, process_pool(WORKERS) as pool:
             milled = pool.map(partial(write_recording, laboratory, folder=folder / "recordings"), planned)
             for number, _ in enumerate(milled, 1):
                 update(number)

@@ -1,6 +1,5 @@
 """`millfrf robot path` from options to files."""
 
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from cutting import MillingProcess, force_harmonics
-from foundation import InputError, writing_whole_file
+from foundation import InputError, process_pool, writing_whole_file
 from robot_model import (
     CompensatedPath,
     CutPath,
@@ -78,7 +77,7 @@ def write_optimised_path(
     loading = Loading(_wrenches(path, process, depth), loads.weight)
     cut = PathCut(case.robot, process, rpm * RPM, max_depth, loads.payload)
     first = close_loops(case.robot.mechanism, posture_of(case, start)[0])
-    with bar("postures along the path"), ProcessPoolExecutor(WORKERS) as pool:
+    with bar("postures along the path"), process_pool(WORKERS) as pool:
         found = optimised(cut, path, asked.redundancy(path), loading, asked.wanted(), first, pool)
     warnings += doubts(found, path)
     for line in summary(found, asked.wanted(), max_depth, depth):

@@ -3,14 +3,13 @@
 import csv
 import os
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cutting import MillingProcess
-from foundation import warning_lines, writing_whole_file
+from foundation import process_pool, warning_lines, writing_whole_file
 from robot_model import (
     CutPlace,
     PostureMap,
@@ -65,7 +64,7 @@ def depth_over_places(
         return job(places)
     parts = [list(places[start :: 4 * workers]) for start in range(4 * workers)]
     limits, lowest = np.empty(len(places)), np.empty(len(places))
-    with ProcessPoolExecutor(workers) as pool:
+    with process_pool(workers) as pool:
         for start, (part, first) in enumerate(pool.map(job, parts)):
             limits[start :: 4 * workers], lowest[start :: 4 * workers] = part, first
     return limits, lowest

@@ -2,14 +2,13 @@
 
 import csv
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError, warning_lines, writing_whole_file
+from foundation import InputError, process_pool, warning_lines, writing_whole_file
 from robot_model import CutPlace, Payload, SpatialRobot, read_robot, target_of, tool_down, tool_postures, typed_values
 
 from ...gate import check_depth, check_speed, read_checked_cutting
@@ -114,7 +113,7 @@ def certified_over_places(
     if not requests:
         raise InputError("no place of the area is reached; move --x, --y or --z")
     doubts = []
-    with ProcessPoolExecutor(2) as pool:
+    with process_pool(2) as pool:
         samples = [requests[i] for i in np.unique(np.round(np.linspace(0, len(requests) - 1, 5)).astype(int))]
         kept = kept_modes(cut, samples, pool)
         found = values_of(replace(cut, highest_frequency=kept.highest_frequency), requests, pool)

@@ -2,13 +2,10 @@
 
 import multiprocessing
 import os
-import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -185,42 +182,3 @@ def test_no_copy_is_left_behind() -> None:
     before = set(multiprocessing.active_children())
     in_processes([partial(_square, k) for k in range(5)])
     assert set(multiprocessing.active_children()) == before
-
-
-KILLED = """
-import os, sys, time
-from pathlib import Path
-os.sched_getaffinity = lambda process: {0, 1}
-from mismatch.inference import in_processes
-def sleeps(name):
-    Path(sys.argv[1], name).write_text(str(os.getpid()))
-    time.sleep(600)
-in_processes([lambda: sleeps("a"), lambda: sleeps("b")])
-"""
-
-
-def _is_there(process: int) -> bool:
-    """Whether a process runs; one that has ended and that nobody asked after does not."""
-    try:
-        return Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
-    except FileNotFoundError:
-        return False
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere nothing runs in copies")
-def test_copies_end_with_a_process_that_is_killed(tmp_path: Path) -> None:
-    program = subprocess.Popen([sys.executable, "-c", KILLED, str(tmp_path)])
-    files = [tmp_path / "a", tmp_path / "b"]
-    _wait_for(lambda: all(one.exists() and one.read_text() for one in files))
-    copies = [int(one.read_text()) for one in files]
-    assert all(map(_is_there, copies))
-    program.kill()
-    program.wait()
-    _wait_for(lambda: not any(map(_is_there, copies)))
-
-
-def _wait_for(happened: Callable[[], bool], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not happened():
-        assert time.monotonic() < end
-        time.sleep(0.02)

@@ -10,11 +10,16 @@ from ....inference import AcceptedCause, Proposal
 from ....models import Fit, Hypothesis
 from ....records import Recordings
 from ....remainder import leftover
-from ..acceptance import possible_gains
+from ..acceptance import impossible, possible_gains
 from ..answer import Answer
 from ..comparison import StructureComparison
+from ..form_errors import with_form_spread
 from ..rounds import likeliest_seen
+from ..told_causes import told_causes
 from .freed_laws_proved import FreedLaws, freed_from_named, freed_from_nothing
+
+NEARLY = "the law's textbook form leaves something that moves with the signal, and a form near it does not"
+"""Why an answer is not whole whose law is known by a free form that hardly differs from it."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +60,8 @@ def freed_answer(
 
     A named law keeps its name. Where a free form of it leaves far less, the name is not the whole: ``explained``
     becomes ``partly explained``. Where no law was proved, the verdict stays ``unexplained`` and no name is told, but
-    the force is, by what it follows, and the improved model predicts with it.
+    the force is, by what it follows, and the improved model predicts with it. Where that force hardly differs from a
+    textbook law, and leaves nothing that moves with the signal, the law's name is told in part.
 
     Parameters
     ----------
@@ -70,16 +76,7 @@ def freed_answer(
     """
     settings, base = comparison.settings, answer.found.base
     if answer.verdict == "unexplained":
-        tried = [
-            freed_from_nothing(
-                recordings, one.fitted, answer.held_out, faults, settings, base=base, places=[one.location]
-            )
-            for one in _likely_laws(answer, comparison)
-        ]
-        freed = min((one for one in tried if one is not None), key=lambda one: one.fitted.score, default=None)
-        return (
-            FreedAnswer(answer) if freed is None else FreedAnswer(_with(answer, freed, recordings), freed, _new(freed))
-        )
+        return _of_unexplained(answer, comparison, recordings, faults)
     places = [one.location for one in answer.found.accepted if one.fitted.hypothesis.causes[-1].axis is not None]
     freed = freed_from_named(recordings, answer.final, answer.held_out, faults, settings, base=base, places=places)
     if freed is None:
@@ -89,6 +86,35 @@ def freed_answer(
         again = replace(again, verdict="partly explained")
         doubt = f"a force of free form leaves {1 / freed.ratio:.2g} of what the named law leaves: its name is not all"
     return FreedAnswer(again, freed, _beside(freed), doubt)
+
+
+def _of_unexplained(
+    answer: Answer, comparison: StructureComparison, recordings: Recordings, faults: Sequence[AcceptedCause]
+) -> FreedAnswer:
+    """A free form where no law was proved, and the law's name after all where the free form hardly differs from it."""
+    settings = comparison.settings
+    pairs = []
+    for one in _likely_laws(answer, comparison):
+        freed = freed_from_nothing(
+            recordings,
+            one.fitted,
+            answer.held_out,
+            faults,
+            settings,
+            base=answer.found.base,
+            places=[one.location],
+        )
+        pairs += [] if freed is None else [(freed, one)]
+    if not pairs:
+        return FreedAnswer(answer)
+    freed, begun = min(pairs, key=lambda pair: pair[0].fitted.score)
+    again = _with(answer, freed, recordings)
+    whole = again.left.noise_like(settings.verdict.noise_like)
+    if not (whole and freed.of_one_family and freed.forms[0].distance <= settings.verdict.near_form):
+        return FreedAnswer(again, freed, _new(freed))
+    causes = told_causes(with_form_spread(begun.fitted, recordings.mended), [begun])
+    again = replace(again, verdict="partly explained", causes=tuple(causes))
+    return FreedAnswer(again, freed, _beside(freed), NEARLY)
 
 
 def _likely_laws(answer: Answer, comparison: StructureComparison) -> list[Proposal[Fit]]:
@@ -103,7 +129,8 @@ def _likely_laws(answer: Answer, comparison: StructureComparison) -> list[Propos
     alone = sorted((one for one in laws if len(one.fitted.hypothesis.causes) == 1), key=lambda one: -one.evidence)
     best = possible_gains(alone, comparison.settings.evidence)[:1]
     seen = likeliest_seen(first.candidates, comparison.laws)
-    return best + [one for one in alone if one.name == seen and all(one is not other for other in best)][:1]
+    other = [one for one in alone if one.name == seen and all(one is not known for known in best)][:1]
+    return [one for one in best + other if not impossible(one, comparison.settings.evidence)]
 
 
 def _with(answer: Answer, freed: FreedLaws, recordings: Recordings) -> Answer:

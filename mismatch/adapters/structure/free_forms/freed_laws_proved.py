@@ -17,7 +17,7 @@ from ....faults import residual_lines
 from ....inference import AcceptedCause, Improvement, Settings, in_processes
 from ....joints import joint_in_words, tip_axes
 from ....models import Fit, Hypothesis, fit, through_structure, with_free_forms
-from ....physics import answer_name, families
+from ....physics import FreeForm, answer_name, families
 from ....records import Recordings
 from ..held_out import HeldOut, chance_of_no_gain, held_out_improvement
 from .distance_from_law import FormOfLaw, form_of_law
@@ -69,6 +69,12 @@ class FreedLaws:
     def ratio(self) -> float:
         """Error held out of what it is compared with over its own."""
         return self.beside.after / max(self.held_out.everywhere.after, 1e-300)
+
+    @property
+    def of_one_family(self) -> bool:
+        """Whether each form has shapes of its law's own family alone."""
+        kinds = [one.physics.kinds for one in self.fitted.hypothesis.laws if isinstance(one.physics, FreeForm)]
+        return ALL_SHAPES not in kinds
 
     def content(self) -> dict[str, Any]:
         """What the file of a diagnosis says of it."""
