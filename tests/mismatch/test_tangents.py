@@ -89,3 +89,22 @@ def test_whitening_of_lines() -> None:
     assert total == pytest.approx(np.linalg.slogdet(covariance)[1].sum(), rel=1e-12)
     np.testing.assert_allclose(white.conj().swapaxes(1, 2) @ white, np.linalg.inv(covariance), atol=1e-9)
     assert whiten_lines(-covariance) == np.inf
+
+
+def test_a_mode_far_beyond_the_record_takes_no_finer_steps(
+    small_model: ModalModel, trial_of: Callable[[ModalModel, str, float, int], BandRecording]
+) -> None:
+    lines = windowed_spectrum(trial_of(small_model, "mid", 50.0, 4), band_of(small_model, 128.0), 4.0)
+    near = _explanation(small_model, lines, "coulomb_friction", _axis(small_model, False))
+    # a mode that takes no part, at 10 MHz: resolved, it would ask for some million instants a sample
+    far = replace(
+        small_model,
+        poles=np.append(small_model.poles, 2j * np.pi * 1e7 - 1e5),
+        right=np.vstack([small_model.right, small_model.right[:1]]),
+        left=np.vstack([small_model.left, 0 * small_model.left[:1]]),
+    )
+    shape = ModelShape(far, LabError())
+    wider = Hypothesis(shape, np.zeros(shape.size), near.causes)
+    seen, same = (predict_lines(one, lines) for one in (near, wider))
+    assert len(same.joints[0].deflection) <= 20 * lines.padded
+    np.testing.assert_allclose(same.response, seen.response, atol=0.02 * float(np.abs(seen.response).max()))
