@@ -221,7 +221,7 @@ KINDS = {
     "mat": ("convert", ".mat", CHANNEL_MAP, _mat),
     "mat of all kinds": ("convert", ".mat", ARRAY_MAP, _mat_of_all_kinds),
     "mat compressed": ("convert", ".mat", ARRAY_MAP, lambda path: _mat_of_all_kinds(path, compressed=True)),
-    "mat 7.3": ("convert", ".mat", ARRAY_MAP.replace("column", "axes = ['channel', 'sample']\ncolumn"), _mat73),
+    "mat 7.3": ("convert", ".mat", "axes = ['channel', 'sample']\n" + ARRAY_MAP, _mat73),
     "hdf5": ("convert", ".h5", ARRAY_MAP, _hdf5),
     "recording of others": ("inspect", ".h5", "", _recording_of_others),
     "tdms": ("convert", ".tdms", CHANNEL_MAP, _tdms),
