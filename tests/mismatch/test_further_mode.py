@@ -11,8 +11,9 @@ import pytest
 from estimation import BandRecording, windowed_spectrum
 from mismatch import Hypothesis, LabError, ModelShape, Settings, band_of, fit
 from mismatch.adapters.structure.acceptance import impossible
+from mismatch.adapters.structure.told_causes import told_causes
 from mismatch.inference import Proposal, ScreeningSettings
-from mismatch.models import modes_are_odd
+from mismatch.models import Fit, modes_are_odd
 from mismatch.physics import ModePhysics, library
 from mismatch.screening import find_mode, linear_candidates, noise_floor
 from modal_fit import ModalModel, ModeErrors
@@ -63,3 +64,22 @@ def test_a_pole_without_a_peak_cannot_be_a_missing_mode(damping: float, said: st
     hypothesis = SimpleNamespace(causes=(cause,), model=SimpleNamespace(poles=np.array([-1 + 100j, pole])))
     proposal: Any = Proposal("missing_mode", {}, SimpleNamespace(hypothesis=hypothesis), 2691.0)
     assert impossible(proposal, Settings().evidence) == said
+
+
+def test_each_of_several_modes_is_told_with_its_own_numbers() -> None:
+    physics = library()["missing_mode"]
+    assert isinstance(physics, ModePhysics)
+    shape = ModelShape(Rig().model, LabError())
+    hypothesis = Hypothesis(shape, np.zeros(shape.size))
+    for frequency in (15.0, 22.0):
+        pole = 2 * np.pi * frequency * (-0.02 + 1j)
+        hypothesis = hypothesis.with_mode(pole, np.ones(1, complex), np.ones(1, complex), physics)
+    size = hypothesis.size
+    fitted = Fit(hypothesis, (), 0.0, 0.0, 0.0, np.diag(np.arange(1.0, size + 1)))
+    accepted = [Proposal("missing_mode", {}, fitted, 30.0 + k) for k in range(2)]
+    told = told_causes(fitted, accepted)
+    assert [one.parameters["frequency_hz"] for one in told] == pytest.approx([15.0, 22.0], rel=1e-3)
+    assert [one.evidence for one in told] == [30.0, 31.0]
+    first, second = (one.standard_errors["damping_ratio"] for one in told)
+    # variances stand in the order of the numbers: those of the mode added last are larger
+    assert second > first

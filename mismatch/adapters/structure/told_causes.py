@@ -40,10 +40,12 @@ def told_causes(fitted: Fit, accepted: Sequence[Proposal[Fit]]) -> list[Accepted
     accepted
         Accepted causes in the order found, which is that of the hypothesis.
     """
-    told = []
+    told: list[AcceptedCause] = []
+    believed, added = fitted.hypothesis.shape.believed, 0
     for place, (one, cause) in enumerate(zip(accepted, fitted.hypothesis.causes, strict=True)):
         if isinstance(cause.physics, ModePhysics):
-            told.append(accepted_mode(fitted, cause.physics, one.evidence))
+            told.append(accepted_mode(fitted, cause.physics, one.evidence, believed + added))
+            added += 1
         else:
             location = dict(one.location)
             if cause.axis is not None:
@@ -69,8 +71,8 @@ def _derived(cause: Cause, covariance: Real) -> tuple[dict[str, float], dict[str
     return here, {name: float(np.sqrt(np.maximum(slope @ own @ slope, 0.0))) for name, slope in slopes.items()}
 
 
-def accepted_mode(fitted: Fit, physics: ModePhysics, evidence: float) -> AcceptedCause:
-    """The mode added last to a fit: frequency, damping ratio and shape at the responses.
+def accepted_mode(fitted: Fit, physics: ModePhysics, evidence: float, number: int) -> AcceptedCause:
+    """A mode that was added to a fit: frequency, damping ratio and shape at the responses.
 
     Parameters
     ----------
@@ -80,12 +82,14 @@ def accepted_mode(fitted: Fit, physics: ModePhysics, evidence: float) -> Accepte
         The cause that added it.
     evidence
         Gain in score by the mode.
+    number
+        Which of the model's modes it is; those that the lab believes come first.
     """
     shape, model = fitted.hypothesis.shape, fitted.hypothesis.model
-    first = shape.per_mode * (len(model.poles) - 1)
+    first = shape.per_mode * number
     spread = np.sqrt(np.maximum(np.diag(fitted.covariance)[first : first + 2], 0.0))
-    frequency, damping = float(model.natural_frequencies[-1]), float(model.damping_ratios[-1])
-    right = np.abs(model.right[-1]) / np.abs(model.right[-1]).max()
+    frequency, damping = float(model.natural_frequencies[number]), float(model.damping_ratios[number])
+    right = np.abs(model.right[number]) / np.abs(model.right[number]).max()
     place = {"shape": dict(zip(model.responses, [round(float(x), 4) for x in right], strict=True))}
     return AcceptedCause(
         physics.name,
