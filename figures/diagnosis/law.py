@@ -17,19 +17,14 @@ def law_figure(found: FreeFormLaw) -> Figure:
     and averaged alike. Where the accepted law has a free form, dotted lines are the library's.
     """
     law = found.name.replace("_", " ")
-    named = law.capitalize() if found.forward.textbook is not None else f"Law ({law})"
+    freed = found.forward.textbook is not None
+    rising, falling = (law.capitalize(), "Free form") if freed else (f"Law ({law})", "Law")
     with house_style():
         figure = new_figure(82.0, None)
         left, right = figure.subplots(1, 2, gridspec_kw={"wspace": 0.24})
-        _draw(left, found.forward, ("o", COLOURS[0]), "Measured, deflection rising", (f"{named}, rising", "-"), 1e6)
-        _draw(
-            left,
-            found.backward,
-            ("v", COLOURS[2]),
-            "Measured, falling",
-            (("Free form, falling" if named[:4] == "Free" else "Law, falling"), (0, (5, 1.5))),
-            1e6,
-        )
+        _draw(left, found.forward, ("o", COLOURS[0]), "Measured, deflection rising", (f"{rising}, rising", "-"), 1e6)
+        lines = f"{falling}, falling", (0, (5, 1.5))
+        _draw(left, found.backward, ("v", COLOURS[2]), "Measured, falling", lines, 1e6)
         _draw(right, found.damping, ("o", COLOURS[0]), "", ("", "-"), 1e3)
         left.set_xlabel(f"Deflection along the joint (µ{found.deflection_unit})")
         right.set_xlabel(f"Velocity along the joint (m{found.deflection_unit}/s)")

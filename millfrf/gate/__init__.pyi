@@ -10,7 +10,7 @@ from .lobes_band import check_band_of_lobes, limits_inside_band
 from .local_lines import check_local_frf
 from .looking import doubts_of
 from .model_and_recordings import check_model_and_recordings
-from .models import check_model, fit_doubts, smearing_doubts, stored_doubts
+from .models import check_model, fit_doubts, smearing_doubts, stored_doubts, terms_left_out
 from .plans import check_demand, check_duration
 from .reciprocity import check_model_reciprocity, check_reciprocity, plainly_different, shown_pairs
 from .recordings import (
@@ -85,4 +85,5 @@ __all__ = [
     "smearing_doubts",
     "stated_cut",
     "stored_doubts",
+    "terms_left_out",
 ]

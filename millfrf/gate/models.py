@@ -60,6 +60,30 @@ def check_model(model: ModalModel, name: str = "the model") -> list[str]:
     return check_frf(replace(model.frf(_lines(model)), band=None), name)
 
 
+def terms_left_out(model: ModalModel, name: str = "the model") -> list[str]:
+    """Say that a job counts the modes of a model alone, where a diagnosis has added terms of physics to them.
+
+    Parameters
+    ----------
+    model
+        Model that a job of modes takes: lobes, a calibration.
+    name
+        Name of its file, for the message.
+
+    Returns
+    -------
+    list of str
+        One doubt, or none where the model has no terms.
+    """
+    if not model.physics:
+        return []
+    terms = ", ".join(dict.fromkeys(str(term.get("name")) for term in model.physics))
+    return [
+        f"{name} holds terms of a diagnosis ({terms}), which only millfrf predict counts: here its modes count alone; "
+        "for lobes with the terms see the report of millfrf diagnose --cutting"
+    ]
+
+
 def _check_band(model: ModalModel, name: str) -> None:
     """Refuse a band that holds none of the modes, as a wrong unit makes it."""
     natural = model.natural_frequencies

@@ -235,8 +235,6 @@ class VerdictSettings(Thresholds, shares=("explained", "partly", "halves")):
         Share of the response that must so be known to be no noise.
     most_over_free
         Error held out over that of the same law in a free form, above which the law's name is not the whole.
-    near_form
-        Share of a free form's force that a textbook law may miss and still lend it its name.
     """
 
     noise_like: float = 0.05
@@ -250,7 +248,6 @@ class VerdictSettings(Thresholds, shares=("explained", "partly", "halves")):
     most_over_alone: float = 1.5
     most_not_noise: float = 0.1
     most_over_free: float = 2.0
-    near_form: float = 0.1
 
 
 @dataclass(frozen=True)

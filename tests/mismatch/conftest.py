@@ -32,6 +32,7 @@ def _loaded(name: str) -> ModuleType:
 
 _MODULE = _loaded("concealed_recordings")
 _RIG = _loaded("one_mode_rig")
+_loaded("hidden_joint")
 
 
 @pytest.fixture(scope="session")

@@ -5,14 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from one_mode_rig import Real, Rig
-from scipy.fft import irfft
+from hidden_joint import MOTION, RIG, law_of, recorded, with_law
+from one_mode_rig import Real
 
-from estimation import WindowedSpectrum, windowed_spectrum
+from estimation import windowed_spectrum
 from foundation import FileFormatError
 from millfrf.structure.diagnosis_words import diagnosis_lines
 from mismatch import (
-    Cause,
     LabError,
     ModelShape,
     Settings,
@@ -24,6 +23,7 @@ from mismatch import (
 from mismatch.adapters.structure.answer import Answer
 from mismatch.adapters.structure.comparison import StructureComparison
 from mismatch.adapters.structure.free_forms import (
+    Beginning,
     FreedAnswer,
     FreedLaws,
     form_of_law,
@@ -33,17 +33,15 @@ from mismatch.adapters.structure.free_forms import (
 )
 from mismatch.adapters.structure.held_out import held_out_improvement, recordings_of
 from mismatch.inference import Proposal, Search, VerdictSettings
-from mismatch.joints import JointAxis, JointLaw, JointMotion
+from mismatch.joints import JointLaw, JointMotion
 from mismatch.models import Fit, Hypothesis, hypothesis_of, improved_model, predict_lines, with_free_forms
-from mismatch.physics import FreeForm, JointPhysics, Parameter, library
+from mismatch.physics import FreeForm, Parameter, library
 from mismatch.remainder import leftover
 from modal_fit import read_modal_model, write_modal_model
 
 LEVELS = (10.0, 20.0, 40.0)
-RIG = Rig()
-MOTION = JointMotion(1e-3, 0.06, 1e-2, 0.6, RIG.stiffness)
 FRICTION = 3.0
-PLACES = [{"direction": [1.0]}]
+PLACES = ({"direction": [1.0]},)
 
 
 @dataclass
@@ -66,30 +64,8 @@ class _Slip:
         return JointLaw(speed=motion.speed, damping=force)
 
 
-def _law(name: str) -> JointPhysics:
-    found = library()[name]
-    assert isinstance(found, JointPhysics)
-    return found
-
-
-def _with(physics: JointPhysics, values: Real) -> Hypothesis:
-    shape = ModelShape(RIG.model, LabError())
-    return Hypothesis(shape, np.zeros(shape.size)).with_cause(Cause(physics, values, "", JointAxis(np.ones(1)), MOTION))
-
-
-def _recorded(falls: float) -> list[WindowedSpectrum]:
-    """Three recordings of a rig with friction, 1 % noise."""
-    band, shown, truth = band_of(RIG.model, RIG.rate), [], _slip(falls)
-    for seed, one in enumerate(RIG.recordings(LEVELS)):
-        lines = windowed_spectrum(one, band, 1.0)
-        moved = irfft(predict_lines(truth, lines).spectrum, n=lines.padded, axis=0)[: len(one.force)]
-        moved += 0.01 * moved.std() * np.random.default_rng(seed).normal(size=moved.shape)
-        shown.append(windowed_spectrum(replace(one, response=moved), band, 1.0))
-    return shown
-
-
 def _slip(falls: float) -> Hypothesis:
-    return _with(_Slip(falls), np.zeros(0))
+    return with_law(_Slip(falls), np.zeros(0))
 
 
 def _over_velocity(hypothesis: Hypothesis) -> Real:
@@ -102,16 +78,16 @@ def _over_velocity(hypothesis: Hypothesis) -> Real:
 
 def _freed(falls: float, *, named: bool = True) -> tuple[Fit, FreedLaws | None]:
     """Dry friction fitted to friction that may fall with speed, and its free form; ``named``: as if it was proved."""
-    lines = _recorded(falls)
+    lines = recorded(_Slip(falls), LEVELS)
     shape = ModelShape(RIG.model, LabError())
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=15)
-    dry = fit(lines, _with(_law("coulomb_friction"), np.array([FRICTION, 2e-3])), iterations=15)
+    dry = fit(lines, with_law(law_of("coulomb_friction"), np.array([FRICTION, 2e-3])), iterations=15)
     both, settings = recordings_of(lines, lines, base.hypothesis), Settings()
     if named:
         worth = held_out_improvement(both, dry.hypothesis, dry.noises, (), settings.proof)
-        return dry, freed_from_named(both, dry, worth, (), settings, base=base, places=PLACES)
+        return dry, freed_from_named(both, Beginning(dry, base, worth, PLACES), (), settings)
     worth = held_out_improvement(both, base.hypothesis, base.noises, (), settings.proof)
-    return dry, freed_from_nothing(both, dry, worth, (), settings, base=base, places=PLACES)
+    return dry, freed_from_nothing(both, Beginning(dry, base, worth, PLACES), (), settings)
 
 
 def test_friction_that_falls_with_speed_gets_its_own_form() -> None:
@@ -141,7 +117,7 @@ def test_a_form_is_told_where_no_law_was_proved() -> None:
 
 
 def test_a_free_form_predicts_from_a_file(tmp_path: Path) -> None:
-    free = with_free_forms(_with(_law("coulomb_friction"), np.array([FRICTION, 2e-3])), "xvm")
+    free = with_free_forms(with_law(law_of("coulomb_friction"), np.array([FRICTION, 2e-3])), "xvm")
     cause = free.causes[0]
     values = cause.values + np.append(np.zeros(2), np.random.default_rng(1).normal(size=len(cause.values) - 2))
     free = replace(free, causes=(replace(cause, values=values),))
@@ -165,10 +141,10 @@ def test_a_term_of_free_form_that_is_none_is_refused(location: dict[str, str]) -
     [("stiffness_hardening", "elastic"), ("coulomb_friction", "dissipative"), ("hysteresis", "one with")],
 )
 def test_what_a_force_follows(name: str, kind: str) -> None:
-    law = _law(name)
+    law = law_of(name)
     (start, *_) = law.starts(MOTION)
     size = 2.0 if name == "coulomb_friction" else 0.1 * RIG.stiffness
-    one = _with(law, np.array([size, *start[1:]]))
+    one = with_law(law, np.array([size, *start[1:]]))
     lines = [windowed_spectrum(RIG.recordings((20.0,))[0], band_of(RIG.model, RIG.rate), 1.0)]
     form = form_of_law(one, one, 0, lines)
     assert form.distance < 1e-6
@@ -177,10 +153,10 @@ def test_what_a_force_follows(name: str, kind: str) -> None:
 
 def _answered(falls: float, most: float) -> FreedAnswer:
     """What becomes of an answer that names dry friction, where it may leave ``most`` times what its free form does."""
-    lines = _recorded(falls)
+    lines = recorded(_Slip(falls), LEVELS)
     shape = ModelShape(RIG.model, LabError())
     base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=15)
-    dry = fit(lines, _with(_law("coulomb_friction"), np.array([FRICTION, 2e-3])), iterations=15)
+    dry = fit(lines, with_law(law_of("coulomb_friction"), np.array([FRICTION, 2e-3])), iterations=15)
     both, settings = (
         recordings_of(lines, lines, base.hypothesis),
         Settings(verdict=VerdictSettings(most_over_free=most)),
@@ -205,11 +181,11 @@ def test_an_answer_keeps_its_name_and_predicts_with_the_free_form() -> None:
 def test_a_name_that_leaves_far_more_than_its_free_form_is_not_the_whole() -> None:
     found = _answered(0.6, 1.5)
     assert found.answer.verdict == "partly explained"
-    assert "its name is not all" in found.doubt
+    assert "does not describe all of the force" in found.doubt
 
 
 def test_a_law_that_nobody_listed_has_no_name_and_predicts() -> None:
-    found = diagnose(RIG.model, [one.recording for one in _recorded(0.6)])
+    found = diagnose(RIG.model, [one.recording for one in recorded(_Slip(0.6), LEVELS)])
     assert found.verdict == "unexplained"
     assert not found.physics
     assert found.improvement.after < 0.1 * found.improvement.refitted

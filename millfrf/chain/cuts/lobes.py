@@ -22,7 +22,7 @@ from stability import (
     zero_order,
 )
 
-from ...gate import check_band_of_lobes, check_frf, check_model, check_window_damping
+from ...gate import check_band_of_lobes, check_frf, check_model, check_window_damping, terms_left_out
 from ...progress import Progress, silent
 
 Speeds = NDArray[np.float64]
@@ -90,7 +90,7 @@ def compute_lobes(
         check_window_damping(dynamics, name)
         doubts = check_frf(dynamics, name)
     else:
-        doubts = check_model(dynamics, name)
+        doubts = [*check_model(dynamics, name), *terms_left_out(dynamics, name)]
     with progress(f"lobes, {method}"):
         found = _solved(known, process, spindle_speeds, max_depth, method)
     doubts += check_band_of_lobes(known, found, process)

@@ -11,7 +11,7 @@ from estimation import Frf
 from foundation import writing_whole_file
 from modal_fit import ModalModel, TipCalibration, calibrate_to_tip, write_modal_model
 
-from ...gate import check_model, check_tip_and_sensor, stored_doubts
+from ...gate import check_model, check_tip_and_sensor, stored_doubts, terms_left_out
 from ...progress import Progress, silent
 from ...provenance import add_to_json, read_provenance, sources, versions
 
@@ -31,7 +31,7 @@ def calibrate_model(
         Directions, points or modes that do not match, or inputs that :mod:`millfrf.gate` refuses; ``names`` are those
         of the FRFs in its messages.
     """
-    doubts = [*check_model(model), *check_tip_and_sensor(model, tip, sensor, names)]
+    doubts = [*check_model(model), *terms_left_out(model), *check_tip_and_sensor(model, tip, sensor, names)]
     with progress("calibrating to the tool tip"):
         found = calibrate_to_tip(model, tip, sensor)
     return replace(found, warnings=(*doubts, *found.warnings))

@@ -12,7 +12,7 @@ import pytest
 from estimation import Frf, FrfCovariance, read_frf, to_receptance, write_frf
 from foundation import InputError
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from millfrf.gate import check_frf, check_model
+from millfrf.gate import check_frf, check_model, terms_left_out
 from modal_fit import ModalModel, read_modal_model, write_modal_model
 from replay_data import default_structure, table_one_model, tip_model
 
@@ -213,3 +213,10 @@ def test_files_keep_what_was_judged(tmp_path: Path) -> None:
     assert read_frf(tmp_path / "frf.h5").band == (13.0, 30.0)
     write_modal_model(tmp_path / "m.json", replace(table_one_model(), band=(13.0, 25.0)))
     assert read_modal_model(tmp_path / "m.json").band == (13.0, 25.0)
+
+
+def test_terms_that_lobes_leave_out_are_told(tmp_path: Path) -> None:
+    model = replace(table_one_model(), physics=({"name": "free_form", "location": {}, "parameters": {}},))
+    assert terms_left_out(table_one_model()) == []
+    (said,) = terms_left_out(model, "improved_model.json")
+    assert said.startswith("improved_model.json holds terms of a diagnosis (free_form), which only millfrf predict")

@@ -81,17 +81,16 @@ def form_of_law(free: Hypothesis, named: Hypothesis, place: int, lines: Sequence
         return FormOfLaw(0.0, 0.0, 0.0, 0.0)
     other = _without(law, linear)
     missing = _without(bent, other[:, None]) if float(other @ other) > 0 else bent
-    most = float(np.sqrt(size * (v @ v)))
     return FormOfLaw(
         float(np.sqrt(missing @ missing / size)),
         _followed(x, bent) / size,
         _followed(v, bent) / size,
-        float(force @ v) / max(float(np.sqrt((force @ force) * (v @ v))), most * 1e-9),
+        float(force @ v / np.sqrt((force @ force) * (v @ v))),
     )
 
 
 def _forces(free: Hypothesis, named: Hypothesis, place: int, lines: WindowedSpectrum) -> tuple[Real, Real, Real, Real]:
-    """Deflection, velocity, and the forces of both laws along them, in units of their sizes over the recording."""
+    """Deflection (m), velocity (m/s) and the forces of both laws along them (N), each (n_samples,)."""
     answer = predict_lines(free, lines).joints[place]
     often = len(answer.deflection) // lines.padded
     n = often * len(lines.recording.force)

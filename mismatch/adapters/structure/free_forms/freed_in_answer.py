@@ -13,13 +13,8 @@ from ....remainder import leftover
 from ..acceptance import impossible, possible_gains
 from ..answer import Answer
 from ..comparison import StructureComparison
-from ..form_errors import with_form_spread
 from ..rounds import likeliest_seen
-from ..told_causes import told_causes
-from .freed_laws_proved import FreedLaws, freed_from_named, freed_from_nothing
-
-NEARLY = "the law's textbook form leaves something that moves with the signal, and a form near it does not"
-"""Why an answer is not whole whose law is known by a free form that hardly differs from it."""
+from .freed_laws_proved import Beginning, FreedLaws, freed_from_named, freed_from_nothing
 
 
 @dataclass(frozen=True)
@@ -60,8 +55,7 @@ def freed_answer(
 
     A named law keeps its name. Where a free form of it leaves far less, the name is not the whole: ``explained``
     becomes ``partly explained``. Where no law was proved, the verdict stays ``unexplained`` and no name is told, but
-    the force is, by what it follows, and the improved model predicts with it. Where that force hardly differs from a
-    textbook law, and leaves nothing that moves with the signal, the law's name is told in part.
+    the force is, by what it follows, and the improved model predicts with it.
 
     Parameters
     ----------
@@ -76,51 +70,32 @@ def freed_answer(
     """
     settings, base = comparison.settings, answer.found.base
     if answer.verdict == "unexplained":
-        return _of_unexplained(answer, comparison, recordings, faults)
-    places = [one.location for one in answer.found.accepted if one.fitted.hypothesis.causes[-1].axis is not None]
-    freed = freed_from_named(recordings, answer.final, answer.held_out, faults, settings, base=base, places=places)
+        starts = [
+            Beginning(one.fitted, base, answer.held_out, (one.location,)) for one in _likely_laws(answer, comparison)
+        ]
+        tried = [freed_from_nothing(recordings, one, faults, settings) for one in starts]
+        found = min((one for one in tried if one is not None), key=lambda one: one.fitted.score, default=None)
+        return (
+            FreedAnswer(answer) if found is None else FreedAnswer(_with(answer, found, recordings), found, _new(found))
+        )
+    places = tuple(one.location for one in answer.found.accepted if one.fitted.hypothesis.causes[-1].axis is not None)
+    freed = freed_from_named(recordings, Beginning(answer.final, base, answer.held_out, places), faults, settings)
     if freed is None:
         return FreedAnswer(answer)
     again, doubt = _with(answer, freed, recordings), ""
     if answer.verdict == "explained" and freed.ratio > settings.verdict.most_over_free:
         again = replace(again, verdict="partly explained")
-        doubt = f"a force of free form leaves {1 / freed.ratio:.2g} of what the named law leaves: its name is not all"
-    return FreedAnswer(again, freed, _beside(freed), doubt)
-
-
-def _of_unexplained(
-    answer: Answer, comparison: StructureComparison, recordings: Recordings, faults: Sequence[AcceptedCause]
-) -> FreedAnswer:
-    """A free form where no law was proved, and the law's name after all where the free form hardly differs from it."""
-    settings = comparison.settings
-    pairs = []
-    for one in _likely_laws(answer, comparison):
-        freed = freed_from_nothing(
-            recordings,
-            one.fitted,
-            answer.held_out,
-            faults,
-            settings,
-            base=answer.found.base,
-            places=[one.location],
+        doubt = (
+            f"the named law leaves {freed.ratio:.2g} times as much of what was held out as its free form; "
+            "the law's name does not describe all of the force"
         )
-        pairs += [] if freed is None else [(freed, one)]
-    if not pairs:
-        return FreedAnswer(answer)
-    freed, begun = min(pairs, key=lambda pair: pair[0].fitted.score)
-    again = _with(answer, freed, recordings)
-    whole = again.left.noise_like(settings.verdict.noise_like)
-    if not (whole and freed.of_one_family and freed.forms[0].distance <= settings.verdict.near_form):
-        return FreedAnswer(again, freed, _new(freed))
-    causes = told_causes(with_form_spread(begun.fitted, recordings.mended), [begun])
-    again = replace(again, verdict="partly explained", causes=tuple(causes))
-    return FreedAnswer(again, freed, _beside(freed), NEARLY)
+    return FreedAnswer(again, freed, _beside(freed), doubt)
 
 
 def _likely_laws(answer: Answer, comparison: StructureComparison) -> list[Proposal[Fit]]:
     """Laws at which a free form may begin: the one that gained most alone, and the likeliest on the motion seen.
 
-    What the free simulation makes of a law says little where its form is wrong; the seen motion knows its family.
+    Where the form of a law is wrong, its free simulation says little, and the seen motion still tells its family.
     """
     if not answer.found.rounds:
         return []

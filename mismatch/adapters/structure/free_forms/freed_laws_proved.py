@@ -17,7 +17,7 @@ from ....faults import residual_lines
 from ....inference import AcceptedCause, Improvement, Settings, in_processes
 from ....joints import joint_in_words, tip_axes
 from ....models import Fit, Hypothesis, fit, through_structure, with_free_forms
-from ....physics import FreeForm, answer_name, families
+from ....physics import answer_name, families
 from ....records import Recordings
 from ..held_out import HeldOut, chance_of_no_gain, held_out_improvement
 from .distance_from_law import FormOfLaw, form_of_law
@@ -70,12 +70,6 @@ class FreedLaws:
         """Error held out of what it is compared with over its own."""
         return self.beside.after / max(self.held_out.everywhere.after, 1e-300)
 
-    @property
-    def of_one_family(self) -> bool:
-        """Whether each form has shapes of its law's own family alone."""
-        kinds = [one.physics.kinds for one in self.fitted.hypothesis.laws if isinstance(one.physics, FreeForm)]
-        return ALL_SHAPES not in kinds
-
     def content(self) -> dict[str, Any]:
         """What the file of a diagnosis says of it."""
         rows = [
@@ -94,38 +88,50 @@ class FreedLaws:
         return {"laws": rows, "held_out": errors, "chance_of_no_gain": self.chance, "evidence": self.evidence}
 
 
+@dataclass(frozen=True)
+class Beginning:
+    """Where a free form begins, and what it is compared with.
+
+    Parameters
+    ----------
+    fitted
+        The fit with laws of the library.
+    base
+        The fit of modes alone, without any cause.
+    held_out
+        What is known of the held-out data: of the named laws, or of modes alone where no law was proved.
+    places
+        Location of each law, as a diagnosis states it.
+    """
+
+    fitted: Fit
+    base: Fit
+    held_out: HeldOut
+    places: tuple[Mapping[str, Any], ...]
+
+
 def freed_from_named(
-    recordings: Recordings,
-    named: Fit,
-    held_out: HeldOut,
-    faults: Sequence[AcceptedCause],
-    settings: Settings,
-    *,
-    base: Fit,
-    places: Sequence[Mapping[str, Any]],
+    recordings: Recordings, begun: Beginning, faults: Sequence[AcceptedCause], settings: Settings
 ) -> FreedLaws | None:
-    """Free the form of the laws of an answer; None where the data held out do not ask for it.
+    """Free the form of named laws; None where the data held out do not ask for it.
+
+    The free form must gain a hundredth of the evidence that all causes have together.
 
     Parameters
     ----------
     recordings
         The recordings, mended and as measured.
-    named
-        The fit with the named laws.
-    held_out
-        What that fit is worth on what was held out.
+    begun
+        The named laws, and what they are worth.
     faults
-        Faults of the recordings.
+        Faults of the recordings, which predictions show again.
     settings
         Thresholds of the diagnosis.
-    base
-        The fit without any cause: a hundredth of the evidence of all causes is asked.
-    places
-        Location of each law, as a diagnosis states it.
     """
+    named, held_out = begun.fitted, begun.held_out
     if not named.hypothesis.laws or not recordings.tested:
         return None
-    whole = base.score - named.score
+    whole = begun.base.score - named.score
     needed = max(settings.evidence.least, settings.evidence.small * whole)
     own, everything = _fitted(recordings, named)
     better = everything is not None and everything.score < own.score - MORE * whole
@@ -137,19 +143,12 @@ def freed_from_named(
         )
         chance = _chance(recordings, named, (held_out.improved, there.improved), settings)
         if _less(there, held_out) and chance < settings.proof.significance:
-            return _told(recordings, (named, freed), there, (held_out.everywhere, chance), places)
+            return _told(recordings, begun, freed, there, (held_out.everywhere, chance))
     return None
 
 
 def freed_from_nothing(
-    recordings: Recordings,
-    begun: Fit,
-    held_out: HeldOut,
-    faults: Sequence[AcceptedCause],
-    settings: Settings,
-    *,
-    base: Fit,
-    places: Sequence[Mapping[str, Any]],
+    recordings: Recordings, begun: Beginning, faults: Sequence[AcceptedCause], settings: Settings
 ) -> FreedLaws | None:
     """Free the form of a law that was not proved; None where that leaves more than half of what modes alone leave.
 
@@ -158,38 +157,32 @@ def freed_from_nothing(
     recordings
         The recordings, mended and as measured.
     begun
-        The fit with the law at which the form begins.
-    held_out
-        What modes alone are worth on what was held out.
+        The law at which the form begins, and what modes alone are worth.
     faults
-        Faults of the recordings.
+        Faults of the recordings, which predictions show again.
     settings
         Thresholds of the diagnosis.
-    base
-        The fit of modes alone.
-    places
-        Location of the law, as a diagnosis states it.
     """
     if not recordings.tested:
         return None
     best: FreedLaws | None = None
-    fitted = begun
+    start, fitted = begun.fitted, begun.fitted
     for kinds in ("", ALL_SHAPES):
-        tried = fit(recordings.mended, with_free_forms(begun.hypothesis, kinds), begun.noises, iterations=STEPS)
+        tried = fit(recordings.mended, with_free_forms(start.hypothesis, kinds), start.noises, iterations=STEPS)
         if not np.isfinite(tried.score) or tried.score >= fitted.score - settings.evidence.least:
             continue
         worth = held_out_improvement(
-            recordings, tried.hypothesis, tried.noises, faults, settings.proof, held_out.linear
+            recordings, tried.hypothesis, tried.noises, faults, settings.proof, begun.held_out.linear
         )
         gain, whole = worth.improvement, worth.everywhere
         sure = gain.evidence > settings.proof.gain and gain.p_value < settings.proof.significance
-        least = (1 - settings.verdict.partly) * min(whole.refitted, whole.before) ** 2
-        if not sure or whole.after**2 > least or gain.after > min(gain.refitted, gain.before):
+        modes = min(whole.refitted, whole.before)
+        halved = whole.after**2 <= (1 - settings.verdict.partly) * modes**2
+        if not (sure and halved and gain.after <= min(gain.refitted, gain.before)):
             continue
         if best is None or whole.after < best.held_out.everywhere.after:
-            beside = replace(whole, after=min(whole.refitted, whole.before))
-            told = _told(recordings, (begun, tried), worth, (beside, gain.p_value), places)
-            best = None if told is None else replace(told, evidence=base.score - tried.score)
+            told = _told(recordings, begun, tried, worth, (replace(whole, after=modes), gain.p_value))
+            best = None if told is None else replace(told, evidence=begun.base.score - tried.score)
             fitted = tried
     return best
 
@@ -218,20 +211,15 @@ def _chance(recordings: Recordings, named: Fit, both: tuple[Hypothesis, Hypothes
 
 
 def _told(
-    recordings: Recordings,
-    fits: tuple[Fit, Fit],
-    worth: HeldOut,
-    beside: tuple[Improvement, float],
-    places: Sequence[Mapping[str, Any]],
+    recordings: Recordings, begun: Beginning, freed: Fit, worth: HeldOut, beside: tuple[Improvement, float]
 ) -> FreedLaws | None:
     """A fit of free form with its distance from the laws; None where a joint would feed the motion with power."""
-    named, freed = fits
-    laws = freed.hypothesis.laws
-    forms = tuple(form_of_law(freed.hypothesis, named.hypothesis, k, recordings.mended) for k in range(len(laws)))
+    named, laws = begun.fitted.hypothesis, freed.hypothesis.laws
+    forms = tuple(form_of_law(freed.hypothesis, named, k, recordings.mended) for k in range(len(laws)))
     if any(cause.law().loses_energy and form.lost < 0 for cause, form in zip(laws, forms, strict=True)):
         return None
-    directed = any("direction" in one for one in places)
+    directed = any("direction" in one for one in begun.places)
     axes = tip_axes(freed.hypothesis.model)[2] if directed else ()
-    words = [joint_in_words(one, axes if "direction" in one else ()) for one in places]
+    words = [joint_in_words(one, axes if "direction" in one else ()) for one in begun.places]
     names = tuple((answer_name(one.physics), place) for one, place in zip(laws, words, strict=True))
-    return FreedLaws(freed, named.hypothesis, worth, *beside, named.score - freed.score, names, forms)
+    return FreedLaws(freed, named, worth, *beside, begun.fitted.score - freed.score, names, forms)

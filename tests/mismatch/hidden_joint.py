@@ -1,0 +1,45 @@
+"""One mode with a joint whose law is hidden, simulated by the tool itself: only forms of laws are judged on it."""
+
+from dataclasses import replace
+
+import numpy as np
+from one_mode_rig import Real, Rig
+from scipy.fft import irfft
+
+from estimation import WindowedSpectrum, windowed_spectrum
+from mismatch import Cause, LabError, ModelShape, band_of
+from mismatch.joints import JointAxis, JointMotion
+from mismatch.models import Hypothesis, predict_lines
+from mismatch.physics import JointPhysics, library
+
+RIG = Rig()
+MOTION = JointMotion(1e-3, 0.06, 1e-2, 0.6, RIG.stiffness)
+
+
+def law_of(name: str) -> JointPhysics:
+    """A joint's law of the library."""
+    found = library()[name]
+    assert isinstance(found, JointPhysics)
+    return found
+
+
+def at_the_joint(physics: JointPhysics, values: Real) -> Cause:
+    """A law with its numbers, at the only axis of the rig."""
+    return Cause(physics, values, "", JointAxis(np.ones(1)), MOTION)
+
+
+def with_law(physics: JointPhysics, values: Real) -> Hypothesis:
+    """The rig with a law, its modes as the lab believes them."""
+    shape = ModelShape(RIG.model, LabError())
+    return Hypothesis(shape, np.zeros(shape.size)).with_cause(at_the_joint(physics, values))
+
+
+def recorded(hidden: JointPhysics, levels: tuple[float, ...]) -> list[WindowedSpectrum]:
+    """One recording a level of the rig with a hidden law, 1 % noise."""
+    band, shown, truth = band_of(RIG.model, RIG.rate), [], with_law(hidden, np.zeros(0))
+    for seed, one in enumerate(RIG.recordings(levels)):
+        lines = windowed_spectrum(one, band, 1.0)
+        moved = irfft(predict_lines(truth, lines).spectrum, n=lines.padded, axis=0)[: len(one.force)]
+        moved += 0.01 * moved.std() * np.random.default_rng(seed).normal(size=moved.shape)
+        shown.append(windowed_spectrum(replace(one, response=moved), band, 1.0))
+    return shown
