@@ -1,5 +1,6 @@
 from .common_band import ComparedBand, compared_band
 from .deflection_form import in_deflections, without_delay
+from .excited_lines import compared_lines, excited_band
 from .held_out_parts import Recordings
 from .measured_noise import noise_content, with_measured_noise
 from .reading import (
@@ -17,6 +18,8 @@ __all__ = [
     "Recordings",
     "band_of",
     "compared_band",
+    "compared_lines",
+    "excited_band",
     "in_deflections",
     "measured_part",
     "noise_content",

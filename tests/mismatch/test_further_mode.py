@@ -10,7 +10,7 @@ import pytest
 
 from estimation import BandRecording, windowed_spectrum
 from mismatch import Hypothesis, LabError, ModelShape, Settings, band_of, fit
-from mismatch.adapters.structure.acceptance import impossible
+from mismatch.adapters.structure.acceptance import impossible, modes_not_seen
 from mismatch.adapters.structure.told_causes import told_causes
 from mismatch.inference import Proposal, ScreeningSettings
 from mismatch.models import Fit, modes_are_odd
@@ -64,6 +64,24 @@ def test_a_pole_without_a_peak_cannot_be_a_missing_mode(damping: float, said: st
     hypothesis = SimpleNamespace(causes=(cause,), model=SimpleNamespace(poles=np.array([-1 + 100j, pole])))
     proposal: Any = Proposal("missing_mode", {}, SimpleNamespace(hypothesis=hypothesis), 2691.0)
     assert impossible(proposal, Settings().evidence) == said
+
+
+@pytest.mark.parametrize(
+    ("frequency", "damping", "lost"), [(15.0, 0.02, []), (34.0, 0.02, [1]), (2.0, 0.02, [1]), (15.0, 0.8, [1])]
+)
+def test_a_mode_that_other_causes_have_moved_away_is_seen_no_more(
+    frequency: float, damping: float, lost: list[int]
+) -> None:
+    """Compared from 3.3 to 30 Hz: beyond, and where it is damped like a slope, the mode is no resonance."""
+    physics, rig = library()["missing_mode"], Rig()
+    assert isinstance(physics, ModePhysics)
+    lines = [windowed_spectrum(one, band_of(rig.model, rig.rate), 1.0) for one in rig.recordings((1.0,))]
+    shape = ModelShape(rig.model, LabError())
+    hypothesis = Hypothesis(shape, np.zeros(shape.size))
+    for at, ratio in ((20.0, 0.02), (frequency, damping)):
+        pole = 2 * np.pi * at * complex(-ratio, np.sqrt(1 - ratio**2))
+        hypothesis = hypothesis.with_mode(pole, np.ones(1, complex), np.ones(1, complex), physics)
+    assert modes_not_seen(hypothesis, lines) == lost
 
 
 def test_each_of_several_modes_is_told_with_its_own_numbers() -> None:

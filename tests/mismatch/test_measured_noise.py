@@ -1,17 +1,21 @@
 """Forces that repeat show the noise without a model: what is above it is left over, whatever moves with the signal."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from one_mode_rig import Rig
 
+from benchmarks.blind_trial.case_spec import draw_cases
+from benchmarks.blind_trial.sealed_case import write_case
 from estimation import BandRecording, measured_noise, windowed_spectrum
 from millfrf.structure.diagnosis_words import diagnosis_lines
-from mismatch import Hypothesis, LabError, ModelShape, band_of, diagnose
+from mismatch import Hypothesis, LabError, ModelShape, band_of, diagnose, read_recordings
 from mismatch.models import outdoes_noise
 from mismatch.noise.noise_model import fit_noise
-from mismatch.records import with_measured_noise
+from mismatch.records import compared_band, compared_lines, with_measured_noise
+from modal_fit import read_modal_model
 
 NOISE, PERIOD, PERIODS = 0.01, 1024, 8
 
@@ -105,3 +109,34 @@ def test_noise_of_forces_that_was_measured_is_held() -> None:
     assert np.exp(free.forces)[0] == pytest.approx(1.0, rel=0.2)
     assert np.exp(held.forces)[0] == pytest.approx(1e-4, rel=0.01)
     assert held.response_level()[0] > 10 * free.response_level()[0]
+
+
+def noisy_force(one: BandRecording, share: float) -> BandRecording:
+    """The recording with white noise on the force as it was measured."""
+    noise = np.random.default_rng(7).normal(size=one.force.shape)
+    return replace(one, force=one.force + share * one.force.std() * noise)
+
+
+def test_only_what_forces_excite_is_compared() -> None:
+    """Forces of 2 to 22 Hz; the model states no band, and would be compared from 3.3 to 30 Hz."""
+    rig = Rig()
+    asked = compared_band(rig.model, rig.rate)
+    lines, band = compared_lines(noisy_force(steady(rig, "only", 4.0, 5), 0.03), asked, 1.0)
+    spacing = rig.rate / PERIOD
+    assert asked.high == pytest.approx(30.0)
+    assert band.low == asked.low
+    assert band.high == pytest.approx(22.0, abs=2 * spacing)
+    assert lines.frequencies[-1] <= band.high
+    assert "stand out of their noise" in band.sentence
+    random = rig.recordings((1.0,))[0]
+    assert compared_lines(random, asked, 1.0)[1] is asked
+
+
+def test_noise_of_forces_beyond_their_band_asks_for_no_mode(tmp_path: Path) -> None:
+    """Before: three modes cancelled the response that noise of the forces beyond a multisine would have caused."""
+    control = next(one for one in draw_cases(120, 3502, only="steady") if one.index == 29)
+    folder = write_case(control, tmp_path)
+    model = read_modal_model(folder / "nominal.json")
+    found = diagnose(model, read_recordings([folder / f"{level}.h5" for level in ("low", "mid", "high")], model))
+    assert (found.verdict, found.physics) == ("none", ())
+    assert 105 < found.content["compared_band"]["high"] < 115

@@ -51,6 +51,26 @@ def _far_modes(hypothesis: Hypothesis, farthest: float) -> str:
     return f"the mode at {before:.4g} Hz would have to lie at {after:.4g} Hz"
 
 
+def modes_not_seen(hypothesis: Hypothesis, lines: Sequence[WindowedSpectrum]) -> list[int]:
+    """Places of the causes whose added mode is no resonance in any compared band; other causes may have moved it there.
+
+    Parameters
+    ----------
+    hypothesis
+        A fitted hypothesis with its causes.
+    lines
+        Windowed lines of the recordings.
+    """
+    low, high = min(one.frequencies[0] for one in lines), max(one.frequencies[-1] for one in lines)
+    added = [(k, one.physics) for k, one in enumerate(hypothesis.causes) if isinstance(one.physics, ModePhysics)]
+    poles = hypothesis.model.poles[hypothesis.shape.believed :]
+    return [
+        place
+        for (place, physics), pole in zip(added, poles, strict=True)
+        if physics.overdamped(complex(pole)) or not low <= abs(pole) / (2 * np.pi) <= high
+    ]
+
+
 def possible_gains(proposals: Sequence[Proposal[Fit]], settings: EvidenceSettings) -> list[Proposal[Fit]]:
     """Causes with possible numbers and the least evidence that counts, most evidence first.
 
@@ -171,6 +191,8 @@ def worth_it(
     """
     fitted, needed = proposal.fitted, evidence_needed(current, base, settings, own=own)
     if isinstance(fitted.hypothesis.causes[-1].physics, ModePhysics):
+        if modes_not_seen(fitted.hypothesis, lines):
+            return False
         needed, clear = needed + _places_of_a_mode(fitted, lines), _mode_measured(fitted, settings.clear)
     else:
         clear = _measured(fitted, settings.clear)

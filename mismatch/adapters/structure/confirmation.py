@@ -8,6 +8,7 @@ from ...faults import residual_lines
 from ...inference import AcceptedCause, Improvement, ProofSettings, Search, Settings, in_processes, released
 from ...models import Fit, Hypothesis, fit, least_misfit, through_structure
 from ...records import Recordings
+from .acceptance import modes_not_seen
 from .comparison import StructureComparison
 from .held_out import ITERATIONS, HeldOut, chance_of_no_gain, held_out_improvement
 
@@ -91,6 +92,8 @@ def _idle(
 ) -> tuple[int, Fit] | None:
     """Place of a cause that the held-out recording does not confirm, and the fit on all recordings without it."""
     last, count = found.current, len(found.accepted)
+    if lost := modes_not_seen(last.hypothesis, comparison.lines):
+        return lost[-1], comparison.without(found, lost[-1]) if count > 1 else found.base
     if not helps(held_out.improvement, last, found.base, comparison.settings):
         return count - 1, _before_last(comparison, found)
     if count == 1:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
+from estimation import BandRecording, WindowedSpectrum
 from foundation import Band, InputError
 from modal_fit import ModalModel
 
@@ -20,9 +20,9 @@ from ...physics import is_fault, library, offered
 from ...records import (
     ComparedBand,
     compared_band,
+    compared_lines,
     in_deflections,
     noise_content,
-    with_measured_noise,
     without_delay,
     without_force_noise,
 )
@@ -95,10 +95,8 @@ def _diagnosed(
 ) -> StructureDiagnosis:
     """The diagnosis, one step after the other."""
     decay = float((-model.poles.real).min())
-    lines = [
-        with_measured_noise(windowed_spectrum(one, band.edges, decay))
-        for one, band in zip(recordings, bands, strict=True)
-    ]
+    read = [compared_lines(one, band, decay) for one, band in zip(recordings, bands, strict=True)]
+    lines, bands = [one for one, _ in read], [band for _, band in read]
     for one in lines:
         _refuse_empty(one)
     progress("modal parameters")
