@@ -11,7 +11,7 @@ from .fitting import Fit, fit, modes_are_odd, plain_fit
 from .hypothesis import Cause, Hypothesis
 from .misfit import shares_left
 
-ITERATIONS, FROM_BELIEF, FROM_PLAIN = 60, 20, 20
+ITERATIONS, FROM_BELIEF, FROM_PLAIN = 60, 60, 20
 
 EXACT = 0.03
 """Error, over the response, that a plain fit takes every line to have: where a fit that gave up a recording begins."""

@@ -33,6 +33,7 @@ from .confirmation import confirmed
 from .free_forms import freed_answer
 from .held_out import recordings_of
 from .prediction import OfferedModel, offered_model
+from .structure_verdict import equivalents_of_answer
 
 FIRST_FIT = 30
 """Steps at most of the modal parameters: a nominal model may be far off."""
@@ -135,7 +136,7 @@ def _diagnosed(
         answer.verdict,
         answer.causes,
         tuple(candidates),
-        found.equivalents if answer.causes else (),
+        equivalents_of_answer(found, answer.causes, settings.evidence),
         answer.held_out.improvement,
         before,
         answer.left,

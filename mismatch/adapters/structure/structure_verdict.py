@@ -4,6 +4,7 @@ from collections.abc import Collection, Sequence
 
 from ...inference import (
     AcceptedCause,
+    EvidenceSettings,
     Findings,
     Improvement,
     Remainder,
@@ -13,9 +14,9 @@ from ...inference import (
     leaves_too_much,
     verdict_of,
 )
-from ...models import Fit, Hypothesis
-from ...physics import ModePhysics
-from .acceptance import strained
+from ...models import Fit, Hypothesis, modes_are_odd
+from ...physics import MODAL_PARAMETERS, ChainPhysics, ModePhysics
+from .acceptance import impossible, strained
 from .rounds import likeliest_seen
 
 
@@ -128,3 +129,36 @@ def has_a_sure_name(found: Search[Fit], laws: Collection[str]) -> bool:
         if seen and seen != one.name and seen not in own.equivalents:
             return False
     return True
+
+
+def equivalents_of_answer(
+    found: Search[Fit], causes: Sequence[AcceptedCause], settings: EvidenceSettings
+) -> tuple[str, ...]:
+    """Names that the data cannot tell from a told cause.
+
+    Odd modal parameters that stand alone cannot be told from a linear cause beside which the modes are not odd, and
+    which is as likely: it only lacks the evidence that a cause must have. A rotor's coupling at one speed is such a
+    cause, as modes with unlike left and right vectors imitate it.
+
+    Parameters
+    ----------
+    found
+        Where the search ended.
+    causes
+        Causes that are told.
+    settings
+        Thresholds of the evidence.
+    """
+    if not causes or found.accepted:
+        return found.equivalents if causes else ()
+    if MODAL_PARAMETERS.name not in [one.name for one in causes]:
+        return ()
+    fitted = [one for each in found.rounds for one in each.proposals if one.evidence > 0]
+    names = [
+        one.name
+        for one in fitted
+        if isinstance(one.fitted.hypothesis.causes[-1].physics, ChainPhysics)
+        and not impossible(one, settings)
+        and not modes_are_odd(one.fitted)
+    ]
+    return tuple(dict.fromkeys(names))
