@@ -8,7 +8,7 @@ from ..inference import AcceptedCause, FaultSettings, Settings
 from ..models import Fit, fit
 from ..physics import CLIPPING, UNMEASURED_EXCITATION
 from .clipping import Clipping, find_clipping, mended
-from .tones import Tone, find_tone, stands_out, without_tone
+from .tones import Tone, find_tone, stands_out, tone_beside, without_tone
 from .tones_beyond import tones_beyond
 
 
@@ -51,6 +51,9 @@ def with_tones_settled(
 ) -> list[AcceptedCause]:
     """Accepted causes without tones that stood out only until the others were known, and with those above the band.
 
+    Tones are told as the final fit leaves them. One whose amplitude differs from recording to recording as much as it
+    is large follows the forces, as the harmonic of a joint does, or is chance in a band of noise: it is not told.
+
     Parameters
     ----------
     fitted
@@ -64,12 +67,18 @@ def with_tones_settled(
     settings
         Thresholds of the tests for tones and clipping.
     """
-    tones = [cause for cause in accepted if cause.name == UNMEASURED_EXCITATION.name]
-    gone = [one for one in tones if not stands_out(fitted, lines, one.parameters["frequency_hz"], settings)]
-    most = settings.most_tones - len(tones) + len(gone)
+    told: list[AcceptedCause] = []
+    for cause in accepted:
+        if cause.name != UNMEASURED_EXCITATION.name:
+            told.append(cause)
+            continue
+        tone = tone_beside(fitted, lines, cause.parameters["frequency_hz"], cause.evidence)
+        if stands_out(fitted, lines, tone.frequency, settings) and tone.is_steady(settings.steady):
+            told.append(_tone_cause(tone, lines[0]))
+    most = settings.most_tones - sum(cause.name == UNMEASURED_EXCITATION.name for cause in told)
     clipped = [cause.location["channel"] for cause in accepted if cause.name == CLIPPING.name]
     beyond = tones_beyond(fitted.hypothesis, lines, decay, most, settings, clipped)
-    return [cause for cause in accepted if cause not in gone] + [_tone_cause(tone, lines[0]) for tone in beyond]
+    return told + [_tone_cause(tone, lines[0]) for tone in beyond]
 
 
 def _tone_cause(tone: Tone, lines: WindowedSpectrum) -> AcceptedCause:

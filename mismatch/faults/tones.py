@@ -50,6 +50,17 @@ class Tone:
     gain: float
     spread: Real
 
+    def is_steady(self, least: float) -> bool:
+        """Tell whether the amplitude is ``least`` times its error in any response; True where no error is known.
+
+        Examples
+        --------
+        >>> Tone(39.9, np.array([0.009, 0.021]), 302.0, np.array([0.007, 0.0165])).is_steady(1.5)
+        False
+        """
+        known = np.isfinite(self.spread)
+        return bool((self.amplitudes >= least * self.spread)[known].any() or not known.any())
+
 
 def mean_and_error(sizes: list[Real]) -> tuple[Real, Real]:
     """Mean over recordings of amplitudes (n_responses,) each, and its standard error: 1.96 of it make 95 %.
@@ -100,9 +111,26 @@ def find_tone(fitted: Fit, lines: list[WindowedSpectrum], settings: FaultSetting
         exact = sharp_frequency(_rests(fitted, lines), [one.recording.rate for one in lines], frequency)
         # the lines beside it seemed to stand out as much; how strong it is does not depend on how far it leaks
         shown = [_at(above_neighbours(power, NEAR), one, exact) for one, power in zip(lines, powers, strict=True)]
-        sizes, spread = mean_and_error(_amplitudes(fitted, lines, exact))
-        return Tone(exact, sizes, 2 * float(np.sum(shown)), spread)
+        return tone_beside(fitted, lines, exact, 2 * float(np.sum(shown)))
     return None
+
+
+def tone_beside(fitted: Fit, lines: list[WindowedSpectrum], frequency: float, gain: float) -> Tone:
+    """A tone with the amplitudes that a fit leaves of it.
+
+    Parameters
+    ----------
+    fitted
+        A fit, whose residual holds the tone.
+    lines
+        Recordings from which the tone was not taken out.
+    frequency
+        Frequency of the tone, Hz.
+    gain
+        Twice the logarithm of the likelihood that the tone gains.
+    """
+    sizes, spread = mean_and_error(_amplitudes(fitted, lines, frequency))
+    return Tone(frequency, sizes, gain, spread)
 
 
 def seen_together(

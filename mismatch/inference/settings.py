@@ -19,7 +19,16 @@ Real = NDArray[float64]
 
 @dataclass(frozen=True)
 class EvidenceSettings(
-    Thresholds, shares=("as_good_form", "small", "small_after_law", "own", "small_in_part", "mends_belief")
+    Thresholds,
+    shares=(
+        "as_good_form",
+        "small",
+        "small_after_linear",
+        "small_after_law",
+        "own",
+        "small_in_part",
+        "mends_belief",
+    ),
 ):
     """When a cause gains enough where it is fitted. Gains are in score: twice the logarithm of a Bayes factor.
 
@@ -42,6 +51,9 @@ class EvidenceSettings(
         had named a gain error with an evidence of 26.
     small
         Share of the evidence found so far below which a further cause may only mend the form of the first.
+    small_after_linear
+        The same share while only linear causes are accepted: a mode or a gain has one form, and leaves nothing but
+        what its numbers lack to their best.
     small_after_law
         The same share once a joint's law is accepted, whose form is never quite the true one.
     own
@@ -63,6 +75,7 @@ class EvidenceSettings(
     clear: float = 4.0
     unclear: float = 5.0
     small: float = 0.01
+    small_after_linear: float = 0.002
     small_after_law: float = 0.1
     own: float = 0.33
     small_in_part: float = 0.25
@@ -151,6 +164,9 @@ class FaultSettings(Thresholds):
         Lines that may stand out as tones; more are a comb, as forces that repeat make it.
     most_tones
         Tones taken out at most.
+    steady
+        Mean amplitude of a tone over recordings, over its error, from which it is one: what follows the forces varies
+        as they do.
     limit_gain
         Twice the logarithm of the likelihood that a limit of a channel must gain.
     beyond, least_beyond
@@ -166,6 +182,7 @@ class FaultSettings(Thresholds):
     quiet_force: float = 5.0
     most_lines: int = 8
     most_tones: int = 4
+    steady: float = 1.5
     limit_gain: float = 60.0
     beyond: float = 1.15
     least_beyond: int = 30

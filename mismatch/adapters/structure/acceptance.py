@@ -158,7 +158,10 @@ def evidence_needed(current: Fit, base: Fit, settings: EvidenceSettings, *, own:
     own
         Whether it is known to mend no law's form.
     """
-    share = settings.small_after_law if current.hypothesis.laws and not own else settings.small
+    if current.hypothesis.laws:
+        share = settings.small if own else settings.small_after_law
+    else:
+        share = settings.small_after_linear
     return max(settings.least, share * (base.score - current.score))
 
 
