@@ -106,3 +106,20 @@ def test_noise_alone_leaves_an_error_as_it_is(linear_trials: list[BandRecording]
     found = fit(lines, Hypothesis(shape, np.zeros(shape.size), (cause,)), iterations=20)
     before, after = found.covariance[-1, -1], with_form_spread(found, lines).covariance[-1, -1]
     assert before <= after < 1.3 * before
+
+
+@pytest.mark.parametrize(("rate", "change"), [(1.0, 4e5), (3.0, -2e5), (6.0, 1e5)])
+def test_a_bent_drift_may_be_an_exponential_one(rate: float, change: float) -> None:
+    """The numbers of the best parabola, by least squares on a fine grid, lead back to the exponential course."""
+    drift = library()["pose_drift"]
+    time = np.linspace(0, 1, 20001)
+    course = change * (1 - np.exp(-rate * time)) / (1 - np.exp(-rate))
+    columns = np.column_stack([np.ones_like(time), time, 4 * (time - 0.5) ** 2 - 1])
+    _, parabola, bend = np.linalg.lstsq(columns, course, rcond=None)[0]
+    assert abs(parabola) < 0.99 * abs(change)
+    assert drift.other_course(np.array([parabola, 0.2, bend])) == pytest.approx([change, 0.2, bend], rel=1e-3)  # type: ignore[attr-defined]
+
+
+def test_an_even_drift_owes_nothing_to_another_course() -> None:
+    even = np.array([3e4, 0.5, 10.0])
+    assert library()["pose_drift"].other_course(even) == pytest.approx(even)  # type: ignore[attr-defined]

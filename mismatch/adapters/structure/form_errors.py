@@ -36,12 +36,13 @@ def with_form_spread(fitted: Fit, lines: Sequence[WindowedSpectrum]) -> Fit:
     """A fit whose covariance holds, beside the noise, what its numbers owe to the form of their laws.
 
     A law that has a wider form, with one shape number more, is fitted in that form too: the difference of its numbers
-    and the growth of their errors count. Where the true law has another form, the numbers that match it best differ
-    between small and large motion. Each recording is cut into blocks of time, and these are put into a weak, a
-    middle and a strong part; each part g has its own answer ``theta_g = theta + N_g^-1 J_g^T V^-1 r_g`` for every
-    number, to first order and with the modes held. Where the parts disagree beyond their noise (Cochran's Q), the
-    variance between them (DerSimonian & Laird 1986, Controlled Clinical Trials 7) is added, widened by Student's t for
-    the few parts: it is not divided by their number, as a wrong form does not average out.
+    and the growth of their errors count. A drift that is bent may be an exponential one. Where the true law has
+    another form, the numbers that match it best differ between small and large motion. Each recording is cut into
+    blocks of time, and these are put into a weak, a middle and a strong part; each part g has its own answer
+    ``theta_g = theta + N_g^-1 J_g^T V^-1 r_g`` for every number, to first order and with the modes held. Where the
+    parts disagree beyond their noise (Cochran's Q), the variance between them (DerSimonian & Laird 1986, Controlled
+    Clinical Trials 7) is added, widened by Student's t for the few parts: it is not divided by their number, as a
+    wrong form does not average out.
 
     Parameters
     ----------
@@ -56,7 +57,7 @@ def with_form_spread(fitted: Fit, lines: Sequence[WindowedSpectrum]) -> Fit:
     told = told[(told < shape.modal_size) | (told >= shape.size)]
     modal = np.concatenate([np.arange(first, first + 2) for first in range(0, believed, shape.per_mode)])
     extra = np.zeros(fitted.hypothesis.size)
-    extra += _of_wider_forms(fitted, list(lines)) + _of_other_forms(fitted, list(lines))
+    extra += _of_wider_forms(fitted, list(lines)) + _of_other_forms(fitted, list(lines)) + _of_other_courses(fitted)
     extra[modal] += _between(fitted, lines, modal)
     if len(told):
         extra[told] += _between(fitted, lines, told)
@@ -108,6 +109,23 @@ def _of_other_forms(fitted: Fit, lines: list[WindowedSpectrum]) -> Real:
             again = fit(lines, replace(fitted.hypothesis, causes=tuple(causes)), fitted.noises, iterations=WIDER)
             moved = again.hypothesis.causes[number].coordinates() - cause.coordinates()
             extra[own] += min(1.0, np.exp(-(again.score - fitted.score) / 2)) * moved**2
+    return extra
+
+
+def _of_other_courses(fitted: Fit) -> Real:
+    """Variance that numbers owe to another course in time that looks like the named one, (size,): the whole difference.
+
+    Both predict alike within the noise, and the interval shall hold either.
+    """
+    extra = np.zeros(fitted.hypothesis.size)
+    at = fitted.hypothesis.shape.size
+    for cause in fitted.hypothesis.causes:
+        own, at = slice(at, at + len(cause.values)), at + cause.size
+        other: Callable[[Real], Real] | None = getattr(cause.physics, "other_course", None)
+        if other is not None:
+            count = len(cause.values)
+            moved = replace(cause, values=other(cause.values)).coordinates()[:count] - cause.coordinates()[:count]
+            extra[own] += moved**2
     return extra
 
 
