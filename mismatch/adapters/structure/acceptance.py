@@ -14,6 +14,9 @@ from ...physics import ChainPhysics, LimitedPhysics, ModePhysics, TwinPhysics
 
 Real = NDArray[np.float64]
 
+BESIDE = 1.15
+"""Factor on an end of the compared band within which a mode beyond it still shapes what lies inside."""
+
 TO_REST = 60
 """Steps at most for modes to make up for a cause that is taken away."""
 
@@ -52,7 +55,9 @@ def _far_modes(hypothesis: Hypothesis, farthest: float) -> str:
 
 
 def modes_not_seen(hypothesis: Hypothesis, lines: Sequence[WindowedSpectrum]) -> list[int]:
-    """Places of the causes whose added mode is no resonance in any compared band; other causes may have moved it there.
+    """Places of the causes whose added mode is no resonance in a compared band, or just beside it.
+
+    Other causes may have moved it there.
 
     Parameters
     ----------
@@ -67,7 +72,7 @@ def modes_not_seen(hypothesis: Hypothesis, lines: Sequence[WindowedSpectrum]) ->
     return [
         place
         for (place, physics), pole in zip(added, poles, strict=True)
-        if physics.overdamped(complex(pole)) or not low <= abs(pole) / (2 * np.pi) <= high
+        if physics.overdamped(complex(pole)) or not low / BESIDE <= abs(pole) / (2 * np.pi) <= BESIDE * high
     ]
 
 
