@@ -51,8 +51,8 @@ def with_tones_settled(
 ) -> list[AcceptedCause]:
     """Accepted causes without tones that stood out only until the others were known, and with those above the band.
 
-    Tones are told as the final fit leaves them. One whose amplitude differs from recording to recording as much as it
-    is large follows the forces, as the harmonic of a joint does, or is chance in a band of noise: it is not told.
+    Tones are told as the final fit leaves them. One whose amplitude differs much from recording to recording is not
+    told: it follows the forces, as the harmonic of a joint does, or is chance in a band of noise.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def with_tones_settled(
             told.append(cause)
             continue
         tone = tone_beside(fitted, lines, cause.parameters["frequency_hz"], cause.evidence)
-        if stands_out(fitted, lines, tone.frequency, settings) and tone.is_steady(settings.steady):
+        if stands_out(fitted, lines, tone.frequency, settings) and tone.is_steady(settings.most_varied, len(lines)):
             told.append(_tone_cause(tone, lines[0]))
     most = settings.most_tones - sum(cause.name == UNMEASURED_EXCITATION.name for cause in told)
     clipped = [cause.location["channel"] for cause in accepted if cause.name == CLIPPING.name]

@@ -50,16 +50,24 @@ class Tone:
     gain: float
     spread: Real
 
-    def is_steady(self, least: float) -> bool:
-        """Tell whether the amplitude is ``least`` times its error in any response; True where no error is known.
+    def is_steady(self, most_varied: float, recordings: int) -> bool:
+        """Tell whether the amplitude in any response is much the same in all recordings; True for a single one.
+
+        Parameters
+        ----------
+        most_varied
+            Standard deviation over mean up to which an amplitude is the same.
+        recordings
+            Number of recordings that the amplitudes were taken from.
 
         Examples
         --------
-        >>> Tone(39.9, np.array([0.009, 0.021]), 302.0, np.array([0.007, 0.0165])).is_steady(1.5)
+        >>> Tone(39.9, np.array([0.009, 0.021]), 302.0, np.array([0.007, 0.0165])).is_steady(0.3, 3)
         False
         """
-        known = np.isfinite(self.spread)
-        return bool((self.amplitudes >= least * self.spread)[known].any() or not known.any())
+        if recordings < 2:
+            return True
+        return bool((self.spread <= most_varied * _widened(recordings) * self.amplitudes).any())
 
 
 def mean_and_error(sizes: list[Real]) -> tuple[Real, Real]:
@@ -77,7 +85,12 @@ def mean_and_error(sizes: list[Real]) -> tuple[Real, Real]:
     mean = np.asarray(np.mean(sizes, axis=0))
     if len(sizes) < 2:
         return mean, np.full(len(mean), np.nan)
-    return mean, np.asarray(np.std(sizes, axis=0, ddof=1) * student.ppf(0.975, len(sizes) - 1) / 1.96)
+    return mean, np.asarray(np.std(sizes, axis=0, ddof=1) * _widened(len(sizes)))
+
+
+def _widened(recordings: int) -> float:
+    """Factor on a standard deviation over few recordings, of which 1.96 then make 95 %."""
+    return float(student.ppf(0.975, recordings - 1)) / 1.96
 
 
 def find_tone(fitted: Fit, lines: list[WindowedSpectrum], settings: FaultSettings = FAULTS) -> Tone | None:

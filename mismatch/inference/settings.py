@@ -164,9 +164,9 @@ class FaultSettings(Thresholds):
         Lines that may stand out as tones; more are a comb, as forces that repeat make it.
     most_tones
         Tones taken out at most.
-    steady
-        Mean amplitude of a tone over recordings, over its error, from which it is one: what follows the forces varies
-        as they do.
+    most_varied
+        Standard deviation of an amplitude over recordings, over its mean, above which it is no tone from elsewhere:
+        what follows the forces varies as they do.
     limit_gain
         Twice the logarithm of the likelihood that a limit of a channel must gain.
     beyond, least_beyond
@@ -182,7 +182,7 @@ class FaultSettings(Thresholds):
     quiet_force: float = 5.0
     most_lines: int = 8
     most_tones: int = 4
-    steady: float = 1.5
+    most_varied: float = 0.3
     limit_gain: float = 60.0
     beyond: float = 1.15
     least_beyond: int = 30

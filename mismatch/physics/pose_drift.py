@@ -45,7 +45,7 @@ class PoseDrift:
         )
 
     def other_course(self, values: Real) -> Real:
-        """Return the numbers of an exponential course whose best parabola is this one.
+        """Return the numbers of an exponential course whose best parabola has this bend over its change.
 
         What warms up or settles follows ``(1 - exp(-a t / T)) / (1 - exp(-a))`` or its mirror image. A parabola follows
         its middle, and changes less from beginning to end: by 12 % for a = 3.
@@ -53,7 +53,13 @@ class PoseDrift:
         Parameters
         ----------
         values : (3,)
-            Change, the time at which the nominal model holds, and bend.
+            Change from beginning to end, N/m; time at which the nominal model holds, as a share of the recording; bend,
+            N/m.
+
+        Returns
+        -------
+        (3,)
+            The same numbers with the change of the exponential course, N/m.
 
         Examples
         --------

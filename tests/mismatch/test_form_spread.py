@@ -17,6 +17,7 @@ from mismatch.joints import JointAxis
 from mismatch.models.fitting import Fit, fit
 from mismatch.models.hypothesis import Cause
 from mismatch.physics import library
+from mismatch.physics.pose_drift import PHYSICS
 
 DIRECTION = np.array([0.8, -0.6])
 LEVELS = (20.0, 35.0, 60.0)
@@ -111,15 +112,14 @@ def test_noise_alone_leaves_an_error_as_it_is(linear_trials: list[BandRecording]
 @pytest.mark.parametrize(("rate", "change"), [(1.0, 4e5), (3.0, -2e5), (6.0, 1e5)])
 def test_a_bent_drift_may_be_an_exponential_one(rate: float, change: float) -> None:
     """The numbers of the best parabola, by least squares on a fine grid, lead back to the exponential course."""
-    drift = library()["pose_drift"]
     time = np.linspace(0, 1, 20001)
     course = change * (1 - np.exp(-rate * time)) / (1 - np.exp(-rate))
     columns = np.column_stack([np.ones_like(time), time, 4 * (time - 0.5) ** 2 - 1])
     _, parabola, bend = np.linalg.lstsq(columns, course, rcond=None)[0]
     assert abs(parabola) < 0.99 * abs(change)
-    assert drift.other_course(np.array([parabola, 0.2, bend])) == pytest.approx([change, 0.2, bend], rel=1e-3)  # type: ignore[attr-defined]
+    assert PHYSICS.other_course(np.array([parabola, 0.2, bend])) == pytest.approx([change, 0.2, bend], rel=1e-3)
 
 
 def test_an_even_drift_owes_nothing_to_another_course() -> None:
     even = np.array([3e4, 0.5, 10.0])
-    assert library()["pose_drift"].other_course(even) == pytest.approx(even)  # type: ignore[attr-defined]
+    assert PHYSICS.other_course(even) == pytest.approx(even)
