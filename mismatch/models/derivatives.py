@@ -16,9 +16,6 @@ from .lines import add_outer, line_products, receptance_at
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
-ASIDE = 0.02
-"""Step of a linear cause's coordinates for a difference quotient."""
-
 
 @dataclass(frozen=True)
 class Slopes:
@@ -144,8 +141,9 @@ def _direct(
         return around.shown(displacement * lines.kinematic)
 
     here, plain = hypothesis.coordinates(), response(linear.around)
+    steps = hypothesis.steps_aside()
     for k in columns:
         aside = here.copy()
-        aside[k] += ASIDE
+        aside[k] += steps[k]
         moved = surround(hypothesis.with_causes(aside), lines.frequencies)
-        yield hypothesis.shape.size + int(k), (response(moved) - plain) / ASIDE
+        yield hypothesis.shape.size + int(k), (response(moved) - plain) / steps[k]

@@ -12,11 +12,14 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 
-def driven_signals(shape: ModelShape, model: ModalModel, frequencies: Real, force: Complex, along: Real) -> Complex:
+def driven_signals(
+    shape: ModelShape, model: ModalModel, frequencies: Real, forces: tuple[Complex, Complex], along: Real
+) -> Complex:
     """Spectra (n, n_signals) whose real combinations are all changes of a deflection by u.
 
     A mode of n responses and m excitations has ``2 + 2 n + 2 m`` numbers, and ``2 + 2 m`` signals; the terms that
-    stand for modes outside the band have m signals each.
+    stand for modes outside the band have m signals each. The joint's own force moves it through the modes alone, as in
+    the free simulation, and so these terms see the outer force alone.
 
     Parameters
     ----------
@@ -26,11 +29,12 @@ def driven_signals(shape: ModelShape, model: ModalModel, frequencies: Real, forc
         The modal model at which the derivative is taken, or one widened by joints.
     frequencies : (n,), Hz
         Frequencies of the lines.
-    force : (n, n_excitations), N
-        Force spectrum at the lines.
+    forces
+        Force spectra at the lines, each (n, n_excitations), N: all that the modes feel, and that without the joint's own.
     along : (n_responses,)
         The combination of responses that is the deflection.
     """
+    force, outer = forces
     s = np.asarray(2j * np.pi * frequencies, dtype=complex)
     m = shape.nominal.left.shape[1]
     signals = np.empty((len(s), len(model.poles) * (2 + 2 * m)), dtype=complex)
@@ -38,7 +42,7 @@ def driven_signals(shape: ModelShape, model: ModalModel, frequencies: Real, forc
     if shape.outside is None:
         return signals
     basis = shape.outside.basis(s)
-    return np.concatenate([signals, *(one[:, None] * force[:, :m] for one in basis)], axis=1)
+    return np.concatenate([signals, *(one[:, None] * outer[:, :m] for one in basis)], axis=1)
 
 
 def driven_mix(shape: ModelShape, model: ModalModel, along: Real) -> Real:

@@ -170,8 +170,8 @@ class _Problem:
         return matrix, gradient
 
     def step(self, state: _State, matrix: Real, gradient: Real) -> Real:
-        """The plain solution of the normal equations."""
-        return plain_step(matrix, gradient)
+        """The solution of the normal equations that passes no limit of a cause's numbers."""
+        return _within_limits(state.hypothesis, matrix, gradient)
 
     def moved(self, state: _State, step: Real) -> _State:
         """The hypothesis a step away, under the noise so far."""
@@ -244,13 +244,25 @@ def _normal_of(lines: WindowedSpectrum, hypothesis: Hypothesis, seen: Misfit) ->
     return 2 * matrix, 2 * gradient
 
 
+def _within_limits(hypothesis: Hypothesis, matrix: Real, gradient: Real) -> Real:
+    """The plain solution; numbers at a limit that it pushes outwards stay there, and the others are solved again."""
+    step = plain_step(matrix, gradient)
+    blocked = np.concatenate([np.zeros(hypothesis.shape.size), hypothesis.blocked()])
+    held = np.zeros(len(step), dtype=bool)
+    while (blocked * step > 0).any():
+        held |= blocked * step > 0
+        step = np.zeros(len(step))
+        step[~held] = plain_step(matrix[np.ix_(~held, ~held)], gradient[~held])
+    return step
+
+
 def _moved(hypothesis: Hypothesis, step: Real) -> Hypothesis:
     size = hypothesis.shape.size
     moved = replace(hypothesis, u=hypothesis.u + step[:size])
     if not hypothesis.causes:
         return moved
     longest = np.concatenate([cause.longest_steps() for cause in hypothesis.causes])
-    return moved.with_causes(hypothesis.coordinates() + np.clip(step[size:], -longest, longest))
+    return moved.stepped(hypothesis.coordinates() + np.clip(step[size:], -longest, longest))
 
 
 def _deviation(hypothesis: Hypothesis) -> float:

@@ -30,6 +30,12 @@ from .model_shape import ModelShape
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
+ASIDE = 0.02
+"""Step of a cause's coordinate for a difference quotient."""
+
+BEYOND_LIMIT = 1e-4
+"""Share by which a number may lie beyond its limit: enough to tell that it asks for more, and near the way back."""
+
 LONGEST_STEP = 15.0
 """Largest change of a cause's coordinate in one step of a fit; one on a linear scale may also change by its half."""
 
@@ -86,6 +92,29 @@ class Cause:
         )
         axis = None if self.axis is None else self.axis.turned(coordinates[count:])
         return replace(self, values=values, axis=axis)
+
+    def stepped(self, coordinates: Real) -> "Cause":
+        """The cause at other coordinates, where a step leads: hardly beyond the limits within which numbers count."""
+        there = self.moved(coordinates)
+        held = held_values(there)
+        margin = BEYOND_LIMIT * np.abs(held)
+        return replace(there, values=np.clip(there.values, held - margin, held + margin))
+
+    def blocked(self) -> Real:
+        """Direction of each coordinate, (size,), in which a limit lies: 1 upwards, -1 downwards, 0 where none does."""
+        result, here = np.zeros(self.size), self.coordinates()
+        for k, parameter in enumerate(self.physics.parameters):
+            for side in (-1.0, 1.0):
+                aside = here.copy()
+                aside[k] += side * ASIDE
+                reached = parameter.to_fit(float(held_values(self.moved(aside))[k]))
+                if abs(reached - aside[k]) > 0.1 * ASIDE:
+                    result[k] = side
+        return result
+
+    def steps_aside(self) -> Real:
+        """Steps of the coordinates, (size,), for difference quotients: away from a limit that is near."""
+        return np.where(self.blocked() > 0, -ASIDE, ASIDE)
 
     def law(self) -> JointLaw:
         """Force law of a joint."""
@@ -205,6 +234,19 @@ class Hypothesis:
             moved.append(cause.moved(coordinates[at : at + cause.size]))
             at += cause.size
         return replace(self, causes=tuple(moved))
+
+    def stepped(self, coordinates: Real) -> "Hypothesis":
+        """The hypothesis with all causes where a step leads, hardly beyond their limits."""
+        there = self.with_causes(coordinates)
+        return replace(self, causes=tuple(one.stepped(one.coordinates()) for one in there.causes))
+
+    def blocked(self) -> Real:
+        """Direction of each coordinate of the causes in which a limit lies: 1 upwards, -1 downwards, else 0."""
+        return np.concatenate([np.zeros(0), *(cause.blocked() for cause in self.causes)])
+
+    def steps_aside(self) -> Real:
+        """Steps of the causes' coordinates for difference quotients: away from a limit that is near."""
+        return np.concatenate([np.zeros(0), *(cause.steps_aside() for cause in self.causes)])
 
     def coordinates(self) -> Real:
         """Coordinates of all causes."""

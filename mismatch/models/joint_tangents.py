@@ -1,6 +1,6 @@
 """Derivative of the joints' forces by everything that is fitted, the structure's motion answering."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,6 @@ from .lines import displacement_at, receptance_at
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Signals = NDArray[np.float32]
-
-BEYOND = 1.3
-"""Changes of motion are followed up to this multiple of the band's end."""
-
-ASIDE = 0.02
-"""Step of a cause's coordinates for a difference quotient at given motion."""
-
 
 LARGEST = 1e30
 """Change of a motion beyond which it has run away: single precision holds no more."""
@@ -89,9 +82,7 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
     predicted
         What the hypothesis predicts for the recording.
     """
-    frequencies = lines.padded_frequencies
-    count = int(np.sum(frequencies <= BEYOND * lines.frequencies[-1]))
-    driving = _outer_change(hypothesis, lines, count)
+    driving = _outer_change(hypothesis, lines)
     paths = hypothesis.reach.paths
     forces = lines.cut(lines.signal(np.stack([answer.force for answer in predicted.joints], axis=1))).T
     found: list[JointChange] = []
@@ -102,13 +93,13 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
         if cause.axis is None:
             continue
         answer, path = predicted.joints[len(found)], paths[len(found)]
-        driving = _Driving(driving.force - answer.force[:count, None] * path.push, driving.change)
         signals, mix, first = _force_change(hypothesis, lines, _Joint(cause, path, own, answer), driving)
         angles, turns = own.start + len(cause.values), path.columns @ path.axis.turns
         change = _mixed(lines.cut(signals), mix)
         found.append(JointChange(path.push, turns, angles, np.ascontiguousarray(forces[len(found)]), change, first))
         if len(found) < len(predicted.joints):
-            driving = _driven_on(hypothesis, lines, driving, found[-1], (signals, mix, answer))
+            felt = _Driving(driving.force - answer.force[:, None] * path.push, driving.change)
+            driving = _driven_on(hypothesis, lines, felt, found[-1], (signals, mix, answer))
     return tuple(found)
 
 
@@ -130,33 +121,31 @@ def _driven_on(
 ) -> _Driving:
     """What drives the joints after one, whose own force changes too."""
     signals, mix, answer = written
-    count = len(driving.force)
     change = driving.change
     if change is None:
         change = np.zeros((*driving.force.shape, hypothesis.size), dtype=complex)
-    moved = _mixed(rfft(signals, n=lines.padded, axis=0)[:count], mix)
+    moved = _mixed(rfft(signals, n=lines.padded, axis=0), mix)
     change[:, :, joint.first : joint.first + moved.shape[1]] -= moved[:, None] * joint.push[:, None]
     angles = slice(joint.angles, joint.angles + joint.turns.shape[1])
-    change[:, :, angles] -= answer.force[:count, None, None] * joint.turns
+    change[:, :, angles] -= answer.force[:, None, None] * joint.turns
     return _Driving(driving.force, change)
 
 
-def _outer_change(hypothesis: Hypothesis, lines: WindowedSpectrum, count: int) -> _Driving:
+def _outer_change(hypothesis: Hypothesis, lines: WindowedSpectrum) -> _Driving:
     """Outer force at padded lines, and its derivative by the numbers of linear causes."""
-    frequencies = lines.padded_frequencies[:count]
-    force, forces = lines.force_lines[:count], hypothesis.reach.forces
+    frequencies, force, forces = lines.padded_frequencies, lines.force_lines, hypothesis.reach.forces
     outer = np.array(forces(surround(hypothesis, frequencies).pushed(force)))
     if all(cause.axis is not None for cause in hypothesis.causes):
         return _Driving(outer, None)
     change = np.zeros((*outer.shape, hypothesis.size), dtype=complex)
-    here, first = hypothesis.coordinates(), hypothesis.shape.size
+    here, first, steps = hypothesis.coordinates(), hypothesis.shape.size, hypothesis.steps_aside()
     at = 0
     for cause in hypothesis.causes:
         for k in range(at, at + cause.size if cause.axis is None else at):
             aside = here.copy()
-            aside[k] += ASIDE
+            aside[k] += steps[k]
             moved = surround(hypothesis.with_causes(aside), frequencies).pushed(force)
-            change[:, :, first + k] = (forces(moved) - outer) / ASIDE
+            change[:, :, first + k] = (forces(moved) - outer) / steps[k]
         at += cause.size
     return _Driving(outer, change if change.any() else None)
 
@@ -221,12 +210,12 @@ def _law_change(cause: Cause, lines: WindowedSpectrum, answer: JointResponse, of
     x, v = answer.deflection[:n], answer.velocity[:n]
     # a derivative need not be known to more than six digits
     result = np.zeros((n, len(cause.values)), dtype=np.float32)
-    here = cause.coordinates()
+    here, steps = cause.coordinates(), cause.steps_aside()
     plain = driven_force(lines, x, v, cause.law(), often=often)
     for k in range(len(cause.values)):
         aside = here.copy()
-        aside[k] += ASIDE
-        change = (driven_force(lines, x, v, cause.moved(aside).law(), often=often) - plain) / ASIDE
+        aside[k] += steps[k]
+        change = (driven_force(lines, x, v, cause.moved(aside).law(), often=often) - plain) / steps[k]
         if not np.abs(change).max() < LARGEST:
             raise np.linalg.LinAlgError(f"the force of {cause.physics.name} runs away when it is simulated")
         result[:, k] = change
@@ -238,19 +227,21 @@ def _driven_change(
 ) -> tuple[Complex, Real]:
     """Derivative of the driven deflection at padded lines: signals (n, n_signals) and their mix (n_signals, size)."""
     path, own, turns = joint.path, joint.own, joint.path.axis.turns
-    force, model = driving.force, hypothesis.reach.model
-    frequencies, along = lines.padded_frequencies[: len(force)], path.along
-    receptance = receptance_at(model, frequencies)
-    driven = driven_signals(hypothesis.shape, model, frequencies, force, along)
+    outer, model = driving.force, hypothesis.reach.model
+    pushed = joint.answer.force[:, None] * path.push
+    frequencies, along = lines.padded_frequencies, path.along
+    driven = driven_signals(hypothesis.shape, model, frequencies, (outer - pushed, outer), along)
     mix = np.zeros((driven.shape[1], hypothesis.size))
     mix[:, : hypothesis.shape.size] = driven_mix(hypothesis.shape, model, along)
-    compliance = along @ receptance
-    displacement = displacement_at(model, frequencies, force) @ (path.rows @ turns)
-    angles = displacement - (compliance @ (path.columns @ turns)) * joint.answer.force[: len(force), None]
-    extra = np.zeros((len(force), hypothesis.size), dtype=complex)
-    extra[:, own.start + len(joint.cause.values) : own.stop] = angles
+    # its own force moves a joint through the modes alone, as in the free simulation
+    modes = replace(model, residuals=None)
+    displacement = displacement_at(model, frequencies, outer) - displacement_at(modes, frequencies, pushed)
+    compliance = along @ receptance_at(modes, frequencies)
+    turned = (compliance @ (path.columns @ turns)) * joint.answer.force[:, None]
+    extra = np.zeros((len(outer), hypothesis.size), dtype=complex)
+    extra[:, own.start + len(joint.cause.values) : own.stop] = displacement @ (path.rows @ turns) - turned
     if driving.change is not None:
-        extra += np.einsum("kq,kqc->kc", compliance, driving.change)
+        extra += np.einsum("kq,kqc->kc", along @ receptance_at(model, frequencies), driving.change)
     used = np.flatnonzero(extra.any(axis=0))
     if len(used) > hypothesis.size // 2:
         return _mixed(driven, mix) + extra, np.eye(hypothesis.size)
