@@ -1,13 +1,14 @@
-from .derivatives import jacobian
+from .cause import Cause, held_values, location_of
 from .fitting import ENOUGH, Fit, fit, modes_are_odd, plain_fit, residual
 from .freed_laws import EVERYTHING, with_free_forms, with_linear_part
-from .hypothesis import Cause, Hypothesis, held_values, line_response, location_of, predict_lines, surround
+from .hypothesis import Hypothesis, line_response, predict_lines, surround
 from .linear_lines import response_to_joint
 from .lines import receptance_at
 from .misfit import known_noise, least_misfit, levels, outdoes_noise, shares_left, through_structure, whitened
 from .model_shape import ModelShape
 from .model_terms import hypothesis_of, improved_model
 from .refinement import believed, following_all, gives_one_up, settled, with_chain
+from .slopes import jacobian
 
 __all__ = [
     "ENOUGH",

@@ -11,9 +11,9 @@ from estimation import WindowedSpectrum
 from ..inference import Descended, Limits, descend, plain_step
 from ..noise import NoiseModel, flat_noise
 from ..physics import MODAL_PARAMETERS
-from .derivatives import slopes
 from .hypothesis import Hypothesis, predict_lines
 from .misfit import Misfit, misfit_under, whitened, with_noise
+from .slopes import slopes
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

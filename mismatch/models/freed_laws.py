@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from ..physics import FreeForm, JointPhysics, WithLinearPart, families
-from .hypothesis import Cause, Hypothesis, held_values
+from .cause import Cause, held_values
+from .hypothesis import Hypothesis
 
 EVERYTHING = "xvmt"
 """All families: deflection (x), velocity (v), memory (m), time (t)."""

@@ -1,9 +1,7 @@
 """A `Hypothesis`: a modal model off its nominal one, with the causes that were added to it."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +12,6 @@ from modal_fit import ModalModel
 
 from ..joints import (
     JointAxis,
-    JointLaw,
-    JointMotion,
     JointReach,
     JointResponse,
     driven_force,
@@ -23,129 +19,13 @@ from ..joints import (
     joint_response,
     modal_scales,
 )
-from ..physics import Chain, ChainPhysics, JointPhysics, LimitedPhysics, ModePhysics, Physics
+from ..physics import Chain, ChainPhysics, ModePhysics
+from .cause import Cause
 from .lines import closed_loop, displacement_at, line_products, receptance_at
 from .model_shape import ModelShape
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
-
-ASIDE = 0.02
-"""Step of a cause's coordinate for a difference quotient."""
-
-BEYOND_LIMIT = 1e-4
-"""Share by which a number may lie beyond its limit: enough to tell that it asks for more, and near the way back."""
-
-LONGEST_STEP = 15.0
-"""Largest change of a cause's coordinate in one step of a fit; one on a linear scale may also change by its half."""
-
-
-@dataclass(frozen=True)
-class Cause:
-    """One cause at a place with its numbers.
-
-    Parameters
-    ----------
-    physics
-        The kind of cause, from the library.
-    values : (n_parameters,)
-        Numbers of the cause in SI units, in the order of ``physics.parameters``.
-    place
-        Place at which a linear cause sits; empty for a joint.
-    axis
-        Where a joint gives way; None for a linear cause.
-    motion
-        Sizes of the joint's motion in the trials; None for a linear cause.
-    seen
-        Deflection and velocity at each sample by recording's name: the law is then driven by them instead of being
-        simulated freely. For approaching a solution only; what was measured leaks into the prediction.
-    """
-
-    physics: Physics
-    values: Real
-    place: str = ""
-    axis: JointAxis | None = None
-    motion: JointMotion | None = None
-    seen: Mapping[str, tuple[Real, Real]] | None = None
-
-    @property
-    def size(self) -> int:
-        """Numbers that are fitted: parameters, and angles of the axis."""
-        return len(self.values) + (len(self.axis.entries) - 1 if self.axis is not None else 0)
-
-    def coordinates(self) -> Real:
-        """Coordinates that the fit starts from, (size,); angles are zero."""
-        values = [p.to_fit(float(v)) for p, v in zip(self.physics.parameters, self.values, strict=True)]
-        return np.array(values + [0.0] * (self.size - len(values)))
-
-    def longest_steps(self) -> Real:
-        """How far each coordinate may move in one step of a fit, (size,)."""
-        numbers = zip(self.coordinates(), self.physics.parameters, strict=False)
-        own = [max(LONGEST_STEP, 0.0 if p.logarithmic else 0.5 * abs(float(c))) for c, p in numbers]
-        return np.array(own + [LONGEST_STEP] * (self.size - len(own)))
-
-    def moved(self, coordinates: Real) -> "Cause":
-        """The cause at other coordinates; angles turn the axis from where it was."""
-        count = len(self.values)
-        values = np.array(
-            [p.from_fit(float(c)) for p, c in zip(self.physics.parameters, coordinates[:count], strict=True)]
-        )
-        axis = None if self.axis is None else self.axis.turned(coordinates[count:])
-        return replace(self, values=values, axis=axis)
-
-    def stepped(self, coordinates: Real) -> "Cause":
-        """The cause at other coordinates, where a step leads: hardly beyond the limits within which numbers count."""
-        there = self.moved(coordinates)
-        held = held_values(there)
-        margin = BEYOND_LIMIT * np.abs(held)
-        return replace(there, values=np.clip(there.values, held - margin, held + margin))
-
-    def blocked(self) -> Real:
-        """Direction of each coordinate, (size,), in which a limit lies: 1 upwards, -1 downwards, 0 where none does."""
-        result, here = np.zeros(self.size), self.coordinates()
-        for k, parameter in enumerate(self.physics.parameters):
-            for side in (-1.0, 1.0):
-                aside = here.copy()
-                aside[k] += side * ASIDE
-                reached = parameter.to_fit(float(held_values(self.moved(aside))[k]))
-                if abs(reached - aside[k]) > 0.1 * ASIDE:
-                    result[k] = side
-        return result
-
-    def steps_aside(self) -> Real:
-        """Steps of the coordinates, (size,), for difference quotients: away from a limit that is near."""
-        return np.where(self.blocked() > 0, -ASIDE, ASIDE)
-
-    def law(self) -> JointLaw:
-        """Force law of a joint."""
-        assert isinstance(self.physics, JointPhysics)
-        assert self.motion is not None
-        return self.physics.law(self.values, self.motion)
-
-
-def location_of(axis: JointAxis, model: ModalModel) -> dict[str, Any]:
-    """Location of a joint, as a diagnosis states it; the largest entry is positive.
-
-    Parameters
-    ----------
-    axis
-        Where the joint gives way.
-    model
-        Model in which it does, whose modes name what takes part.
-    """
-    entries = axis.entries * np.sign(axis.entries[np.argmax(np.abs(axis.entries))])
-    parts = [round(float(x), 6) for x in entries]
-    if axis.scales is None:
-        return {"direction": parts}
-    frequencies = (round(float(frequency), 4) for frequency in model.natural_frequencies)
-    return {"participation": [{"mode_hz": f, "part": part} for f, part in zip(frequencies, parts, strict=True)]}
-
-
-def held_values(cause: Cause) -> Real:
-    """The numbers that a law goes by, brought within what its name means."""
-    if isinstance(cause.physics, LimitedPhysics) and cause.motion is not None:
-        return cause.physics.held(cause.values, cause.motion)
-    return cause.values
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,9 @@ from ..physics import (
     library,
     rig_of,
 )
+from .cause import Cause
 from .freed_laws import EVERYTHING
-from .hypothesis import Cause, Hypothesis
+from .hypothesis import Hypothesis
 from .model_shape import ModelShape
 
 

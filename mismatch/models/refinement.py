@@ -7,8 +7,9 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..physics import ChainPhysics
+from .cause import Cause
 from .fitting import Fit, fit, modes_are_odd, plain_fit
-from .hypothesis import Cause, Hypothesis
+from .hypothesis import Hypothesis
 from .misfit import shares_left
 
 ITERATIONS, FROM_BELIEF, FROM_PLAIN = 60, 60, 20

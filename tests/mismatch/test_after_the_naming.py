@@ -15,7 +15,7 @@ from mismatch.adapters.structure.receptance_at_level import equivalent_receptanc
 from mismatch.joints import JointAxis
 from mismatch.joints.joint_law import JointLaw, JointMotion
 from mismatch.models import with_linear_part
-from mismatch.models.hypothesis import Cause
+from mismatch.models.cause import Cause
 from mismatch.physics import JointPhysics, Parameter, library
 from mismatch.records.reading import measured_part
 from modal_fit import ModalModel

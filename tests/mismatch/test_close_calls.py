@@ -12,8 +12,8 @@ from mismatch import LabError, ModelShape, StructureDiagnosis, diagnose
 from mismatch.adapters.structure.acceptance import worth_it
 from mismatch.faults.tones import find_tone
 from mismatch.inference import EvidenceSettings, Proposal, ScreeningSettings
+from mismatch.models.cause import Cause
 from mismatch.models.fitting import Fit, fit
-from mismatch.models.hypothesis import Cause
 from mismatch.physics.channel_delay import PHYSICS as DELAY
 from mismatch.physics.missing_mode import PHYSICS as MISSING_MODE
 from mismatch.screening import SightedMode, linear_candidates

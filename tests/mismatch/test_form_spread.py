@@ -14,8 +14,8 @@ from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from mismatch import Hypothesis, JointMotion, LabError, ModelShape, band_of
 from mismatch.adapters.structure.form_errors import with_form_spread
 from mismatch.joints import JointAxis
+from mismatch.models.cause import Cause
 from mismatch.models.fitting import Fit, fit
-from mismatch.models.hypothesis import Cause
 from mismatch.physics import library
 from mismatch.physics.pose_drift import PHYSICS
 

@@ -6,8 +6,9 @@ import pytest
 from mismatch.adapters.structure.acceptance import plainest, twins_of
 from mismatch.inference import EvidenceSettings, Proposal
 from mismatch.joints.joint_law import JointMotion
+from mismatch.models.cause import Cause
 from mismatch.models.fitting import Fit
-from mismatch.models.hypothesis import Cause, Hypothesis
+from mismatch.models.hypothesis import Hypothesis
 from mismatch.models.model_shape import LabError, ModelShape
 from mismatch.physics import JointPhysics, answer_name, library
 from modal_fit import ModalModel

@@ -1,8 +1,15 @@
 """Numbers that a law holds within limits of the motion are reported as the law goes by them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from hidden_joint import MOTION as RIG_MOTION
+from hidden_joint import RIG, at_the_joint, law_of, with_law
+from scipy.fft import irfft
 
+from estimation import windowed_spectrum
+from mismatch import band_of, fit, predict_lines
 from mismatch.joints.joint_law import JointMotion
 from mismatch.physics import JointPhysics, LimitedPhysics, library
 from mismatch.physics.protocol import DRY
@@ -33,3 +40,42 @@ def test_beyond_its_limit_a_number_changes_nothing(name: str, values: list[float
         np.testing.assert_allclose(law.damping, laws[0].damping)
         np.testing.assert_allclose(law.springs, laws[0].springs)
         np.testing.assert_allclose(law.yields, laws[0].yields)
+
+
+@pytest.mark.parametrize(
+    ("name", "truth", "start"),
+    [
+        ("coulomb_friction", [6.0, 2e-3], [6.0, 0.05]),
+        ("presliding_friction", [6.0, 3e-5], [6.0, 5e-4]),
+        ("hysteresis", [6e4, 2e-4, 0.8], [6e4, 2e-5, 0.8]),
+    ],
+)
+def test_a_fit_that_begins_beyond_a_limit_finds_back(name: str, truth: list[float], start: list[float]) -> None:
+    """Nothing changes beyond a limit, and a difference quotient there is zero: the step aside goes inwards."""
+    law, band = law_of(name), band_of(RIG.model, RIG.rate)
+    hidden = with_law(law, np.array(truth))
+    assert isinstance(law, LimitedPhysics)
+    assert law.strained(np.array(start), RIG_MOTION)
+    lines = []
+    for seed, one in enumerate(RIG.recordings((20.0, 60.0))):
+        plain = windowed_spectrum(one, band, 1.0)
+        moved = irfft(predict_lines(hidden, plain).spectrum, n=plain.padded, axis=0)[: len(one.force)]
+        moved += 0.01 * moved.std() * np.random.default_rng(seed).normal(size=moved.shape)
+        lines.append(windowed_spectrum(replace(one, response=moved), band, 1.0))
+    found = fit(lines, with_law(law, np.array(start)), iterations=20).hypothesis.causes[-1]
+    assert not law.strained(found.values, RIG_MOTION)
+    np.testing.assert_allclose(found.values[:2], truth[:2], rtol=0.1)
+
+
+def test_numbers_stop_at_their_limits() -> None:
+    """A fit's step leads hardly beyond a limit: far enough to tell that more is asked for."""
+    law = law_of("coulomb_friction")
+    limit = DRY * RIG_MOTION.velocity
+    inside = at_the_joint(law, np.array([6.0, 0.5 * limit]))
+    assert not inside.blocked().any()
+    stepped = inside.stepped(inside.coordinates() + np.array([0.0, 9.0]))
+    assert stepped.values[1] == pytest.approx(limit, rel=1e-3)
+    assert isinstance(law, LimitedPhysics)
+    assert law.strained(stepped.values, RIG_MOTION)
+    assert stepped.blocked().tolist() == [0.0, 1.0]
+    assert (stepped.steps_aside() < 0).tolist() == [False, True]

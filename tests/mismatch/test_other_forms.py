@@ -7,8 +7,8 @@ from concealed_recordings import RATE, forces, linear_acceleration, structure, t
 from estimation import WindowedSpectrum, windowed_spectrum
 from mismatch import Hypothesis, LabError, ModelShape, band_of
 from mismatch.adapters.structure.form_errors import with_form_spread
+from mismatch.models.cause import Cause
 from mismatch.models.fitting import Fit, fit
-from mismatch.models.hypothesis import Cause
 from mismatch.physics import library
 from mismatch.physics.ac_coupling import TWO_STAGES
 

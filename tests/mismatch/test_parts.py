@@ -12,8 +12,8 @@ from mismatch import physics as physics_folder
 from mismatch.adapters.structure.told_causes import accepted_cause
 from mismatch.joints.joint_law import POINTS
 from mismatch.joints.joint_simulation import driven_force, joint_response
+from mismatch.models.cause import Cause
 from mismatch.models.fitting import Fit
-from mismatch.models.hypothesis import Cause
 from mismatch.models.lines.modal_lines import receptance_at
 from mismatch.noise.noise_model import fit_noise, whitening
 from modal_fit import ModalModel, Residuals

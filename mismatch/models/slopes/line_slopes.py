@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
 
-from .hypothesis import Hypothesis, Predicted, Surround, surround
+from ..hypothesis import Hypothesis, Predicted, Surround, surround
+from ..linear_lines import LinearLines, linear_lines
+from ..lines import add_outer, line_products, receptance_at
 from .joint_tangents import JointChange, joint_changes
-from .linear_lines import LinearLines, linear_lines
-from .lines import add_outer, line_products, receptance_at
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

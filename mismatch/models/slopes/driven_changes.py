@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
-from .lines import driven_basis
-from .model_shape import ModelShape
+from ..lines import driven_basis
+from ..model_shape import ModelShape
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -30,7 +30,7 @@ def driven_signals(
     frequencies : (n,), Hz
         Frequencies of the lines.
     forces
-        Force spectra at the lines, each (n, n_excitations), N: all that the modes feel, and that without the joint's own.
+        Force spectra at the lines, each (n, n_excitations), N: what the modes feel, and that without the joint's own.
     along : (n_responses,)
         The combination of responses that is the deflection.
     """

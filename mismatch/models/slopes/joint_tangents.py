@@ -8,10 +8,11 @@ from scipy.fft import irfft, rfft
 
 from estimation import WindowedSpectrum
 
-from ..joints import JointPath, JointResponse, driven_force, joint_dynamics, stiffness_ramp, tangent_run
+from ...joints import JointPath, JointResponse, driven_force, joint_dynamics, stiffness_ramp, tangent_run
+from ..cause import Cause
+from ..hypothesis import Hypothesis, Predicted, surround
+from ..lines import displacement_at, receptance_at
 from .driven_changes import driven_mix, driven_signals
-from .hypothesis import Cause, Hypothesis, Predicted, surround
-from .lines import displacement_at, receptance_at
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

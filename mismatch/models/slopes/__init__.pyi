@@ -1,0 +1,3 @@
+from .line_slopes import Slopes, jacobian, slopes
+
+__all__ = ["Slopes", "jacobian", "slopes"]
