@@ -18,6 +18,10 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Signals = NDArray[np.float32]
 
+BEYOND = 10.0
+"""Changes of motion are followed up to this multiple of the band's end, which most records do not reach. Modes hardly
+move there; the flexibility of modes outside the band does, and dry friction feels it (at 3 a third of it is missed)."""
+
 LARGEST = 1e30
 """Change of a motion beyond which it has run away: single precision holds no more."""
 
@@ -83,7 +87,8 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
     predicted
         What the hypothesis predicts for the recording.
     """
-    driving = _outer_change(hypothesis, lines)
+    count = int(np.sum(lines.padded_frequencies <= BEYOND * lines.frequencies[-1]))
+    driving = _outer_change(hypothesis, lines, count)
     paths = hypothesis.reach.paths
     forces = lines.cut(lines.signal(np.stack([answer.force for answer in predicted.joints], axis=1))).T
     found: list[JointChange] = []
@@ -99,7 +104,7 @@ def joint_changes(hypothesis: Hypothesis, lines: WindowedSpectrum, predicted: Pr
         change = _mixed(lines.cut(signals), mix)
         found.append(JointChange(path.push, turns, angles, np.ascontiguousarray(forces[len(found)]), change, first))
         if len(found) < len(predicted.joints):
-            felt = _Driving(driving.force - answer.force[:, None] * path.push, driving.change)
+            felt = _Driving(driving.force - answer.force[:count, None] * path.push, driving.change)
             driving = _driven_on(hypothesis, lines, felt, found[-1], (signals, mix, answer))
     return tuple(found)
 
@@ -122,19 +127,20 @@ def _driven_on(
 ) -> _Driving:
     """What drives the joints after one, whose own force changes too."""
     signals, mix, answer = written
-    change = driving.change
+    change, count = driving.change, len(driving.force)
     if change is None:
         change = np.zeros((*driving.force.shape, hypothesis.size), dtype=complex)
-    moved = _mixed(rfft(signals, n=lines.padded, axis=0), mix)
+    moved = _mixed(rfft(signals, n=lines.padded, axis=0)[:count], mix)
     change[:, :, joint.first : joint.first + moved.shape[1]] -= moved[:, None] * joint.push[:, None]
     angles = slice(joint.angles, joint.angles + joint.turns.shape[1])
-    change[:, :, angles] -= answer.force[:, None, None] * joint.turns
+    change[:, :, angles] -= answer.force[:count, None, None] * joint.turns
     return _Driving(driving.force, change)
 
 
-def _outer_change(hypothesis: Hypothesis, lines: WindowedSpectrum) -> _Driving:
+def _outer_change(hypothesis: Hypothesis, lines: WindowedSpectrum, count: int) -> _Driving:
     """Outer force at padded lines, and its derivative by the numbers of linear causes."""
-    frequencies, force, forces = lines.padded_frequencies, lines.force_lines, hypothesis.reach.forces
+    frequencies, force = lines.padded_frequencies[:count], lines.force_lines[:count]
+    forces = hypothesis.reach.forces
     outer = np.array(forces(surround(hypothesis, frequencies).pushed(force)))
     if all(cause.axis is not None for cause in hypothesis.causes):
         return _Driving(outer, None)
@@ -229,8 +235,8 @@ def _driven_change(
     """Derivative of the driven deflection at padded lines: signals (n, n_signals) and their mix (n_signals, size)."""
     path, own, turns = joint.path, joint.own, joint.path.axis.turns
     outer, model = driving.force, hypothesis.reach.model
-    pushed = joint.answer.force[:, None] * path.push
-    frequencies, along = lines.padded_frequencies, path.along
+    pushed = joint.answer.force[: len(outer), None] * path.push
+    frequencies, along = lines.padded_frequencies[: len(outer)], path.along
     driven = driven_signals(hypothesis.shape, model, frequencies, (outer - pushed, outer), along)
     mix = np.zeros((driven.shape[1], hypothesis.size))
     mix[:, : hypothesis.shape.size] = driven_mix(hypothesis.shape, model, along)
@@ -238,7 +244,7 @@ def _driven_change(
     modes = replace(model, residuals=None)
     displacement = displacement_at(model, frequencies, outer) - displacement_at(modes, frequencies, pushed)
     compliance = along @ receptance_at(modes, frequencies)
-    turned = (compliance @ (path.columns @ turns)) * joint.answer.force[:, None]
+    turned = (compliance @ (path.columns @ turns)) * joint.answer.force[: len(outer), None]
     extra = np.zeros((len(outer), hypothesis.size), dtype=complex)
     extra[:, own.start + len(joint.cause.values) : own.stop] = displacement @ (path.rows @ turns) - turned
     if driving.change is not None:
