@@ -21,15 +21,20 @@ class Recordings:
     worst
         Number of the recording of which modal parameters alone, fitted to all, leave most: a law that is felt at one
         of two levels must show there.
+    chosen
+        Number of a recording that is held out instead of the usual one.
     """
 
     mended: list[WindowedSpectrum]
     measured: list[WindowedSpectrum]
     worst: int = 0
+    chosen: int | None = None
 
     @property
     def held_out_place(self) -> int:
         """Number of the recording held out: the middle level, so that the others bracket it; of two the worst."""
+        if self.chosen is not None:
+            return self.chosen
         return self.worst if len(self.mended) == 2 else (len(self.mended) - 1) // 2
 
     @property

@@ -40,6 +40,6 @@ def recorded(hidden: JointPhysics, levels: tuple[float, ...]) -> list[WindowedSp
     for seed, one in enumerate(RIG.recordings(levels)):
         lines = windowed_spectrum(one, band, 1.0)
         moved = irfft(predict_lines(truth, lines).spectrum, n=lines.padded, axis=0)[: len(one.force)]
-        moved += 0.01 * moved.std() * np.random.default_rng(seed).normal(size=moved.shape)
+        moved += 0.01 * moved.std() * np.random.default_rng(2000 + seed).normal(size=moved.shape)
         shown.append(windowed_spectrum(replace(one, response=moved), band, 1.0))
     return shown

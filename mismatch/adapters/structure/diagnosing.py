@@ -114,10 +114,10 @@ def _diagnosed(
     comparison = StructureComparison(mended, causes, settings, before)
     found = search(comparison, base, progress)
     progress("held-out recording")
-    both = recordings_of(mended, measured, base.hypothesis)
-    found, held_out = confirmed(comparison, both, found, faults)
+    proof = confirmed(comparison, recordings_of(mended, measured, base.hypothesis), found, faults)
+    both = proof.recordings
     progress("what is left")
-    answer = answer_of(comparison, both, found, held_out, faults, decay)
+    answer = answer_of(comparison, both, proof.found, proof.held_out, faults, decay)
     progress("form of the law")
     freed = freed_answer(answer, comparison, both, [one for one in answer.causes if is_fault(one.name)])
     answer = freed.answer
