@@ -9,6 +9,9 @@ from mismatch import BinnedForce, FreeFormLaw
 
 from ..style import COLOURS, SHADE, house_style, legend_above, legend_height, new_figure, panel_letter, place_panels
 
+COLUMNS = 3
+"""Columns of the legend, whose labels are long."""
+
 
 def law_figure(found: FreeFormLaw) -> Figure:
     """Force against deflection, moving forth and back, and against velocity with what depends on deflection taken off.
@@ -36,8 +39,8 @@ def law_figure(found: FreeFormLaw) -> Figure:
             axes.axvline(0, color="#999999", linewidth=0.5, zorder=1)
             axes.locator_params(axis="x", nbins=6)
             panel_letter(axes, number)
-        place_panels(figure, left=17.0, top=legend_height(left) + 5.0)
-        legend_above(figure, left)
+        place_panels(figure, left=17.0, top=legend_height(left, COLUMNS) + 5.0)
+        legend_above(figure, left, COLUMNS)
     return figure
 
 

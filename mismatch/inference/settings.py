@@ -27,6 +27,7 @@ class EvidenceSettings(
         "small_after_law",
         "own",
         "small_in_part",
+        "beside_fault",
         "mends_belief",
     ),
 ):
@@ -62,6 +63,11 @@ class EvidenceSettings(
     small_in_part
         Share of the evidence of all causes below which one is not told where the answer is partial: it may mend what is
         left of the others.
+    beside_fault
+        Share of the evidence of mended faults below which a cause may only mend what their mending leaves.
+    stands_out
+        Evidence that a further mode needs for each real number measured within its half-power band: 0.5 where its
+        resonance explains two thirds of the noise's power there (0.5 = ln 1.65).
     mends_belief
         Share of the odd deviation from the laboratory's model that a cause must remove when it gains no misfit.
     farthest
@@ -79,6 +85,8 @@ class EvidenceSettings(
     small_after_law: float = 0.1
     own: float = 0.33
     small_in_part: float = 0.25
+    beside_fault: float = 0.002
+    stands_out: float = 0.5
     mends_belief: float = 0.6
     farthest: float = 50.0
 

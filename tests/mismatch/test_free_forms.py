@@ -184,11 +184,22 @@ def test_a_name_that_leaves_far_more_than_its_free_form_is_not_the_whole() -> No
     assert "does not describe all of the force" in found.doubt
 
 
+@pytest.mark.parametrize(("falls", "verdict"), [(0.6, "explained"), (0.9, "partly explained")])
+def test_friction_that_falls_is_named(falls: float, verdict: str) -> None:
+    """By 60 % it is friction beside damping that falls with the square; by 90 % a free form beside the name."""
+    found = diagnose(RIG.model, [one.recording for one in recorded(_Slip(falls), LEVELS)])
+    assert found.verdict == verdict
+    assert found.physics[0].name == "coulomb_friction"
+    assert found.improvement.after < 0.5 * found.improvement.refitted
+
+
 def test_a_law_that_nobody_listed_has_no_name_and_predicts() -> None:
-    found = diagnose(RIG.model, [one.recording for one in recorded(_Slip(0.6), LEVELS)])
+    """A force that turns with the speed from braking to driving: modes alone leave ten times the noise."""
+    found = diagnose(RIG.model, [one.recording for one in recorded(_Slip(1.3), LEVELS)])
     assert found.verdict == "unexplained"
     assert not found.physics
-    assert found.improvement.after < 0.1 * found.improvement.refitted
+    assert found.improvement.after < 1.1 * found.improvement.noise_floor
+    assert found.improvement.noise_floor < 0.1 * found.improvement.refitted
     assert found.content["improved_model"]["model"] == "final"
     assert [one["name"] for one in improved_model_of(found).physics] == ["free_form"]
     (said,) = (line for line in diagnosis_lines(found) if line.startswith("Free form: no law"))

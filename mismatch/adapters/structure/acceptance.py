@@ -201,7 +201,8 @@ def worth_it(
     if isinstance(fitted.hypothesis.causes[-1].physics, ModePhysics):
         if modes_not_seen(fitted.hypothesis, lines):
             return False
-        needed, clear = needed + _places_of_a_mode(fitted, lines), _mode_measured(fitted, settings.clear)
+        needed = max(needed + _places_of_a_mode(fitted, lines), settings.stands_out * _numbers_in_a_mode(fitted, lines))
+        clear = _mode_measured(fitted, settings.clear)
     else:
         clear = _measured(fitted, settings.clear)
         needed *= 1.0 if clear else settings.unclear
@@ -228,6 +229,14 @@ def _places_of_a_mode(fitted: Fit, lines: list[WindowedSpectrum]) -> float:
     pole = fitted.hypothesis.model.poles[-1]
     band = max(one.frequencies[-1] for one in lines) - min(one.frequencies[0] for one in lines)
     return 2 * float(np.log(max(band / (-float(pole.real) / np.pi), 1.0)))
+
+
+def _numbers_in_a_mode(fitted: Fit, lines: list[WindowedSpectrum]) -> int:
+    """Real numbers that were measured within the half-power band, ``2 zeta f``, of the mode added last."""
+    pole = fitted.hypothesis.model.poles[-1]
+    centre, half = abs(pole) / (2 * np.pi), -float(pole.real) / (2 * np.pi)
+    inside = (np.abs(one.frequencies - centre) <= half for one in lines)
+    return sum(2 * int(np.sum(which)) * one.measured.shape[1] for which, one in zip(inside, lines, strict=True))
 
 
 def _is_missed(fitted: Fit, lines: list[WindowedSpectrum], needed: float) -> bool:

@@ -92,6 +92,9 @@ def answer_of(
         causes = [cause for cause in causes if cause not in faults or cause in seen]
         held_out = scored(both, (held_out.linear, held_out.improved), current.noises, seen, settings.proof)
     deviation = _deviation(both.mended, spread)
+    if deviation is not None and faults and deviation.evidence < settings.evidence.least:
+        # what the mending of a fault leaves may move the modes as much
+        deviation = None
     causes += [] if deviation is None else [deviation]
     left = leftover(current.hypothesis, both.mended)
     judged = partial(

@@ -13,7 +13,7 @@ from modal_fit import ModalModel
 
 from ...behaviour import behaviour_of
 from ...faults import repair_faults
-from ...inference import Diagnosis, EvidenceSettings, Progress, Settings, search
+from ...inference import AcceptedCause, Diagnosis, EvidenceSettings, Progress, Settings, search
 from ...location import SpindleSpeed, StructureDetails, StructureDiagnosis, located, residual_view
 from ...models import Fit, Hypothesis, ModelShape, fit, known_noise, outdoes_noise, through_structure
 from ...physics import is_fault, library, offered
@@ -111,7 +111,7 @@ def _diagnosed(
     mended, base, faults = repair_faults(measured, base, settings)
     before = leftover(base.hypothesis, mended)
     causes, left_out = offered(settings.causes or library(), model)
-    comparison = StructureComparison(mended, causes, settings, before)
+    comparison = StructureComparison(mended, causes, _beside(faults, settings), before)
     found = search(comparison, base, progress)
     progress("held-out recording")
     proof = confirmed(comparison, recordings_of(mended, measured, base.hypothesis), found, faults)
@@ -156,6 +156,13 @@ def _diagnosed(
             "improved_model": _offered(answer, measured).content(),
         },
     )
+
+
+def _beside(faults: Sequence[AcceptedCause], settings: Settings) -> Settings:
+    """Thresholds beside mended faults: what a channel clipped is put back nearly, and a small cause may mend that."""
+    least = settings.evidence.beside_fault * sum(one.evidence for one in faults)
+    evidence = replace(settings.evidence, least=max(settings.evidence.least, least))
+    return replace(settings, evidence=evidence)
 
 
 def _offered(answer: Answer, measured: list[WindowedSpectrum]) -> OfferedModel:
