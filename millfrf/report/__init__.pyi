@@ -1,5 +1,5 @@
 from .collection import Collected, collect
-from .diagnoses import write_cut_report, write_diagnosis_report, write_robot_report
+from .diagnoses import left_in_words, write_cut_report, write_diagnosis_report, write_robot_report
 from .page import ReportOptions, write_report
 from .pages import (
     FigureFiles,
@@ -22,6 +22,7 @@ __all__ = [
     "Section",
     "asked_figures",
     "collect",
+    "left_in_words",
     "page_text",
     "picture_of",
     "write_cut_report",

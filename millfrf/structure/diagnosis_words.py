@@ -2,6 +2,7 @@
 
 from mismatch import AcceptedCause, StructureDiagnosis, joint_in_words, tip_axes
 
+from ..report import left_in_words
 from ..tables import evidence_in_words
 
 
@@ -20,10 +21,7 @@ def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
     if diagnosis.equivalents:
         lines.append(f"cannot be told from: {', '.join(diagnosis.equivalents)}")
     if diagnosis.verdict == "partly explained":
-        lines.append(
-            f"{100 * diagnosis.improvement.after:.3g} % of the held-out response is still not predicted, and "
-            f"{100 * diagnosis.leftover:.0f} % of that moves with the signal, more than a whole explanation may leave"
-        )
+        lines.append(left_in_words(diagnosis))
     lines += [
         f"{one.name} is not told: {one.location['impossible']}"
         for one in diagnosis.candidates

@@ -9,6 +9,7 @@ from foundation import DegreeOfFreedom
 from mismatch import AcceptedCause, StructureDiagnosis, form_of, joint_in_words, rig_of, tip_axes
 
 from ...tables import odds_in_words
+from .left_words import left_in_words
 from .next_tests import next_test
 
 
@@ -67,6 +68,8 @@ def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
     )
     fall = fall if gain.after < gain.before else ""
     if diagnosis.verdict == "partly explained":
+        if diagnosis.content.get("free_form"):
+            return f"Only partly explained: the model leaves out {found}{fall}. But {left_in_words(diagnosis)}."
         return (
             f"Only partly explained: the model leaves out {found}{fall}. {'They help' if several else 'It helps'}, but "
             f"{left} is still not predicted, more than a whole explanation may leave: something else is missing too, "
