@@ -191,6 +191,9 @@ def test_friction_that_falls_is_named(falls: float, verdict: str) -> None:
     assert found.verdict == verdict
     assert found.physics[0].name == "coulomb_friction"
     assert found.improvement.after < 0.5 * found.improvement.refitted
+    said = [line for line in diagnosis_lines(found) if line.startswith("the named law leaves")]
+    assert len(said) == (verdict == "partly explained")
+    assert all(line.endswith(f"leaves {100 * found.improvement.after:.3g} %") for line in said)
 
 
 def test_a_law_that_nobody_listed_has_no_name_and_predicts() -> None:
