@@ -4,7 +4,7 @@ from .joint_law import JointLaw, JointMotion
 from .joint_paths import JointPath, JointReach, joint_reach
 from .joint_simulation import JointResponse, driven_force, joint_dynamics, joint_response, stiffness_ramp
 from .joint_words import joint_in_words
-from .reciprocity import modal_scales
+from .reciprocity import inside_of, modal_scales
 from .saturation import Saturation, rounded, saturated
 from .tangent_loop import tangent_run
 
@@ -20,6 +20,7 @@ __all__ = [
     "axis_location",
     "axis_of",
     "driven_force",
+    "inside_of",
     "joint_dynamics",
     "joint_in_words",
     "joint_reach",

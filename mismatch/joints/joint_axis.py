@@ -19,16 +19,24 @@ TURN_STEP = 0.02
 class ModalScales:
     """What one unit of a mode's part in a joint stands for.
 
+    A mode has one part where its shape is real. A structure whose damping is not proportional has complex modes, and
+    then each has two parts: one in phase with its scale, one that leads it by a quarter of a turn.
+
     Parameters
     ----------
-    seen : (n_modes,)
-        Deflection of the joint per unit of each modal coordinate, in the unit of the model's right vectors.
-    pushed : (n_modes,)
-        Force on each modal coordinate per unit of the joint's force, in the unit of the model's left vectors.
+    seen : (n_parts,)
+        Deflection of the joint per unit of each modal coordinate, in the unit of the model's right vectors: one number
+        for each mode, or these and behind them the same times i.
+    pushed : (n_parts,)
+        Force on each modal coordinate per unit of the joint's force, in the unit of the model's left vectors, likewise.
     """
 
     seen: Complex
     pushed: Complex
+
+    def with_phases(self) -> "ModalScales":
+        """Scales for two parts of each mode, from those for one."""
+        return ModalScales(np.append(self.seen, 1j * self.seen), np.append(self.pushed, 1j * self.pushed))
 
 
 @dataclass(frozen=True)
@@ -38,7 +46,7 @@ class JointAxis:
     Parameters
     ----------
     entries : (n_entries,)
-        Unit vector: over the axes that forces and responses share (:func:`tip_axes`), or over the modes.
+        Unit vector: over the axes that forces and responses share (:func:`tip_axes`), or over the parts of the modes.
     scales
         What the entries are counted in where they belong to modes; None for a direction at the tip.
     """
@@ -56,23 +64,55 @@ class JointAxis:
         turned = self.entries + self.turns @ angles
         return replace(self, entries=turned / np.linalg.norm(turned))
 
-    def with_mode(self, scales: ModalScales) -> "JointAxis":
-        """The axis in a model with one more mode, which takes no part yet; ``scales`` (1,) are that mode's."""
-        if self.scales is None:
-            return self
-        own = ModalScales(
-            np.append(self.scales.seen, scales.seen[-1]), np.append(self.scales.pushed, scales.pushed[-1])
-        )
-        return JointAxis(np.append(self.entries, 0.0), own)
+    def with_phases(self) -> "JointAxis":
+        """The axis with a second part for each mode, a quarter of a turn ahead of the first, which is none yet."""
+        assert self.scales is not None
+        return JointAxis(np.append(self.entries, np.zeros_like(self.entries)), self.scales.with_phases())
 
-    def without_mode(self, place: int) -> "JointAxis":
-        """The axis in a model without one of the modes."""
+    def parts(self, modes: int) -> Complex:
+        """Part of each mode (n_modes,) as a complex number, counted in its scale; real where it has one part."""
+        rows = self.entries.reshape(-1, modes)
+        return np.asarray(rows[0] + 1j * rows[1] if len(rows) > 1 else rows[0] + 0j)
+
+    def turned_over(self, mode: int, modes: int) -> "JointAxis":
+        """The axis in which one of ``modes`` takes part with the other sign."""
+        rows = self.entries.reshape(-1, modes).copy()
+        rows[:, mode] *= -1
+        return replace(self, entries=rows.ravel())
+
+    def with_mode(self, scales: ModalScales, modes: int) -> "JointAxis":
+        """The axis in a model with one more mode than ``modes``, which takes no part yet.
+
+        The last entries of ``scales`` are that mode's.
+        """
         if self.scales is None:
             return self
-        kept = np.delete(self.entries, place)
-        own = ModalScales(np.delete(self.scales.seen, place), np.delete(self.scales.pushed, place))
+        phased = len(self.entries) > modes
+        seen, pushed = (
+            np.append(values[:modes], last) for values, last in zip(self._values(), _last(scales), strict=True)
+        )
+        own = ModalScales(seen, pushed)
+        entries = np.append(self.entries.reshape(-1, modes), np.zeros((2 if phased else 1, 1)), axis=1).ravel()
+        return JointAxis(entries, own.with_phases() if phased else own)
+
+    def without_mode(self, place: int, modes: int) -> "JointAxis":
+        """The axis in a model without one of ``modes``."""
+        if self.scales is None:
+            return self
+        kept = np.delete(self.entries.reshape(-1, modes), place, axis=1).ravel()
+        seen, pushed = (np.delete(one.reshape(-1, modes), place, axis=1).ravel() for one in self._values())
         size = float(np.linalg.norm(kept))
-        return JointAxis(kept / size if size else np.eye(len(kept))[0], own)
+        return JointAxis(kept / size if size else np.eye(len(kept))[0], ModalScales(seen, pushed))
+
+    def _values(self) -> tuple[Complex, Complex]:
+        """Both scales of all parts."""
+        assert self.scales is not None
+        return self.scales.seen, self.scales.pushed
+
+
+def _last(scales: ModalScales) -> tuple[complex, complex]:
+    """Both scales of the last mode."""
+    return complex(scales.seen[-1]), complex(scales.pushed[-1])
 
 
 def across(direction: Real) -> Real:

@@ -52,7 +52,7 @@ class JointPath:
 class JointReach:
     """A modal model, and how each joint acts on it.
 
-    Where a joint's axis lies in the modes, each mode's own coordinate is one more response, and a force on it one more
+    Where a joint's axis lies in the modes, each part of a mode is one more response, and a force on it one more
     excitation: everything that holds between forces and responses then holds for the joint.
 
     Parameters
@@ -84,14 +84,14 @@ def joint_reach(model: ModalModel, axes: Sequence[JointAxis]) -> JointReach:
     """
     n, m, count = len(model.responses), len(model.excitations), len(model.poles)
     inner = [axis.scales for axis in axes if axis.scales is not None]
-    more = count * len(inner)
+    more = sum(len(scales.seen) for scales in inner)
     widened = model
     if inner:
         names = tuple(f"MODE {place % count + 1}:+S" for place in range(more))
         widened = replace(
             model,
-            right=np.hstack([model.right, *(np.diag(scales.seen) for scales in inner)]),
-            left=np.hstack([model.left, *(np.diag(scales.pushed) for scales in inner)]),
+            right=np.hstack([model.right, *(_of_modes(scales.seen, count) for scales in inner)]),
+            left=np.hstack([model.left, *(_of_modes(scales.pushed, count) for scales in inner)]),
             responses=(*model.responses, *names),
             excitations=(*model.excitations, *names),
             residuals=_widened_residuals(model, more),
@@ -103,12 +103,17 @@ def joint_reach(model: ModalModel, axes: Sequence[JointAxis]) -> JointReach:
             rows, columns, _ = tip_axes(model)
             paths.append(JointPath(axis, np.pad(rows, ((0, more), (0, 0))), np.pad(columns, ((0, more), (0, 0)))))
         else:
-            ends = (np.zeros((size + more, count)) for size in (n, m))
-            rows, columns = ends
-            rows[n + first : n + first + count] = columns[m + first : m + first + count] = np.eye(count)
+            parts = len(axis.entries)
+            rows, columns = (np.zeros((size + more, parts)) for size in (n, m))
+            rows[n + first : n + first + parts] = columns[m + first : m + first + parts] = np.eye(parts)
             paths.append(JointPath(axis, rows, columns))
-            first += count
+            first += parts
     return JointReach(widened, tuple(paths))
+
+
+def _of_modes(scales: Complex, count: int) -> Complex:
+    """Entries (n_modes, n_parts) of the modes' vectors for the scales (n_parts,) of one or two parts of each mode."""
+    return np.hstack([np.diag(part) for part in scales.reshape(-1, count)])
 
 
 def _widened_residuals(model: ModalModel, more: int) -> Residuals | None:

@@ -21,6 +21,8 @@ def joint_in_words(location: Mapping[str, Any], axes: Sequence[str] = ()) -> str
     --------
     >>> joint_in_words({"direction": [0.8, -0.6]}, ("X", "Y"))
     'along +0.800 X, -0.600 Y'
+    >>> joint_in_words({"direction": [0.8, -0.6], "participation": []}, ("X", "Y"))
+    'inside, nearly along +0.800 X, -0.600 Y'
     >>> parts = [{"mode_hz": 7.3, "part": 0.95}, {"mode_hz": 11.0, "part": -0.3}]
     >>> joint_in_words({"participation": parts})
     'inside: the mode at 7.3 Hz takes part with +0.95, that at 11 Hz with -0.30'
@@ -33,7 +35,8 @@ def joint_in_words(location: Mapping[str, Any], axes: Sequence[str] = ()) -> str
     if "direction" in location:
         named = list(axes) + [""] * (len(location["direction"]) - len(axes))
         parts = [f"{value:+.3f} {name}".rstrip() for value, name in zip(location["direction"], named, strict=False)]
-        return "along " + ", ".join(parts) + other
+        nearly = "inside, nearly " if "participation" in location else ""
+        return f"{nearly}along " + ", ".join(parts) + other
     if "participation" not in location:
         return ""
     told = [one for one in location["participation"] if abs(one["part"]) >= LEAST_PART]

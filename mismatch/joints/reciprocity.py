@@ -4,7 +4,7 @@ import numpy as np
 
 from modal_fit import ModalModel
 
-from .joint_axis import Complex, ModalScales, tip_axes
+from .joint_axis import Complex, JointAxis, ModalScales, tip_axes
 
 
 def modal_scales(model: ModalModel) -> ModalScales:
@@ -26,6 +26,25 @@ def modal_scales(model: ModalModel) -> ModalScales:
     turn = _doubled_phase(right) - np.conj(_doubled_phase(left))
     phase = np.exp(0.5j * np.angle(turn))
     return ModalScales(seen * phase, -1j * pushed * np.conj(phase))
+
+
+def inside_of(model: ModalModel, axis: JointAxis) -> JointAxis:
+    """The axis over the modes, each with a phase, that moves and pushes most like one at the tip.
+
+    Parameters
+    ----------
+    model
+        Modal model whose modes take part.
+    axis
+        A direction at the tip.
+    """
+    scales = modal_scales(model)
+    rows, columns, _ = tip_axes(model)
+    seen, pushed = model.right @ rows @ axis.entries / scales.seen, model.left @ columns @ axis.entries / scales.pushed
+    parts = 0.5 * (seen + pushed)
+    size = float(np.linalg.norm(parts))
+    entries = np.append(parts.real, parts.imag) / size
+    return JointAxis(entries, ModalScales(size * scales.seen, size * scales.pushed).with_phases())
 
 
 def _doubled_phase(vectors: Complex) -> Complex:

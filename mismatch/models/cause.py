@@ -117,12 +117,22 @@ def location_of(axis: JointAxis, model: ModalModel) -> dict[str, Any]:
     model
         Model in which it does, whose modes name what takes part.
     """
-    entries = axis.entries * np.sign(axis.entries[np.argmax(np.abs(axis.entries))])
-    parts = [round(float(x), 6) for x in entries]
     if axis.scales is None:
-        return {"direction": parts}
-    frequencies = (round(float(frequency), 4) for frequency in model.natural_frequencies)
-    return {"participation": [{"mode_hz": f, "part": part} for f, part in zip(frequencies, parts, strict=True)]}
+        entries = axis.entries * np.sign(axis.entries[np.argmax(np.abs(axis.entries))])
+        return {"direction": [round(float(x), 6) for x in entries]}
+    parts = axis.parts(len(model.poles))
+    largest = parts[np.argmax(np.abs(parts))]
+    # the phase that all modes share is that of the whole, and says nothing
+    parts = parts * np.sign(largest.real if largest.real else 1.0)
+    frequencies = [round(float(frequency), 4) for frequency in model.natural_frequencies]
+    told: list[dict[str, float]] = []
+    for frequency, part in zip(frequencies, parts, strict=True):
+        sign = -1.0 if part.real < 0 else 1.0
+        one = {"mode_hz": frequency, "part": round(sign * float(abs(part)), 6)}
+        if len(axis.entries) > len(parts):
+            one["lead_deg"] = round(float(np.degrees(np.angle(sign * part))), 2)
+        told.append(one)
+    return {"participation": told}
 
 
 def held_values(cause: Cause) -> Real:

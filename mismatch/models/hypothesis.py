@@ -76,8 +76,8 @@ class Hypothesis:
             return replace(self, causes=kept)
         added = sum(isinstance(cause.physics, ModePhysics) for cause in self.causes[:place])
         shape, u = self.shape.without_mode(added, self.u)
-        gone = self.shape.believed + added
-        rested = (one if one.axis is None else replace(one, axis=one.axis.without_mode(gone)) for one in kept)
+        gone, modes = self.shape.believed + added, len(self.shape.nominal.poles)
+        rested = (one if one.axis is None else replace(one, axis=one.axis.without_mode(gone, modes)) for one in kept)
         return Hypothesis(shape, u, tuple(rested))
 
     def with_mode(self, pole: complex, right: Complex, left: Complex, physics: ModePhysics) -> "Hypothesis":
@@ -87,8 +87,8 @@ class Hypothesis:
         u = np.concatenate([own, np.zeros(shape.per_mode), outside])
         known = self.causes
         if any(cause.axis is not None and cause.axis.scales is not None for cause in known):
-            scales = modal_scales(shape.nominal)
-            axes = (None if one.axis is None else one.axis.with_mode(scales) for one in known)
+            scales, modes = modal_scales(shape.nominal), len(self.shape.nominal.poles)
+            axes = (None if one.axis is None else one.axis.with_mode(scales, modes) for one in known)
             known = tuple(replace(one, axis=axis) for one, axis in zip(known, axes, strict=True))
         return Hypothesis(shape, u, (*known, Cause(physics, np.zeros(0))))
 

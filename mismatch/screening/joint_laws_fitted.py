@@ -14,7 +14,7 @@ from ..models import Cause, Fit, following_all, gives_one_up, location_of
 from ..physics import JointPhysics, answer_name
 from .joint_places import JointPlace, joint_places
 from .joint_screening import Screened, screen_joints
-from .joint_starts import begun_at, driven_by_what_was_seen, freed, with_turned_signs
+from .joint_starts import begun_at, driven_by_what_was_seen, freed, with_phases, with_turned_signs
 from .whitened_residual import linear_floor
 
 NEARLY_AS_GOOD, MOST_FOLLOWED = 0.7, 3
@@ -154,6 +154,7 @@ def _simulated(
         order = [taken, *(one for one in places if one is not taken)]
     if not np.isfinite(fitted.score):
         return None
+    fitted = with_phases(lines, fitted, settings.evidence.least)
     axis = fitted.hypothesis.causes[-1].axis
     assert axis is not None
     # a direction at the tip that nothing else comes near to says all

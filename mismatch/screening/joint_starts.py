@@ -10,7 +10,7 @@ import numpy as np
 
 from estimation import WindowedSpectrum
 
-from ..joints import JointAxis
+from ..joints import JointAxis, inside_of
 from ..models import Fit, Hypothesis, fit
 from ..physics import JointPhysics
 from .joint_screening import Screened, screen_joints
@@ -105,9 +105,9 @@ def with_turned_signs(lines: list[WindowedSpectrum], fitted: Fit, least: float) 
     """
     axis = fitted.hypothesis.causes[-1].axis
     while axis is not None and axis.scales is not None and len(axis.entries) > 1:
-        turned = [
-            _turned(fitted.hypothesis, axis, int(mode)) for mode in np.flatnonzero(abs(axis.entries) > SMALLEST_PART)
-        ]
+        modes = len(fitted.hypothesis.model.poles)
+        large = np.flatnonzero(abs(axis.parts(modes)) > SMALLEST_PART)
+        turned = [_along(fitted.hypothesis, axis.turned_over(int(mode), modes)) for mode in large]
         begun = min((fit(lines, one, iterations=TURN_STEPS) for one in turned), key=lambda one: one.score)
         if not np.isfinite(begun.score):
             break
@@ -118,9 +118,54 @@ def with_turned_signs(lines: list[WindowedSpectrum], fitted: Fit, least: float) 
     return fitted
 
 
-def _turned(hypothesis: Hypothesis, axis: JointAxis, mode: int) -> Hypothesis:
-    """The hypothesis in which one mode takes part in the last law's joint with the other sign."""
-    entries = axis.entries.copy()
-    entries[mode] *= -1
-    last = replace(hypothesis.causes[-1], axis=replace(axis, entries=entries))
-    return replace(hypothesis, causes=(*hypothesis.causes[:-1], last))
+def with_phases(lines: list[WindowedSpectrum], fitted: Fit, least: float) -> Fit:
+    """The fit, or a better one in which the modes' parts in the last law's joint have phases of their own.
+
+    In a structure with real mode shapes all points of a mode move in phase, and its part in a joint is a real number.
+    Where damping is not proportional to stiffness and mass, a joint between them leads or lags.
+
+    Parameters
+    ----------
+    lines
+        Windowed spectra of the recordings that are compared.
+    fitted
+        A fit whose last cause is a joint's law; one at the tip, or with phases, is given back as it is.
+    least
+        Gain in score that counts, which pays for a number more for each mode already.
+    """
+    axis = fitted.hypothesis.causes[-1].axis
+    if axis is None or axis.scales is None or not np.isfinite(fitted.score):
+        return fitted
+    if len(axis.entries) > len(fitted.hypothesis.model.poles):
+        return fitted
+    start = _along(fitted.hypothesis, axis.with_phases())
+    phased = fit(lines, start, fitted.noises, iterations=FREE_STEPS, tolerance=10.0)
+    return phased if phased.score < fitted.score - least else fitted
+
+
+def moved_inside(lines: list[WindowedSpectrum], fitted: Fit, least: float) -> Fit:
+    """The fit, or a better one in which the last law's joint at the tip sits inside, where it moves nearly alike.
+
+    A direction at the tip stands for a joint between links as well as two or three numbers can: what each mode does in
+    the joint is then that of the tip. Inside, each mode has a part and a phase of its own.
+
+    Parameters
+    ----------
+    lines
+        Windowed spectra of the recordings that are compared.
+    fitted
+        A fit whose last cause is a joint's law; one that sits inside is given back as it is.
+    least
+        Gain in score that counts.
+    """
+    axis = fitted.hypothesis.causes[-1].axis
+    if axis is None or axis.scales is not None or not np.isfinite(fitted.score):
+        return fitted
+    start = _along(fitted.hypothesis, inside_of(fitted.hypothesis.model, axis))
+    inside = fit(lines, start, fitted.noises, iterations=FREE_STEPS, tolerance=10.0)
+    return inside if inside.score < fitted.score - least else fitted
+
+
+def _along(hypothesis: Hypothesis, axis: JointAxis) -> Hypothesis:
+    """The hypothesis with the last law's joint along another axis."""
+    return replace(hypothesis, causes=(*hypothesis.causes[:-1], replace(hypothesis.causes[-1], axis=axis)))

@@ -134,7 +134,8 @@ def place(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
         model = diagnosis.details.final.hypothesis.model
         _, columns, axes = tip_axes(model)
         node = DegreeOfFreedom.parse(model.excitations[int(abs(columns[:, 0]).argmax())]).node
-        return f"in a joint at {node} that acts {joint_in_words(location, axes)}"
+        at = f"at {node} that acts " if "participation" not in location else ""
+        return f"in a joint {at}{joint_in_words(location, axes)}"
     if "participation" in location:
         return f"in a joint {joint_in_words(location)}"
     if "channel" in location:

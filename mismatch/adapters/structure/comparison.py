@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from estimation import WindowedSpectrum
 
 from ...inference import Proposal, Remainder, Round, Search, Settings, equivalents_of
-from ...models import Cause, Fit, fit, gives_one_up, settled
+from ...models import Cause, Fit, fit, gives_one_up, location_of, settled
 from ...physics import JointPhysics, Physics, answer_name
 from ...remainder import leftover
-from ...screening import gains_beside_laws
+from ...screening import gains_beside_laws, moved_inside
 from .acceptance import evidence_needed, impossible, plainest, possible_gains, twins_of, worth_it
 from .rounds import Standing, StructureRound, Weighed, likeliest_seen, only_modes, weigh
 
@@ -84,8 +84,7 @@ class StructureComparison:
         good = possible_gains(weighed.proposals, evidence)
         while (first := plainest(good, evidence.as_good)) is not None:
             best = twins_of(first, good, evidence.small)[0]
-            rested = settled(self.lines, best.fitted)
-            chosen = replace(best, fitted=rested, evidence=search.current.score - rested.score)
+            chosen = self._rested(best, search.current)
             good = [one for one in good if one is not best]
             if impossible(chosen, evidence):
                 continue
@@ -94,6 +93,19 @@ class StructureComparison:
             # another form of the same cause may have numbers that the data do tell
             good = [one for one in good if one.name == best.name]
         return None
+
+    def _rested(self, best: Proposal[Fit], current: Fit) -> Proposal[Fit]:
+        """A proposal fitted until it rests, its joint inside where the data tell that from the tip."""
+        rested = settled(self.lines, best.fitted)
+        margin = self.settings.screening.place * (current.score - rested.score)
+        inside = moved_inside(self.lines, rested, max(self.settings.evidence.least, margin))
+        if inside is rested:
+            return replace(best, fitted=rested, evidence=current.score - rested.score)
+        rested, axis = settled(self.lines, inside), inside.hypothesis.causes[-1].axis
+        assert axis is not None
+        # the direction along which it was found at the tip still says most to a reader
+        location = {**best.location, **location_of(axis, rested.hypothesis.model)}
+        return replace(best, location=location, fitted=rested, evidence=current.score - rested.score)
 
     def is_of_its_own(self, search: Search[Fit], place: int, less: Fit) -> bool:
         """Whether an accepted cause mends no law's form, and explains most of what moves with the signal without it."""
