@@ -146,6 +146,10 @@ class StructureComparison:
         """
         evidence, limits = self.settings.evidence, self.settings.verdict
         possible = [one for one in weighed.proposals if not impossible(one, evidence)]
+        # only the chosen law is tried inside: its rivals stand at the tip, and are compared with it there
+        there = [one.evidence for one in possible if one.name == chosen.name]
+        if "participation" in chosen.location and "direction" in chosen.location and there:
+            chosen = replace(chosen, evidence=max(there))
         near = equivalents_of(possible, chosen, evidence.as_good)
         if chosen.name not in self.laws:
             return near
