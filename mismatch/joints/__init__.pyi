@@ -4,6 +4,9 @@ from .joint_law import JointLaw, JointMotion
 from .joint_paths import JointPath, JointReach, joint_reach
 from .joint_simulation import JointResponse, driven_force, joint_dynamics, joint_response, stiffness_ramp
 from .joint_words import joint_in_words
+from .law_change_loop import law_change_run
+from .law_slopes import LawSlopes, law_quotient, law_slopes
+from .modal_filters import ModalFilters, modal_filters
 from .reciprocity import inside_of, modal_scales
 from .saturation import Saturation, rounded, saturated
 from .tangent_loop import tangent_run
@@ -15,6 +18,8 @@ __all__ = [
     "JointPath",
     "JointReach",
     "JointResponse",
+    "LawSlopes",
+    "ModalFilters",
     "ModalScales",
     "Saturation",
     "axis_location",
@@ -25,6 +30,10 @@ __all__ = [
     "joint_in_words",
     "joint_reach",
     "joint_response",
+    "law_change_run",
+    "law_quotient",
+    "law_slopes",
+    "modal_filters",
     "modal_scales",
     "rounded",
     "saturated",

@@ -10,7 +10,7 @@ Real = NDArray[np.float64]
 
 
 @compiled
-def cell_of(table: Real, cells: float, reach: float, at: float) -> int:
+def cell_of(table: NDArray[np.floating], cells: float, reach: float, at: float) -> int:
     """Cell of an evenly spaced table over [-reach, reach], ``cells`` of which are one unit long."""
     return int(min(max((at + reach) * cells, 0.0), len(table) - 2.0))
 

@@ -6,24 +6,29 @@ from numpy.typing import NDArray
 from cutting import compiled
 
 from .joint_loop import look_up
+from .law_change_loop import law_change_run
+from .modal_filter_loop import filters_run
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
-Columns = NDArray[np.floating]
+Columns = NDArray[np.float32]
+
+PART = 128
+"""Instants that are worked through at once: what they need stays in the processor's cache, and calls are few."""
 
 
 @compiled
 def tangent_run(
     motion: tuple[Real, Real],
     dynamics: tuple[Complex, Complex, Complex, Complex, Complex],
-    tables: tuple[Real, Real],
-    spans: tuple[float, float],
-    ramp: Real,
-    elements: tuple[Real, Real],
-    change: tuple[Columns, Columns],
+    law: tuple[tuple[Real, Real], tuple[float, float], Real, tuple[Real, Real]],
+    slopes: tuple[tuple[Columns, Columns], Columns, tuple[Columns, Columns], float],
+    filters: tuple[Columns, Columns, tuple[Columns, Columns, Columns], tuple[int, float]],
+    given: tuple[Columns, Columns],
+    weights: Columns,
     force: Columns,
 ) -> None:
-    """Write the change of a joint's force for every column of a change of what drives it.
+    """Write the change of a joint's force for every column of a change of its law, or of what drives it.
 
     Along the motion of :func:`mismatch.joints.joint_loop.free_run`, ``dg = e + g_x dx + g_v dv + memory`` with
     ``dx = dx_driven - (h * dg)``: linear, but with slopes that change from instant to instant. An element that sticks
@@ -33,24 +38,89 @@ def tangent_run(
     ----------
     motion
         Deflection (m) and velocity (m/s) of the free run, each (n,).
-    dynamics, tables, spans, ramp, elements
-        Arguments of the free run, at this run's step.
-    change
-        Changes of the driven deflection (m) and velocity (m/s), each (n, n_columns).
-    force : (n, n_columns)
-        Holds e, the law's own change at this motion; receives dg.
+    dynamics
+        Argument of the free run, at this run's step.
+    law
+        Tables, spans, ramp and elements of the free run.
+    slopes
+        Change e of the law: parts of :class:`mismatch.joints.law_slopes.LawSlopes`, and the share of the recording's
+        duration between two instants. These columns come first.
+    filters
+        Sources, start, ``turns`` with ``inputs`` and ``direct``, ``n_modes`` with ``step`` of
+        :class:`mismatch.joints.modal_filters.ModalFilters`: changes of the driven motion that are modal filters.
+        These columns come next.
+    given
+        Other changes of the driven deflection (m) and velocity (m/s), each (n, n_given). These columns come last.
+    weights : (2 often - 1,)
+        Weights of the instants around one that is written.
+    force : (n // often, n_columns), N
+        Receives dg at every ``often``-th instant, the weighted mean of those around it.
+    """
+    spans, elements = law[1], law[3]
+    state, numbers, n_columns = filters[1].copy(), slopes[1].shape[1], force.shape[1]
+    n, n_elements = (len(weights) + 1) // 2 * len(force), len(elements[0])
+    factors, own = _step_factors(dynamics)
+    modes, rows = np.zeros((2, len(factors), n_columns), np.float32), np.zeros((3, n_columns), np.float32)
+    changes, e = np.zeros((2, PART, n_columns), np.float32), np.zeros((PART, numbers), np.float32)
+    gains, sticks = np.zeros((PART, 4), np.float32), np.ones((PART, n_elements), dtype=np.bool_)
+    memory, held = (np.zeros(n_elements), np.zeros(n_elements)), np.zeros((n_elements, n_columns), np.float32)
+    elastic = (elements[0], sticks, np.ones(n_elements, dtype=np.bool_), held)
+    force[:] = 0.0
+    for begin in range(0, n, PART):
+        count = min(PART, n - begin)
+        dx, dv = changes[0, :count], changes[1, :count]
+        law_change_run(motion, begin, (spans, elements[1]), slopes, memory, (sticks, e[:count]))
+        _slopes(motion, begin, law, sticks, own, gains[:count])
+        filters_run(filters[0], begin, state, filters[2], filters[3], numbers, (dx, dv))
+        _write_others(given, begin, numbers, (dx, dv))
+        _answer(factors, gains, e, (dx, dv), (modes[0], modes[1], rows), elastic, len(filters[2][2]) > 0)
+        _write(dx, weights, begin, force)
+
+
+@compiled
+def _slopes(
+    motion: tuple[Real, Real],
+    begin: int,
+    law: tuple[tuple[Real, Real], tuple[float, float], Real, tuple[Real, Real]],
+    sticks: NDArray[np.bool_],
+    own: tuple[float, float],
+    out: Columns,
+) -> None:
+    """Write the law's slopes at each instant: by deflection, velocity, what is left of a force, and its own way."""
+    tables, spans, ramp, elements = law
+    for k in range(len(out)):
+        slope_x = look_up(tables[0], spans[0], motion[0][begin + k])[1] + ramp[begin + k]
+        slope_v = look_up(tables[1], spans[1], motion[1][begin + k])[1]
+        for i in range(sticks.shape[1]):
+            if sticks[k, i]:
+                slope_x += elements[0][i]
+        whole = 1.0 / max(0.2, 1.0 + own[0] * slope_x + own[1] * slope_v)
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = slope_x, slope_v, whole, own[0]
+
+
+@compiled
+def _write_others(given: tuple[Columns, Columns], begin: int, numbers: int, changes: tuple[Columns, Columns]) -> None:
+    """Write the driven motion of the law's own columns, which is none, and of the last ones."""
+    for side in range(2):
+        change, known = changes[side], given[side]
+        first = change.shape[1] - known.shape[1]
+        for k in range(len(change)):
+            for j in range(numbers):
+                change[k, j] = 0.0
+            for j in range(known.shape[1]):
+                change[k, first + j] = known[begin + k, j]
+
+
+@compiled
+def _step_factors(dynamics: tuple[Complex, Complex, Complex, Complex, Complex]) -> tuple[Columns, tuple[float, float]]:
+    """Factors of one step of each mode, and what a force itself does to deflection and velocity at once.
+
+    They are as precise as the columns: mixed kinds of numbers take twice the time.
     """
     turn, early, late, to_x, to_v = dynamics
-    n_modes, n_columns = len(turn), force.shape[1]
-    real, imaginary = np.zeros((n_modes, n_columns), force.dtype), np.zeros((n_modes, n_columns), force.dtype)
-    before, held = np.zeros(n_columns, force.dtype), np.zeros(n_columns, force.dtype)
-    dx, dv = np.zeros(n_columns, force.dtype), np.zeros(n_columns, force.dtype)
-    memory = (np.zeros(len(elements[0])), np.ones(len(elements[0]), dtype=np.bool_))
-    stuck_at = np.zeros((len(elements[0]), n_columns), force.dtype)
+    factors = np.empty((len(turn), 8), np.float32)
     own_x, own_v = 0.0, 0.0
-    # factors as precise as the columns: mixed kinds of numbers take twice the time
-    factors = np.empty((n_modes, 8), force.dtype)
-    for r in range(n_modes):
+    for r in range(len(turn)):
         own_x += 2.0 * (to_x[r] * late[r]).real
         own_v += 2.0 * (to_v[r] * late[r]).real
         # the end of the last step and the beginning of this one push with the same force
@@ -58,72 +128,98 @@ def tangent_run(
         factors[r, 0], factors[r, 1], factors[r, 2], factors[r, 3] = turn[r].real, turn[r].imag, push.real, push.imag
         factors[r, 4], factors[r, 5] = 2.0 * to_x[r].real, 2.0 * to_x[r].imag
         factors[r, 6], factors[r, 7] = 2.0 * to_v[r].real, 2.0 * to_v[r].imag
-    own, slopes = np.empty(1, force.dtype), np.empty(3, force.dtype)
-    own[0] = own_x
-    before_x = motion[0][0]
-    for k in range(len(force)):
-        x = motion[0][k]
-        slope_x = look_up(tables[0], spans[0], x)[1] + ramp[k]
-        slope_x += _sticking(elements, memory, x - before_x, dx, (stuck_at, held))
-        slope_v = look_up(tables[1], spans[1], motion[1][k])[1]
-        before_x = x
-        slopes[0], slopes[1] = slope_x, slope_v
-        slopes[2] = 1.0 / max(0.2, 1.0 + own_x * slope_x + own_v * slope_v)
-        dx[:] = change[0][k]
-        dv[:] = change[1][k]
-        for r in range(n_modes):
-            _advance(factors[r], real[r], imaginary[r], before, dx, dv)
-        _answer(slopes, own[0], held, force[k], before, dx, dv)
+    return factors, (own_x, own_v)
 
 
 @compiled
 def _answer(
-    slopes: Columns, own: float, held: Columns, force: Columns, before: Columns, dx: Columns, dv: Columns
+    factors: Columns,
+    gains: Columns,
+    e: Columns,
+    changes: tuple[Columns, Columns],
+    state: tuple[Columns, Columns, Columns],
+    elements: tuple[Real, NDArray[np.bool_], NDArray[np.bool_], Columns],
+    rates: bool,
 ) -> None:
-    """Overwrite the law's own change by that of the force, which takes its share of the deflection."""
-    slope_x, slope_v, whole = slopes[0], slopes[1], slopes[2]
-    for j in range(len(force)):
-        dg = (force[j] + slope_x * dx[j] + slope_v * dv[j] - held[j]) * whole
-        force[j] = dg
-        before[j] = dg
-        dx[j] -= own * dg
+    """Overwrite the driven change of the deflection by the change of the force, instant by instant.
+
+    ``state`` are both parts of the modes, and rows: the force's change before, its memory, and the deflection's change
+    before. They are copied: only what a function itself has made is known to lie apart, and then a loop runs over
+    eight columns at once.
+    """
+    real, imaginary, rows = state[0].copy(), state[1].copy(), state[2]
+    x, v, g = np.zeros_like(rows[0]), np.zeros_like(rows[0]), rows[0].copy()
+    n_columns = len(g)
+    for k in range(len(changes[0])):
+        if len(elements[0]):
+            _slip(elements, k, rows)
+        for j in range(n_columns):
+            x[j] = changes[0][k, j]
+        if rates:
+            for j in range(n_columns):
+                v[j] = changes[1][k, j]
+        for r in range(len(factors)):
+            _advance(factors, r, real, imaginary, g, x, v, rates)
+        slope_x, slope_v, whole, own = gains[k, 0], gains[k, 1], gains[k, 2], gains[k, 3]
+        for j in range(n_columns):
+            g[j] = (slope_x * x[j] + slope_v * v[j] - rows[1, j]) * whole
+        for j in range(e.shape[1]):
+            g[j] += e[k, j] * whole
+        for j in range(n_columns):
+            rows[2, j] = x[j] - own * g[j]
+            changes[0][k, j] = g[j]
+    state[0][:], state[1][:] = real, imaginary
+    rows[0] = g
 
 
 @compiled
-def _sticking(
-    elements: tuple[Real, Real],
-    memory: tuple[Real, NDArray[np.bool_]],
-    moved: float,
-    dx: Columns,
-    kept: tuple[Columns, Columns],
-) -> float:
-    """Stiffness of the elements that stick; keeps for each what the change was when it last slipped."""
-    springs, yields = elements
-    stretch, sticks = memory
-    stuck_at, held = kept
-    stiffness = 0.0
+def _advance(
+    factors: Columns, r: int, real: Columns, imaginary: Columns, g: Columns, x: Columns, v: Columns, rates: bool
+) -> None:
+    """One step of mode ``r`` for all columns, added to the changes of deflection and, if wanted, velocity."""
+    turn, across, push, pull = factors[r, 0], factors[r, 1], factors[r, 2], factors[r, 3]
+    x_real, x_imaginary, v_real, v_imaginary = factors[r, 4], factors[r, 5], factors[r, 6], factors[r, 7]
+    if rates:
+        for j in range(len(g)):
+            a = turn * real[r, j] - across * imaginary[r, j] - push * g[j]
+            b = across * real[r, j] + turn * imaginary[r, j] - pull * g[j]
+            real[r, j], imaginary[r, j] = a, b
+            x[j] += x_real * a - x_imaginary * b
+            v[j] += v_real * a - v_imaginary * b
+        return
+    for j in range(len(g)):
+        a = turn * real[r, j] - across * imaginary[r, j] - push * g[j]
+        b = across * real[r, j] + turn * imaginary[r, j] - pull * g[j]
+        real[r, j], imaginary[r, j] = a, b
+        x[j] += x_real * a - x_imaginary * b
+
+
+@compiled
+def _slip(elements: tuple[Real, NDArray[np.bool_], NDArray[np.bool_], Columns], k: int, rows: Columns) -> None:
+    """Keep for each element that begins to stick what the change was when it last slipped; forget it where it slips."""
+    springs, sticks, stuck, held = elements
     for i in range(len(springs)):
-        trial = stretch[i] + moved
-        stretch[i] = min(max(trial, -yields[i]), yields[i])
-        if abs(trial) <= yields[i]:
-            stiffness += springs[i]
-            if not sticks[i]:
-                stuck_at[i] = dx
-                held += springs[i] * dx
-        elif sticks[i]:
-            held -= springs[i] * stuck_at[i]
-        sticks[i] = abs(trial) <= yields[i]
-    return stiffness
+        spring = np.float32(springs[i])
+        if sticks[k, i] and not stuck[i]:
+            for j in range(rows.shape[1]):
+                held[i, j] = rows[2, j]
+                rows[1, j] += spring * rows[2, j]
+        elif stuck[i] and not sticks[k, i]:
+            for j in range(rows.shape[1]):
+                rows[1, j] -= spring * held[i, j]
+        stuck[i] = sticks[k, i]
 
 
 @compiled
-def _advance(factors: Columns, real: Columns, imaginary: Columns, before: Columns, dx: Columns, dv: Columns) -> None:
-    """One step of one mode for all columns, added to the changes of deflection and velocity."""
-    turn, across, push, pull = factors[0], factors[1], factors[2], factors[3]
-    x_real, x_imaginary, v_real, v_imaginary = factors[4], factors[5], factors[6], factors[7]
-    for j in range(len(before)):
-        a = turn * real[j] - across * imaginary[j] - push * before[j]
-        b = across * real[j] + turn * imaginary[j] - pull * before[j]
-        real[j], imaginary[j] = a, b
-        dx[j] += x_real * a - x_imaginary * b
-        dv[j] += v_real * a - v_imaginary * b
+def _write(dg: Columns, weights: Columns, begin: int, force: Columns) -> None:
+    """Add a part's instants to those at the recording's rate before and behind them."""
+    often = (len(weights) + 1) // 2
+    for k in range(len(dg)):
+        row, past = (begin + k) // often, (begin + k) % often
+        weight = weights[past + often - 1]
+        for j in range(dg.shape[1]):
+            force[row, j] += weight * dg[k, j]
+        if past and row + 1 < len(force):
+            weight = weights[past - 1]
+            for j in range(dg.shape[1]):
+                force[row + 1, j] += weight * dg[k, j]

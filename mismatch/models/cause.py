@@ -89,10 +89,13 @@ class Cause:
         result, here = np.zeros(self.size), self.coordinates()
         for k, parameter in enumerate(self.physics.parameters):
             for side in (-1.0, 1.0):
-                aside = here.copy()
-                aside[k] += side * ASIDE
-                reached = parameter.to_fit(float(held_values(self.moved(aside))[k]))
-                if abs(reached - aside[k]) > 0.1 * ASIDE:
+                aside = here[k] + side * ASIDE
+                value = parameter.from_fit(float(aside))
+                if isinstance(self.physics, LimitedPhysics):
+                    values = self.values.copy()
+                    values[k] = value
+                    value = float(held_values(replace(self, values=values))[k])
+                if abs(parameter.to_fit(value) - aside) > 0.1 * ASIDE:
                     result[k] = side
         return result
 

@@ -1,6 +1,7 @@
 """A joint's law whose form is free: shapes over deflection, velocity, memory and time are added to it."""
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -79,26 +80,44 @@ class FreeForm:
         """Return the law of the joint's force at these numbers."""
         own = len(self.law_of.parameters)
         law = self.law_of.law(values[:own], motion)
-        unit = UNIT * motion.stiffness * motion.deflection
-        factors = list(unit * values[own:])
+        factors = list(_unit(motion) * values[own:])
         changes: dict[str, Any] = {}
         if "x" in self.kinds:
-            # a table reaches as far as the law's own
-            reach = law.reach if len(law.stiffness) else motion.reach
-            shapes = _over_deflection(_grid(reach / motion.deflection))
+            reach = _reach(law, motion)
+            shapes = _over_deflection(reach / motion.deflection)
             changes |= {"reach": reach, "stiffness": _with_shapes(law.stiffness, shapes, factors)}
         if "v" in self.kinds:
-            speed = law.speed if len(law.damping) else motion.speed
-            shapes = _over_velocity(_grid(speed / motion.velocity))
+            speed = _speed(law, motion)
+            shapes = _over_velocity(speed / motion.velocity)
             changes |= {"speed": speed, "damping": _with_shapes(law.damping, shapes, factors)}
         if "m" in self.kinds:
-            yields = np.array(YIELDS) * motion.deflection
-            springs = np.array([factors.pop(0) for _ in YIELDS]) / np.minimum(yields, motion.deflection)
+            yields, units = _elements(motion)
+            springs = units * [factors.pop(0) for _ in YIELDS]
             changes |= {"springs": np.append(law.springs, springs), "yields": np.append(law.yields, yields)}
         if "t" in self.kinds:
             ramp, bend = (factor / motion.deflection for factor in factors)
             changes |= {"ramp": law.ramp + ramp, "bend": law.bend + bend}
         return replace(law, **changes)
+
+    def law_changes(self, values: Real, motion: JointMotion) -> tuple[JointLaw, ...]:
+        """Return what a unit of each shape's factor changes of the law: the force is linear in them."""
+        law = self.law(values, motion)
+        unit, none = _unit(motion), np.zeros(len(law.springs))
+        plain = JointLaw(reach=law.reach, speed=law.speed, springs=none, yields=none)
+        found: list[JointLaw] = []
+        if "x" in self.kinds:
+            shapes = _over_deflection(law.reach / motion.deflection)
+            found += [replace(plain, stiffness=unit * shape) for shape in shapes]
+        if "v" in self.kinds:
+            shapes = _over_velocity(law.speed / motion.velocity)
+            found += [replace(plain, damping=unit * shape) for shape in shapes]
+        if "m" in self.kinds:
+            units = np.diag(unit * _elements(motion)[1])
+            own = np.zeros((len(units), len(none) - len(units)))
+            found += [replace(plain, springs=springs) for springs in np.hstack([own, units])]
+        if "t" in self.kinds:
+            found += [replace(plain, ramp=unit / motion.deflection), replace(plain, bend=unit / motion.deflection)]
+        return tuple(found)
 
 
 def families(law: JointLaw) -> str:
@@ -121,15 +140,47 @@ def families(law: JointLaw) -> str:
     return "".join(kind for kind, there in has.items() if there)
 
 
-def _over_deflection(x: Real) -> list[Real]:
-    """Shapes over the deflection, which is counted in typical ones: knees, powers, and an asymmetric one."""
+def _unit(motion: JointMotion) -> float:
+    """Force of a shape's unit, N."""
+    return UNIT * motion.stiffness * motion.deflection
+
+
+def _reach(law: JointLaw, motion: JointMotion) -> float:
+    """End of the table over the deflection: it reaches as far as the law's own."""
+    return law.reach if len(law.stiffness) else motion.reach
+
+
+def _speed(law: JointLaw, motion: JointMotion) -> float:
+    """End of the table over the velocity, likewise."""
+    return law.speed if len(law.damping) else motion.speed
+
+
+def _elements(motion: JointMotion) -> tuple[Real, Real]:
+    """Yields of the elements that are added, and the spring of each for a force of one."""
+    yields = np.array(YIELDS) * motion.deflection
+    return yields, 1 / np.minimum(yields, motion.deflection)
+
+
+@lru_cache(maxsize=8)
+def _over_deflection(end: float) -> Real:
+    """Shapes over deflections up to ``end`` typical ones: knees, powers, and an asymmetric one. A fit asks often."""
+    x = _grid(end)
     knees = [saturated(x, knee, SHARPNESS) / max(knee, 1.0) for knee in KNEES]
-    return [*knees, x, x**2, x * np.abs(x), x**3 / 3, x**5 / 15]
+    return _kept([*knees, x, x**2, x * np.abs(x), x**3 / 3, x**5 / 15])
 
 
-def _over_velocity(v: Real) -> list[Real]:
-    """Shapes over the velocity, which is counted in typical ones: friction that saturates, and powers."""
-    return [*(np.tanh(v / speed) for speed in SPEEDS), v, v * np.abs(v), v**3 / 3]
+@lru_cache(maxsize=8)
+def _over_velocity(end: float) -> Real:
+    """Shapes over velocities up to ``end`` typical ones: friction that saturates, and powers. A fit asks often."""
+    v = _grid(end)
+    return _kept([*(np.tanh(v / speed) for speed in SPEEDS), v, v * np.abs(v), v**3 / 3])
+
+
+def _kept(shapes: list[Real]) -> Real:
+    """Shapes (n, POINTS) that nobody can change."""
+    result = np.array(shapes)
+    result.flags.writeable = False
+    return result
 
 
 def _grid(end: float) -> Real:
@@ -137,9 +188,11 @@ def _grid(end: float) -> Real:
     return np.linspace(-end, end, POINTS)
 
 
-def _with_shapes(table: Real, shapes: list[Real], factors: list[float]) -> Real:
+def _with_shapes(table: Real, shapes: Real, factors: list[float]) -> Real:
     """A law's own table, or none, with shapes by their factors, which are taken from the list."""
-    added = np.sum([factors.pop(0) * shape for shape in shapes], axis=0)
+    added = np.array([factors.pop(0) for _ in shapes]) @ shapes
     if not len(table):
         return np.asarray(added)
+    if len(table) == POINTS:
+        return np.asarray(added + table)
     return np.asarray(added + np.interp(_grid(1.0), np.linspace(-1, 1, len(table)), table))
