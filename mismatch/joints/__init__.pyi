@@ -1,7 +1,7 @@
 from .axis_file import axis_location, axis_of
 from .joint_axis import JointAxis, ModalScales, tip_axes
 from .joint_law import JointLaw, JointMotion
-from .joint_paths import JointPath, JointReach, joint_reach
+from .joint_paths import JointPath, JointReach, combined_model, joint_reach
 from .joint_simulation import JointResponse, driven_force, joint_dynamics, joint_response, stiffness_ramp
 from .joint_words import joint_in_words
 from .law_change_loop import law_change_run
@@ -24,6 +24,7 @@ __all__ = [
     "Saturation",
     "axis_location",
     "axis_of",
+    "combined_model",
     "driven_force",
     "inside_of",
     "joint_dynamics",

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from .joint_axis import JointAxis, tip_axes
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+
+PART = "MODE"
+"""Node of the degrees of freedom that stand for parts of modes in joints."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +70,21 @@ class JointReach:
     model: ModalModel
     paths: tuple[JointPath, ...]
 
+    @cached_property
+    def reduced(self) -> ModalModel:
+        """The model's own degrees of freedom, and behind them one response and one excitation for each joint.
+
+        The first is the joint's deflection, the second a unit of its force: what parts of modes a joint has does not
+        count where only these are asked for, and there may be many.
+        """
+        n, m = (
+            sum(not label.startswith(PART) for label in labels)
+            for labels in (self.model.responses, self.model.excitations)
+        )
+        rows = np.hstack([np.eye(len(self.model.responses), n), *(path.along[:, None] for path in self.paths)])
+        columns = np.hstack([np.eye(len(self.model.excitations), m), *(path.push[:, None] for path in self.paths)])
+        return combined_model(self.model, rows, columns)
+
     def forces(self, force: Complex) -> Complex:
         """Forces (n_lines, n) on the model's own excitations as forces on all, (n_lines, n_excitations)."""
         more = len(self.model.excitations) - force.shape[1]
@@ -87,7 +106,7 @@ def joint_reach(model: ModalModel, axes: Sequence[JointAxis]) -> JointReach:
     more = sum(len(scales.seen) for scales in inner)
     widened = model
     if inner:
-        names = tuple(f"MODE {place % count + 1}:+S" for place in range(more))
+        names = tuple(f"{PART} {place % count + 1}:+S" for place in range(more))
         widened = replace(
             model,
             right=np.hstack([model.right, *(_of_modes(scales.seen, count) for scales in inner)]),
@@ -109,6 +128,35 @@ def joint_reach(model: ModalModel, axes: Sequence[JointAxis]) -> JointReach:
             paths.append(JointPath(axis, rows, columns))
             first += parts
     return JointReach(widened, tuple(paths))
+
+
+def combined_model(model: ModalModel, rows: Real, columns: Real) -> ModalModel:
+    """The model between combinations of its responses and combinations of its excitations.
+
+    Parameters
+    ----------
+    model
+        Modal model.
+    rows : (n_responses, n_wanted)
+        Each column is one combination of responses.
+    columns : (n_excitations, m_wanted)
+        Each column is the excitations by one unit.
+    """
+    residuals = model.residuals
+    if residuals is not None:
+        residues = None if residuals.residues is None else rows.T @ residuals.residues @ columns
+        upper, lower = (rows.T @ one @ columns for one in (residuals.upper, residuals.lower))
+        residuals = replace(residuals, upper=upper, lower=lower, residues=residues)
+    return replace(
+        model,
+        right=model.right @ rows,
+        left=model.left @ columns,
+        responses=tuple(f"COMBINATION {k + 1}:+S" for k in range(rows.shape[1])),
+        excitations=tuple(f"COMBINATION {k + 1}:+S" for k in range(columns.shape[1])),
+        residuals=residuals,
+        covariance=None,
+        errors=None,
+    )
 
 
 def _of_modes(scales: Complex, count: int) -> Complex:

@@ -196,22 +196,22 @@ class Predicted:
 def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Predicted:
     """Response of the whole hypothesis to a recording's forces, cut and windowed like the measurement."""
     reach, frequencies = hypothesis.reach, lines.padded_frequencies
-    model, n = reach.model, len(hypothesis.model.responses)
+    model, n = reach.reduced, len(hypothesis.model.responses)
     around = surround(hypothesis, frequencies)
-    pushed = reach.forces(around.pushed(lines.force_lines))
+    pushed = around.pushed(lines.force_lines)
     # one number stands for all where there is no joint
-    joint: Complex = np.broadcast_to(np.zeros((), dtype=complex), pushed.shape)
-    felt, joints = pushed, []
-    for cause, path in zip(hypothesis.laws, reach.paths, strict=True):
+    joint: Complex = np.broadcast_to(np.zeros((), dtype=complex), (len(pushed), len(reach.model.excitations)))
+    felt, joints = np.pad(pushed, ((0, 0), (0, len(reach.paths)))), []
+    for number, (cause, path) in enumerate(zip(hypothesis.laws, reach.paths, strict=True)):
         if cause.seen is not None:
             x, v = cause.seen[lines.recording.name]
             answer = JointResponse(rfft(driven_force(lines, x, v, cause.law()), n=lines.padded), x, v)
         else:
-            free = displacement_at(model, frequencies, felt) @ path.along
-            answer = joint_response(model, lines, free, path.ends, cause.law())
+            free = displacement_at(model, frequencies, felt)[:, n + number]
+            answer = joint_response(reach.model, lines, free, path.ends, cause.law())
         joints.append(answer)
         joint = joint + answer.force[:, None] * path.push
-        felt = pushed - joint
+        felt[:, pushed.shape[1] + number] = -answer.force
     if around.feedback is None:
         displacement = displacement_at(model, frequencies, felt)[:, :n]
     else:

@@ -9,7 +9,7 @@ from scipy.fft import irfft
 from estimation import WindowedSpectrum
 from modal_fit import ModalModel
 
-from ...joints import JointPath, ModalFilters, modal_filters
+from ...joints import JointPath, ModalFilters, combined_model, modal_filters
 from ..hypothesis import Hypothesis
 from ..lines import displacement_at, driven_basis, modal_displacement
 from ..model_shape import ModelShape
@@ -210,9 +210,10 @@ def _angle_signals(
 def _moved_signal(model: ModalModel, moved: Moved, frequencies: Real, along: Real) -> NDArray[np.complexfloating]:
     """What a change of the driving forces does to the deflection."""
     if moved.spectra is None:
-        return (displacement_at(model, frequencies, np.asarray(moved.push, dtype=complex)) @ along)[:, None]
-    push = np.tile(moved.push[:, 0].astype(complex), (len(frequencies), 1))
-    compliance = (displacement_at(model, frequencies, push) @ along)[:, None]
+        seen = combined_model(model, along[:, None], np.eye(len(model.excitations)))
+        return displacement_at(seen, frequencies, np.asarray(moved.push, dtype=complex))
+    between = combined_model(model, along[:, None], np.real(moved.push))
+    compliance = displacement_at(between, frequencies, np.ones((len(frequencies), 1), dtype=complex))
     return np.asarray(compliance.astype(moved.spectra.dtype) * moved.spectra)
 
 
