@@ -3,7 +3,6 @@ from .chain_screening import ScreenedChain, screen_chains
 from .joint_direction import JointSighting, SeenMotion, find_direction, seen_motion
 from .joint_laws_fitted import SightedLaws, joint_candidates, sighted_laws
 from .joint_screening import screen_joints
-from .joint_starts import moved_inside
 from .level_continuation import laws_by_level
 from .linear_causes_fitted import channel_of, linear_candidates
 from .missing_mode import SightedMode, find_mode
@@ -27,7 +26,6 @@ __all__ = [
     "laws_by_level",
     "linear_candidates",
     "linear_floor",
-    "moved_inside",
     "noise_floor",
     "screen_chains",
     "screen_joints",

@@ -14,7 +14,14 @@ from ..models import Cause, Fit, following_all, gives_one_up, location_of
 from ..physics import JointPhysics, answer_name
 from .joint_places import JointPlace, joint_places
 from .joint_screening import Screened, screen_joints
-from .joint_starts import begun_at, driven_by_what_was_seen, freed, with_phases, with_turned_signs
+from .joint_starts import (
+    begun_at,
+    driven_by_what_was_seen,
+    freed,
+    moved_inside,
+    with_phases,
+    with_turned_signs,
+)
 from .whitened_residual import linear_floor
 
 NEARLY_AS_GOOD, MOST_FOLLOWED = 0.7, 3
@@ -99,7 +106,36 @@ def joint_candidates(
     if strong:
         near += _missing_kinds(near, driven, lambda one: one.hypothesis.causes[-1])
     simulated = in_processes([partial(_simulated, lines, current, one, sighted.places, settings) for one in near])
-    return [one for one in simulated if one is not None]
+    found = [one for one in simulated if one is not None]
+    return found + _inside_too(lines, current, max(found, key=lambda one: one.evidence), settings) if found else []
+
+
+def _inside_too(
+    lines: list[WindowedSpectrum], current: Fit, best: Proposal[Fit], settings: Settings
+) -> list[Proposal[Fit]]:
+    """A law at the tip once more, inside, if the data tell the one from the other; nothing else.
+
+    At the tip it may gain less than modes that imitate it: what it then lacks is its place.
+
+    Parameters
+    ----------
+    lines
+        Windowed spectra of the recordings that are compared.
+    current
+        The fit without the law.
+    best
+        The law that was found.
+    settings
+        Thresholds of the diagnosis.
+    """
+    inside = moved_inside(lines, best.fitted, max(settings.evidence.least, settings.screening.place * best.evidence))
+    if inside is best.fitted:
+        return []
+    axis = inside.hypothesis.causes[-1].axis
+    assert axis is not None
+    # the direction along which it was found at the tip still says most to a reader
+    location = {**best.location, **location_of(axis, inside.hypothesis.model)}
+    return [Proposal(best.name, location, inside, current.score - inside.score)]
 
 
 def _promising(sighted: SightedLaws, least: float, strong: bool, limits: ScreeningSettings) -> list[Screened]:

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from estimation import WindowedSpectrum
 
 from ...inference import Proposal, Remainder, Round, Search, Settings, equivalents_of
-from ...models import Cause, Fit, fit, gives_one_up, location_of, settled
+from ...models import Cause, Fit, fit, gives_one_up, settled
 from ...physics import JointPhysics, Physics, answer_name
 from ...remainder import leftover
-from ...screening import gains_beside_laws, moved_inside
+from ...screening import gains_beside_laws
 from .acceptance import evidence_needed, impossible, plainest, possible_gains, twins_of, worth_it
 from .rounds import Standing, StructureRound, Weighed, likeliest_seen, only_modes, weigh
 
@@ -84,7 +84,8 @@ class StructureComparison:
         good = possible_gains(weighed.proposals, evidence)
         while (first := plainest(good, evidence.as_good)) is not None:
             best = twins_of(first, good, evidence.small)[0]
-            chosen = self._rested(best, search.current)
+            rested = settled(self.lines, best.fitted)
+            chosen = replace(best, fitted=rested, evidence=search.current.score - rested.score)
             good = [one for one in good if one is not best]
             if impossible(chosen, evidence):
                 continue
@@ -94,23 +95,11 @@ class StructureComparison:
             good = [one for one in good if one.name == best.name]
         return None
 
-    def _rested(self, best: Proposal[Fit], current: Fit) -> Proposal[Fit]:
-        """A proposal fitted until it rests, its joint inside where the data tell that from the tip."""
-        rested = settled(self.lines, best.fitted)
-        margin = self.settings.screening.place * (current.score - rested.score)
-        inside = moved_inside(self.lines, rested, max(self.settings.evidence.least, margin))
-        if inside is rested:
-            return replace(best, fitted=rested, evidence=current.score - rested.score)
-        rested, axis = settled(self.lines, inside), inside.hypothesis.causes[-1].axis
-        assert axis is not None
-        # the direction along which it was found at the tip still says most to a reader
-        location = {**best.location, **location_of(axis, rested.hypothesis.model)}
-        return replace(best, location=location, fitted=rested, evidence=current.score - rested.score)
-
     def is_of_its_own(self, search: Search[Fit], place: int, less: Fit) -> bool:
         """Whether an accepted cause mends no law's form, and explains most of what moves with the signal without it."""
-        whole, cause = search.current, search.accepted[place].fitted.hypothesis.causes[-1]
-        return self._mends_no_form(cause, (less, whole), search.base)
+        # as it is now: modes that were found later take part in its joint, too
+        cause = search.current.hypothesis.causes[place]
+        return self._mends_no_form(cause, (less, search.current), search.base)
 
     def _is_worth_it(self, chosen: Proposal[Fit], search: Search[Fit]) -> bool:
         """Whether a cause has enough evidence; after a law less is enough of one that mends no form."""
@@ -146,8 +135,8 @@ class StructureComparison:
         """
         evidence, limits = self.settings.evidence, self.settings.verdict
         possible = [one for one in weighed.proposals if not impossible(one, evidence)]
-        # only the chosen law is tried inside: its rivals stand at the tip, and are compared with it there
-        there = [one.evidence for one in possible if one.name == chosen.name]
+        # only the best law is tried inside: its rivals stand at the tip, and are compared with it there
+        there = [one.evidence for one in possible if one.name == chosen.name and "participation" not in one.location]
         if "participation" in chosen.location and "direction" in chosen.location and there:
             chosen = replace(chosen, evidence=max(there))
         near = equivalents_of(possible, chosen, evidence.as_good)
