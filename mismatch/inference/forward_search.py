@@ -37,8 +37,9 @@ def pruned(comparison: Comparison[Fit], found: Search[Fit]) -> Search[Fit]:
     """Let go of causes that later ones have made needless (backward elimination).
 
     What one cause leaves may look like another: a mode that imitates a joint is found before the joint is. Each cause
-    before the last is taken away; if the fit without it loses less than the evidence a cause needs, it stays away,
-    unless the comparison knows that it mends nothing of the others.
+    is taken away; if the fit without it loses less than the evidence a cause needs, it stays away, unless the
+    comparison knows that it mends nothing of the others. The last one, too: it may have gained what the fit before it
+    had left undone.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ def pruned(comparison: Comparison[Fit], found: Search[Fit]) -> Search[Fit]:
     found
         The search where it ended.
     """
-    for place in range(len(found.accepted) - 2, -1, -1):
+    for place in range(len(found.accepted) - 1, -1, -1):
         if len(found.accepted) < 2:
             break
         less = comparison.without(found, place)
