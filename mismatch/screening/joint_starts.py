@@ -22,6 +22,10 @@ FEW = 1000
 FREE_STEPS = 10
 """Steps at most of a law that is simulated freely; the one that is accepted is fitted to the end."""
 
+MOST_OUT_OF_PHASE = 0.25
+"""Share of the parts of modes in a joint that may be out of phase (:attr:`JointAxis.out_of_phase`). A damper of a tenth
+of the critical damping between ground and one of three masses makes 0.1 of it; a spring that stands for friction, 1."""
+
 SMALLEST_PART = 0.05
 """Part of a mode, over all parts, below which its sign matters little."""
 
@@ -140,7 +144,7 @@ def with_phases(lines: list[WindowedSpectrum], fitted: Fit, least: float) -> Fit
         return fitted
     start = _along(fitted.hypothesis, axis.with_phases())
     phased = fit(lines, start, fitted.noises, iterations=FREE_STEPS, tolerance=10.0)
-    return phased if phased.score < fitted.score - least else fitted
+    return phased if phased.score < fitted.score - least and _in_phase(phased) else fitted
 
 
 def moved_inside(lines: list[WindowedSpectrum], fitted: Fit, least: float) -> Fit:
@@ -163,7 +167,13 @@ def moved_inside(lines: list[WindowedSpectrum], fitted: Fit, least: float) -> Fi
         return fitted
     start = _along(fitted.hypothesis, inside_of(fitted.hypothesis.model, axis))
     inside = fit(lines, start, fitted.noises, iterations=FREE_STEPS, tolerance=10.0)
-    return inside if inside.score < fitted.score - least else fitted
+    return inside if inside.score < fitted.score - least and _in_phase(inside) else fitted
+
+
+def _in_phase(fitted: Fit) -> bool:
+    """Whether the last law's joint has phases that a structure can have."""
+    axis = fitted.hypothesis.causes[-1].axis
+    return axis is None or axis.out_of_phase <= MOST_OUT_OF_PHASE
 
 
 def _along(hypothesis: Hypothesis, axis: JointAxis) -> Hypothesis:

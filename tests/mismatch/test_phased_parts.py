@@ -183,6 +183,21 @@ def test_modes_come_and_go_with_both_parts(chain: ModalModel, recorded: list[Win
     np.testing.assert_allclose(turned.turned_over(1, 3).parts(3), parts * [-1, 1, -1])
 
 
+def test_a_phase_that_all_share_is_left_out(chain: ModalModel) -> None:
+    """It would turn a spring into a damper: parts that all lead by an eighth of a turn are those that do not."""
+    parts = _true_parts(chain).real
+    parts /= np.linalg.norm(parts)
+    leading = parts * np.exp(0.25j * np.pi)
+    axis = JointAxis(np.append(leading.real, leading.imag), modal_scales(chain).with_phases())
+    assert axis.out_of_phase == pytest.approx(1.0)
+    assert axis.angles == 4
+    plain = axis.turned(np.zeros(4))
+    assert plain.out_of_phase == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(plain.parts(3), parts * np.sign(plain.parts(3).real @ parts), atol=1e-12)
+    turned = plain.turned(np.array([3.0, -2.0, 1.0, 2.0])).parts(3)
+    assert np.sum(turned**2).imag == pytest.approx(0.0, abs=1e-12)
+
+
 def test_phases_are_told(chain: ModalModel) -> None:
     parts = _true_parts(chain)
     axis = JointAxis(np.append(parts.real, parts.imag), modal_scales(chain).with_phases())

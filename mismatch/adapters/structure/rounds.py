@@ -159,7 +159,7 @@ def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
             best = possible_gains(proposals, settings.evidence)
             gained = best[0].evidence if best else 0.0
             proposals += joint_candidates(lines, current, sighted, settings, least, gained)
-    if much and laws and not _explains(proposals, standing):
+    if much and laws and _no_linear_cause_leads(proposals, settings.evidence) and not _explains(proposals, standing):
         proposals += laws_by_level(lines, current, laws, settings)
     proposals += twin_laws(lines, current, possible_gains(proposals, settings.evidence)[:1], causes)
     weighed += [_candidate(one, settings.evidence) for one in proposals]
@@ -234,6 +234,15 @@ def _explains(proposals: list[Proposal[Fit]], standing: Standing) -> bool:
     if left.share <= limits.noise_like:
         return True
     return left.size <= (1 - limits.explained) * standing.before.size and not strained(hypothesis)
+
+
+def _no_linear_cause_leads(proposals: list[Proposal[Fit]], evidence: EvidenceSettings) -> bool:
+    """Whether no linear cause is the best of a round: else it is taken first, and laws are tried beside it again.
+
+    To carry laws from level to level takes longer than all other fits of a round.
+    """
+    best = possible_gains(proposals, evidence)
+    return not best or not isinstance(best[0].fitted.hypothesis.causes[-1].physics, ChainPhysics)
 
 
 def _joints_are_due(proposals: list[Proposal[Fit]], standing: Standing) -> bool:
