@@ -63,21 +63,14 @@ class JointAxis:
         return bool(np.allclose(behind, 1j * ahead, rtol=1e-9, atol=0.0))
 
     @property
-    def angles(self) -> int:
-        """Number of angles by which the axis can turn."""
-        return int(self.turns.shape[1])
-
-    @property
     def turns(self) -> Real:
-        """Change of the entries by a unit of each angle, (n_entries, n_angles).
+        """Change of the entries by a unit of each angle, (n_entries, n_entries - 1)."""
+        return TURN_STEP * across(self.entries)
 
-        A phase that all modes share is left out: a spring along parts that all lead by an eighth of a turn would be a
-        damper.
-        """
-        if not self.phased:
-            return TURN_STEP * across(self.entries[None])
-        ahead, behind = np.split(self.entries, 2)
-        return TURN_STEP * across(np.stack([self.entries, np.append(-behind, ahead)]))
+    def turned(self, angles: Real) -> "JointAxis":
+        """The axis turned by angles (n_entries - 1,), counted in :data:`TURN_STEP`."""
+        turned = self.entries + self.turns @ angles
+        return replace(self, entries=turned / np.linalg.norm(turned))
 
     @property
     def out_of_phase(self) -> float:
@@ -87,19 +80,15 @@ class JointAxis:
         ahead, behind = np.split(self.entries, 2)
         return float(np.sum(np.abs(2 * ahead * behind)) / np.sum(self.entries**2))
 
-    def turned(self, angles: Real) -> "JointAxis":
-        """The axis turned by angles (n_angles,), counted in :data:`TURN_STEP`."""
-        turned = self.entries + self.turns @ angles
-        return replace(self, entries=turned / np.linalg.norm(turned)).without_common_phase()
-
-    def without_common_phase(self) -> "JointAxis":
-        """The axis without the phase that its parts share, half that of the sum of their squares."""
+    @property
+    def common_lead(self) -> float:
+        """Phase that the parts share, rad: half that of the sum of their squares. At an eighth of a turn a spring with
+        it is a damper.
+        """
         if not self.phased:
-            return self
+            return 0.0
         ahead, behind = np.split(self.entries, 2)
-        parts = ahead + 1j * behind
-        parts = parts * np.exp(-0.5j * np.angle(np.sum(parts**2)))
-        return replace(self, entries=np.append(parts.real, parts.imag))
+        return float(0.5 * np.angle(np.sum((ahead + 1j * behind) ** 2)))
 
     def with_phases(self) -> "JointAxis":
         """The axis with a second part for each mode, a quarter of a turn ahead of the first, which is none yet."""
@@ -152,9 +141,9 @@ def _last(scales: ModalScales) -> tuple[complex, complex]:
     return complex(scales.seen[-1]), complex(scales.pushed[-1])
 
 
-def across(directions: Real) -> Real:
-    """Orthonormal vectors across directions (k, n), which are orthonormal, (n, n - k)."""
-    return np.asarray(np.linalg.svd(directions)[2][len(directions) :].T)
+def across(direction: Real) -> Real:
+    """Orthonormal vectors across a direction, (n, n - 1)."""
+    return np.asarray(np.linalg.svd(direction[None, :])[2][1:].T)
 
 
 def tip_axes(model: ModalModel) -> tuple[Real, Real, tuple[str, ...]]:

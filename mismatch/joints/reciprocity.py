@@ -44,8 +44,7 @@ def inside_of(model: ModalModel, axis: JointAxis) -> JointAxis:
     parts = 0.5 * (seen + pushed)
     size = float(np.linalg.norm(parts))
     entries = np.append(parts.real, parts.imag) / size
-    axis = JointAxis(entries, ModalScales(size * scales.seen, size * scales.pushed).with_phases())
-    return axis.without_common_phase()
+    return JointAxis(entries, ModalScales(size * scales.seen, size * scales.pushed).with_phases())
 
 
 def _doubled_phase(vectors: Complex) -> Complex:

@@ -55,7 +55,7 @@ class Cause:
     @property
     def size(self) -> int:
         """Numbers that are fitted: parameters, and angles of the axis."""
-        return len(self.values) + (self.axis.angles if self.axis is not None else 0)
+        return len(self.values) + (len(self.axis.entries) - 1 if self.axis is not None else 0)
 
     def coordinates(self) -> Real:
         """Coordinates that the fit starts from, (size,); angles are zero."""

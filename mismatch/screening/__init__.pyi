@@ -3,7 +3,7 @@ from .chain_screening import ScreenedChain, screen_chains
 from .joint_direction import JointSighting, SeenMotion, find_direction, seen_motion
 from .joint_laws_fitted import SightedLaws, joint_candidates, sighted_laws
 from .joint_screening import screen_joints
-from .joint_starts import MOST_OUT_OF_PHASE
+from .joint_starts import phases_too_large
 from .level_continuation import laws_by_level
 from .linear_causes_fitted import channel_of, linear_candidates
 from .missing_mode import SightedMode, find_mode
@@ -11,7 +11,6 @@ from .spring_twins import twin_laws
 from .whitened_residual import Floor, FloorRecord, linear_floor, noise_floor
 
 __all__ = [
-    "MOST_OUT_OF_PHASE",
     "Floor",
     "FloorRecord",
     "Gains",
@@ -29,6 +28,7 @@ __all__ = [
     "linear_candidates",
     "linear_floor",
     "noise_floor",
+    "phases_too_large",
     "screen_chains",
     "screen_joints",
     "seen_motion",

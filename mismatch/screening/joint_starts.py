@@ -22,9 +22,13 @@ FEW = 1000
 FREE_STEPS = 10
 """Steps at most of a law that is simulated freely; the one that is accepted is fitted to the end."""
 
-MOST_OUT_OF_PHASE = 0.25
-"""Share of the parts of modes in a joint that may be out of phase (:attr:`JointAxis.out_of_phase`). A damper of a tenth
-of the critical damping between ground and one of three masses makes 0.1 of it; a spring that stands for friction, 1."""
+MOST_OUT_OF_PHASE = 0.5
+"""Share of the parts of modes in a joint that may be out of phase (:attr:`JointAxis.out_of_phase`). A damper between
+ground and one of three masses, which damps their modes by 7 to 11 %, makes 0.1 to 0.36 of it
+(`tests/mismatch/test_phased_parts.py`); a spring that stands for friction 1."""
+
+MOST_COMMON_LEAD = 0.2
+"""Largest phase that all modes share in a joint, rad. That damper makes 0.06 to 0.13, a spring for friction 0.77."""
 
 SMALLEST_PART = 0.05
 """Part of a mode, over all parts, below which its sign matters little."""
@@ -173,7 +177,22 @@ def moved_inside(lines: list[WindowedSpectrum], fitted: Fit, least: float) -> Fi
 def _in_phase(fitted: Fit) -> bool:
     """Whether the last law's joint has phases that a structure can have."""
     axis = fitted.hypothesis.causes[-1].axis
-    return axis is None or axis.out_of_phase <= MOST_OUT_OF_PHASE
+    return axis is None or not phases_too_large(axis)
+
+
+def phases_too_large(axis: JointAxis) -> str:
+    """Why no structure has such phases of its modes in a joint; empty where one may.
+
+    Parameters
+    ----------
+    axis
+        Where a joint gives way.
+    """
+    if abs(axis.common_lead) > MOST_COMMON_LEAD:
+        return f"its joint would have to lead in all modes by {np.degrees(abs(axis.common_lead)):.0f} degrees"
+    if axis.out_of_phase > MOST_OUT_OF_PHASE:
+        return f"{100 * axis.out_of_phase:.0f} % of its joint's motion would have to be out of phase"
+    return ""
 
 
 def _along(hypothesis: Hypothesis, axis: JointAxis) -> Hypothesis:

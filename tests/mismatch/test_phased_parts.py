@@ -20,7 +20,7 @@ from mismatch.joints import JointAxis, JointMotion, inside_of, joint_in_words, m
 from mismatch.models import Cause, Fit, hypothesis_of, improved_model, location_of
 from mismatch.physics import JointPhysics, library
 from mismatch.physics.missing_mode import PHYSICS as MISSING_MODE
-from mismatch.screening.joint_starts import moved_inside, with_phases
+from mismatch.screening.joint_starts import moved_inside, phases_too_large, with_phases
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
@@ -34,6 +34,9 @@ DAMPING = 1e-4 * STIFFNESS + np.diag([250.0, 0.0, 0.0])
 
 JOINT = np.array([1.0, -1.0, 0.0])
 """The joint lies between the first and the second mass; the force acts on the third."""
+
+NEAR_TIP = np.array([0.0, -0.4, 1.0])
+"""A joint that moves nearly as the third mass does."""
 
 CUBIC = 4e10
 
@@ -58,14 +61,14 @@ def chain() -> ModalModel:
     return ModalModel(poles, right, left, ("TCP:+X", "ARM:+X"), ("TCP:+X",))
 
 
-def _acceleration(force: Real) -> Real:
+def _acceleration(force: Real, joint: Real) -> Real:
     """Accelerations (n, 3) of the chain with a cubic joint, by Runge-Kutta, without what lies above the recording."""
     step, inverse = 1 / (RATE * FINE), np.linalg.inv(MASSES)
     fine = np.append(resample(force, len(force) * FINE), 0.0)
 
     def slope(state: Real, push: float) -> Real:
         x, v = state[:3], state[3:]
-        inner = DAMPING @ v + STIFFNESS @ x + JOINT * CUBIC * (JOINT @ x) ** 3
+        inner = DAMPING @ v + STIFFNESS @ x + joint * CUBIC * (joint @ x) ** 3
         return np.concatenate([v, inverse @ (np.array([0.0, 0.0, push]) - inner)])
 
     state, shown = np.zeros(6), np.empty((len(fine) - 1, 3))
@@ -78,14 +81,14 @@ def _acceleration(force: Real) -> Real:
     return np.asarray(resample(shown, len(force)))
 
 
-def _recorded(model: ModalModel, level: float, seed: int) -> WindowedSpectrum:
+def _recorded(model: ModalModel, level: float, seed: int, joint: Real) -> WindowedSpectrum:
     """One recording of the chain under a smooth random force, 1 % noise."""
     rng = np.random.default_rng(seed)
     n = int(24 * RATE)
     spectrum = np.fft.rfft(rng.normal(size=n))
     spectrum[np.fft.rfftfreq(n, 1 / RATE) > 24] = 0
     force = level * np.fft.irfft(spectrum, n)
-    response = _acceleration(force)[:, [2, 1]]
+    response = _acceleration(force, joint)[:, [2, 1]]
     response += 0.01 * response.std(axis=0) * rng.normal(size=response.shape)
     motions = channels_of("acceleration", model.responses, ("ax", "arm"))
     forces = channels_of("force", model.excitations, ("fx",))
@@ -95,7 +98,7 @@ def _recorded(model: ModalModel, level: float, seed: int) -> WindowedSpectrum:
 
 @pytest.fixture(scope="module")
 def recorded(chain: ModalModel) -> list[WindowedSpectrum]:
-    return [_recorded(chain, level, seed) for seed, level in enumerate((60.0, 150.0))]
+    return [_recorded(chain, level, seed, JOINT) for seed, level in enumerate((60.0, 150.0))]
 
 
 def _true_parts(model: ModalModel) -> Complex:
@@ -151,12 +154,16 @@ def test_phases_are_given_once(recorded: list[WindowedSpectrum], real_parts: Fit
     assert with_phases(recorded, real_parts, 1e9) is real_parts
 
 
-def test_a_joint_at_the_tip_moves_inside_where_it_is(chain: ModalModel, recorded: list[WindowedSpectrum]) -> None:
-    """At the tip no number but the law's own is free: inside, the parts lead to the joint's own."""
-    tip = fit(recorded, _begun(chain, JointAxis(np.ones(1))), iterations=20)
-    inside = moved_inside(recorded, tip, LEAST)
+def test_a_joint_at_the_tip_moves_inside_where_it_is(chain: ModalModel) -> None:
+    lines = [_recorded(chain, level, seed, NEAR_TIP) for seed, level in enumerate((5.0, 12.0))]
+    tip = fit(lines, _begun(chain, JointAxis(np.ones(1))), iterations=20)
+    inside = moved_inside(lines, tip, LEAST)
     assert inside.score < tip.score - 100
-    assert moved_inside(recorded, inside, LEAST) is inside
+    axis = inside.hypothesis.causes[-1].axis
+    assert axis is not None
+    assert phases_too_large(axis) == ""
+    assert moved_inside(lines, inside, LEAST) is inside
+    assert moved_inside(lines, tip, 1e9) is tip
 
 
 def test_inside_of_the_tip_is_the_tip(chain: ModalModel, recorded: list[WindowedSpectrum]) -> None:
@@ -183,19 +190,17 @@ def test_modes_come_and_go_with_both_parts(chain: ModalModel, recorded: list[Win
     np.testing.assert_allclose(turned.turned_over(1, 3).parts(3), parts * [-1, 1, -1])
 
 
-def test_a_phase_that_all_share_is_left_out(chain: ModalModel) -> None:
-    """It would turn a spring into a damper: parts that all lead by an eighth of a turn are those that do not."""
-    parts = _true_parts(chain).real
-    parts /= np.linalg.norm(parts)
-    leading = parts * np.exp(0.25j * np.pi)
-    axis = JointAxis(np.append(leading.real, leading.imag), modal_scales(chain).with_phases())
-    assert axis.out_of_phase == pytest.approx(1.0)
-    assert axis.angles == 4
-    plain = axis.turned(np.zeros(4))
-    assert plain.out_of_phase == pytest.approx(0.0, abs=1e-12)
-    np.testing.assert_allclose(plain.parts(3), parts * np.sign(plain.parts(3).real @ parts), atol=1e-12)
-    turned = plain.turned(np.array([3.0, -2.0, 1.0, 2.0])).parts(3)
-    assert np.sum(turned**2).imag == pytest.approx(0.0, abs=1e-12)
+@pytest.mark.parametrize(
+    ("lead", "said"),
+    [((0.05, 0.05, 0.05), ""), ((0.785, 0.785, 0.785), "all modes by 45 degrees"), ((0.6, -0.6, 0.1), "out of phase")],
+)
+def test_phases_that_turn_a_spring_into_a_damper_are_impossible(
+    chain: ModalModel, lead: tuple[float, ...], said: str
+) -> None:
+    parts = np.array([0.7, 0.7, 0.3]) * np.exp(1j * np.array(lead))
+    axis = JointAxis(np.append(parts.real, parts.imag) / np.linalg.norm(parts), modal_scales(chain).with_phases())
+    assert (said in phases_too_large(axis)) if said else phases_too_large(axis) == ""
+    assert phases_too_large(JointAxis(parts.real)) == ""
 
 
 def test_phases_are_told(chain: ModalModel) -> None:

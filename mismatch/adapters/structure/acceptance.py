@@ -11,7 +11,7 @@ from estimation import WindowedSpectrum
 from ...inference import EvidenceSettings, Proposal
 from ...models import Cause, Fit, Hypothesis, fit
 from ...physics import ChainPhysics, LimitedPhysics, ModePhysics, TwinPhysics
-from ...screening import MOST_OUT_OF_PHASE
+from ...screening import phases_too_large
 
 Real = NDArray[np.float64]
 
@@ -34,9 +34,7 @@ def impossible(proposal: Proposal[Fit], settings: EvidenceSettings) -> str:
     """
     cause = proposal.fitted.hypothesis.causes[-1]
     if cause.axis is not None:
-        if cause.axis.out_of_phase > MOST_OUT_OF_PHASE:
-            return f"{100 * cause.axis.out_of_phase:.0f} % of its joint's motion would have to be out of phase"
-        return _far_modes(proposal.fitted.hypothesis, settings.farthest)
+        return phases_too_large(cause.axis) or _far_modes(proposal.fitted.hypothesis, settings.farthest)
     if isinstance(cause.physics, ModePhysics):
         return cause.physics.overdamped(complex(proposal.fitted.hypothesis.model.poles[-1]))
     said: Callable[[Real, Real], str] | None = getattr(cause.physics, "impossible", None)
