@@ -24,11 +24,11 @@ FREE_STEPS = 10
 
 MOST_OUT_OF_PHASE = 0.5
 """Share of the parts of modes in a joint that may be out of phase (:attr:`JointAxis.out_of_phase`). A damper between
-ground and one of three masses, which damps their modes by 7 to 11 %, makes 0.1 to 0.36 of it
+ground and one of three masses, which damps their modes by 7 to 11 %, makes 0.17 to 0.4 of it
 (`tests/mismatch/test_phased_parts.py`); a spring that stands for friction 1."""
 
 MOST_COMMON_LEAD = 0.2
-"""Largest phase that all modes share in a joint, rad. That damper makes 0.06 to 0.13, a spring for friction 0.77."""
+"""Largest phase that all modes share in a joint, rad. That damper makes 0.05 to 0.15, a spring for friction 0.77."""
 
 SMALLEST_PART = 0.05
 """Part of a mode, over all parts, below which its sign matters little."""
