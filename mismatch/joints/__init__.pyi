@@ -1,15 +1,14 @@
 from .axis_file import axis_location, axis_of
+from .filters_of_modes import ModalFilters, modal_filters
 from .joint_axis import JointAxis, ModalScales, tip_axes
 from .joint_law import JointLaw, JointMotion
 from .joint_paths import JointPath, JointReach, combined_model, joint_reach
 from .joint_simulation import JointResponse, driven_force, joint_dynamics, joint_response, stiffness_ramp
 from .joint_words import joint_in_words
-from .law_change_loop import law_change_run
-from .law_slopes import LawSlopes, law_quotient, law_slopes
-from .modal_filters import ModalFilters, modal_filters
+from .loops import law_change_run, tangent_run
 from .reciprocity import inside_of, modal_scales
 from .saturation import Saturation, rounded, saturated
-from .tangent_loop import tangent_run
+from .slopes_of_law import LawSlopes, law_quotient, law_slopes
 
 __all__ = [
     "JointAxis",

@@ -136,7 +136,7 @@ def combined_model(model: ModalModel, rows: Real, columns: Real) -> ModalModel:
     Parameters
     ----------
     model
-        Modal model.
+        Modal model whose responses and excitations are combined.
     rows : (n_responses, n_wanted)
         Each column is one combination of responses.
     columns : (n_excitations, m_wanted)

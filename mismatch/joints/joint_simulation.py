@@ -10,7 +10,7 @@ from estimation import WindowedSpectrum
 from modal_fit import ModalModel
 
 from .joint_law import JointLaw
-from .joint_loop import driven_run, free_run
+from .loops import driven_run, free_run
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -123,7 +123,7 @@ def joint_dynamics(
     Returns
     -------
     turn, early, late, to_x, to_v : (n_modes,)
-        As :func:`mismatch.joints.joint_loop.free_run` takes them.
+        As :func:`mismatch.joints.loops.free_run` takes them.
     """
     poles = model.poles
     z = poles * step

@@ -5,11 +5,9 @@ import pytest
 from hidden_joint import MOTION, law_of
 from scipy.fft import irfft, rfft
 
+from mismatch.joints import modal_filters
 from mismatch.joints.joint_law import JointMotion
-from mismatch.joints.joint_loop import driven_run
-from mismatch.joints.law_change_loop import law_change_run
-from mismatch.joints.modal_filter_loop import filters_run
-from mismatch.joints.modal_filters import modal_filters
+from mismatch.joints.loops import driven_run, filters_run, law_change_run
 from mismatch.models.cause import Cause
 from mismatch.models.slopes.law_changes import cause_slopes
 from mismatch.physics import FreeForm

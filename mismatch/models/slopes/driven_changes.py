@@ -113,9 +113,9 @@ def driven_change(
     hypothesis
         Hypothesis at which the derivative is taken.
     joint
-        The joint.
+        The joint whose driven motion changes.
     driving
-        What drives it.
+        Forces at padded lines that drive it, and their changes.
     lines
         Windowed spectrum of the recording.
     size

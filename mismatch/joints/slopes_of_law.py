@@ -76,7 +76,7 @@ def law_quotient(law: JointLaw, aside: JointLaw, step: float) -> JointLaw:
     law, aside
         The law, and the law with a coordinate a step aside; both have the same elements.
     step
-        That step.
+        Length of that step, in the coordinate's unit of a fit.
     """
     return JointLaw(
         law.reach,

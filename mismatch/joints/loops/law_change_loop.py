@@ -31,7 +31,7 @@ def law_change_run(
     law
         Ends of the tables' axes, deflection (m) and velocity (m/s), and the elements' yields (m), (n_elements,).
     slopes
-        Parts of :class:`mismatch.joints.law_slopes.LawSlopes`, and the share of the recording's duration between two
+        Parts of :class:`mismatch.joints.LawSlopes`, and the share of the recording's duration between two
         instants.
     memory
         How far each element is stretched (m), and the direction in which it last slipped (0: never), (n_elements,);

@@ -14,7 +14,7 @@ from scipy.fft import irfft
 
 from cutting import compiled
 
-from .modal_filter_loop import MOMENTS
+from .loops import MOMENTS
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

@@ -26,7 +26,7 @@ def filters_run(
     Parameters
     ----------
     sources : (n, n_sources MOMENTS + n_direct)
-        Sources of :class:`mismatch.joints.modal_filters.ModalFilters` at all instants.
+        Sources of :class:`mismatch.joints.ModalFilters` at all instants.
     begin
         The first instant of the part.
     state : (2 n_states,)

@@ -30,7 +30,7 @@ def tangent_run(
 ) -> None:
     """Write the change of a joint's force for every column of a change of its law, or of what drives it.
 
-    Along the motion of :func:`mismatch.joints.joint_loop.free_run`, ``dg = e + g_x dx + g_v dv + memory`` with
+    Along the motion of :func:`mismatch.joints.loops.free_run`, ``dg = e + g_x dx + g_v dv + memory`` with
     ``dx = dx_driven - (h * dg)``: linear, but with slopes that change from instant to instant. An element that sticks
     since an instant ``t_i`` adds ``k_i (dx - dx(t_i))``, one that slips nothing.
 
@@ -43,11 +43,11 @@ def tangent_run(
     law
         Tables, spans, ramp and elements of the free run.
     slopes
-        Change e of the law: parts of :class:`mismatch.joints.law_slopes.LawSlopes`, and the share of the recording's
+        Change e of the law: parts of :class:`mismatch.joints.LawSlopes`, and the share of the recording's
         duration between two instants. These columns come first.
     filters
         Sources, start, ``turns`` with ``inputs`` and ``direct``, ``n_modes`` with ``step`` of
-        :class:`mismatch.joints.modal_filters.ModalFilters`: changes of the driven motion that are modal filters.
+        :class:`mismatch.joints.ModalFilters`: changes of the driven motion that are modal filters.
         These columns come next.
     given
         Other changes of the driven deflection (m) and velocity (m/s), each (n, n_given). These columns come last.
