@@ -18,8 +18,8 @@ Real = NDArray[np.float64]
 INSTANTS_PER_PERIOD = 20.0
 """Instants of the simulation in one period of the highest mode."""
 
-FINEST = 20
-"""Instants for each sample at most: of a mode beyond the sampling rate, which a fit may try, nothing is recorded. It
+FEWEST, FINEST = 4, 20
+"""Instants for each sample, at least and at most: of a mode beyond the sampling rate, which a fit may try, nothing is recorded. It
 follows the joint's force without delay, and each step of the simulation is exact for a force that runs straight."""
 
 
@@ -48,12 +48,16 @@ def fineness(model: ModalModel, lines: WindowedSpectrum) -> int:
     """
     highest = max(float(model.natural_frequencies.max()), float(lines.frequencies[-1]))
     wanted = INSTANTS_PER_PERIOD * highest / lines.recording.rate
-    # a multiple of four: derivatives follow every second or fourth instant, where that is enough (`substeps`)
-    return int(np.clip(4 * np.ceil(min(wanted, FINEST) / 4), 4, FINEST))
+    return int(np.clip(FEWEST * np.ceil(min(wanted, FINEST) / FEWEST), FEWEST, FINEST))
 
 
 def substeps(model: ModalModel, rate: float, fine: int) -> int:
-    """Instants for each sample at which a motion is kept: a divisor of ``fine`` that follows the highest mode."""
+    """Instants for each sample at which a motion is kept: a divisor of ``fine`` that follows the highest mode.
+
+    Where the band's end asks for more instants, all are kept: derivatives under dry friction feel what lies between.
+    """
+    if fine > FEWEST:
+        return fine
     wanted = INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate
     return next((k for k in range(1, fine) if fine % k == 0 and k >= wanted), fine)
 
