@@ -18,8 +18,8 @@ Real = NDArray[np.float64]
 INSTANTS_PER_PERIOD = 20.0
 """Instants of the simulation in one period of the highest mode."""
 
-FEWEST, FINEST = 4, 20
-"""Instants for each sample, at least and at most: of a mode beyond the sampling rate, which a fit may try, nothing is recorded. It
+FINEST = 20
+"""Instants for each sample at most: of a mode beyond the sampling rate, which a fit may try, nothing is recorded. It
 follows the joint's force without delay, and each step of the simulation is exact for a force that runs straight."""
 
 
@@ -40,24 +40,14 @@ class JointResponse:
     velocity: Real
 
 
-def fineness(model: ModalModel, lines: WindowedSpectrum) -> int:
-    """Instants of the simulation for each sample of the recording: the band's end needs as many as the highest mode.
-
-    A joint's force has harmonics, which the compared band shows up to its end. With eight instants in a period there
-    the exponent of a cubic spring was found as 3.09.
-    """
-    highest = max(float(model.natural_frequencies.max()), float(lines.frequencies[-1]))
-    wanted = INSTANTS_PER_PERIOD * highest / lines.recording.rate
-    return int(np.clip(FEWEST * np.ceil(min(wanted, FINEST) / FEWEST), FEWEST, FINEST))
+def fineness(model: ModalModel, rate: float) -> int:
+    """Instants of the simulation for each sample of the recording."""
+    wanted = INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate
+    return int(np.clip(np.ceil(min(wanted, FINEST)), 4, FINEST))
 
 
 def substeps(model: ModalModel, rate: float, fine: int) -> int:
-    """Instants for each sample at which a motion is kept: a divisor of ``fine`` that follows the highest mode.
-
-    Where the band's end asks for more instants, all are kept: derivatives under dry friction feel what lies between.
-    """
-    if fine > FEWEST:
-        return fine
+    """Instants for each sample at which a motion is kept: a divisor of ``fine`` that follows the highest mode."""
     wanted = INSTANTS_PER_PERIOD * float(model.natural_frequencies.max()) / rate
     return next((k for k in range(1, fine) if fine % k == 0 and k >= wanted), fine)
 
@@ -81,7 +71,7 @@ def joint_response(
         Force law of the joint.
     """
     frequencies = lines.padded_frequencies
-    fine = fineness(model, lines)
+    fine = fineness(model, lines.recording.rate)
     n = fine * lines.padded
     finer = fine * free
     deflection = irfft(finer, n=n)

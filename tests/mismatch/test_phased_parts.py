@@ -26,7 +26,7 @@ from modal_fit import ModalModel
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-RATE, FINE, LEAST = 128.0, 16, 20.0
+RATE, FINE, LEAST = 256.0, 8, 20.0
 MASSES = np.diag([6.0, 5.0, 4.0])
 STIFFNESS = 3e4 * np.array([[2.2, -1.0, 0.0], [-1.0, 1.7, -0.7], [0.0, -0.7, 0.9]])
 DAMPING = 1e-4 * STIFFNESS + np.diag([250.0, 0.0, 0.0])
