@@ -14,9 +14,6 @@ from .joint_axis import JointAxis, tip_axes
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
-PART = "MODE"
-"""Node of the degrees of freedom that stand for parts of modes in joints."""
-
 
 @dataclass(frozen=True)
 class JointPath:
@@ -77,10 +74,8 @@ class JointReach:
         The first is the joint's deflection, the second a unit of its force: what parts of modes a joint has does not
         count where only these are asked for, and there may be many.
         """
-        n, m = (
-            sum(not label.startswith(PART) for label in labels)
-            for labels in (self.model.responses, self.model.excitations)
-        )
+        more = sum(len(path.axis.entries) for path in self.paths if path.axis.scales is not None)
+        n, m = len(self.model.responses) - more, len(self.model.excitations) - more
         rows = np.hstack([np.eye(len(self.model.responses), n), *(path.along[:, None] for path in self.paths)])
         columns = np.hstack([np.eye(len(self.model.excitations), m), *(path.push[:, None] for path in self.paths)])
         return combined_model(self.model, rows, columns)
@@ -106,7 +101,7 @@ def joint_reach(model: ModalModel, axes: Sequence[JointAxis]) -> JointReach:
     more = sum(len(scales.seen) for scales in inner)
     widened = model
     if inner:
-        names = tuple(f"{PART} {place % count + 1}:+S" for place in range(more))
+        names = tuple(f"MODE {place % count + 1}:+S" for place in range(more))
         widened = replace(
             model,
             right=np.hstack([model.right, *(_of_modes(scales.seen, count) for scales in inner)]),
