@@ -212,3 +212,10 @@ def test_phases_are_told(chain: ModalModel) -> None:
     leads = np.degrees(np.angle(parts * np.sign(parts.real)))
     assert [one["lead_deg"] for one in told] == pytest.approx(leads, abs=0.01)
     assert joint_in_words({"participation": told}).startswith("inside: the mode at ")
+
+
+def test_a_node_may_be_called_as_parts_of_modes_are(chain: ModalModel, recorded: list[WindowedSpectrum]) -> None:
+    named = replace(chain, responses=("MODE1:+X", "ARM:+X"), excitations=("MODE1:+X",))
+    plain, other = (_begun(model, inside_of(model, JointAxis(np.ones(1)))) for model in (chain, named))
+    one, same = (predict_lines(hypothesis, recorded[0]).response for hypothesis in (plain, other))
+    np.testing.assert_allclose(same, one, rtol=1e-9)
