@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from modal_fit import ModalModel
 
-from .modal_loops import modal_displacement
+from .modal_loops import add_outside, modal_displacement
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -41,9 +41,34 @@ def displacement_at(model: ModalModel, frequencies: Real, force: Complex) -> Com
     s = np.asarray(2j * np.pi * frequencies, dtype=complex)
     out = np.empty((len(s), model.right.shape[1]), dtype=complex)
     modal_displacement(s, model.poles, model.right, model.left, np.ascontiguousarray(force), out)
-    if model.residuals is not None:
-        plain = replace(model.residuals, lower=np.zeros_like(model.residuals.lower))
-        out += np.einsum("kpq,kq->kp", plain.receptance(s), force)
-        inside = (frequencies >= model.natural_frequencies.min() / 3) & (frequencies > 0)
-        out[inside] += (force[inside] @ model.residuals.lower.T) / s[inside, None] ** 2
+    _add_outside(model, s, force, out)
     return out * np.exp(-s * model.delay)[:, None] if model.delay else out
+
+
+def outside_displacement(model: ModalModel, frequencies: Real, force: Complex) -> Complex:
+    """The part of :func:`displacement_at` that modes outside the band make, (n, n_responses).
+
+    Parameters
+    ----------
+    frequencies : (n,), Hz
+        Frequencies of the lines, from 0 Hz on.
+    force : (n, n_excitations), N
+        Force spectrum at the lines.
+    """
+    s = np.asarray(2j * np.pi * frequencies, dtype=complex)
+    out = np.zeros((len(s), model.right.shape[1]), dtype=complex)
+    _add_outside(model, s, force, out)
+    return out * np.exp(-s * model.delay)[:, None] if model.delay else out
+
+
+def _add_outside(model: ModalModel, s: Complex, force: Complex, out: Complex) -> None:
+    """Add the residual terms' part; under a third of the lowest mode a residual inertia is left out."""
+    if model.residuals is None:
+        return
+    own = model.residuals
+    poles = np.zeros(0, dtype=complex) if own.poles is None else np.asarray(own.poles, dtype=complex)
+    residues = np.zeros((0, *own.upper.shape)) if own.residues is None else own.residues
+    lowest = 2 * np.pi * float(model.natural_frequencies.min()) / 3
+    plain = (np.ascontiguousarray(own.upper, dtype=float), np.ascontiguousarray(own.lower, dtype=float))
+    terms = (np.ascontiguousarray(poles), np.ascontiguousarray(residues, dtype=complex))
+    add_outside(s, terms, plain, lowest, np.ascontiguousarray(force, dtype=complex), out)

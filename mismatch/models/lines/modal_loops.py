@@ -48,6 +48,44 @@ def modal_displacement(s: Complex, poles: Complex, right: Complex, left: Complex
 
 
 @compiled
+def add_outside(
+    s: Complex, terms: tuple[Complex, Complex], plain: tuple[Real, Real], lowest: float, force: Complex, out: Complex
+) -> None:
+    """Add what modes outside the band make of forces.
+
+    ``(U + L / s^2 + sum_n R_n / (s - p_n) + conjugate) F``; at lines below ``lowest`` without L.
+
+    Parameters
+    ----------
+    s : (n,), rad/s
+        Laplace variable ``i omega`` of the lines.
+    terms
+        Poles (n_terms,) outside the band, rad/s, and residues (n_terms, n_responses, n_excitations), m/(N s).
+    plain
+        Residual flexibility U, m/N, and residual inertia L, 1/kg, each (n_responses, n_excitations).
+    lowest
+        Angular frequency from which L counts, rad/s.
+    force : (n, n_excitations), N
+        Force spectrum at the lines.
+    out : (n, n_responses), m
+        Is added to: the displacement at the lines.
+    """
+    poles, residues = terms
+    upper, lower = plain
+    for k in range(len(s)):
+        inverse_square = over(s[k] * s[k]) if s[k].imag >= lowest and s[k].imag > 0.0 else 0.0j
+        for p in range(upper.shape[0]):
+            for q in range(upper.shape[1]):
+                out[k, p] += (upper[p, q] + inverse_square * lower[p, q]) * force[k, q]
+        for n in range(len(poles)):
+            up, down = over(s[k] - poles[n]), over(s[k] - poles[n].conjugate())
+            for p in range(upper.shape[0]):
+                for q in range(upper.shape[1]):
+                    residue = residues[n, p, q]
+                    out[k, p] += (up * residue + down * residue.conjugate()) * force[k, q]
+
+
+@compiled
 def modal_slopes(
     s: Complex,
     force: Complex,

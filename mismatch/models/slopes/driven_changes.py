@@ -1,6 +1,6 @@
 """What changes of everything that is fitted do to a joint's driven motion, as its tangent run takes it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,8 @@ from modal_fit import ModalModel
 
 from ...joints import JointPath, ModalFilters, combined_model, modal_filters
 from ..hypothesis import Hypothesis
-from ..lines import displacement_at, driven_basis, modal_displacement
-from ..model_shape import ModelShape
+from ..lines import displacement_at, driven_basis, modal_displacement, outside_displacement
+from ..outside_band import OutsideBand
 from .driven_mix import driven_mix
 
 Complex = NDArray[np.complex128]
@@ -130,14 +130,17 @@ def driven_change(
     sources, pushes = _sources(model, (felt, m), (*driving.joints, (joint.force, joint.path.push)))
     modes = (model.poles[slow], pushes[slow], (model.right @ along)[slow])
     filters = modal_filters(often * sources, (often * lines.padded, step), modes, (m, rates))
+    # modes outside the band take no part in a joint inside
+    outside = None if joint.path.axis.scales is not None else shape.outside
     signals: list[NDArray[np.complexfloating]] = [
         _fast_signals(model, ~slow, frequencies, (felt, m), along),
-        _outside_signals(shape, frequencies, driving.force[:, :m]),
+        _outside_signals(outside, frequencies, driving.force[:, :m]),
         _angle_signals(model, joint, frequencies, driving.force, (sources, pushes)),
     ]
     turns = np.eye(signals[-1].shape[1], hypothesis.size, joint.angles)
     signals += [_moved_signal(model, moved, frequencies, along) for moved in driving.moved]
     modal = np.pad(driven_mix(shape, model, along), ((0, 0), (0, hypothesis.size - shape.size)))
+    modal = modal if outside is not None else modal[: len(slow) * (2 + 2 * m)]
     mix = [modal[_order(slow, m, len(modal))], turns, *(moved.mix for moved in driving.moved)]
     return DrivenChange(filters, _in_time(signals, lines, size), np.vstack(mix))
 
@@ -177,11 +180,11 @@ def _fast_signals(
     return signals
 
 
-def _outside_signals(shape: ModelShape, frequencies: Real, outer: Complex) -> Complex:
+def _outside_signals(outside: OutsideBand | None, frequencies: Real, outer: Complex) -> Complex:
     """The outer force through each of the terms that stand for modes outside the band."""
-    if shape.outside is None:
+    if outside is None:
         return np.zeros((len(outer), 0), dtype=complex)
-    basis = shape.outside.basis(np.asarray(2j * np.pi * frequencies, dtype=complex))
+    basis = outside.basis(np.asarray(2j * np.pi * frequencies, dtype=complex))
     return np.concatenate([one[:, None] * outer for one in basis], axis=1)
 
 
@@ -201,9 +204,8 @@ def _angle_signals(
     one = np.ones((len(back), 1), dtype=complex)
     modal_displacement(s, model.poles, back, one, np.ascontiguousarray(joint.force[:, None]), pushed)
     signals -= pushed
-    if model.residuals is not None:
-        whole, modes = (displacement_at(one, frequencies, outer) for one in (model, replace(model, residuals=None)))
-        signals += (whole - modes) @ seen
+    if model.residuals is not None and path.axis.scales is None:
+        signals += outside_displacement(combined_model(model, seen, np.eye(outer.shape[1])), frequencies, outer)
     return signals
 
 
