@@ -107,19 +107,30 @@ def descend(problem: Problem[State], start: State, limits: Limits) -> Descended[
             break
         before = problem.cost(state)
         farther = _downhill(problem, state, step, expected, limits)
-        if not problem.cost(farther) < before:
+        equations = None
+        if problem.cost(farther) < before:
+            farther = problem.settled(farther)
+            equations = _equations(problem, farther)
+        if equations is None:
             if damping > limits.most_damping:
                 break
             damping = max(10 * damping, 0.1)
             continue
         damping /= 10
-        state = problem.settled(farther)
+        state, (matrix, gradient) = farther, equations
         # nuisance numbers may still be settling when a step gains nothing
         idle = idle + 1 if before - problem.cost(state) < limits.tolerance else 0
         if idle == limits.idle:
             break
-        matrix, gradient = problem.normal_equations(state)
     return Descended(state, matrix)
+
+
+def _equations(problem: Problem[State], state: State) -> tuple[Real, Real] | None:
+    """Normal equations of a state; None where derivatives run away, so that no step leads there."""
+    try:
+        return problem.normal_equations(state)
+    except np.linalg.LinAlgError:
+        return None
 
 
 def _downhill(problem: Problem[State], here: State, step: Real, expected: float, limits: Limits) -> State:
