@@ -1,5 +1,5 @@
 from .cause import Cause, held_values, location_of
-from .fitting import ENOUGH, Fit, fit, modes_are_odd, plain_fit, residual
+from .fitting import ENOUGH, Fit, fit, modes_are_odd, residual
 from .freed_laws import EVERYTHING, with_free_forms, with_linear_part
 from .hypothesis import Hypothesis, line_response, predict_lines, surround
 from .linear_lines import response_to_joint
@@ -7,6 +7,7 @@ from .lines import receptance_at
 from .misfit import known_noise, least_misfit, levels, outdoes_noise, shares_left, through_structure, whitened
 from .model_shape import ModelShape
 from .model_terms import hypothesis_of, improved_model
+from .plain_fits import even_fit, plain_fit
 from .refinement import believed, following_all, gives_one_up, settled, with_chain
 from .slopes import jacobian
 
@@ -18,6 +19,7 @@ __all__ = [
     "Hypothesis",
     "ModelShape",
     "believed",
+    "even_fit",
     "fit",
     "following_all",
     "gives_one_up",

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from estimation import WindowedSpectrum
 
 from ..inference import Descended, Limits, descend, plain_step
-from ..noise import NoiseModel, flat_noise
+from ..noise import NoiseModel
 from ..physics import MODAL_PARAMETERS
 from .hypothesis import Hypothesis, predict_lines
 from .misfit import Misfit, misfit_under, whitened, with_noise
@@ -22,9 +22,6 @@ THREADS = 2
 
 ENOUGH, LEFT_OUT = 4000, 3
 """Lines of a recording on which a fit begins if it has more, and the steps on all lines that this saves."""
-
-EXACT = 0.01
-"""Error, over the response, that a plain fit takes every line to have."""
 
 BLOCK = 512
 """Lines whose derivatives are worked out together."""
@@ -66,6 +63,7 @@ def fit(
     iterations: int = 8,
     tolerance: float = 3.0,
     held: bool = False,
+    rival: float = np.inf,
 ) -> Fit:
     """Fit a hypothesis to recordings.
 
@@ -87,6 +85,8 @@ def fit(
         Gain in misfit that counts: the fit ends after two smaller gains, or where less than a tenth of it is expected.
     held
         Whether ``noises`` are held, and not estimated.
+    rival
+        ``misfit + |u|^2`` that another fit has reached: where this one cannot come below it, it ends early.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def fit(
         With an infinite misfit and score where the start runs away when it is simulated: nothing then speaks for it.
     """
     try:
-        return _fit(lines, start, noises, iterations, tolerance, held)
+        return _fit(lines, start, noises, Limits(iterations, tolerance, rival=rival), held)
     except np.linalg.LinAlgError:
         size = start.size
         return Fit(start, noises or (), np.inf, _deviation(start), np.inf, np.zeros((size, size)))
@@ -104,8 +104,7 @@ def _fit(
     lines: list[WindowedSpectrum],
     start: Hypothesis,
     noises: tuple[NoiseModel, ...] | None,
-    iterations: int,
-    tolerance: float,
+    limits: Limits,
     held: bool,
 ) -> Fit:
     """The fit of a start that can be simulated."""
@@ -113,10 +112,11 @@ def _fit(
     with ThreadPoolExecutor(THREADS) as pool:
         rough = [one.thinned(ENOUGH) for one in lines]
         if any(few is not one for few, one in zip(rough, lines, strict=True)):
-            state = _descended(pool, rough, hypothesis, known, Limits(iterations, tolerance), held).state
+            # on fewer lines a cost is less
+            state = _descended(pool, rough, hypothesis, known, replace(limits, rival=np.inf), held).state
             hypothesis, known = state.hypothesis, tuple(one.noise for one in state.seen)
-            iterations = max(0, iterations - LEFT_OUT)
-        end = _descended(pool, lines, hypothesis, known, Limits(iterations, tolerance), held)
+            limits = replace(limits, most=max(0, limits.most - LEFT_OUT))
+        end = _descended(pool, lines, hypothesis, known, limits, held)
         hypothesis, seen = end.state.hypothesis, end.state.seen
         if not held:
             cold = list(pool.map(with_noise, lines, [hypothesis] * len(lines), [None] * len(lines), seen))
@@ -203,27 +203,6 @@ def _descended(
     else:
         seen = list(pool.map(with_noise, lines, [start] * len(lines), current))
     return descend(_Problem(pool, lines, held), _State(start, seen), limits)
-
-
-def plain_fit(lines: list[WindowedSpectrum], start: Hypothesis, *, iterations: int, exact: float = EXACT) -> Fit:
-    """Fit by unweighted least squares: every line counts alike, at whatever frequency and level.
-
-    No noise is inferred. Each response is scaled by its power over all recordings, and the lab's belief hardly counts.
-
-    Parameters
-    ----------
-    lines
-        Windowed spectra of the recordings that are compared.
-    start
-        Hypothesis that the fit begins with.
-    iterations
-        Number of steps at most.
-    exact
-        Error, over the response, that every line is taken to have: the larger it is, the more the lab's belief counts.
-    """
-    power = np.mean([np.mean(np.abs(one.measured) ** 2, axis=0) for one in lines], axis=0)
-    noises = tuple(flat_noise(one.frequencies, exact**2 * power, one.force_here.shape[1]) for one in lines)
-    return fit(lines, start, noises, iterations=iterations, held=True)
 
 
 def residual(fitted: Fit, lines: list[WindowedSpectrum]) -> list[Complex]:

@@ -8,11 +8,15 @@ from estimation import WindowedSpectrum
 
 from ..physics import ChainPhysics
 from .cause import Cause
-from .fitting import Fit, fit, modes_are_odd, plain_fit
+from .fitting import Fit, fit, modes_are_odd
 from .hypothesis import Hypothesis
 from .misfit import shares_left
+from .plain_fits import plain_fit
 
 ITERATIONS, FROM_BELIEF, FROM_PLAIN = 60, 60, 20
+
+TOLERANCE, AT_REST = 3.0, 5e-4
+"""Gain of a step from which a fit has come to rest, and as a share of what its last cause gained."""
 
 EXACT = 0.03
 """Error, over the response, that a plain fit takes every line to have: where a fit that gave up a recording begins."""
@@ -21,7 +25,7 @@ FAR_WORSE = 2.0
 """Share left of one recording over that of another from which the fit has given the first up."""
 
 
-def settled(lines: list[WindowedSpectrum], fitted: Fit) -> Fit:
+def settled(lines: list[WindowedSpectrum], fitted: Fit, gained: float = 0.0) -> Fit:
     """Fit until it rests; if the modes then look odd, fit again from the lab's model and keep the better of both.
 
     A cause of changed stiffness and the modes it changes run along one long valley: a search that began beside it may
@@ -33,11 +37,15 @@ def settled(lines: list[WindowedSpectrum], fitted: Fit) -> Fit:
         Windowed spectra of the recordings that are compared.
     fitted
         A fit of a few steps, from which the search goes on.
+    gained
+        What its last cause has gained in score.
     """
-    rested = fit(lines, fitted.hypothesis, fitted.noises, iterations=ITERATIONS)
+    least = max(TOLERANCE, AT_REST * gained)
+    rested = fit(lines, fitted.hypothesis, fitted.noises, iterations=ITERATIONS, tolerance=least)
     if not modes_are_odd(rested) or not rested.hypothesis.has_added_physics:
         return rested
-    again = fit(lines, believed(rested.hypothesis), rested.noises, iterations=ITERATIONS)
+    fresh, reached = believed(rested.hypothesis), rested.misfit + rested.deviation
+    again = fit(lines, fresh, rested.noises, iterations=ITERATIONS, tolerance=least, rival=reached)
     return min(rested, again, key=lambda one: one.score)
 
 
@@ -100,7 +108,8 @@ def with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Fit
         return fitted
     absent = replace(cause, values=cause.physics.start(hypothesis.shape.nominal))
     fresh = believed(hypothesis).with_cause(absent)
-    return min(fitted, fit(lines, fresh, iterations=FROM_BELIEF), key=lambda one: one.score)
+    again = fit(lines, fresh, iterations=FROM_BELIEF, rival=fitted.misfit + fitted.deviation)
+    return min(fitted, again, key=lambda one: one.score)
 
 
 def believed(hypothesis: Hypothesis) -> Hypothesis:

@@ -142,8 +142,11 @@ def _without(
     comparison: StructureComparison, both: Recordings, found: Search[Fit], place: int, faults: list[AcceptedCause]
 ) -> tuple[Search[Fit], HeldOut]:
     """The search without one of its causes, and what the others are worth on what was held out."""
-    loss = found.accepted[place].evidence
-    found = released(found, place, comparison.without(found, place), "small beside what is left", loss)
+    loss, less = found.accepted[place].evidence, comparison.without(found, place)
+    if place == len(found.accepted) - 1:
+        # what the others became with it may run away without it
+        less = min(less, found.steps[place], key=lambda one: one.score)
+    found = released(found, place, less, "small beside what is left", loss)
     last, proof = found.current, comparison.settings.proof
     return found, held_out_improvement(both, last.hypothesis, last.noises, faults, proof)
 

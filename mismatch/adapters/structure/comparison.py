@@ -84,7 +84,7 @@ class StructureComparison:
         good = possible_gains(weighed.proposals, evidence)
         while (first := plainest(good, evidence.as_good)) is not None:
             best = twins_of(first, good, evidence.small)[0]
-            rested = settled(self.lines, best.fitted)
+            rested = settled(self.lines, best.fitted, best.evidence)
             chosen = replace(best, fitted=rested, evidence=search.current.score - rested.score)
             good = [one for one in good if one is not best]
             if impossible(chosen, evidence):

@@ -32,6 +32,7 @@ from .comparison import StructureComparison
 from .confirmation import confirmed
 from .free_forms import freed_answer
 from .held_out import recordings_of
+from .last_fit import last_fit
 from .prediction import OfferedModel, offered_model
 from .structure_verdict import equivalents_of_answer
 
@@ -119,8 +120,10 @@ def _diagnosed(
     progress("what is left")
     answer = answer_of(comparison, both, proof.found, proof.held_out, faults, decay)
     progress("form of the law")
-    freed = freed_answer(answer, comparison, both, [one for one in answer.causes if is_fault(one.name)])
-    answer = freed.answer
+    told_faults = [one for one in answer.causes if is_fault(one.name)]
+    freed = freed_answer(answer, comparison, both, told_faults)
+    last = last_fit(freed.answer, both, told_faults, settings.proof)
+    answer = last.answer
     found = answer.found
     progress("where the mismatch sits")
     band = max(bands, key=lambda band: band.high)
@@ -153,7 +156,7 @@ def _diagnosed(
             "behaviour": behaviour.content(),
             "free_form": freed.content(),
             "noise": _noise_of(answer.final, measured),
-            "improved_model": _offered(answer, measured).content(),
+            "improved_model": _offered(answer, measured, last.sentence).content(),
         },
     )
 
@@ -165,10 +168,11 @@ def _beside(faults: Sequence[AcceptedCause], settings: Settings) -> Settings:
     return replace(settings, evidence=evidence)
 
 
-def _offered(answer: Answer, measured: list[WindowedSpectrum]) -> OfferedModel:
-    """Which model is offered to predict with."""
+def _offered(answer: Answer, measured: list[WindowedSpectrum], last: str) -> OfferedModel:
+    """Which model is offered to predict with, and what its last fit brings."""
     gain = answer.held_out.improvement
-    return offered_model(answer.verdict, answer.final.hypothesis, measured, answer.causes, gain)
+    offer = offered_model(answer.verdict, answer.final.hypothesis, measured, answer.causes, gain)
+    return replace(offer, sentence=" ".join(one for one in (offer.sentence, last) if one))
 
 
 def _noise_of(final: Fit, lines: list[WindowedSpectrum]) -> list[dict[str, Any]]:
