@@ -12,6 +12,7 @@ from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
 PLACE = ("TCP:+X",)
+NOISE, PERIOD, PERIODS = 0.01, 1024, 8
 
 
 @dataclass(frozen=True)
@@ -108,6 +109,17 @@ class Rig:
 
 
 _ORDERS = {"displacement": 0, "angle": 0, "velocity": 1, "angular_velocity": 1, "acceleration": 2, "voltage": 0}
+
+
+def steady(rig: Rig, name: str, level: float, seed: int) -> BandRecording:
+    """Eight periods of a multisine of 2 to 22 Hz, once the rig has settled."""
+    rng = np.random.default_rng(seed)
+    spectrum = np.zeros(PERIOD // 2 + 1, dtype=complex)
+    lines = np.arange(round(2 * PERIOD / rig.rate), round(22 * PERIOD / rig.rate))
+    spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
+    period = np.fft.irfft(spectrum, n=PERIOD)
+    one = rig.recording(name, np.tile(level * period / period.std(), PERIODS + 2), NOISE, seed)
+    return replace(one, force=one.force[2 * PERIOD :], response=one.response[2 * PERIOD :])
 
 
 def written(folder: Path, recording: BandRecording) -> Path:

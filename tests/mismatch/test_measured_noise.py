@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from one_mode_rig import Rig
+from one_mode_rig import NOISE, PERIOD, Rig, steady
 
 from benchmarks.blind_trial.case_spec import draw_cases
 from benchmarks.blind_trial.sealed_case import write_case
@@ -16,19 +16,6 @@ from mismatch.models import outdoes_noise
 from mismatch.noise.noise_model import fit_noise
 from mismatch.records import compared_band, compared_lines, with_measured_noise
 from modal_fit import read_modal_model
-
-NOISE, PERIOD, PERIODS = 0.01, 1024, 8
-
-
-def steady(rig: Rig, name: str, level: float, seed: int) -> BandRecording:
-    """Eight periods of a multisine of 2 to 22 Hz, once the rig has settled."""
-    rng = np.random.default_rng(seed)
-    spectrum = np.zeros(PERIOD // 2 + 1, dtype=complex)
-    lines = np.arange(round(2 * PERIOD / rig.rate), round(22 * PERIOD / rig.rate))
-    spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines)))
-    period = np.fft.irfft(spectrum, n=PERIOD)
-    one = rig.recording(name, np.tile(level * period / period.std(), PERIODS + 2), NOISE, seed)
-    return replace(one, force=one.force[2 * PERIOD :], response=one.response[2 * PERIOD :])
 
 
 @pytest.mark.parametrize("levels", [(1.0, 4.0), (4.0,)])

@@ -1,0 +1,80 @@
+"""The last fit counts every recording alike: it predicts better where a law has another form, and is left out else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hidden_joint import at_the_joint, law_of
+from one_mode_rig import Rig, steady
+
+from estimation import WindowedSpectrum, windowed_spectrum
+from mismatch import Hypothesis, LabError, ModelShape, Settings, band_of
+from mismatch.adapters.structure.answer import Answer
+from mismatch.adapters.structure.held_out import held_out_improvement, recordings_of
+from mismatch.adapters.structure.last_fit import last_fit
+from mismatch.inference import Search
+from mismatch.models import Fit, even_fit, fit, plain_fit
+from mismatch.records import Recordings, compared_band, compared_lines
+from mismatch.remainder import leftover
+
+LEVELS = (1.0, 4.0)
+RIG = Rig().stiffened(0.3, 4.0)
+
+
+def _read() -> list[WindowedSpectrum]:
+    """Two levels of a cubic spring that repeat, so that their noise is known."""
+    band = compared_band(RIG.model, RIG.rate, None)
+    return [compared_lines(steady(RIG, f"level_{level:g}", level, 5), band, 1.0)[0] for level in LEVELS]
+
+
+def _answer(law: str, values: list[float]) -> tuple[Answer, Recordings]:
+    """What is told where a law was fitted."""
+    lines = _read()
+    shape = ModelShape(RIG.model, LabError())
+    base = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=15)
+    begun = base.hypothesis.nominal.with_cause(at_the_joint(law_of(law), np.array(values)))
+    fitted = fit(lines, begun, iterations=40)
+    both = recordings_of(lines, lines, base.hypothesis)
+    worth = held_out_improvement(both, fitted.hypothesis, fitted.noises, (), Settings().proof)
+    found = Search((base, fitted))
+    return Answer("partly explained", (), fitted, found, leftover(fitted.hypothesis, lines), worth), both
+
+
+def test_a_law_of_another_form_predicts_better() -> None:
+    answer, both = _answer("backlash", [0.3 * RIG.stiffness, 1e-4])
+    assert answer.held_out.improvement.after > 1.5 * answer.held_out.improvement.noise_floor
+    last = last_fit(answer, both, (), Settings().proof)
+    assert last.answer is not answer
+    for one in ("improvement", "everywhere"):
+        assert getattr(last.answer.held_out, one).after < getattr(answer.held_out, one).after
+    assert "every recording counts alike" in last.sentence
+    # its score is a likelihood's, under noise of its own, and so it is worse than the likeliest
+    assert answer.final.score < last.answer.final.score < np.inf
+
+
+def test_the_true_law_is_left_as_it_is() -> None:
+    answer, both = _answer("stiffness_hardening", [1e-9 * RIG.cubic, 3.0])
+    assert answer.held_out.improvement.after < 1.5 * answer.held_out.improvement.noise_floor
+    last = last_fit(answer, both, (), Settings().proof)
+    assert last.answer is answer
+    assert last.sentence == ""
+
+
+def test_levels_count_alike_whatever_their_size() -> None:
+    """A linear model of two unlike rigs: ten times the force of one changes nothing but for plain least squares."""
+    rigs = Rig(), replace(Rig(), frequency=10.4)
+    band = band_of(RIG.model, RIG.rate)
+    first, second = (rig.recordings((1.0,), 40.0)[0] for rig in rigs)
+    shape = ModelShape(Rig().model, LabError())
+
+    def frequencies(factor: float) -> tuple[float, float]:
+        louder = replace(second, force=factor * second.force, response=factor * second.response)
+        lines = [windowed_spectrum(one, band, 1.0) for one in (first, louder)]
+        begun = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=3)
+        even: Fit = even_fit(lines, begun, iterations=30)
+        plain = plain_fit(lines, begun.hypothesis, iterations=30)
+        return tuple(float(one.hypothesis.model.natural_frequencies[0]) for one in (even, plain))  # type: ignore
+
+    (even, plain), (even_loud, plain_loud) = frequencies(1.0), frequencies(10.0)
+    assert even_loud == pytest.approx(even, abs=1e-3)
+    assert plain_loud - plain > 0.05
