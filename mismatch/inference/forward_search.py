@@ -90,3 +90,17 @@ def released(found: Search[Fit], place: int, less: Fit, stage: str, evidence: fl
         accepted=(*found.accepted[:place], *found.accepted[place + 1 :]),
         rejected=(*found.rejected, Candidate(gone.name, evidence, stage, dict(gone.location))),
     )
+
+
+def emptied(found: Search[Fit], stage: str) -> Search[Fit]:
+    """A search that let go of all its causes.
+
+    Parameters
+    ----------
+    found
+        The search with causes.
+    stage
+        Why they go, as their candidates say.
+    """
+    gone = tuple(Candidate(one.name, one.evidence, stage, dict(one.location)) for one in found.accepted)
+    return replace(found, steps=found.steps[:1], accepted=(), rejected=(*found.rejected, *gone))

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
+
 from estimation import WindowedSpectrum
 
 from ...behaviour import FollowedAlone, followed_alone
@@ -14,6 +16,7 @@ from ...physics import is_fault
 from ...records import Recordings
 from ...remainder import leftover
 from .comparison import StructureComparison
+from .confirmation import fit_without
 from .form_errors import with_form_spread
 from .held_out import HeldOut, held_out_improvement, scored
 from .structure_verdict import has_a_sure_name, shown_faults, small_beside_the_rest, verdict_of_structure
@@ -113,9 +116,13 @@ def answer_of(
         no_noise = followed_alone(current.hypothesis, found.base.hypothesis, both.mended, settings.verdict)
         verdict = judged(followed_alone=bool(no_noise))
     if verdict == "partly explained" and found.accepted:
-        small = small_beside_the_rest(found, settings.evidence.small_in_part)
-        if small:
-            return answer_of(comparison, both, *_without(comparison, both, found, small[-1], faults), faults, decay)
+        for place in reversed(small_beside_the_rest(found, settings.evidence.small_in_part)):
+            less = fit_without(comparison, found, place)
+            # where the others run away without it, it stays
+            if np.isfinite(less.score):
+                return answer_of(
+                    comparison, both, *_without(comparison, both, found, (place, less), faults), faults, decay
+                )
         causes = [cause for cause in causes if cause is not deviation]
         if not has_a_sure_name(found, comparison.laws):
             verdict = "unexplained"
@@ -139,14 +146,15 @@ def _unexplained(
 
 
 def _without(
-    comparison: StructureComparison, both: Recordings, found: Search[Fit], place: int, faults: list[AcceptedCause]
+    comparison: StructureComparison,
+    both: Recordings,
+    found: Search[Fit],
+    gone: tuple[int, Fit],
+    faults: list[AcceptedCause],
 ) -> tuple[Search[Fit], HeldOut]:
     """The search without one of its causes, and what the others are worth on what was held out."""
-    loss, less = found.accepted[place].evidence, comparison.without(found, place)
-    if place == len(found.accepted) - 1:
-        # what the others became with it may run away without it
-        less = min(less, found.steps[place], key=lambda one: one.score)
-    found = released(found, place, less, "small beside what is left", loss)
+    place, less = gone
+    found = released(found, place, less, "small beside what is left", found.accepted[place].evidence)
     last, proof = found.current, comparison.settings.proof
     return found, held_out_improvement(both, last.hypothesis, last.noises, faults, proof)
 

@@ -8,7 +8,7 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ...faults import residual_lines
-from ...inference import AcceptedCause, Improvement, ProofSettings, Search, Settings, in_processes, released
+from ...inference import AcceptedCause, Improvement, ProofSettings, Search, Settings, emptied, in_processes, released
 from ...models import Fit, fit, least_misfit, through_structure
 from ...records import Recordings
 from .acceptance import modes_not_seen
@@ -94,6 +94,13 @@ def _confirmed(
         if gone is None:
             break
         place, less = gone
+        if not np.isfinite(less.score):
+            # without it the rest runs away: nothing of what was found stands
+            found = emptied(found, "not confirmed")
+            last = found.current
+            return Confirmed(
+                found, held_out_improvement(recordings, last.hypothesis, last.noises, faults, proof), recordings
+            )
         found = released(found, place, less, "not confirmed", found.accepted[place].evidence)
         last = found.current
         held_out = held_out_improvement(recordings, last.hypothesis, last.noises, faults, proof, held_out.linear)
@@ -163,12 +170,35 @@ def _idle(
     return None
 
 
+def fit_without(comparison: StructureComparison, found: Search[Fit], place: int) -> Fit:
+    """The fit without one of the causes; for the last one the step before, where that is as good.
+
+    What the others have become beside the last cause may run away without it, and the step before never does.
+
+    Parameters
+    ----------
+    comparison
+        How fits without a cause are made.
+    found
+        The search with the cause.
+    place
+        Which of the accepted causes is left out.
+    """
+    less = comparison.without(found, place)
+    step = _step_before(found) if place == len(found.accepted) - 1 else None
+    return less if step is None else min(less, step, key=lambda one: one.score)
+
+
 def _before_last(comparison: StructureComparison, found: Search[Fit]) -> Fit:
-    """The fit without the last cause: the step before, unless that still has a cause that was let go since."""
+    """The fit without the last cause: the step before, if there is one."""
+    step = _step_before(found)
+    return comparison.without(found, len(found.accepted) - 1) if step is None else step
+
+
+def _step_before(found: Search[Fit]) -> Fit | None:
+    """The step before the last cause; None where that still has a cause that was let go since."""
     step, kept = found.steps[-2], found.current.hypothesis.causes[:-1]
-    if [one.physics for one in step.hypothesis.causes] == [one.physics for one in kept]:
-        return step
-    return comparison.without(found, len(kept))
+    return step if [one.physics for one in step.hypothesis.causes] == [one.physics for one in kept] else None
 
 
 def _missed(
