@@ -17,6 +17,7 @@ from mismatch.inference import (
     SearchSettings,
     Settings,
     best_first,
+    emptied,
     equivalents_of,
     released,
     search,
@@ -145,6 +146,15 @@ def test_a_search_ends_with_the_fit_that_is_left_when_its_last_cause_goes() -> N
     assert left.current is less
     assert len(left.steps) == len(left.accepted) + 1
     assert released(left, 0, less, "not confirmed", 0.0).steps == (found.base,)
+
+
+def test_a_search_that_lets_go_of_all_causes_says_why() -> None:
+    found = imitated().searched()
+    left = emptied(found, "not confirmed")
+    assert left.current is found.base
+    assert left.accepted == ()
+    names = [one.name for one in found.accepted]
+    assert [(one.name, one.stage) for one in left.rejected[-2:]] == [(name, "not confirmed") for name in names]
 
 
 def test_the_last_cause_is_never_pruned() -> None:
