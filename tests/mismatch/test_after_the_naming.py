@@ -11,7 +11,7 @@ from acquisition import Channel, RecordingWriter, StreamDescription
 from estimation import BandRecording, windowed_spectrum
 from foundation import InputError
 from mismatch import Hypothesis, LabError, ModelShape, band_of
-from mismatch.adapters.structure.receptance_at_level import equivalent_receptance
+from mismatch.adapters.structure.predicting import equivalent_receptance
 from mismatch.joints import JointAxis
 from mismatch.joints.joint_law import JointLaw, JointMotion
 from mismatch.models import with_linear_part

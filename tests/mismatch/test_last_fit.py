@@ -11,7 +11,7 @@ from estimation import WindowedSpectrum, windowed_spectrum
 from mismatch import Hypothesis, LabError, ModelShape, Settings, band_of
 from mismatch.adapters.structure.answer import Answer
 from mismatch.adapters.structure.held_out import held_out_improvement, recordings_of
-from mismatch.adapters.structure.last_fit import last_fit
+from mismatch.adapters.structure.predicting import last_fit
 from mismatch.inference import Search
 from mismatch.models import Fit, even_fit, fit, plain_fit
 from mismatch.records import Recordings, compared_band, compared_lines

@@ -1,6 +1,5 @@
 from .diagnosing import diagnose
-from .prediction import Prediction, improved_model_of, predict
-from .receptance_at_level import equivalent_receptance
+from .predicting import Prediction, equivalent_receptance, improved_model_of, predict
 
 __all__ = [
     "Prediction",

@@ -32,8 +32,8 @@ from .comparison import StructureComparison
 from .confirmation import confirmed
 from .free_forms import freed_answer
 from .held_out import recordings_of
-from .last_fit import last_fit
-from .prediction import OfferedModel, offered_model
+from .odd_modes import with_cause_of_odd_modes
+from .predicting import OfferedModel, last_fit, offered_model
 from .structure_verdict import equivalents_of_answer
 
 FIRST_FIT = 30
@@ -113,7 +113,7 @@ def _diagnosed(
     before = leftover(base.hypothesis, mended)
     causes, left_out = offered(settings.causes or library(), model)
     comparison = StructureComparison(mended, causes, _beside(faults, settings), before)
-    found = search(comparison, base, progress)
+    found = with_cause_of_odd_modes(comparison, search(comparison, base, progress))
     progress("held-out recording")
     proof = confirmed(comparison, recordings_of(mended, measured, base.hypothesis), found, faults)
     both = proof.recordings

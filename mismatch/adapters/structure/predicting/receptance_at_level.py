@@ -5,8 +5,8 @@ from numpy.typing import NDArray
 
 from estimation import Frf, WindowedSpectrum
 
-from ...joints import driven_force
-from ...models import Hypothesis, predict_lines, surround
+from ....joints import driven_force
+from ....models import Hypothesis, predict_lines, surround
 
 Real = NDArray[np.float64]
 

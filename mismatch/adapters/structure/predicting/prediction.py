@@ -11,12 +11,12 @@ from scipy.fft import irfft
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from modal_fit import ModalModel
 
-from ...faults import residual_lines, with_faults
-from ...inference import AcceptedCause, Improvement
-from ...location import StructureDiagnosis
-from ...models import Hypothesis, hypothesis_of, improved_model, predict_lines
-from ...physics import is_fault
-from ...records import band_of, in_deflections, without_delay
+from ....faults import residual_lines, with_faults
+from ....inference import AcceptedCause, Improvement
+from ....location import StructureDiagnosis
+from ....models import Hypothesis, hypothesis_of, improved_model, predict_lines
+from ....physics import is_fault
+from ....records import band_of, in_deflections, without_delay
 
 Real = NDArray[np.float64]
 

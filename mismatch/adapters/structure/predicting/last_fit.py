@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...inference import AcceptedCause, ProofSettings
-from ...models import even_fit
-from ...records import Recordings
-from ...remainder import leftover
-from .answer import Answer
-from .held_out import HeldOut, scored
+from ....inference import AcceptedCause, ProofSettings
+from ....models import even_fit
+from ....records import Recordings
+from ....remainder import leftover
+from ..answer import Answer
+from ..held_out import HeldOut, scored
 
 STEPS = 20
 """Steps at most of the last fit."""

@@ -1,0 +1,116 @@
+"""A linear cause behind modes that look odd: they have taken up what it does, so that no gain in misfit shows it.
+
+A gain, a misalignment or a rotor's coupling changes shapes and mass scales alone. Modes that are free to move follow
+it, far from where the laboratory found them, and the misfit has nothing left to say. Fitted from the laboratory's own
+model, the cause that is there brings the modes back.
+"""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from estimation import WindowedSpectrum
+
+from ...inference import Candidate, Proposal, Round, Search, in_processes, pruned
+from ...models import Cause, Fit, Hypothesis, believed, fit, modes_are_odd
+from ...physics import MODAL_PARAMETERS, ChainPhysics, answer_name
+from ...screening import channel_of
+from .acceptance import impossible
+from .comparison import StructureComparison
+
+FEW, ROUGH_STEPS, STEPS = 1000, 8, 25
+"""Lines of a recording and steps at most on which causes are compared, and steps of the fits that decide."""
+
+FOLLOWED = 2
+"""Causes that are fitted to all lines."""
+
+BROUGHT_BACK = 0.3
+"""Share of what is odd about the modes that a cause must take away, and gain in score."""
+
+
+def with_cause_of_odd_modes(comparison: StructureComparison, found: Search[Fit]) -> Search[Fit]:
+    """The search with one more linear cause, where beside its causes modes look odd and that cause brings them back.
+
+    Its last fit is replaced where one from the lab's own model is better, and causes that it makes needless go.
+
+    Parameters
+    ----------
+    comparison
+        Recordings, causes and thresholds.
+    found
+        Where the search ended.
+    """
+    after = _searched(comparison, found)
+    gained = found.current.score - after.current.score
+    # a cause that brings modes back has little evidence beside a law's, and pruning asks for more
+    rested = len(after.accepted) == len(found.accepted) and gained > comparison.settings.evidence.least
+    return pruned(comparison, after) if rested else after
+
+
+def _searched(comparison: StructureComparison, found: Search[Fit]) -> Search[Fit]:
+    """The search with the cause, or with a better last fit."""
+    last = found.current
+    if not found.accepted or not modes_are_odd(last):
+        return found
+    chains = [one for one in comparison.causes.values() if isinstance(one, ChainPhysics)]
+    alone, begun = _begun(comparison.lines, last, chains)
+    starts = [alone, *begun[:FOLLOWED]]
+    tasks = [partial(fit, comparison.lines, one, last.noises, iterations=STEPS) for one in starts]
+    again, *fitted = in_processes(tasks)
+    found = _rested(found, again)
+    possible = [_proposal(found.current, one) for one in fitted if np.isfinite(one.score)]
+    possible = [one for one in possible if not impossible(one, comparison.settings.evidence)]
+    if not possible:
+        return found
+    best = max(possible, key=lambda one: one.evidence)
+    # what the modes become beside the cause may be better without it, too
+    without = best.fitted.hypothesis.without(len(found.accepted))
+    found = _rested(found, fit(comparison.lines, without, best.fitted.noises, iterations=STEPS))
+    best = replace(best, evidence=found.current.score - best.fitted.score)
+    odd, left = _odd(found.current), _odd(best.fitted)
+    needed = max(comparison.settings.evidence.least, BROUGHT_BACK * odd)
+    if not modes_are_odd(found.current) or best.evidence < needed or left > (1 - BROUGHT_BACK) * odd:
+        return found
+    told = tuple(Candidate(one.name, one.evidence, "fitted", one.location) for one in possible)
+    return replace(
+        found,
+        steps=(*found.steps, best.fitted),
+        accepted=(*found.accepted, best),
+        rounds=(*found.rounds, Round(tuple(possible), best, told)),
+    )
+
+
+def _begun(lines: list[WindowedSpectrum], last: Fit, chains: list[ChainPhysics]) -> tuple[Hypothesis, list[Hypothesis]]:
+    """The lab's model with the causes so far, fitted roughly alone and with each linear cause, best first."""
+    fresh = believed(last.hypothesis)
+    nominal = fresh.shape.nominal
+    taken = {(cause.physics.name, cause.place) for cause in fresh.causes}
+    more = [
+        Cause(physics, physics.start(nominal), place)
+        for physics in chains
+        for place in physics.places(nominal)
+        if (physics.name, place) not in taken
+    ]
+    rough = [one.thinned(FEW) for one in lines]
+    starts = [fresh, *(fresh.with_cause(one) for one in more)]
+    fits = in_processes([partial(fit, rough, one, last.noises, iterations=ROUGH_STEPS) for one in starts])
+    others = sorted((one for one in fits[1:] if np.isfinite(one.score)), key=lambda one: one.score)
+    return fits[0].hypothesis, [one.hypothesis for one in others]
+
+
+def _proposal(current: Fit, fitted: Fit) -> Proposal[Fit]:
+    cause = fitted.hypothesis.causes[-1]
+    return Proposal(answer_name(cause.physics), channel_of(cause), fitted, current.score - fitted.score)
+
+
+def _rested(found: Search[Fit], again: Fit) -> Search[Fit]:
+    """The search with another fit of its last step, if that is better."""
+    return replace(found, steps=(*found.steps[:-1], again)) if again.score < found.current.score else found
+
+
+def _odd(fitted: Fit) -> float:
+    """By how much ``|u|^2`` of the believed modes exceeds what errors of a lab's usual size make of it."""
+    shape = fitted.hypothesis.shape
+    rows = shape.modal_rows(fitted.hypothesis.u)[: shape.believed]
+    return MODAL_PARAMETERS.excess(float(np.sum(rows**2)), shape.believed * (shape.per_mode - 2))
