@@ -19,7 +19,7 @@ from ...screening import channel_of
 from .acceptance import impossible
 from .comparison import StructureComparison
 
-FEW, ROUGH_STEPS, STEPS = 1000, 8, 25
+FEW, ROUGH_STEPS, STEPS = 1000, 4, 30
 """Lines of a recording and steps at most on which causes are compared, and steps of the fits that decide."""
 
 FOLLOWED = 2
@@ -55,7 +55,7 @@ def _searched(comparison: StructureComparison, found: Search[Fit]) -> Search[Fit
         return found
     chains = [one for one in comparison.causes.values() if isinstance(one, ChainPhysics)]
     alone, begun = _begun(comparison.lines, last, chains)
-    starts = [alone, *begun[:FOLLOWED]]
+    starts = [alone, *(one for pair in begun[:FOLLOWED] for one in pair)]
     tasks = [partial(fit, comparison.lines, one, last.noises, iterations=STEPS) for one in starts]
     again, *fitted = in_processes(tasks)
     found = _rested(found, again)
@@ -81,8 +81,14 @@ def _searched(comparison: StructureComparison, found: Search[Fit]) -> Search[Fit
     )
 
 
-def _begun(lines: list[WindowedSpectrum], last: Fit, chains: list[ChainPhysics]) -> tuple[Hypothesis, list[Hypothesis]]:
-    """The lab's model with the causes so far, fitted roughly alone and with each linear cause, best first."""
+def _begun(
+    lines: list[WindowedSpectrum], last: Fit, chains: list[ChainPhysics]
+) -> tuple[Hypothesis, list[tuple[Hypothesis, ...]]]:
+    """The lab's model with the causes so far, fitted roughly alone, and with each linear cause, best first.
+
+    Each cause begins twice: at the lab's model, and at the last fit, from which a valley may lead to it. A law that is
+    far from linear is not followed from everywhere. What counts is the gain over the same start without the cause.
+    """
     fresh = believed(last.hypothesis)
     nominal = fresh.shape.nominal
     taken = {(cause.physics.name, cause.place) for cause in fresh.causes}
@@ -92,11 +98,22 @@ def _begun(lines: list[WindowedSpectrum], last: Fit, chains: list[ChainPhysics])
         for place in physics.places(nominal)
         if (physics.name, place) not in taken
     ]
-    rough = [one.thinned(FEW) for one in lines]
-    starts = [fresh, *(fresh.with_cause(one) for one in more)]
-    fits = in_processes([partial(fit, rough, one, last.noises, iterations=ROUGH_STEPS) for one in starts])
-    others = sorted((one for one in fits[1:] if np.isfinite(one.score)), key=lambda one: one.score)
-    return fits[0].hypothesis, [one.hypothesis for one in others]
+    rough, starts = [one.thinned(FEW) for one in lines], (fresh, last.hypothesis)
+    tasks = [partial(fit, rough, fresh, last.noises, iterations=2 * ROUGH_STEPS)]
+    for begun in starts:
+        tasks += [partial(fit, rough, begun, last.noises, iterations=ROUGH_STEPS)]
+        tasks += [partial(fit, rough, begun.with_cause(one), last.noises, iterations=ROUGH_STEPS) for one in more]
+    alone, *fits = in_processes(tasks)
+    half = len(more) + 1
+    pairs = list(zip(fits[1:half], fits[half + 1 :], strict=True))
+    without = fits[0], fits[half]
+
+    def gain(pair: tuple[Fit, Fit]) -> float:
+        gains = [less.score - one.score for less, one in zip(without, pair, strict=True)]
+        return max((one for one in gains if np.isfinite(one)), default=-np.inf)
+
+    ranked = sorted(pairs, key=gain, reverse=True)
+    return alone.hypothesis, [tuple(one.hypothesis for one in pair if np.isfinite(one.score)) for pair in ranked]
 
 
 def _proposal(current: Fit, fitted: Fit) -> Proposal[Fit]:
