@@ -16,10 +16,6 @@ MORE_THAN_EXPECTED, LONGER = 1.5, 3.0
 """Gain of a step over the gain expected of it from which a longer one is tried, and how much longer."""
 
 
-CATCHES_UP = 20
-"""Steps like its last in which a descent must be able to reach a rival, or it ends."""
-
-
 class Problem(Protocol[State]):
     """What a hypothesis gives to the descent; a state is its numbers with all that was computed for them."""
 
@@ -62,8 +58,6 @@ class Limits:
         Levenberg's damping, as a share of the diagonal, above which a failed step ends the descent.
     lengthens
         Whether steps that gain more than expected are lengthened.
-    rival
-        Cost that another descent has reached; infinite where there is none. Only what comes below it is of use.
     """
 
     most: int = 8
@@ -72,7 +66,6 @@ class Limits:
     tries: int = 4
     most_damping: float = 1.0
     lengthens: bool = True
-    rival: float = np.inf
 
 
 @dataclass(frozen=True)
@@ -126,9 +119,8 @@ def descend(problem: Problem[State], start: State, limits: Limits) -> Descended[
         damping /= 10
         state, (matrix, gradient) = farther, equations
         # nuisance numbers may still be settling when a step gains nothing
-        gained = before - problem.cost(state)
-        idle = idle + 1 if gained < limits.tolerance else 0
-        if idle == limits.idle or problem.cost(state) - limits.rival > CATCHES_UP * gained:
+        idle = idle + 1 if before - problem.cost(state) < limits.tolerance else 0
+        if idle == limits.idle:
             break
     return Descended(state, matrix)
 

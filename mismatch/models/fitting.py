@@ -63,7 +63,6 @@ def fit(
     iterations: int = 8,
     tolerance: float = 3.0,
     held: bool = False,
-    rival: float = np.inf,
 ) -> Fit:
     """Fit a hypothesis to recordings.
 
@@ -85,8 +84,6 @@ def fit(
         Gain in misfit that counts: the fit ends after two smaller gains, or where less than a tenth of it is expected.
     held
         Whether ``noises`` are held, and not estimated.
-    rival
-        ``misfit + |u|^2`` that another fit has reached: where this one cannot come below it, it ends early.
 
     Returns
     -------
@@ -94,7 +91,7 @@ def fit(
         With an infinite misfit and score where the start runs away when it is simulated: nothing then speaks for it.
     """
     try:
-        return _fit(lines, start, noises, Limits(iterations, tolerance, rival=rival), held)
+        return _fit(lines, start, noises, Limits(iterations, tolerance), held)
     except np.linalg.LinAlgError:
         size = start.size
         return Fit(start, noises or (), np.inf, _deviation(start), np.inf, np.zeros((size, size)))
@@ -112,8 +109,7 @@ def _fit(
     with ThreadPoolExecutor(THREADS) as pool:
         rough = [one.thinned(ENOUGH) for one in lines]
         if any(few is not one for few, one in zip(rough, lines, strict=True)):
-            # on fewer lines a cost is less
-            state = _descended(pool, rough, hypothesis, known, replace(limits, rival=np.inf), held).state
+            state = _descended(pool, rough, hypothesis, known, limits, held).state
             hypothesis, known = state.hypothesis, tuple(one.noise for one in state.seen)
             limits = replace(limits, most=max(0, limits.most - LEFT_OUT))
         end = _descended(pool, lines, hypothesis, known, limits, held)

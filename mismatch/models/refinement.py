@@ -44,8 +44,7 @@ def settled(lines: list[WindowedSpectrum], fitted: Fit, gained: float = 0.0) -> 
     rested = fit(lines, fitted.hypothesis, fitted.noises, iterations=ITERATIONS, tolerance=least)
     if not modes_are_odd(rested) or not rested.hypothesis.has_added_physics:
         return rested
-    fresh, reached = believed(rested.hypothesis), rested.misfit + rested.deviation
-    again = fit(lines, fresh, rested.noises, iterations=ITERATIONS, tolerance=least, rival=reached)
+    again = fit(lines, believed(rested.hypothesis), rested.noises, iterations=ITERATIONS, tolerance=least)
     return min(rested, again, key=lambda one: one.score)
 
 
@@ -108,8 +107,7 @@ def with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Fit
         return fitted
     absent = replace(cause, values=cause.physics.start(hypothesis.shape.nominal))
     fresh = believed(hypothesis).with_cause(absent)
-    again = fit(lines, fresh, iterations=FROM_BELIEF, rival=fitted.misfit + fitted.deviation)
-    return min(fitted, again, key=lambda one: one.score)
+    return min(fitted, fit(lines, fresh, iterations=FROM_BELIEF), key=lambda one: one.score)
 
 
 def believed(hypothesis: Hypothesis) -> Hypothesis:

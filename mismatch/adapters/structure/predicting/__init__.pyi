@@ -1,4 +1,4 @@
-from .last_fit import LastFit, last_fit
+from .final_refit import LastFit, last_fit
 from .prediction import OfferedModel, Prediction, improved_model_of, offered_model, predict
 from .receptance_at_level import equivalent_receptance
 
