@@ -186,6 +186,7 @@ def main(folder: Path, target: Path | None) -> None:
     assert behaviour is not None
     print(*(one.sentence for one in behaviour.modes), sep="\n")
     print(*behaviour.distortion, sep="\n")
+    print(found.content["improved_model"]["sentence"])
     print("left of the lower and of the upper level's last periods:")
     for name, errors in errors_of(records, nominal, found).items():
         print(f"{name}: " + ", ".join(f"{100 * value:.1f} %" for value in errors))

@@ -73,7 +73,7 @@ def test_levels_count_alike_whatever_their_size() -> None:
         begun = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=3)
         even: Fit = even_fit(lines, begun, iterations=30)
         plain = plain_fit(lines, begun.hypothesis, iterations=30)
-        return tuple(float(one.hypothesis.model.natural_frequencies[0]) for one in (even, plain))  # type: ignore
+        return tuple(float(one.hypothesis.model.natural_frequencies[0]) for one in (even, plain))
 
     (even, plain), (even_loud, plain_loud) = frequencies(1.0), frequencies(10.0)
     assert even_loud == pytest.approx(even, abs=1e-3)

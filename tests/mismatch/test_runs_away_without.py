@@ -1,0 +1,54 @@
+"""Without a cause the others may run away: then the step before it stands, or nothing of what was found."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from hidden_joint import law_of, with_law
+from one_mode_rig import Rig
+
+from mismatch import LabError, ModelShape
+from mismatch.adapters.structure.confirmation import fit_without
+from mismatch.inference import Proposal, Search
+from mismatch.models import Fit, Hypothesis
+from mismatch.physics import library
+
+
+@dataclass(frozen=True)
+class _Comparison:
+    """A comparison in which the fit without a cause is known."""
+
+    less: Fit
+
+    def without(self, search: Search[Fit], place: int) -> Fit:
+        return self.less
+
+
+def _fit(hypothesis: Hypothesis, score: float) -> Fit:
+    return Fit(hypothesis, (), score, 0.0, score, np.zeros((hypothesis.size, hypothesis.size)))
+
+
+def _search() -> Search[Fit]:
+    """Friction first, then a mode beside it."""
+    shape = ModelShape(Rig().model, LabError())
+    base = Hypothesis(shape, np.zeros(shape.size))
+    friction = with_law(law_of("coulomb_friction"), np.array([3.0, 2e-3]))
+    mode = friction.with_mode(-3 + 90j, np.ones(1, complex), np.ones(1, complex), library()["missing_mode"])
+    steps = _fit(base, 0.0), _fit(friction, -1000.0), _fit(mode, -1100.0)
+    told = [Proposal(name, {}, one, 0.0) for name, one in (("coulomb_friction", steps[1]), ("missing_mode", steps[2]))]
+    return Search(steps, tuple(told))
+
+
+def test_without_the_last_cause_the_step_before_never_runs_away() -> None:
+    found = _search()
+    lost = _fit(found.steps[1].hypothesis, np.inf)
+    assert fit_without(_Comparison(lost), found, 1) is found.steps[1]
+    better = _fit(found.steps[1].hypothesis, -1050.0)
+    assert fit_without(_Comparison(better), found, 1) is better
+
+
+def test_a_step_that_holds_another_cause_is_not_the_step_before() -> None:
+    found = _search()
+    lost = _fit(found.steps[1].hypothesis, np.inf)
+    other = replace(found, steps=(found.steps[0], found.steps[0], found.steps[2]))
+    assert fit_without(_Comparison(lost), other, 1) is lost
+    assert fit_without(_Comparison(lost), found, 0) is lost
