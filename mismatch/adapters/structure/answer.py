@@ -20,7 +20,7 @@ from .confirmation import fit_without
 from .form_errors import with_form_spread
 from .held_out import HeldOut, held_out_improvement, scored
 from .structure_verdict import has_a_sure_name, shown_faults, small_beside_the_rest, verdict_of_structure
-from .told_causes import modal_deviation, told_causes
+from .told_causes import modal_deviation, told_causes, undamped_modes
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,11 @@ def answer_of(
     """
     settings, current = comparison.settings, found.current
     spread = with_form_spread(current, both.mended)
+    for place in reversed(undamped_modes(spread)):
+        less = fit_without(comparison, found, place)
+        if np.isfinite(less.score):
+            gone = place, less, "its damping cannot be told from none"
+            return answer_of(comparison, both, *_without(comparison, both, found, gone, faults), faults, decay)
     named = [*faults, *told_causes(spread, found.accepted)]
     causes = with_tones_settled(current, both.measured, named, decay, settings.faults)
     faults = [cause for cause in causes if is_fault(cause.name)]
@@ -120,9 +125,8 @@ def answer_of(
             less = fit_without(comparison, found, place)
             # where the others run away without it, it stays
             if np.isfinite(less.score):
-                return answer_of(
-                    comparison, both, *_without(comparison, both, found, (place, less), faults), faults, decay
-                )
+                gone = place, less, "small beside what is left"
+                return answer_of(comparison, both, *_without(comparison, both, found, gone, faults), faults, decay)
         causes = [cause for cause in causes if cause is not deviation]
         if not has_a_sure_name(found, comparison.laws):
             verdict = "unexplained"
@@ -149,12 +153,12 @@ def _without(
     comparison: StructureComparison,
     both: Recordings,
     found: Search[Fit],
-    gone: tuple[int, Fit],
+    gone: tuple[int, Fit, str],
     faults: list[AcceptedCause],
 ) -> tuple[Search[Fit], HeldOut]:
     """The search without one of its causes, and what the others are worth on what was held out."""
-    place, less = gone
-    found = released(found, place, less, "small beside what is left", found.accepted[place].evidence)
+    place, less, stage = gone
+    found = released(found, place, less, stage, found.accepted[place].evidence)
     last, proof = found.current, comparison.settings.proof
     return found, held_out_improvement(both, last.hypothesis, last.noises, faults, proof)
 

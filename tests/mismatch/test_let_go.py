@@ -1,4 +1,4 @@
-"""Without a cause the others may run away: then the step before it stands, or nothing of what was found."""
+"""Causes that are let go of: modes without damping, and those without which the others run away."""
 
 from dataclasses import dataclass, replace
 
@@ -8,6 +8,7 @@ from one_mode_rig import Rig
 
 from mismatch import LabError, ModelShape
 from mismatch.adapters.structure.confirmation import fit_without
+from mismatch.adapters.structure.told_causes import undamped_modes
 from mismatch.inference import Proposal, Search
 from mismatch.models import Fit, Hypothesis
 from mismatch.physics import library
@@ -21,6 +22,16 @@ class _Comparison:
 
     def without(self, search: Search[Fit], place: int) -> Fit:
         return self.less
+
+
+def test_a_mode_without_damping_is_told_by_its_errors() -> None:
+    mode = _search().current
+    shape = mode.hypothesis.shape
+    at = shape.believed * shape.per_mode + 1
+    for error, gone in ((0.1, []), (10.0, [1])):
+        covariance = mode.covariance.copy()
+        covariance[at, at] = (error / shape.lab.damping) ** 2
+        assert undamped_modes(replace(mode, covariance=covariance)) == gone
 
 
 def _fit(hypothesis: Hypothesis, score: float) -> Fit:
