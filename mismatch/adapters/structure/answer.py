@@ -86,11 +86,8 @@ def answer_of(
     """
     settings, current = comparison.settings, found.current
     spread = with_form_spread(current, both.mended)
-    for place in reversed(undamped_modes(spread)):
-        less = fit_without(comparison, found, place)
-        if np.isfinite(less.score):
-            gone = place, less, "its damping cannot be told from none"
-            return answer_of(comparison, both, *_without(comparison, both, found, gone, faults), faults, decay)
+    if less := _without_one_of(comparison, both, found, undamped_modes(spread), "undamped", faults):
+        return answer_of(comparison, both, *less, faults, decay)
     named = [*faults, *told_causes(spread, found.accepted)]
     causes = with_tones_settled(current, both.measured, named, decay, settings.faults)
     faults = [cause for cause in causes if is_fault(cause.name)]
@@ -121,12 +118,9 @@ def answer_of(
         no_noise = followed_alone(current.hypothesis, found.base.hypothesis, both.mended, settings.verdict)
         verdict = judged(followed_alone=bool(no_noise))
     if verdict == "partly explained" and found.accepted:
-        for place in reversed(small_beside_the_rest(found, settings.evidence.small_in_part)):
-            less = fit_without(comparison, found, place)
-            # where the others run away without it, it stays
-            if np.isfinite(less.score):
-                gone = place, less, "small beside what is left"
-                return answer_of(comparison, both, *_without(comparison, both, found, gone, faults), faults, decay)
+        small = small_beside_the_rest(found, settings.evidence.small_in_part)
+        if less := _without_one_of(comparison, both, found, small, "small beside what is left", faults):
+            return answer_of(comparison, both, *less, faults, decay)
         causes = [cause for cause in causes if cause is not deviation]
         if not has_a_sure_name(found, comparison.laws):
             verdict = "unexplained"
@@ -149,18 +143,25 @@ def _unexplained(
     return Answer("unexplained", (), base, found, comparison.before, held_out, rejected)
 
 
-def _without(
+def _without_one_of(
     comparison: StructureComparison,
     both: Recordings,
     found: Search[Fit],
-    gone: tuple[int, Fit, str],
+    places: list[int],
+    why: str,
     faults: list[AcceptedCause],
-) -> tuple[Search[Fit], HeldOut]:
-    """The search without one of its causes, and what the others are worth on what was held out."""
-    place, less, stage = gone
-    found = released(found, place, less, stage, found.accepted[place].evidence)
-    last, proof = found.current, comparison.settings.proof
-    return found, held_out_improvement(both, last.hypothesis, last.noises, faults, proof)
+) -> tuple[Search[Fit], HeldOut] | None:
+    """The search without one of its causes, the last of ``places``, and what the others are worth on held-out data.
+
+    A cause without which the others run away stays; None where none goes.
+    """
+    for place in reversed(places):
+        less = fit_without(comparison, found, place)
+        if np.isfinite(less.score):
+            found = released(found, place, less, why, found.accepted[place].evidence)
+            last, proof = found.current, comparison.settings.proof
+            return found, held_out_improvement(both, last.hypothesis, last.noises, faults, proof)
+    return None
 
 
 def _deviation(lines: list[WindowedSpectrum], current: Fit) -> AcceptedCause | None:

@@ -19,11 +19,11 @@ from ...screening import channel_of
 from .acceptance import impossible
 from .comparison import StructureComparison
 
-FEW, ROUGH_STEPS, STEPS = 1000, 4, 30
-"""Lines of a recording and steps at most on which causes are compared, and steps of the fits that decide."""
+PART, FEW, ROUGH_STEPS = 0.34, 1000, 4
+"""Part of each recording, lines of it and steps at most on which causes are compared: motion takes time to simulate."""
 
-FOLLOWED = 2
-"""Causes that are fitted to all lines."""
+FOLLOWED, FIRST_STEPS, STEPS = 2, 8, 30
+"""Causes that are fitted to all that was recorded, steps at most of those fits, and of the two that decide."""
 
 BROUGHT_BACK = 0.3
 """Share of what is odd about the modes that a cause must take away, and gain in score."""
@@ -56,14 +56,17 @@ def _searched(comparison: StructureComparison, found: Search[Fit]) -> Search[Fit
     chains = [one for one in comparison.causes.values() if isinstance(one, ChainPhysics)]
     alone, begun = _begun(comparison.lines, last, chains)
     starts = [alone, *(one for pair in begun[:FOLLOWED] for one in pair)]
-    tasks = [partial(fit, comparison.lines, one, last.noises, iterations=STEPS) for one in starts]
+    tasks = [partial(fit, comparison.lines, one, last.noises, iterations=FIRST_STEPS) for one in starts]
     again, *fitted = in_processes(tasks)
+    nearest = min((one for one in fitted if np.isfinite(one.score)), key=lambda one: one.score, default=again)
+    tasks = [partial(fit, comparison.lines, one.hypothesis, one.noises, iterations=STEPS) for one in (again, nearest)]
+    again, nearest = in_processes(tasks)
     found = _rested(found, again)
-    possible = [_proposal(found.current, one) for one in fitted if np.isfinite(one.score)]
-    possible = [one for one in possible if not impossible(one, comparison.settings.evidence)]
-    if not possible:
+    if len(nearest.hypothesis.causes) == len(last.hypothesis.causes) or not np.isfinite(nearest.score):
         return found
-    best = max(possible, key=lambda one: one.evidence)
+    best = _proposal(found.current, nearest)
+    if impossible(best, comparison.settings.evidence):
+        return found
     # what the modes become beside the cause may be better without it, too
     without = best.fitted.hypothesis.without(len(found.accepted))
     found = _rested(found, fit(comparison.lines, without, best.fitted.noises, iterations=STEPS))
@@ -72,12 +75,12 @@ def _searched(comparison: StructureComparison, found: Search[Fit]) -> Search[Fit
     needed = max(comparison.settings.evidence.least, BROUGHT_BACK * odd)
     if not modes_are_odd(found.current) or best.evidence < needed or left > (1 - BROUGHT_BACK) * odd:
         return found
-    told = tuple(Candidate(one.name, one.evidence, "fitted", one.location) for one in possible)
+    told = Candidate(best.name, best.evidence, "fitted", best.location)
     return replace(
         found,
         steps=(*found.steps, best.fitted),
         accepted=(*found.accepted, best),
-        rounds=(*found.rounds, Round(tuple(possible), best, told)),
+        rounds=(*found.rounds, Round((best,), best, (told,))),
     )
 
 
@@ -98,7 +101,7 @@ def _begun(
         for place in physics.places(nominal)
         if (physics.name, place) not in taken
     ]
-    rough, starts = [one.thinned(FEW) for one in lines], (fresh, last.hypothesis)
+    rough, starts = [one.between(0.0, PART).thinned(FEW) for one in lines], (fresh, last.hypothesis)
     tasks = [partial(fit, rough, fresh, last.noises, iterations=2 * ROUGH_STEPS)]
     for begun in starts:
         tasks += [partial(fit, rough, begun, last.noises, iterations=ROUGH_STEPS)]
