@@ -16,7 +16,7 @@ from .plain_fits import plain_fit
 ITERATIONS, FROM_BELIEF, FROM_PLAIN = 60, 60, 20
 
 TOLERANCE, AT_REST = 3.0, 5e-4
-"""Gain of a step from which a fit has come to rest, and as a share of what its last cause gained."""
+"""Gain of a step from which a fit has come to rest, and as a share of what its causes have gained."""
 
 EXACT = 0.03
 """Error, over the response, that a plain fit takes every line to have: where a fit that gave up a recording begins."""
@@ -38,7 +38,7 @@ def settled(lines: list[WindowedSpectrum], fitted: Fit, gained: float = 0.0) -> 
     fitted
         A fit of a few steps, from which the search goes on.
     gained
-        What its last cause has gained in score.
+        What its causes have gained in score.
     """
     least = max(TOLERANCE, AT_REST * gained)
     rested = fit(lines, fitted.hypothesis, fitted.noises, iterations=ITERATIONS, tolerance=least)

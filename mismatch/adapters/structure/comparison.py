@@ -13,8 +13,8 @@ from ...screening import gains_beside_laws
 from .acceptance import evidence_needed, impossible, plainest, possible_gains, twins_of, worth_it
 from .rounds import Standing, StructureRound, Weighed, likeliest_seen, only_modes, weigh
 
-PRUNING = 20
-"""Steps at most of a fit without one of its causes."""
+PRUNING, TO_REST = 20, 60
+"""Steps at most of a fit without one of its causes, and of the last fit of a search."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,14 @@ class StructureComparison:
         )
         return StructureRound(tuple(weighed.proposals), chosen, tuple(weighed.candidates), equivalents, failed)
 
+    def at_rest(self, search: Search[Fit]) -> Search[Fit]:
+        """The search with its last fit at rest: while causes compete, a fit ends where they no longer differ by it."""
+        last = search.current
+        if not search.accepted:
+            return search
+        again = fit(self.lines, last.hypothesis, last.noises, iterations=TO_REST)
+        return replace(search, steps=(*search.steps[:-1], again)) if again.score < last.score else search
+
     def without(self, search: Search[Fit], place: int) -> Fit:
         """The last step fitted without one of its causes."""
         last = search.current
@@ -84,7 +92,7 @@ class StructureComparison:
         good = possible_gains(weighed.proposals, evidence)
         while (first := plainest(good, evidence.as_good)) is not None:
             best = twins_of(first, good, evidence.small)[0]
-            rested = settled(self.lines, best.fitted, best.evidence)
+            rested = settled(self.lines, best.fitted, search.base.score - best.fitted.score)
             chosen = replace(best, fitted=rested, evidence=search.current.score - rested.score)
             good = [one for one in good if one is not best]
             if impossible(chosen, evidence):
