@@ -14,7 +14,7 @@ from .acceptance import evidence_needed, impossible, plainest, possible_gains, t
 from .rounds import Standing, StructureRound, Weighed, likeliest_seen, only_modes, weigh
 
 PRUNING, TO_REST = 20, 60
-"""Steps at most of a fit without one of its causes, and of the last fit of a search."""
+"""Steps at most of a fit without one of its causes, and of one with a cause that is taken."""
 
 
 @dataclass(frozen=True)
@@ -69,14 +69,6 @@ class StructureComparison:
         )
         return StructureRound(tuple(weighed.proposals), chosen, tuple(weighed.candidates), equivalents, failed)
 
-    def at_rest(self, search: Search[Fit]) -> Search[Fit]:
-        """The search with its last fit at rest: while causes compete, a fit ends where they no longer differ by it."""
-        last = search.current
-        if not search.accepted:
-            return search
-        again = fit(self.lines, last.hypothesis, last.noises, iterations=TO_REST)
-        return replace(search, steps=(*search.steps[:-1], again)) if again.score < last.score else search
-
     def without(self, search: Search[Fit], place: int) -> Fit:
         """The last step fitted without one of its causes."""
         last = search.current
@@ -98,10 +90,16 @@ class StructureComparison:
             if impossible(chosen, evidence):
                 continue
             if self._is_worth_it(chosen, search):
-                return chosen
+                return self._at_rest(chosen, search)
             # another form of the same cause may have numbers that the data do tell
             good = [one for one in good if one.name == best.name]
         return None
+
+    def _at_rest(self, chosen: Proposal[Fit], search: Search[Fit]) -> Proposal[Fit]:
+        """A cause that is taken, fitted to its end: a next one must not live on what this one left undone."""
+        fitted = fit(self.lines, chosen.fitted.hypothesis, chosen.fitted.noises, iterations=TO_REST)
+        last = min(chosen.fitted, fitted, key=lambda one: one.score)
+        return replace(chosen, fitted=last, evidence=search.current.score - last.score)
 
     def is_of_its_own(self, search: Search[Fit], place: int, less: Fit) -> bool:
         """Whether an accepted cause mends no law's form, and explains most of what moves with the signal without it."""
