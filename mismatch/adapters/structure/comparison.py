@@ -98,8 +98,9 @@ class StructureComparison:
     def _at_rest(self, chosen: Proposal[Fit], search: Search[Fit]) -> Proposal[Fit]:
         """A cause that is taken, fitted to its end: a next one must not live on what this one left undone."""
         fitted = fit(self.lines, chosen.fitted.hypothesis, chosen.fitted.noises, iterations=TO_REST)
-        last = min(chosen.fitted, fitted, key=lambda one: one.score)
-        return replace(chosen, fitted=last, evidence=search.current.score - last.score)
+        farther = replace(chosen, fitted=fitted, evidence=search.current.score - fitted.score)
+        better = farther.evidence > chosen.evidence and not impossible(farther, self.settings.evidence)
+        return farther if better else chosen
 
     def is_of_its_own(self, search: Search[Fit], place: int, less: Fit) -> bool:
         """Whether an accepted cause mends no law's form, and explains most of what moves with the signal without it."""
