@@ -1,5 +1,5 @@
 from .cause import Cause, held_values, location_of
-from .fitting import ENOUGH, Fit, fit, modes_are_odd, residual
+from .fitting import ENOUGH, Fit, fit, modes_are_odd, oddity_of_modes, residual
 from .freed_laws import EVERYTHING, with_free_forms, with_linear_part
 from .hypothesis import Hypothesis, line_response, predict_lines, surround
 from .linear_lines import response_to_joint
@@ -33,6 +33,7 @@ __all__ = [
     "line_response",
     "location_of",
     "modes_are_odd",
+    "oddity_of_modes",
     "outdoes_noise",
     "plain_fit",
     "predict_lines",

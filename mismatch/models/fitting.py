@@ -252,7 +252,24 @@ def modes_are_odd(fitted: Fit) -> bool:
     fitted
         A hypothesis fitted to recordings.
     """
+    return MODAL_PARAMETERS.odd(*_modal_deviation(fitted))
+
+
+def oddity_of_modes(fitted: Fit) -> float:
+    """Excess ``|u|^2 - n`` of the believed modes' deviation over what errors of the usual size make it, 0 or more.
+
+    Parameters
+    ----------
+    fitted
+        A hypothesis fitted to recordings.
+    """
+    deviation, count = _modal_deviation(fitted)
+    return max(0.0, deviation - count)
+
+
+def _modal_deviation(fitted: Fit) -> tuple[float, int]:
+    """``|u|^2`` of the believed modes in lab errors, and how many numbers it is the sum over."""
     shape = fitted.hypothesis.shape
     rows = shape.modal_rows(fitted.hypothesis.u)[: shape.believed]
     # the two numbers of each mode's scale are free
-    return MODAL_PARAMETERS.odd(float(np.sum(rows**2)), shape.believed * (shape.per_mode - 2))
+    return float(np.sum(rows**2)), shape.believed * (shape.per_mode - 2)

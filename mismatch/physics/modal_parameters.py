@@ -22,9 +22,5 @@ class ModalParameters:
         """Tell whether ``|u|^2`` of ``count`` believed numbers is larger than errors of the usual size make it."""
         return bool(deviation >= count + 4 * np.sqrt(2 * count))
 
-    def excess(self, deviation: float, count: int) -> float:
-        """By how much ``|u|^2`` of ``count`` believed numbers exceeds its mean under errors of the usual size."""
-        return max(0.0, deviation - count)
-
 
 PHYSICS = ModalParameters()

@@ -3,15 +3,21 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pytest
 from hidden_joint import law_of, with_law
 from one_mode_rig import Rig
 
-from mismatch import LabError, ModelShape
+from estimation import windowed_spectrum
+from mismatch import LabError, ModelShape, Settings, band_of
+from mismatch.adapters.structure import confirmation
+from mismatch.adapters.structure.comparison import StructureComparison
 from mismatch.adapters.structure.confirmation import fit_without
+from mismatch.adapters.structure.held_out import held_out_improvement, recordings_of
 from mismatch.adapters.structure.told_causes import undamped_modes
 from mismatch.inference import Proposal, Search
-from mismatch.models import Fit, Hypothesis
+from mismatch.models import Fit, Hypothesis, fit
 from mismatch.physics import library
+from mismatch.remainder import leftover
 
 
 @dataclass(frozen=True)
@@ -63,3 +69,21 @@ def test_a_step_that_holds_another_cause_is_not_the_step_before() -> None:
     other = replace(found, steps=(found.steps[0], found.steps[0], found.steps[2]))
     assert fit_without(_Comparison(lost), other, 1) is lost
     assert fit_without(_Comparison(lost), found, 0) is lost
+
+
+def test_nothing_stands_where_the_rest_runs_away_without_what_is_not_confirmed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two levels of a linear rig; the first cause is called idle, and the fit without it runs away."""
+    lines = [windowed_spectrum(one, band_of(Rig().model, 128.0), 1.0) for one in Rig().recordings((1.0, 2.0), 40.0)]
+    found = _search()
+    both = recordings_of(lines, lines, found.base.hypothesis)
+    base = fit(lines, found.base.hypothesis, iterations=3)
+    found = replace(found, steps=(base, *found.steps[1:]))
+    worth = held_out_improvement(both, base.hypothesis, base.noises, (), Settings().proof)
+    lost = _fit(found.steps[1].hypothesis, np.inf)
+    monkeypatch.setattr(confirmation, "_idle", lambda *given: (0, lost))
+    comparison = StructureComparison(lines, {}, Settings(), leftover(base.hypothesis, lines))
+    left = confirmation._confirmed(comparison, both, found, [], worth)
+    assert left.found.accepted == ()
+    assert left.found.current is base
+    assert {one.name for one in left.found.rejected} == {"coulomb_friction", "missing_mode"}
+    assert left.held_out.improvement.after == pytest.approx(worth.improvement.after)

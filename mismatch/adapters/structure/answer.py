@@ -86,7 +86,7 @@ def answer_of(
     """
     settings, current = comparison.settings, found.current
     spread = with_form_spread(current, both.mended)
-    if less := _without_one_of(comparison, both, found, undamped_modes(spread), "undamped", faults):
+    if less := _without_one_of(comparison, both, found, undamped_modes(spread), "its damping may be none", faults):
         return answer_of(comparison, both, *less, faults, decay)
     named = [*faults, *told_causes(spread, found.accepted)]
     causes = with_tones_settled(current, both.measured, named, decay, settings.faults)

@@ -97,11 +97,8 @@ def _confirmed(
         if not np.isfinite(less.score):
             # without it the rest runs away: nothing of what was found stands
             found = emptied(found, "not confirmed")
-            last = found.current
-            return Confirmed(
-                found, held_out_improvement(recordings, last.hypothesis, last.noises, faults, proof), recordings
-            )
-        found = released(found, place, less, "not confirmed", found.accepted[place].evidence)
+        else:
+            found = released(found, place, less, "not confirmed", found.accepted[place].evidence)
         last = found.current
         held_out = held_out_improvement(recordings, last.hypothesis, last.noises, faults, proof, held_out.linear)
     return Confirmed(found, held_out, recordings)

@@ -113,7 +113,9 @@ def _diagnosed(
     before = leftover(base.hypothesis, mended)
     causes, left_out = offered(settings.causes or library(), model)
     comparison = StructureComparison(mended, causes, _beside(faults, settings), before)
-    found = with_cause_of_odd_modes(comparison, search(comparison, base, progress))
+    found = search(comparison, base, progress)
+    progress("causes behind odd modes")
+    found = with_cause_of_odd_modes(comparison, found)
     progress("held-out recording")
     proof = confirmed(comparison, recordings_of(mended, measured, base.hypothesis), found, faults)
     both = proof.recordings

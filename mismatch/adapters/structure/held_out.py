@@ -52,6 +52,11 @@ class HeldOut:
     everywhere: Improvement
     measured: bool
 
+    def leaves_less_than(self, other: "HeldOut") -> bool:
+        """Whether less is left of what was held out, both where errors are told and in all recordings together."""
+        pairs = (self.improvement, other.improvement), (self.everywhere, other.everywhere)
+        return all(mine.after < theirs.after for mine, theirs in pairs)
+
 
 def recordings_of(mended: list[WindowedSpectrum], measured: list[WindowedSpectrum], base: Hypothesis) -> Recordings:
     """The recordings, and which of them modal parameters alone follow worst.

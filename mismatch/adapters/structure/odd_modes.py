@@ -13,8 +13,8 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ...inference import Candidate, Proposal, Round, Search, in_processes, pruned
-from ...models import Cause, Fit, Hypothesis, believed, fit, modes_are_odd
-from ...physics import MODAL_PARAMETERS, ChainPhysics, answer_name
+from ...models import Cause, Fit, Hypothesis, believed, fit, modes_are_odd, oddity_of_modes
+from ...physics import ChainPhysics, answer_name
 from ...screening import channel_of
 from .acceptance import impossible
 from .comparison import StructureComparison
@@ -61,7 +61,7 @@ def _searched(comparison: StructureComparison, found: Search[Fit]) -> Search[Fit
     nearest = min((one for one in fitted if np.isfinite(one.score)), key=lambda one: one.score, default=again)
     tasks = [partial(fit, comparison.lines, one.hypothesis, one.noises, iterations=STEPS) for one in (again, nearest)]
     again, nearest = in_processes(tasks)
-    found = _rested(found, again)
+    found = _rested(comparison, found, again)
     if len(nearest.hypothesis.causes) == len(last.hypothesis.causes) or not np.isfinite(nearest.score):
         return found
     best = _proposal(found.current, nearest)
@@ -69,9 +69,10 @@ def _searched(comparison: StructureComparison, found: Search[Fit]) -> Search[Fit
         return found
     # what the modes become beside the cause may be better without it, too
     without = best.fitted.hypothesis.without(len(found.accepted))
-    found = _rested(found, fit(comparison.lines, without, best.fitted.noises, iterations=STEPS))
+    again = fit(comparison.lines, without, best.fitted.noises, iterations=STEPS)
+    found = _rested(comparison, found, again)
     best = replace(best, evidence=found.current.score - best.fitted.score)
-    odd, left = _odd(found.current), _odd(best.fitted)
+    odd, left = oddity_of_modes(found.current), oddity_of_modes(best.fitted)
     needed = max(comparison.settings.evidence.least, BROUGHT_BACK * odd)
     if not modes_are_odd(found.current) or best.evidence < needed or left > (1 - BROUGHT_BACK) * odd:
         return found
@@ -124,13 +125,9 @@ def _proposal(current: Fit, fitted: Fit) -> Proposal[Fit]:
     return Proposal(answer_name(cause.physics), channel_of(cause), fitted, current.score - fitted.score)
 
 
-def _rested(found: Search[Fit], again: Fit) -> Search[Fit]:
-    """The search with another fit of its last step, if that is better."""
-    return replace(found, steps=(*found.steps[:-1], again)) if again.score < found.current.score else found
-
-
-def _odd(fitted: Fit) -> float:
-    """By how much ``|u|^2`` of the believed modes exceeds what errors of a lab's usual size make of it."""
-    shape = fitted.hypothesis.shape
-    rows = shape.modal_rows(fitted.hypothesis.u)[: shape.believed]
-    return MODAL_PARAMETERS.excess(float(np.sum(rows**2)), shape.believed * (shape.per_mode - 2))
+def _rested(comparison: StructureComparison, found: Search[Fit], again: Fit) -> Search[Fit]:
+    """The search with another fit of its last step, if that is better and can be."""
+    told = replace(found.accepted[-1], fitted=again)
+    if again.score >= found.current.score or impossible(told, comparison.settings.evidence):
+        return found
+    return replace(found, steps=(*found.steps[:-1], again))

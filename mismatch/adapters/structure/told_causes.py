@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...inference import AcceptedCause, Proposal
-from ...models import Cause, Fit, held_values, location_of, modes_are_odd
+from ...models import Cause, Fit, held_values, location_of, modes_are_odd, oddity_of_modes
 from ...physics import MODAL_PARAMETERS, ModePhysics, answer_name
 
 Real = NDArray[np.float64]
@@ -145,5 +145,5 @@ def modal_deviation(fitted: Fit) -> AcceptedCause | None:
         errors[f"frequency_{k + 1}_hz"] = float(spread[k, 0] * shape.lab.frequency * nominal.natural_frequencies[k])
         parameters[f"damping_ratio_{k + 1}"] = float(model.damping_ratios[k])
         errors[f"damping_ratio_{k + 1}"] = float(spread[k, 1] * shape.lab.damping * nominal.damping_ratios[k])
-    beyond = float(np.sum(rows**2)) - count * (shape.per_mode - 2)
-    return AcceptedCause(MODAL_PARAMETERS.name, {"modes": [k + 1 for k in modes]}, parameters, errors, beyond)
+    place = {"modes": [k + 1 for k in modes]}
+    return AcceptedCause(MODAL_PARAMETERS.name, place, parameters, errors, oddity_of_modes(fitted))

@@ -46,14 +46,14 @@ def displacement_at(model: ModalModel, frequencies: Real, force: Complex) -> Com
 
 
 def outside_displacement(model: ModalModel, frequencies: Real, force: Complex) -> Complex:
-    """The part of :func:`displacement_at` that modes outside the band make, (n, n_responses).
+    """The part of :func:`displacement_at` that modes outside the band make, (n, n_responses), m.
 
     Parameters
     ----------
-    frequencies : (n,), Hz
-        Frequencies of the lines, from 0 Hz on.
-    force : (n, n_excitations), N
-        Force spectrum at the lines.
+    model
+        Modal model, with the residual terms that stand for those modes.
+    frequencies, force
+        As for :func:`displacement_at`.
     """
     s = np.asarray(2j * np.pi * frequencies, dtype=complex)
     out = np.zeros((len(s), model.right.shape[1]), dtype=complex)

@@ -142,7 +142,7 @@ def freed_from_named(
             recordings, freed.hypothesis, freed.noises, faults, settings.proof, held_out.linear
         )
         chance = _chance(recordings, named, (held_out.improved, there.improved), settings)
-        if _less(there, held_out) and chance < settings.proof.significance:
+        if there.leaves_less_than(held_out) and chance < settings.proof.significance:
             return _told(recordings, begun, freed, there, (held_out.everywhere, chance))
     return None
 
@@ -193,12 +193,6 @@ def _fitted(recordings: Recordings, named: Fit) -> tuple[Fit, Fit | None]:
     starts = [with_free_forms(named.hypothesis, kinds) for kinds in (("",) if drifts else ("", ALL_SHAPES))]
     found = in_processes([partial(fit, recordings.mended, one, named.noises, iterations=STEPS) for one in starts])
     return found[0], found[1] if len(found) > 1 else None
-
-
-def _less(there: HeldOut, before: HeldOut) -> bool:
-    """Whether one leaves less of what was held out than the other, where it is told and everywhere."""
-    pairs = (there.improvement, before.improvement), (there.everywhere, before.everywhere)
-    return all(one.after < other.after for one, other in pairs)
 
 
 def _chance(recordings: Recordings, named: Fit, both: tuple[Hypothesis, Hypothesis], settings: Settings) -> float:

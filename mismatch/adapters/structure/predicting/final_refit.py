@@ -63,19 +63,13 @@ def last_fit(
     if not np.isfinite(elsewhere.score):
         return LastFit(answer)
     there = scored(recordings, (before.linear, elsewhere.hypothesis), final.noises, faults, settings)
-    if not _less(there, before):
+    if not there.leaves_less_than(before):
         return LastFit(answer)
     again = even_fit(recordings.mended, final, iterations=STEPS)
     if not np.isfinite(again.score):
         return LastFit(answer)
     left = leftover(again.hypothesis, recordings.mended)
     return LastFit(replace(answer, final=again, held_out=there, left=left), _in_words(before, there))
-
-
-def _less(there: HeldOut, before: HeldOut) -> bool:
-    """Whether one leaves less of what was held out than the other, where it is told and everywhere."""
-    pairs = (there.improvement, before.improvement), (there.everywhere, before.everywhere)
-    return all(one.after < other.after for one, other in pairs)
 
 
 def _in_words(before: HeldOut, there: HeldOut) -> str:
