@@ -11,7 +11,7 @@ from scipy.stats import t as student
 from estimation import WindowedSpectrum
 
 from ..inference import FAULTS, FaultSettings
-from ..models import Fit, levels, predict_lines, through_structure
+from ..models import Fit, fitted_noise, levels, predict_lines, through_structure
 from ..noise import NoiseModel, whitening
 
 Real = NDArray[np.float64]
@@ -282,7 +282,7 @@ def _step(lines: WindowedSpectrum) -> float:
 def _whitened_power(fitted: Fit, lines: WindowedSpectrum, noise: NoiseModel) -> Real:
     """Power of each residual line in units of its noise, mean over channels."""
     rest = lines.measured - predict_lines(fitted.hypothesis, lines).response
-    own = noise.covariance(lines.frequencies, through_structure(fitted.hypothesis, lines))
+    own = fitted_noise(lines, through_structure(fitted.hypothesis, lines), noise)
     return np.asarray(np.sum(np.abs(np.einsum("kij,kj->ki", whitening(own), rest)) ** 2, axis=1) / rest.shape[1])
 
 

@@ -9,7 +9,7 @@ from scipy.fft import irfft, rfft
 from estimation import WindowedSpectrum
 
 from ..joints import JointAxis, JointLaw, driven_force
-from ..models import Cause, Fit, Hypothesis, predict_lines, through_structure
+from ..models import Cause, Fit, Hypothesis, fitted_noise, predict_lines, through_structure
 from ..noise import whitening
 from ..physics import FreeForm, answer_name, rig_of
 from ..screening import FloorRecord, SeenMotion, seen_motion
@@ -150,7 +150,7 @@ def _seen(
     """Return motion and force along the joint in one recording, and the forces of both laws for that motion."""
     axis, laws = joint
     through = through_structure(bare, lines)
-    covariance = final.noises[number].covariance(lines.frequencies, through)
+    covariance = fitted_noise(lines, through, final.noises[number])
     rest = lines.measured - predict_lines(bare, lines).response
     record = FloorRecord(lines, rest, through, whitening(covariance), np.zeros((0, 0)), np.zeros(0))
     seen: SeenMotion = seen_motion(record, bare, axis)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
 
-from ..models import Fit, Hypothesis, predict_lines, through_structure
+from ..models import Fit, Hypothesis, fitted_noise, predict_lines, through_structure
 from ..noise import whitening
 from .band_means import band_means
 
@@ -106,7 +106,7 @@ def normalised(
     """
     rest = lines.measured - predict_lines(hypothesis, lines).response
     through = through_structure(reference.hypothesis, lines)
-    covariance = reference.noises[number].covariance(lines.frequencies, through)
+    covariance = fitted_noise(lines, through, reference.noises[number])
     variance = np.real(np.einsum("kii->ki", covariance))
     return rest / np.sqrt(variance), np.einsum("kij,kj->ki", whitening(covariance), rest), variance
 

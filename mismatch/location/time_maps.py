@@ -9,7 +9,7 @@ from scipy.signal.windows import hann
 
 from estimation import WindowedSpectrum
 
-from ..models import Fit, Hypothesis, predict_lines, through_structure
+from ..models import Fit, Hypothesis, fitted_noise, predict_lines, through_structure
 from ..noise import whitening
 from .band_means import band_means
 from .residual_maps import overlap
@@ -105,7 +105,7 @@ def _kept(lines: WindowedSpectrum, rest: Real) -> Real:
 def _whitening_at(reference: Fit, number: int, lines: WindowedSpectrum, axis: Real) -> Complex:
     """Return the whitening at other frequencies, from the mean of the noise's covariance over the nearest lines."""
     through = through_structure(reference.hypothesis, lines)
-    covariance = reference.noises[number].covariance(lines.frequencies, through)
+    covariance = fitted_noise(lines, through, reference.noises[number])
     nearest = np.clip(np.searchsorted(0.5 * (axis[1:] + axis[:-1]), lines.frequencies), 0, len(axis) - 1)
     held = np.maximum(np.bincount(nearest, minlength=len(axis)), 1)
     mean = np.zeros((len(axis), *covariance.shape[1:]), dtype=complex)

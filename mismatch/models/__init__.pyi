@@ -4,7 +4,16 @@ from .freed_laws import EVERYTHING, with_free_forms, with_linear_part
 from .hypothesis import Hypothesis, line_response, predict_lines, surround
 from .linear_lines import response_to_joint
 from .lines import receptance_at
-from .misfit import known_noise, least_misfit, levels, outdoes_noise, shares_left, through_structure, whitened
+from .misfit import (
+    fitted_noise,
+    known_noise,
+    least_misfit,
+    levels,
+    outdoes_noise,
+    shares_left,
+    through_structure,
+    whitened,
+)
 from .model_shape import ModelShape
 from .model_terms import hypothesis_of, improved_model
 from .plain_fits import even_fit, plain_fit
@@ -21,6 +30,7 @@ __all__ = [
     "believed",
     "even_fit",
     "fit",
+    "fitted_noise",
     "following_all",
     "gives_one_up",
     "held_values",

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from estimation import WindowedSpectrum
 
-from ..noise import NoiseModel, fit_noise, size_of_white, whitened_columns, whitening_and_determinant
+from ..noise import NoiseModel, fit_noise, inexactness, size_of_white, whitened_columns, whitening_and_determinant
 from .hypothesis import Hypothesis, Predicted, predict_lines
 from .linear_lines import LinearLines, linear_lines
 
@@ -85,7 +85,8 @@ def with_noise(
         raise np.linalg.LinAlgError(f"the response predicted for {lines.recording.name} is not finite")
     linear = seen.linear if seen is not None and seen.linear is not None else linear_lines(hypothesis, lines)
     forces = None if lines.noise is None else np.einsum("kqq->kq", lines.noise.forces).real.mean(axis=0)
-    found = fit_noise(lines.frequencies, rest, linear.through, levels(lines), noise, forces)
+    inexact = inexactness(lines.measured)
+    found = fit_noise(lines.frequencies, rest, linear.through, levels(lines), noise, forces, inexact)
     return _misfit_of(lines, predicted, linear, rest, found)
 
 
@@ -117,6 +118,21 @@ def known_noise(lines: WindowedSpectrum, through: Complex, noise: NoiseModel) ->
     if lines.noise is None:
         return noise.covariance(lines.frequencies, through)
     return lines.noise.covariance(lines.frequencies, through)
+
+
+def fitted_noise(lines: WindowedSpectrum, through: Complex, noise: NoiseModel) -> Complex:
+    """Covariance of what a fit takes for noise and for error of the signal, (n_lines, n_responses, n_responses).
+
+    Parameters
+    ----------
+    lines
+        Windowed lines of the recording.
+    through : (n_lines, n_responses, n_excitations)
+        Matrix from measured forces to responses at the lines.
+    noise
+        Noise that was fitted to the recording.
+    """
+    return noise.covariance(lines.frequencies, through, inexactness(lines.measured))
 
 
 def outdoes_noise(hypothesis: Hypothesis, lines: WindowedSpectrum) -> bool:
@@ -173,6 +189,6 @@ def _misfit_of(
     """Misfit of a residual under a given noise; infinite where it is not finite."""
     if not np.isfinite(rest).all():
         return Misfit(predicted, linear, rest, rest, np.inf, noise)
-    white, log_determinant = whitening_and_determinant(noise.covariance(lines.frequencies, linear.through))
+    white, log_determinant = whitening_and_determinant(fitted_noise(lines, linear.through, noise))
     misfit = 2 * (log_determinant + size_of_white(white, np.ascontiguousarray(rest), np.empty(len(rest))))
     return Misfit(predicted, linear, white, rest, misfit if np.isfinite(misfit) else np.inf, noise)

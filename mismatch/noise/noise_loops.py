@@ -77,7 +77,7 @@ def line_covariances(own: Real, through: Complex, pushed: Real, out: Complex) ->
 
 @compiled
 def noise_likelihood(
-    bands: tuple[Real, Complex, Complex],
+    bands: tuple[Real, Complex, Complex, Real],
     own: Real,
     pushed: Real,
     slopes: tuple[Real, Real],
@@ -85,13 +85,13 @@ def noise_likelihood(
 ) -> float:
     """Return ``sum_b n_b (ln det V_b + tr V_b^-1 S_b)``, and write its slopes and curvature.
 
-    The covariance of a band is ``V = diag(own) + sum_q pushed_q T_q``.
+    The covariance of a band is ``V = diag(own + known) + sum_q pushed_q T_q``.
 
     Parameters
     ----------
     bands
         Lines in each band (n_bands,), covariance of the residual (n_bands, n, n), what unit noise of each force leaves
-        in the responses (n_bands, n_excitations, n, n).
+        in the responses (n_bands, n_excitations, n, n), and variance that is known beforehand (n_bands, n).
     own : (n_bands, n)
         Noise variance of each response in each band.
     pushed : (n_excitations,), N^2
@@ -102,7 +102,7 @@ def noise_likelihood(
         Receives second derivatives: by ln own twice (n_bands, n, n), by ln own and ln pushed
         (n_bands, n, n_excitations), and by ln pushed twice (n_excitations, n_excitations).
     """
-    counts, sample, through = bands
+    counts, sample, through, known = bands
     by_own, by_force = slopes
     n = own.shape[1]
     cost = 0.0
@@ -111,7 +111,7 @@ def noise_likelihood(
     v = np.empty((n, n), dtype=np.complex128)
     inverse = np.empty((n, n), dtype=np.complex128)
     for b in range(len(counts)):
-        _covariance(through[b], own[b], pushed, v)
+        _covariance(through[b], own[b] + known[b], pushed, v)
         log_determinant = whiten_in_place(v)
         if not np.isfinite(log_determinant):
             return np.inf

@@ -24,6 +24,9 @@ FORCE_SHARE = (-0.7, 1.0)
 HELD = 1e-3
 """Standard deviation of the ln variance of a force's noise that was measured."""
 
+EXACT = 2e-3
+"""Share of a response that no measurement and no simulation is exact to: sensors are linear to a percent at best."""
+
 WARM, COLD = 12, 60
 """Steps at most if the search begins with a noise that was fitted before, and if it begins with none."""
 
@@ -48,17 +51,29 @@ class NoiseModel:
     responses: Real
     forces: Real
 
-    def covariance(self, frequencies: Real, through: Complex) -> Complex:
-        """V at lines, (n_lines, n_responses, n_responses); ``through`` is G, (n_lines, n_responses, n_excitations)."""
+    def covariance(self, frequencies: Real, through: Complex, inexact: Real | None = None) -> Complex:
+        """Covariance V at lines, (n_lines, n_responses, n_responses).
+
+        Parameters
+        ----------
+        frequencies : (n_lines,), Hz
+            Frequencies of the lines.
+        through : (n_lines, n_responses, n_excitations)
+            Matrix G from forces to responses at the lines.
+        inexact : (n_lines, n_responses)
+            Variance of what goes with the signal itself, from :func:`inexactness`; None: none.
+        """
         own = np.exp(_hat(self.knots, frequencies) @ self.responses.T)
+        if inexact is not None:
+            own += inexact
         result = np.empty((*own.shape, own.shape[1]), dtype=complex)
         line_covariances(own, np.ascontiguousarray(through), np.exp(self.forces), result)
         return result
 
-    def sizes(self, frequencies: Real, residual: Complex, through: Complex) -> Real:
+    def sizes(self, frequencies: Real, residual: Complex, through: Complex, inexact: Real | None = None) -> Real:
         """Whitened squares ``r^H V^-1 r`` of residual lines (n_lines, n_responses), (n_lines,)."""
         sizes = np.empty(len(residual))
-        white = whitening_and_determinant(self.covariance(frequencies, through))[0]
+        white = whitening_and_determinant(self.covariance(frequencies, through, inexact))[0]
         size_of_white(white, np.ascontiguousarray(residual), sizes)
         return sizes
 
@@ -82,6 +97,15 @@ def flat_noise(frequencies: Real, responses: Real, n_excitations: int) -> NoiseM
     knots = np.linspace(np.log(frequencies[0]), np.log(frequencies[-1]), KNOTS)
     level = np.tile(np.log(np.maximum(responses, 1e-30))[:, None], KNOTS)
     return NoiseModel(knots, level, np.full(n_excitations, -80.0))
+
+
+def inexactness(measured: Complex) -> Real:
+    """Variance of the error that goes with the signal, ``(EXACT |y|)^2`` of each line (n_lines, n_responses).
+
+    Where a few lines hold all that is known, as at a constant speed, they stand a thousand times above the noise.
+    Without this error the likelihood asks a model to follow them to the noise, and takes whatever makes it.
+    """
+    return np.asarray(EXACT**2 * (measured.real**2 + measured.imag**2))
 
 
 def whitening(covariance: Complex) -> Complex:
@@ -111,6 +135,7 @@ def fit_noise(
     levels: tuple[Real, Real],
     start: NoiseModel | None = None,
     forces: Real | None = None,
+    inexact: Real | None = None,
 ) -> NoiseModel:
     """Most likely noise of residual lines that are Gaussian, outlying lines weighted down.
 
@@ -131,6 +156,8 @@ def fit_noise(
         Noise that the search begins with; None: taken from the residual.
     forces : (n_excitations,)
         Variance of the forces' noise at a line where it was measured, which is then held; None: estimated.
+    inexact : (n_lines, n_responses)
+        Variance of what goes with the signal, which is known; None: none.
     """
     knots = np.linspace(np.log(frequencies[0]), np.log(frequencies[-1]), KNOTS)
     n, m = residual.shape[1], through.shape[2]
@@ -145,11 +172,14 @@ def fit_noise(
     if held is not None:
         start = replace(start, forces=held)
     belief = _belief(n, m, levels, held)
+    known = np.zeros(residual.shape) if inexact is None else inexact
     noise = start
     for turn in range(1 if warm else 2):
         if turn:
-            weights = np.minimum(1.0, (4.0 * n + 6.0) / np.maximum(noise.sizes(frequencies, residual, through), 1e-12))
-        lumps = lumped(residual, through, weights, hat)
+            weights = np.minimum(
+                1.0, (4.0 * n + 6.0) / np.maximum(noise.sizes(frequencies, residual, through, inexact), 1e-12)
+            )
+        lumps = lumped(residual, through, weights, hat, known)
         first = np.concatenate([noise.responses.ravel(), noise.forces])
         best = most_likely(first, lumps, belief, WARM if warm else COLD)
         noise = NoiseModel(knots, best[: n * KNOTS].reshape(n, KNOTS), best[n * KNOTS :])

@@ -37,16 +37,33 @@ class Lumps:
         Covariance that unit noise of each force leaves in the responses.
     hats : (n_bands, n_knots)
         Weights that interpolate from the knots to each band.
+    known : (n_bands, n)
+        Variance of each response in each band that is known beforehand.
     """
 
     counts: Real
     sample: Complex
     through: Complex
     hats: Real
+    known: Real
 
 
-def lumped(residual: Complex, through: Complex, weights: Real, hat: Real) -> Lumps:
-    """Lines (n_lines, n) with their weights (n_lines,) and interpolation (n_lines, n_knots) in narrow bands."""
+def lumped(residual: Complex, through: Complex, weights: Real, hat: Real, known: Real) -> Lumps:
+    """Lines in narrow bands.
+
+    Parameters
+    ----------
+    residual : (n_lines, n)
+        Residual lines of the responses.
+    through : (n_lines, n, n_excitations)
+        Matrix from forces to responses at each line.
+    weights : (n_lines,)
+        Weight of each line, 1 or less.
+    hat : (n_lines, n_knots)
+        Weights that interpolate from the knots to each line.
+    known : (n_lines, n)
+        Variance of each response that is known beforehand.
+    """
     count, n = residual.shape
     bands = min(MOST_BANDS, max(2, count // LEAST_LINES))
     edges = np.unique(np.linspace(0, count, bands + 1).astype(np.int64))
@@ -54,7 +71,8 @@ def lumped(residual: Complex, through: Complex, weights: Real, hat: Real) -> Lum
     sample = np.empty((len(counts), n, n), dtype=complex)
     passed = np.empty((len(counts), through.shape[2], n, n), dtype=complex)
     lump_lines(edges, np.ascontiguousarray(residual), weights, np.ascontiguousarray(through), sample, passed)
-    return Lumps(counts, sample, passed, np.add.reduceat(hat, edges[:-1], axis=0) / counts[:, None])
+    hats, sure = (np.add.reduceat(one, edges[:-1], axis=0) / counts[:, None] for one in (hat, known))
+    return Lumps(counts, sample, passed, hats, sure)
 
 
 def cost_of(x: Real, lumps: Lumps, belief: tuple[Real, Real]) -> tuple[float, Real, Real]:
@@ -75,7 +93,8 @@ def cost_of(x: Real, lumps: Lumps, belief: tuple[Real, Real]) -> tuple[float, Re
     pushed = np.exp(np.clip(x[n * knots :], -80, 80))
     by_own, by_force = np.empty((bands, n)), np.empty(m)
     parts = np.empty((bands, n, n)), np.empty((bands, n, m)), np.empty((m, m))
-    cost = noise_likelihood((lumps.counts, lumps.sample, lumps.through), own, pushed, (by_own, by_force), parts)
+    bands_of = lumps.counts, lumps.sample, lumps.through, lumps.known
+    cost = noise_likelihood(bands_of, own, pushed, (by_own, by_force), parts)
     gradient = np.concatenate([(by_own.T @ lumps.hats).ravel(), by_force])
     curvature = np.empty((len(x), len(x)))
     hats = lumps.hats

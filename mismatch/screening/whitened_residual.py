@@ -9,7 +9,7 @@ from scipy.stats import gamma
 
 from estimation import WindowedSpectrum
 
-from ..models import ENOUGH, Fit, jacobian, levels, predict_lines, through_structure, whitened
+from ..models import ENOUGH, Fit, fitted_noise, jacobian, levels, predict_lines, through_structure, whitened
 from ..noise import whitening
 
 Complex = NDArray[np.complex128]
@@ -114,7 +114,7 @@ def noise_floor(fitted: Fit, lines: list[WindowedSpectrum]) -> Floor:
 
     def covariance(k: int, rest: Complex, through: Complex, few: WindowedSpectrum) -> Complex:
         del rest
-        return fitted.noises[k].covariance(few.frequencies, through)
+        return fitted_noise(few, through, fitted.noises[k])
 
     return _floor(fitted, lines, covariance)
 

@@ -20,7 +20,7 @@ def lumps() -> Lumps:
     noise = [rng.normal(size=(600, k)) + 1j * rng.normal(size=(600, k)) for k in (N, M)]
     rest = noise[0] * [0.5, 2.0] + np.einsum("kpq,kq->kp", through, noise[1] * 0.7)
     rest[200:220] *= 30
-    return lumped(rest, through, np.ones(600), hat)
+    return lumped(rest, through, np.ones(600), hat, 0.3 * np.abs(rest) ** 2)
 
 
 @pytest.fixture
@@ -35,11 +35,16 @@ def test_likelihood_of_noise_is_gaussian() -> None:
     root = rng.normal(size=(3, 2, 2, 2)) + 1j * rng.normal(size=(3, 2, 2, 2))
     sample, through = root[:, 0] @ root[:, 0].conj().swapaxes(1, 2), root @ root.conj().swapaxes(2, 3)
     counts, own, pushed = np.array([4.0, 9.0, 2.0]), rng.uniform(0.5, 2, (3, 2)), np.array([0.3, 0.8])
+    known = rng.uniform(0, 1, (3, 2))
     slopes = np.empty((3, 2)), np.empty(2)
     cost = noise_likelihood(
-        (counts, sample, through), own, pushed, slopes, (np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty((2, 2)))
+        (counts, sample, through, known),
+        own,
+        pushed,
+        slopes,
+        (np.empty((3, 2, 2)), np.empty((3, 2, 2)), np.empty((2, 2))),
     )
-    covariance = np.einsum("q,bqij->bij", pushed, through) + own[:, :, None] * np.eye(2)
+    covariance = np.einsum("q,bqij->bij", pushed, through) + (own + known)[:, :, None] * np.eye(2)
     traces = np.trace(np.linalg.solve(covariance, sample), axis1=1, axis2=2).real
     assert cost == pytest.approx(float(counts @ (np.linalg.slogdet(covariance)[1] + traces)), rel=1e-10)
 

@@ -9,7 +9,7 @@ from estimation import WindowedSpectrum
 
 from ...faults import residual_lines
 from ...inference import AcceptedCause, Improvement, ProofSettings, Search, Settings, emptied, in_processes, released
-from ...models import Fit, fit, least_misfit, through_structure
+from ...models import Fit, fit, fitted_noise, least_misfit, through_structure
 from ...records import Recordings
 from .acceptance import modes_not_seen
 from .comparison import StructureComparison
@@ -215,7 +215,7 @@ def _missed(
     place = recordings.held_out_place
     here = recordings.held_out(recordings.mended)
     rest, without = residual_lines(held_out.improved, here), residual_lines(less.hypothesis, here)
-    covariance = last.noises[place].covariance(here.frequencies, through_structure(last.hypothesis, here))
+    covariance = fitted_noise(here, through_structure(last.hypothesis, here), last.noises[place])
     gain = least_misfit(less.hypothesis, here) - least_misfit(held_out.improved, here)
     if gain <= settings.proof.gain:
         return False

@@ -11,7 +11,7 @@ from scipy.stats import t as student
 
 from estimation import WindowedSpectrum
 
-from ...models import Fit, fit, held_values, jacobian, predict_lines, through_structure
+from ...models import Fit, fit, fitted_noise, held_values, jacobian, predict_lines, through_structure
 from ...noise import NoiseModel, whitening
 from ...physics import FormedPhysics, JointPhysics
 from .held_out import block_slices
@@ -145,7 +145,7 @@ def _parts(
     """Normal equations of the weak, the middle and the strong part of a recording."""
     hypothesis = fitted.hypothesis
     predicted = predict_lines(hypothesis, lines)
-    white = whitening(noise.covariance(lines.frequencies, through_structure(hypothesis, lines)))
+    white = whitening(fitted_noise(lines, through_structure(hypothesis, lines), noise))
     slopes = np.einsum("kij,kjc->kic", white, jacobian(hypothesis, lines, predicted)[:, :, which])
     rest = np.einsum("kij,kj->ki", white, lines.measured - predicted.response)
     n = len(lines.window)

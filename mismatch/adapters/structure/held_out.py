@@ -13,7 +13,17 @@ from estimation import WindowedSpectrum
 
 from ...faults import residual_lines
 from ...inference import AcceptedCause, Improvement, ProofSettings, in_processes, ratio_interval
-from ...models import Fit, Hypothesis, fit, known_noise, least_misfit, plain_fit, shares_left, through_structure
+from ...models import (
+    Fit,
+    Hypothesis,
+    fit,
+    fitted_noise,
+    known_noise,
+    least_misfit,
+    plain_fit,
+    shares_left,
+    through_structure,
+)
 from ...noise import NoiseModel, whitening
 from ...records import Recordings
 
@@ -155,7 +165,7 @@ def scored(
         residual_lines(improved, here, faults),
     ]
     through = through_structure(improved, here)
-    covariance = noises[place].covariance(here.frequencies, through)
+    covariance = fitted_noise(here, through, noises[place])
     floor = known_noise(here, through, noises[place])
     power = float(np.sum(np.abs(here.measured) ** 2))
     runs_away = not np.isfinite(rests[2]).all()

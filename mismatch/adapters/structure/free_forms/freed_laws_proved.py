@@ -16,7 +16,7 @@ import numpy as np
 from ....faults import residual_lines
 from ....inference import AcceptedCause, Improvement, Settings, in_processes
 from ....joints import joint_in_words, tip_axes
-from ....models import Fit, Hypothesis, fit, through_structure, with_free_forms
+from ....models import Fit, Hypothesis, fit, fitted_noise, through_structure, with_free_forms
 from ....physics import answer_name, families
 from ....records import Recordings
 from ..held_out import HeldOut, chance_of_no_gain, held_out_improvement
@@ -199,7 +199,7 @@ def _chance(recordings: Recordings, named: Fit, both: tuple[Hypothesis, Hypothes
     """Chance that the second of two hypotheses predicts what was held out no better than the first."""
     here = recordings.held_out(recordings.mended)
     noise = named.noises[recordings.held_out_place]
-    covariance = noise.covariance(here.frequencies, through_structure(named.hypothesis, here))
+    covariance = fitted_noise(here, through_structure(named.hypothesis, here), noise)
     rival, final = (residual_lines(one, here) for one in both)
     return chance_of_no_gain(here, covariance, rival, final, settings.proof)
 
