@@ -33,9 +33,10 @@ WARM, COLD = 12, 60
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Covariance of one trial's residual lines, ``V(f) = diag c(f) + G(f) diag(v) G(f)^H``.
+    """Covariance of one trial's residual lines, ``V(f) = diag(c(f) + e(f)) + G(f) diag(v) G(f)^H``.
 
-    G carries the noise of the measured forces through the structure to the responses.
+    G carries the noise of the measured forces through the structure to the responses; e is the error that goes with the
+    signal, which is known.
 
     Parameters
     ----------

@@ -184,7 +184,9 @@ def test_a_name_that_leaves_far_more_than_its_free_form_is_not_the_whole() -> No
     assert "does not describe all of the force" in found.doubt
 
 
-@pytest.mark.parametrize(("falls", "verdict"), [(0.1, "explained"), (0.6, "partly explained"), (0.9, "partly explained")])
+@pytest.mark.parametrize(
+    ("falls", "verdict"), [(0.1, "explained"), (0.6, "partly explained"), (0.9, "partly explained")]
+)
 def test_friction_that_falls_is_named(falls: float, verdict: str) -> None:
     """By 10 % it is dry friction; by more the name leaves five times the noise, which its free form does not."""
     found = diagnose(RIG.model, [one.recording for one in recorded(_Slip(falls), LEVELS)])
