@@ -12,7 +12,7 @@ from foundation import MillfrfError
 
 from ..models import Hypothesis
 from ..physics import rig_of
-from .families import FAMILIES, BehaviourSettings, family_of, sentence_of
+from .families import FAMILIES, FOLLOWS_LEVEL, BehaviourSettings, family_of, sentence_of
 from .level_refit import RefittedModes, refitted_modes
 from .mode_trend import ModeTrend, mode_trends
 
@@ -41,6 +41,11 @@ class Behaviour:
     unit: str
     modes: tuple[ModeTrend, ...]
     distortion: tuple[str, ...] = ()
+
+    @property
+    def follows_level(self) -> bool:
+        """Whether modes move with the level for certain, as no linear structure's do."""
+        return self.family in FOLLOWS_LEVEL
 
     def content(self) -> dict[str, Any]:
         """Plain numbers and texts for a file."""

@@ -21,6 +21,9 @@ FAMILIES: Mapping[str, str] = {
 }
 """Families of behaviour, and what each says."""
 
+FOLLOWS_LEVEL = frozenset(FAMILIES) - {"none", "drift", "doubtful", "cannot tell"}
+"""Families that no linear structure has, whatever its numbers are."""
+
 
 @dataclass(frozen=True)
 class BehaviourSettings:

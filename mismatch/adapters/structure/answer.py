@@ -1,6 +1,6 @@
 """What a diagnosis tells of a structure: the verdict, the causes under it, and what they are worth on held-out data."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -10,7 +10,7 @@ from estimation import WindowedSpectrum
 
 from ...behaviour import FollowedAlone, followed_alone
 from ...faults import with_tones_settled
-from ...inference import AcceptedCause, Candidate, Remainder, Search, released
+from ...inference import AcceptedCause, Candidate, Remainder, Search, VerdictSettings, released
 from ...models import Fit, fit, with_linear_part
 from ...physics import is_fault
 from ...records import Recordings
@@ -19,6 +19,7 @@ from .comparison import StructureComparison
 from .confirmation import fit_without
 from .form_errors import with_form_spread
 from .held_out import HeldOut, held_out_improvement, scored
+from .level_check import moved_by_level, verdict_beside_moving_modes
 from .structure_verdict import has_a_sure_name, shown_faults, small_beside_the_rest, verdict_of_structure
 from .told_causes import modal_deviation, told_causes, undamped_modes
 
@@ -45,6 +46,8 @@ class Answer:
         Causes that the verdict turns down.
     no_noise
         Recordings of which the causes leave much that is no noise, and that keep the answer from being whole.
+    moving
+        How modes move with the level, where nothing that was found depends on it; empty where that is not seen.
     """
 
     verdict: str
@@ -55,6 +58,7 @@ class Answer:
     held_out: HeldOut
     rejected: tuple[Candidate, ...] = ()
     no_noise: tuple[FollowedAlone, ...] = ()
+    moving: str = ""
 
 
 def answer_of(
@@ -112,11 +116,10 @@ def answer_of(
         everywhere=held_out.everywhere,
         measured=held_out.measured,
     )
-    verdict = judged()
-    no_noise: tuple[FollowedAlone, ...] = ()
-    if verdict in ("none", "explained"):
-        no_noise = followed_alone(current.hypothesis, found.base.hypothesis, both.mended, settings.verdict)
-        verdict = judged(followed_alone=bool(no_noise))
+    verdict, no_noise = _judged_alone(judged, found, both, settings.verdict)
+    moving = moved_by_level(current.hypothesis, causes, comparison.behaviour)
+    if moving and verdict != "unexplained":
+        verdict = verdict_beside_moving_modes(held_out.improvement, causes, settings.verdict)
     if verdict == "partly explained" and found.accepted:
         small = small_beside_the_rest(found, settings.evidence.small_in_part)
         if less := _without_one_of(comparison, both, found, small, "small beside what is left", faults):
@@ -125,8 +128,32 @@ def answer_of(
         if not has_a_sure_name(found, comparison.laws):
             verdict = "unexplained"
     if verdict == "unexplained":
-        return replace(_unexplained(comparison, both, found, held_out, causes), no_noise=no_noise)
-    return Answer(verdict, tuple(causes), current, found, left, held_out, no_noise=no_noise)
+        none_told = _unexplained(comparison, both, found, held_out, causes)
+        return replace(none_told, no_noise=no_noise, moving=moving)
+    return Answer(verdict, tuple(causes), current, found, left, held_out, no_noise=no_noise, moving=moving)
+
+
+def _judged_alone(
+    judged: Callable[..., str], found: Search[Fit], both: Recordings, settings: VerdictSettings
+) -> tuple[str, tuple[FollowedAlone, ...]]:
+    """The verdict, and recordings of which a whole answer leaves what modes of their own follow: it is then not whole.
+
+    Parameters
+    ----------
+    judged
+        Gives the verdict, and with ``followed_alone`` that of an answer that is not whole.
+    found
+        Where the search ended.
+    both
+        The recordings, mended and as measured.
+    settings
+        Thresholds of the verdict.
+    """
+    verdict = judged()
+    if verdict not in ("none", "explained"):
+        return verdict, ()
+    no_noise = followed_alone(found.current.hypothesis, found.base.hypothesis, both.mended, settings)
+    return judged(followed_alone=bool(no_noise)), no_noise
 
 
 def _unexplained(

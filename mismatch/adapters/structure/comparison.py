@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from estimation import WindowedSpectrum
 
+from ...behaviour import Behaviour
 from ...inference import Proposal, Remainder, Round, Search, Settings, equivalents_of
 from ...models import Cause, Fit, fit, gives_one_up, settled
 from ...physics import JointPhysics, Physics, answer_name
@@ -31,12 +32,20 @@ class StructureComparison:
         Thresholds of the diagnosis.
     before
         Part of the residual that moves with the signal when no cause is accepted.
+    behaviour
+        What modes do with the level, without any law; None: not looked at.
     """
 
     lines: list[WindowedSpectrum]
     causes: Mapping[str, Physics]
     settings: Settings
     before: Remainder
+    behaviour: Behaviour | None = None
+
+    @property
+    def modes_move(self) -> bool:
+        """Whether modes move with the level, which no linear cause makes them do."""
+        return self.behaviour is not None and self.behaviour.follows_level
 
     @property
     def laws(self) -> set[str]:
@@ -54,7 +63,7 @@ class StructureComparison:
         """
         current = search.current
         moving = leftover(current.hypothesis, self.lines) if search.accepted else self.before
-        standing = Standing(self.lines, current, search.base, moving, self.before, self.settings)
+        standing = Standing(self.lines, current, search.base, moving, self.before, self.settings, self.modes_move)
         spared = self._laws_failed_at(search) * self.settings.search.laws_again <= moving.size
         linear = {name: one for name, one in self.causes.items() if not isinstance(one, JointPhysics)}
         weighed = weigh(standing, linear if spared else self.causes)

@@ -112,7 +112,8 @@ def _diagnosed(
     mended, base, faults = repair_faults(measured, base, settings)
     before = leftover(base.hypothesis, mended)
     causes, left_out = offered(settings.causes or library(), model)
-    comparison = StructureComparison(mended, causes, _beside(faults, settings), before)
+    behaviour = behaviour_of(base.hypothesis, mended)
+    comparison = StructureComparison(mended, causes, _beside(faults, settings), before, behaviour)
     found = search(comparison, base, progress)
     progress("causes behind odd modes")
     found = with_cause_of_odd_modes(comparison, found)
@@ -133,7 +134,7 @@ def _diagnosed(
     unseen = both.held_out(measured)
     details = StructureDetails(base, answer.final, tuple(mended), tuple(measured), elsewhere, unseen, band)
     # faults that are not told may have been none: a resonance that was taken for a tone
-    behaviour = behaviour_of(base.hypothesis, measured if answer.verdict == "unexplained" else mended)
+    behaviour = behaviour_of(base.hypothesis, measured) if faults and answer.verdict == "unexplained" else behaviour
     view = residual_view(details, answer.verdict == "unexplained", recordings, settings.location)
     candidates = sorted([*found.candidates, *answer.rejected], key=lambda one: -one.evidence)
     return Diagnosis(
@@ -150,6 +151,7 @@ def _diagnosed(
         doubts=(
             *beyond_model(base.hypothesis, mended),
             *(one.sentence for one in answer.no_noise),
+            *([answer.moving] if answer.moving else []),
             *([freed.doubt] if freed.doubt else []),
         ),
         content={

@@ -47,6 +47,8 @@ class Standing:
         Parts of the residuals of ``current`` and of ``base`` that move with the signal.
     settings
         Thresholds of the diagnosis.
+    modes_move
+        Whether modes move with the level, which no linear cause makes them do.
     """
 
     lines: list[WindowedSpectrum]
@@ -55,13 +57,17 @@ class Standing:
     moving: Remainder
     before: Remainder
     settings: Settings
+    modes_move: bool = False
 
     def is_left(self, left: Remainder, hypothesis: Hypothesis) -> bool:
         """Whether more is left than noise and the form of a law make, or too much of the response for noise.
 
         What is left may swell with the signal no more than by chance where all of it comes from one resonance, so
-        that a residual of much of the response is never taken for noise before joints were looked for.
+        that a residual of much of the response is never taken for noise before joints were looked for. Where modes
+        move with the level, something is left until a law is found, however steady the recordings are.
         """
+        if self.modes_move and not hypothesis.laws:
+            return True
         small, limits = self.settings.evidence.small, self.settings.verdict
         if left.share > limits.noise_like and left.size > 3 * small * self.before.size:
             return True

@@ -1,0 +1,77 @@
+"""Modes that move with the level: a law is looked for, and an answer without one is not whole."""
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from benchmarks.blind_trial.case_spec import draw_cases
+from benchmarks.blind_trial.sealed_case import write_case
+from mismatch import diagnose, read_recordings
+from mismatch.adapters.structure.level_check import moved_by_level, verdict_beside_moving_modes
+from mismatch.behaviour import FAMILIES, Behaviour
+from mismatch.inference import Improvement, VerdictSettings
+from modal_fit import read_modal_model
+
+SOFTENS = Behaviour("softening", "Mode at 6.1 Hz softens by 0.9 %.", "N", ())
+LINEAR: Any = SimpleNamespace(laws=())
+LAW: Any = SimpleNamespace(laws=(1,))
+GAIN: Any = SimpleNamespace(name="gain_error")
+CLIPPED: Any = SimpleNamespace(name="clipping")
+
+
+@pytest.mark.parametrize(
+    ("group", "cases", "seed", "index", "law"),
+    [("steady", 120, 4301, 20, "stiffness_softening"), ("extended", 300, 4201, 1, "stiffness_hardening")],
+)
+def test_a_spring_is_found_where_a_linear_cause_was_told(
+    tmp_path: Path, group: str, cases: int, seed: int, index: int, law: str
+) -> None:
+    """Before: a table's mass and an axis were told, with an evidence of 37, as no law had been looked for."""
+    spec = next(one for one in draw_cases(cases, seed, only=group) if one.index == index)
+    given = write_case(spec, tmp_path)
+    model = read_modal_model(given / "nominal.json")
+    found = diagnose(model, read_recordings([given / f"{level}.h5" for level in ("low", "mid", "high")], model))
+    assert found.verdict == "explained"
+    assert [one.name for one in found.physics] == [law]
+    assert found.physics[0].evidence > 1000
+
+
+def test_what_a_linear_answer_does_not_move_is_told() -> None:
+    assert moved_by_level(LINEAR, (GAIN,), SOFTENS) == (
+        "Mode at 6.1 Hz softens by 0.9 %. No linear model does that, so the answer is not whole"
+    )
+
+
+@pytest.mark.parametrize(
+    ("answer", "causes", "behaviour"),
+    [
+        (LAW, (), SOFTENS),
+        (LINEAR, (CLIPPED,), SOFTENS),
+        (LINEAR, (GAIN,), None),
+        *[(LINEAR, (GAIN,), replace(SOFTENS, family=one)) for one in ("none", "drift", "doubtful", "cannot tell")],
+    ],
+)
+def test_nothing_is_said_where_modes_stay_or_something_moves_them(
+    answer: Any, causes: tuple[Any, ...], behaviour: Behaviour | None
+) -> None:
+    assert not moved_by_level(answer, causes, behaviour)
+
+
+def test_all_other_families_follow_the_level() -> None:
+    stay = {"none", "drift", "doubtful", "cannot tell"}
+    assert all(replace(SOFTENS, family=one).follows_level != (one in stay) for one in FAMILIES)
+
+
+@pytest.mark.parametrize(
+    ("after", "causes", "verdict"),
+    [(0.05, (GAIN,), "partly explained"), (0.09, (GAIN,), "unexplained"), (0.05, (), "unexplained")],
+)
+def test_a_linear_cause_must_halve_the_error_of_a_plain_refit(
+    after: float, causes: tuple[Any, ...], verdict: str
+) -> None:
+    """Whatever the nominal model leaves: a refit takes much of that, too."""
+    gain = Improvement("mid", 0.5, 0.1, after, 0.01, 0.001, (0.1, 0.3))
+    assert verdict_beside_moving_modes(gain, causes, VerdictSettings()) == verdict
