@@ -14,7 +14,7 @@ from ...inference import AcceptedCause, Candidate, Remainder, Search, VerdictSet
 from ...models import Fit, fit, with_linear_part
 from ...physics import is_fault
 from ...records import Recordings
-from ...remainder import leftover
+from ...remainder import Bursts, bursts_left, leftover
 from .comparison import StructureComparison
 from .confirmation import fit_without
 from .form_errors import with_form_spread
@@ -48,6 +48,8 @@ class Answer:
         Recordings of which the causes leave much that is no noise, and that keep the answer from being whole.
     moving
         How modes move with the level, where nothing that was found depends on it; empty where that is not seen.
+    bursts
+        Recordings of which a linear answer leaves bursts.
     """
 
     verdict: str
@@ -59,6 +61,13 @@ class Answer:
     rejected: tuple[Candidate, ...] = ()
     no_noise: tuple[FollowedAlone, ...] = ()
     moving: str = ""
+    bursts: tuple[Bursts, ...] = ()
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why the answer is not whole, in sentences."""
+        moving = [self.moving] if self.moving else []
+        return (*(one.sentence for one in self.no_noise), *moving, *(one.sentence for one in self.bursts))
 
 
 def answer_of(
@@ -120,6 +129,9 @@ def answer_of(
     moving = moved_by_level(current.hypothesis, causes, comparison.behaviour)
     if moving and verdict != "unexplained":
         verdict = verdict_beside_moving_modes(held_out.improvement, causes, settings.verdict)
+    # a law of a joint may leave bursts where its form is not quite the true one
+    bursts = () if current.hypothesis.laws else bursts_left(current.hypothesis, both.mended)
+    verdict = "unexplained" if verdict == "none" and bursts else verdict
     if verdict == "partly explained" and found.accepted:
         small = small_beside_the_rest(found, settings.evidence.small_in_part)
         if less := _without_one_of(comparison, both, found, small, "small beside what is left", faults):
@@ -129,8 +141,9 @@ def answer_of(
             verdict = "unexplained"
     if verdict == "unexplained":
         none_told = _unexplained(comparison, both, found, held_out, causes)
-        return replace(none_told, no_noise=no_noise, moving=moving)
-    return Answer(verdict, tuple(causes), current, found, left, held_out, no_noise=no_noise, moving=moving)
+        return replace(none_told, no_noise=no_noise, moving=moving, bursts=bursts)
+    told = Answer(verdict, tuple(causes), current, found, left, held_out)
+    return replace(told, no_noise=no_noise, moving=moving, bursts=bursts)
 
 
 def _judged_alone(

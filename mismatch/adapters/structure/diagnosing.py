@@ -150,8 +150,7 @@ def _diagnosed(
         replace(details, view=view, behaviour=behaviour, textbook=freed.textbook),
         doubts=(
             *beyond_model(base.hypothesis, mended),
-            *(one.sentence for one in answer.no_noise),
-            *([answer.moving] if answer.moving else []),
+            *answer.doubts,
             *([freed.doubt] if freed.doubt else []),
         ),
         content={
