@@ -19,7 +19,7 @@ from .comparison import StructureComparison
 from .confirmation import fit_without
 from .form_errors import with_form_spread
 from .held_out import HeldOut, held_out_improvement, scored
-from .level_check import moved_by_level, verdict_beside_moving_modes
+from .level_check import moved_by_level, stands_beside_moving_modes
 from .structure_verdict import has_a_sure_name, shown_faults, small_beside_the_rest, verdict_of_structure
 from .told_causes import modal_deviation, told_causes, undamped_modes
 
@@ -128,7 +128,8 @@ def answer_of(
     verdict, no_noise = _judged_alone(judged, found, both, settings.verdict)
     moving = moved_by_level(current.hypothesis, causes, comparison.behaviour)
     if moving and verdict != "unexplained":
-        verdict = verdict_beside_moving_modes(held_out.improvement, causes, settings.verdict)
+        stands = not found.accepted or stands_beside_moving_modes(held_out.improvement, settings.verdict)
+        verdict = judged(followed_alone=True) if stands else "unexplained"
     # a law of a joint may leave bursts where its form is not quite the true one
     bursts = () if current.hypothesis.laws else bursts_left(current.hypothesis, both.mended)
     verdict = "unexplained" if verdict == "none" and bursts else verdict
