@@ -25,7 +25,7 @@ HELD = 1e-3
 """Standard deviation of the ln variance of a force's noise that was measured."""
 
 EXACT = 2e-3
-"""Share of a response that no measurement and no simulation is exact to: sensors are linear to a percent at best."""
+"""Share of a response that no measurement and no simulation is exact to: sensors are rarely as linear. Chosen."""
 
 WARM, COLD = 12, 60
 """Steps at most if the search begins with a noise that was fitted before, and if it begins with none."""

@@ -10,7 +10,8 @@ from scipy.stats import gamma
 
 from estimation import WindowedSpectrum
 
-from ..models import Hypothesis, predict_lines
+from ..models import Hypothesis
+from .rest_in_time import shown_and_left
 
 Real = NDArray[np.float64]
 
@@ -82,23 +83,21 @@ def bursts_left(hypothesis: Hypothesis, recordings: list[WindowedSpectrum]) -> t
 
 def _bursts(hypothesis: Hypothesis, one: WindowedSpectrum) -> Bursts | None:
     """Bursts of the response that shows most of them; None where they hold little."""
-    rate, n = one.recording.rate, len(one.recording.force)
-    shown = irfft(predict_lines(hypothesis, one).spectrum, n=one.padded, axis=0)[:n]
-    kept = slice(one.start, n - int(rate) // 2)
-    rest = (one.recording.response - shown)[kept]
+    rate = one.recording.rate
+    shown, rest = shown_and_left(hypothesis, one)
     length = max(int(BLOCK * rate), 1)
     if len(rest) // length < FEWEST + 2 * ENDS:
         return None
     band = float(one.frequencies[0]), float(one.frequencies[-1])
     powers = _block_powers(_whitened(rest, rate, band), length)
-    signal = _block_powers(shown[kept], length)
+    signal = _block_powers(shown, length)
     bursts = (powers > _limit(band, len(powers))) & (signal <= WITH_SIGNAL * np.median(signal, axis=0))
     shares = np.sum(np.where(bursts, powers - 1.0, 0.0), axis=0) / powers.sum(axis=0)
     worst = int(np.argmax(shares))
     if shares[worst] < SHARE:
         return None
     strongest = int(np.argmax(np.where(bursts[:, worst], powers[:, worst], 0.0)))
-    at = (kept.start + (strongest + ENDS + 0.5) * length) / rate
+    at = (one.start + (strongest + ENDS + 0.5) * length) / rate
     return Bursts(one.recording.name, float(shares[worst]), int(bursts[:, worst].sum()), len(powers), at)
 
 

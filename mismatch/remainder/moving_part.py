@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft
 from scipy.signal import ShortTimeFFT
 from scipy.signal.windows import hann
 
@@ -12,6 +11,7 @@ from ..inference import Remainder
 from ..models import Hypothesis, predict_lines, through_structure
 from .cell_regression import moving_power
 from .repeated_part import repeated_share
+from .rest_in_time import shown_and_left
 
 Real = NDArray[np.float64]
 
@@ -74,11 +74,7 @@ def leftover(hypothesis: Hypothesis, lines: list[WindowedSpectrum]) -> Remainder
 
 def _moving(hypothesis: Hypothesis, one: WindowedSpectrum) -> Real:
     """Share of the residual's power and of the response's that moves with the signal, (n_responses, 2)."""
-    predicted = predict_lines(hypothesis, one)
-    n = len(one.recording.force)
-    shown = irfft(predicted.spectrum, n=one.padded, axis=0)[:n]
-    rest = (one.recording.response - shown)[one.start : n - int(one.recording.rate) // 2]
-    shown = shown[one.start : n - int(one.recording.rate) // 2]
+    shown, rest = shown_and_left(hypothesis, one)
     found = []
     for p in range(rest.shape[1]):
         r, s = _powers(rest[:, p], one), _powers(shown[:, p], one)

@@ -6,14 +6,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from trial_case import diagnosed
 
-from benchmarks.blind_trial.case_spec import draw_cases
-from benchmarks.blind_trial.sealed_case import write_case
-from mismatch import diagnose, read_recordings
 from mismatch.adapters.structure.level_check import moved_by_level, stands_beside_moving_modes
 from mismatch.behaviour import FAMILIES, Behaviour
 from mismatch.inference import Improvement, VerdictSettings
-from modal_fit import read_modal_model
 
 SOFTENS = Behaviour("softening", "Mode at 6.1 Hz softens by 0.9 %.", "N", ())
 LINEAR: Any = SimpleNamespace(laws=())
@@ -30,10 +27,7 @@ def test_a_spring_is_found_where_a_linear_cause_was_told(
     tmp_path: Path, group: str, cases: int, seed: int, index: int, law: str
 ) -> None:
     """Before: a table's mass and an axis were told, with an evidence of 37, as no law had been looked for."""
-    spec = next(one for one in draw_cases(cases, seed, only=group) if one.index == index)
-    given = write_case(spec, tmp_path)
-    model = read_modal_model(given / "nominal.json")
-    found = diagnose(model, read_recordings([given / f"{level}.h5" for level in ("low", "mid", "high")], model))
+    found = diagnosed(tmp_path, group, cases, seed, index)
     assert found.verdict == "explained"
     assert [one.name for one in found.physics] == [law]
     assert found.physics[0].evidence > 1000

@@ -5,23 +5,10 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from trial_case import diagnosed
 
-from benchmarks.blind_trial.case_spec import draw_cases
-from benchmarks.blind_trial.sealed_case import write_case
-from mismatch import diagnose, read_recordings
 from mismatch.adapters.structure.acceptance import evidence_needed
 from mismatch.inference import EvidenceSettings
-from mismatch.location import StructureDiagnosis
-from modal_fit import read_modal_model
-
-
-def diagnosed(folder: Path, group: str, cases: int, seed: int, index: int) -> StructureDiagnosis:
-    """What is told of a case of a blind trial."""
-    spec = next(one for one in draw_cases(cases, seed, only=group) if one.index == index)
-    assert spec.effect == "gyroscopic_coupling"
-    given = write_case(spec, folder)
-    model = read_modal_model(given / "nominal.json")
-    return diagnose(model, read_recordings([given / f"{level}.h5" for level in ("low", "mid", "high")], model))
 
 
 def test_a_strong_coupling_is_found_from_the_modes_that_the_lab_believes(tmp_path: Path) -> None:

@@ -65,7 +65,7 @@ class Answer:
 
     @property
     def doubts(self) -> tuple[str, ...]:
-        """Why the answer is not whole, in sentences."""
+        """What speaks against the answer, or shows that it is not whole: sentences for the reader."""
         moving = [self.moving] if self.moving else []
         return (*(one.sentence for one in self.no_noise), *moving, *(one.sentence for one in self.bursts))
 
@@ -129,7 +129,7 @@ def answer_of(
     moving = moved_by_level(current.hypothesis, causes, comparison.behaviour)
     if moving and verdict != "unexplained":
         stands = not found.accepted or stands_beside_moving_modes(held_out.improvement, settings.verdict)
-        verdict = judged(followed_alone=True) if stands else "unexplained"
+        verdict = judged(not_whole=True) if stands else "unexplained"
     # a law of a joint may leave bursts where its form is not quite the true one
     bursts = () if current.hypothesis.laws else bursts_left(current.hypothesis, both.mended)
     verdict = "unexplained" if verdict == "none" and bursts else verdict
@@ -155,7 +155,7 @@ def _judged_alone(
     Parameters
     ----------
     judged
-        Gives the verdict, and with ``followed_alone`` that of an answer that is not whole.
+        Gives the verdict, and with ``not_whole`` that of an answer that is not whole.
     found
         Where the search ended.
     both
@@ -167,7 +167,7 @@ def _judged_alone(
     if verdict not in ("none", "explained"):
         return verdict, ()
     no_noise = followed_alone(found.current.hypothesis, found.base.hypothesis, both.mended, settings)
-    return judged(followed_alone=bool(no_noise)), no_noise
+    return judged(not_whole=bool(no_noise)), no_noise
 
 
 def _unexplained(

@@ -29,7 +29,7 @@ def verdict_of_structure(
     *,
     everywhere: Improvement | None = None,
     measured: bool = False,
-    followed_alone: bool = False,
+    not_whole: bool = False,
 ) -> str:
     """Give the verdict: ``none``, ``explained``, ``partly explained`` or ``unexplained``.
 
@@ -51,14 +51,15 @@ def verdict_of_structure(
         The same errors over all that was held out; None: nothing else was.
     measured
         Whether the noise was measured, and not inferred from what a model leaves.
-    followed_alone
-        Whether modes that are refitted to one recording alone follow much of what the answer leaves of it.
+    not_whole
+        Whether the answer is known to leave something: modes that are refitted to one recording alone follow much of
+        what it leaves there, or modes move with the level and nothing that would be told moves them.
     """
     before, after = left
     most = settings.most_of_response
     incomplete = leaves_too_much(gain, settings) if causes else min(gain.before, gain.after) > most
     incomplete |= bool(causes) and measured and gain.after > settings.most_over_measured * gain.noise_floor
-    incomplete |= followed_alone
+    incomplete |= not_whole
     excluded = strained(hypothesis) and not after.noise_like(settings.noise_like)
     # a law that leaves much of the response may stand for another that nobody listed
     # a linear refit may follow one of two levels, at the other's expense
