@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, rfft, rfftfreq
 from scipy.signal import welch
+from scipy.signal.windows import tukey
 from scipy.stats import gamma
 
 from estimation import WindowedSpectrum
@@ -16,7 +17,7 @@ from .rest_in_time import shown_and_left
 Real = NDArray[np.float64]
 
 BLOCK, ENDS, FEWEST = 0.25, 2, 24
-"""Length of a block, s; blocks left out at either end, where whitening sees the end; least number that tells."""
+"""Length of a block, s; blocks at either end that are faded out and do not count; least number that tells."""
 
 SEGMENT = 2.0
 """Length of the segments whose median gives the spectrum of what is left, s: bursts do not move a median."""
@@ -102,14 +103,18 @@ def _bursts(hypothesis: Hypothesis, one: WindowedSpectrum) -> Bursts | None:
 
 
 def _whitened(rest: Real, rate: float, band: tuple[float, float]) -> Real:
-    """What is left (n, n_responses) in the band, divided by the square root of its median spectrum."""
+    """What is left (n, n_responses) in the band, divided by the square root of its median spectrum.
+
+    It fades in and out: what lies beyond the band, where nothing is modelled, would leak into it from sharp ends.
+    """
     axis, density = welch(
         rest, rate, nperseg=min(int(SEGMENT * rate), len(rest)), detrend=False, average="median", axis=0
     )
     lines = rfftfreq(len(rest), 1 / rate)
     inside = (lines >= band[0]) & (lines <= band[1])
     level = np.stack([np.interp(lines, axis, column) for column in density.T], axis=1)
-    white = rfft(rest, axis=0) / np.sqrt(np.maximum(level, 1e-12 * density.max(axis=0)))
+    faded = rest * tukey(len(rest), 2 * ENDS * BLOCK * rate / len(rest))[:, None]
+    white = rfft(faded, axis=0) / np.sqrt(np.maximum(level, 1e-12 * density.max(axis=0)))
     return np.asarray(irfft(white * inside[:, None], n=len(rest), axis=0))
 
 

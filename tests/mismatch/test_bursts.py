@@ -46,6 +46,14 @@ def test_noise_does_not_burst(seed: int) -> None:
     assert not left(RIG.recording("quiet", RIG.forces(20.0, 60.0, seed), noise=0.03, seed=seed))
 
 
+def test_modes_beyond_the_band_do_not_burst_at_the_ends() -> None:
+    """Before: the sharp ends of a strong motion beyond the band leaked into it, and passed for blows."""
+    quiet = RIG.recording("quiet", RIG.forces(20.0, 60.0, 5), noise=0.001, seed=5)
+    time = np.arange(len(quiet.response)) / quiet.rate
+    beyond = 3.0 * quiet.response.std() * np.cos(2 * np.pi * 31.0 * time)
+    assert not left(replace(quiet, response=quiet.response + beyond[:, None]))
+
+
 def test_blows_burst_where_they_fall() -> None:
     quiet, loud = struck(20.0, 1, 0.0), replace(struck(20.0, 2, 3.0), name="loud")
     (found,) = left(quiet, loud)
