@@ -14,6 +14,7 @@ class CoulombFriction:
     """A force of constant size against the velocity, smooth around standstill."""
 
     name = "coulomb_friction"
+    beyond = "quadratic_damping"
     equation = "g = F_c tanh(v / v0)"
     source = "Coulomb 1785; Armstrong-Helouvry, Dupont & Canudas de Wit 1994, Automatica 30"
     parameters = (

@@ -17,6 +17,7 @@ class Hysteresis:
     """Microslip: bolts, gears and bearings stick, slip little by little and remember where they turned."""
 
     name = "hysteresis"
+    beyond = "coulomb_friction"
     equation = "g = sum_i k_i p_i(x), elastic-plastic elements with yields spread around one"
     source = "Iwan 1966, J. Applied Mechanics 33; Bouc 1967, Wen 1976"
     parameters = (

@@ -26,6 +26,7 @@ class PreslidingFriction:
 
     name = "presliding_friction"
     answers_as = "coulomb_friction"
+    beyond = "hysteresis"
     equation = "g = F_c p(x): a force that follows the deflection since the last turn, and slides at F_c"
     source = "Dahl 1968, Aerospace Corp. TOR-0158; Canudas de Wit, Olsson, Astrom & Lischinsky 1995, IEEE TAC 40"
     parameters = (

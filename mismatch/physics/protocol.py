@@ -129,7 +129,15 @@ class TwinPhysics(Protocol):
 
 @runtime_checkable
 class LimitedPhysics(Protocol):
-    """A joint's law that keeps its name only within limits set by the motion; beyond them it is another law."""
+    """A joint's law that keeps its name only within limits set by the motion; beyond them it is another law.
+
+    Parameters
+    ----------
+    beyond
+        Name that an answer has for the law beyond the limits.
+    """
+
+    beyond: str
 
     def held(self, values: Real, motion: JointMotion) -> Real:
         """Return the numbers that the law uses: the given ones, brought within the limits."""

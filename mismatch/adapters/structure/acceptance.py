@@ -142,12 +142,27 @@ def strained(hypothesis: Hypothesis) -> bool:
     hypothesis
         A fitted hypothesis with its causes.
     """
-    return any(
-        isinstance(cause.physics, LimitedPhysics)
+    return bool(names_beyond(hypothesis))
+
+
+def names_beyond(hypothesis: Hypothesis) -> tuple[str, ...]:
+    """Names of the laws that the data ask for beyond the limits of those told, each once.
+
+    At the limit of its name a law is as much the one as the other.
+
+    Parameters
+    ----------
+    hypothesis
+        A fitted hypothesis with its causes.
+    """
+    names = [
+        cause.physics.beyond
+        for cause in hypothesis.laws
+        if isinstance(cause.physics, LimitedPhysics)
         and cause.motion is not None
         and cause.physics.strained(cause.values, cause.motion)
-        for cause in hypothesis.causes
-    )
+    ]
+    return tuple(dict.fromkeys(names))
 
 
 def evidence_needed(current: Fit, base: Fit, settings: EvidenceSettings, *, own: bool = False) -> float:

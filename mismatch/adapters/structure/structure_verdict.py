@@ -16,7 +16,7 @@ from ...inference import (
 )
 from ...models import Fit, Hypothesis, modes_are_odd
 from ...physics import MODAL_PARAMETERS, ChainPhysics, ModePhysics
-from .acceptance import impossible, strained
+from .acceptance import impossible, names_beyond, strained
 from .rounds import likeliest_seen
 
 
@@ -137,9 +137,10 @@ def equivalents_of_answer(
 ) -> tuple[str, ...]:
     """Names that the data cannot tell from a told cause.
 
-    Odd modal parameters that stand alone cannot be told from a linear cause beside which the modes are not odd, and
-    which is as likely: it only lacks the evidence that a cause must have. A rotor's coupling at one speed is such a
-    cause, as modes with unlike left and right vectors imitate it.
+    A law whose numbers end at the limits of its name cannot be told from the law beyond them. Odd modal parameters that
+    stand alone cannot be told from a linear cause beside which the modes are not odd, and which is as likely: it only
+    lacks the evidence that a cause must have. A rotor's coupling at one speed is such a cause, as modes with unlike
+    left and right vectors imitate it.
 
     Parameters
     ----------
@@ -150,8 +151,12 @@ def equivalents_of_answer(
     settings
         Thresholds of the evidence.
     """
-    if not causes or found.accepted:
-        return found.equivalents if causes else ()
+    if not causes:
+        return ()
+    if found.accepted:
+        told = [one.name for one in causes]
+        beyond = [name for name in names_beyond(found.current.hypothesis) if name not in told]
+        return tuple(dict.fromkeys([*found.equivalents, *beyond]))
     if MODAL_PARAMETERS.name not in [one.name for one in causes]:
         return ()
     fitted = [one for each in found.rounds for one in each.proposals if one.evidence > 0]
