@@ -36,7 +36,12 @@ def with_law(physics: JointPhysics, values: Real) -> Hypothesis:
 
 def recorded(hidden: JointPhysics, levels: tuple[float, ...]) -> list[WindowedSpectrum]:
     """One recording a level of the rig with a hidden law, 1 % noise."""
-    band, shown, truth = band_of(RIG.model, RIG.rate), [], with_law(hidden, np.zeros(0))
+    return moved_by(with_law(hidden, np.zeros(0)), levels)
+
+
+def moved_by(truth: Hypothesis, levels: tuple[float, ...]) -> list[WindowedSpectrum]:
+    """One recording a level of the rig as a hypothesis moves it, 1 % noise."""
+    band, shown = band_of(RIG.model, RIG.rate), []
     for seed, one in enumerate(RIG.recordings(levels)):
         lines = windowed_spectrum(one, band, 1.0)
         moved = irfft(predict_lines(truth, lines).spectrum, n=lines.padded, axis=0)[: len(one.force)]

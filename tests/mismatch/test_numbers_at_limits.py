@@ -1,34 +1,19 @@
 """Numbers that a law holds within limits of the motion are reported as the law goes by them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from hidden_joint import MOTION as RIG_MOTION
-from hidden_joint import RIG, at_the_joint, law_of, with_law
-from scipy.fft import irfft
+from hidden_joint import at_the_joint, law_of, moved_by, with_law
 
-from estimation import WindowedSpectrum, windowed_spectrum
-from mismatch import band_of, fit, predict_lines
+from mismatch import fit
 from mismatch.adapters.structure.structure_verdict import equivalents_of_answer
 from mismatch.inference import AcceptedCause, EvidenceSettings, Proposal, Search
 from mismatch.joints.joint_law import JointMotion
-from mismatch.models import Hypothesis
 from mismatch.physics import JointPhysics, LimitedPhysics, library
 from mismatch.physics.protocol import DRY
 
 MOTION = JointMotion(reach=1e-3, speed=0.1, deflection=2e-4, velocity=0.02, stiffness=1e6)
-
-
-def moved_by(hidden: Hypothesis) -> list[WindowedSpectrum]:
-    """Two recordings of the rig as a hypothesis moves it, 1 % noise."""
-    lines, band = [], band_of(RIG.model, RIG.rate)
-    for seed, one in enumerate(RIG.recordings((20.0, 60.0))):
-        plain = windowed_spectrum(one, band, 1.0)
-        moved = irfft(predict_lines(hidden, plain).spectrum, n=plain.padded, axis=0)[: len(one.force)]
-        moved += 0.01 * moved.std() * np.random.default_rng(2000 + seed).normal(size=moved.shape)
-        lines.append(windowed_spectrum(replace(one, response=moved), band, 1.0))
-    return lines
+LEVELS = (20.0, 60.0)
 
 
 @pytest.mark.parametrize(
@@ -70,7 +55,7 @@ def test_a_fit_that_begins_beyond_a_limit_finds_back(name: str, truth: list[floa
     hidden = with_law(law, np.array(truth))
     assert isinstance(law, LimitedPhysics)
     assert law.strained(np.array(start), RIG_MOTION)
-    found = fit(moved_by(hidden), with_law(law, np.array(start)), iterations=20).hypothesis.causes[-1]
+    found = fit(moved_by(hidden, LEVELS), with_law(law, np.array(start)), iterations=20).hypothesis.causes[-1]
     assert not law.strained(found.values, RIG_MOTION)
     np.testing.assert_allclose(found.values[:2], truth[:2], rtol=0.1)
 
@@ -90,18 +75,18 @@ def test_numbers_stop_at_their_limits() -> None:
 
 
 @pytest.mark.parametrize(
-    ("presliding", "equivalents"),
-    [(3e-5, ("coulomb_friction",)), (4e-4, ())],
+    ("name", "truth", "equivalents"),
+    [
+        ("presliding_friction", [6.0, 3e-5], ("coulomb_friction",)),
+        ("hysteresis", [15e3, 4e-4, 0.8], ()),
+    ],
 )
 def test_at_the_limit_of_its_name_a_law_is_told_with_the_law_beyond(
-    presliding: float, equivalents: tuple[str, ...]
+    name: str, truth: list[float], equivalents: tuple[str, ...]
 ) -> None:
     """Friction that slides almost at once, fitted as hysteresis, ends at its limit; hysteresis does not."""
-    hidden = with_law(law_of("hysteresis"), np.array([6 / presliding, presliding, 0.8]))
-    if equivalents:
-        hidden = with_law(law_of("presliding_friction"), np.array([6.0, presliding]))
     begun = with_law(law_of("hysteresis"), np.array([2e4, 3e-4, 0.8]))
-    fitted = fit(moved_by(hidden), begun, iterations=20)
+    fitted = fit(moved_by(with_law(law_of(name), np.array(truth)), LEVELS), begun, iterations=20)
     search = Search((fitted, fitted), (Proposal("hysteresis", {}, fitted, 100.0),))
     told = [AcceptedCause("hysteresis", {}, {}, {}, 100.0)]
     assert equivalents_of_answer(search, told, EvidenceSettings()) == equivalents
