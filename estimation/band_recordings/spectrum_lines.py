@@ -94,6 +94,17 @@ class WindowedSpectrum:
             trust=_full_trust(self.recording, len(self.band)),
         )
 
+    def with_whole_forces(self) -> "WindowedSpectrum":
+        """Forces that act from the first sample to the last; behind the recording they fade out, mirrored in time.
+
+        A prediction of the whole recording needs them. A comparison does not see the ends, and fades the forces there.
+        """
+        force, fading = self.recording.force, _rising(self.recording)
+        after = force[-2 : -2 - fading : -1] * _rise(fading)[::-1, None]
+        padded = next_fast_len(self.padded + fading, real=True)
+        padded += padded % 2
+        return replace(self, padded=padded, force_lines=np.asarray(rfft(np.vstack([force, after]), n=padded, axis=0)))
+
     def between(self, first: float, last: float) -> "WindowedSpectrum":
         """The same recording compared in a part of its samples alone; it is still predicted from its beginning.
 
@@ -188,10 +199,15 @@ def _rising(recording: BandRecording) -> int:
     return min(int(recording.rate), len(recording.force) // 20)
 
 
+def _rise(count: int) -> Real:
+    """Half a cosine from 0 to 1, (count,)."""
+    return np.asarray(0.5 - 0.5 * np.cos(np.pi * np.arange(count) / count))
+
+
 def padded_force(spectrum: WindowedSpectrum) -> Complex:
     """Spectrum of the ramped and padded force."""
     ramp, rising = np.ones(len(spectrum.recording.force)), _rising(spectrum.recording)
-    rise = 0.5 - 0.5 * np.cos(np.pi * np.arange(rising) / rising)
+    rise = _rise(rising)
     if not spectrum.recording.at_rest:
         ramp[:rising] = rise
     ramp[len(ramp) - rising :] = rise[::-1]

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from modal_fit import ModalModel
@@ -178,8 +177,9 @@ class Prediction:
 
 
 def predict(model: ModalModel, trial: BandRecording) -> Prediction:
-    """Simulate a recording's forces through a model and its terms of physics.
+    """Simulate a recording's forces through a model and its terms of physics, from the first sample to the last.
 
+    The simulation begins at rest. What the structure did before is unknown, and rings in the run-in.
     A limit (``clipping``) is applied to its channel. A steady tone (``unmeasured_excitation``) has no known phase in
     another recording; its amplitude and phase are read from the recording at that one frequency.
 
@@ -195,8 +195,8 @@ def predict(model: ModalModel, trial: BandRecording) -> Prediction:
     band = band_of(model, trial.rate)
     decay = float((-model.poles.real).min())
     lines = windowed_spectrum(trial, band, decay)
-    n = len(trial.force)
-    response = np.asarray(irfft(predict_lines(hypothesis, lines).spectrum, n=lines.padded, axis=0)[:n])
+    whole = lines.with_whole_forces()
+    response = whole.signal(predict_lines(hypothesis, whole).spectrum)
     response = with_faults(response, trial, lines.start, model.physics)
     measured, shown = (lines.cut(signal) for signal in (trial.response, response))
     rest, power = np.abs(measured - shown) ** 2, np.abs(measured) ** 2
