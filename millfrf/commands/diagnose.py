@@ -38,12 +38,16 @@ def diagnose(
     cutting: Annotated[
         Path | None, typer.Option("--cutting", metavar="CUT.toml", help="Cut whose stability lobes the report shows.")
     ] = None,
+    search_time: Annotated[
+        float,
+        typer.Option("--search-time", metavar="SECONDS", help="After this time no further cause is looked for."),
+    ] = 120.0,
     stream: Annotated[str | None, typer.Option("--stream", help="Sample clock.")] = None,
     figures: Figures = None,
     figure_format: FigureFormat = "svg",
 ) -> None:
     """Locate where a model and recordings disagree, name the physics left out, model it, show that the fit improves."""
-    from mismatch import LabError, Settings
+    from mismatch import LabError, SearchSettings, Settings
 
     from ..answers import stored_answer
     from ..gate import read_checked_cutting
@@ -66,7 +70,9 @@ def diagnose(
     process, doubts = read_checked_cutting(cutting) if cutting is not None else (None, [])
     for doubt in doubts:
         say(f"warning: {doubt}")
-    settings = Settings(LabError(*lab_error))
+    if not search_time > 0:
+        raise InputError(f"--search-time {search_time:g}: give a positive number of seconds, for example 300")
+    settings = Settings(LabError(*lab_error), search=SearchSettings(longest=search_time))
     result = diagnose_files(
         model,
         recordings,

@@ -3,7 +3,7 @@ from .descent import Descended, Limits, Problem, bounded_step, descend, plain_st
 from .diagnosis import VERDICTS, AcceptedCause, Candidate, Diagnosis, HeldOutError, Improvement
 from .diagnosis_file import diagnosis_content, read_diagnosis, write_diagnosis
 from .form_errors import jackknife_variance, shift_weight
-from .forward_search import Progress, emptied, pruned, released, search
+from .forward_search import Patience, Progress, emptied, pruned, released, search
 from .paired_tests import ratio_interval, signed_ranks, students_test
 from .process_pool import in_processes
 from .remainder import Remainder
@@ -40,6 +40,7 @@ __all__ = [
     "LabError",
     "Limits",
     "LocationSettings",
+    "Patience",
     "Problem",
     "Progress",
     "ProofSettings",

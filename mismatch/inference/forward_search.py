@@ -1,12 +1,41 @@
-"""The search for causes: one after the other while each is worth it, then without those made needless."""
+"""The search for causes: one after the other while each is worth it and time is left, then without needless ones."""
 
+import time
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from .comparison import Comparison, Fit, Search, SureComparison
 from .diagnosis import Candidate
 
 Progress = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Patience:
+    """A clock that says when a search has lasted long enough.
+
+    What is under way is ended; nothing new is begun. Forked processes see the same clock.
+
+    Parameters
+    ----------
+    seconds
+        How long the search may last, s.
+    begun
+        When it began, on the clock of ``time.monotonic``, s.
+
+    Examples
+    --------
+    >>> Patience(60.0).over, Patience(0.0).over
+    (False, True)
+    """
+
+    seconds: float
+    begun: float = field(default_factory=time.monotonic)
+
+    @property
+    def over(self) -> bool:
+        """Whether the time has passed."""
+        return time.monotonic() - self.begun >= self.seconds
 
 
 def search(comparison: Comparison[Fit], base: Fit, progress: Progress) -> Search[Fit]:

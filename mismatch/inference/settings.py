@@ -109,6 +109,8 @@ class SearchSettings(Thresholds, shares=("within_reach", "laws_again")):
         Share of what moved with the signal when joint laws failed, below which they are tried again.
     levels_apart
         Factor between the weakest and the strongest recording from which laws are carried from one to the other.
+    longest
+        Time after which no further cause is looked for, s; the answer says so. What was found is judged all the same.
     """
 
     most_causes: int = 3
@@ -117,6 +119,7 @@ class SearchSettings(Thresholds, shares=("within_reach", "laws_again")):
     laws_first: float = 100.0
     laws_again: float = 0.7
     levels_apart: float = 1.3
+    longest: float = 120.0
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,12 @@
 """The comparison of a modal model with recordings, as the search sees it."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from estimation import WindowedSpectrum
 
 from ...behaviour import Behaviour
-from ...inference import Proposal, Remainder, Round, Search, Settings, equivalents_of
+from ...inference import Patience, Proposal, Remainder, Round, Search, Settings, equivalents_of
 from ...models import Cause, Fit, fit, gives_one_up, settled
 from ...physics import JointPhysics, Physics, answer_name
 from ...remainder import leftover
@@ -34,6 +34,8 @@ class StructureComparison:
         Part of the residual that moves with the signal when no cause is accepted.
     behaviour
         What modes do with the level, without any law; None: not looked at.
+    patience
+        How long causes are looked for.
     """
 
     lines: list[WindowedSpectrum]
@@ -41,6 +43,7 @@ class StructureComparison:
     settings: Settings
     before: Remainder
     behaviour: Behaviour | None = None
+    patience: Patience = field(default_factory=lambda: Patience(float("inf")))
 
     @property
     def modes_move(self) -> bool:
@@ -53,8 +56,8 @@ class StructureComparison:
         return {answer_name(one) for one in self.causes.values() if isinstance(one, JointPhysics)}
 
     def finished(self, search: Search[Fit]) -> bool:
-        """Whether to stop before a round finds nothing: never, as a small cause may hide behind a large one."""
-        return False
+        """Whether to stop before a round finds nothing: a small cause may hide behind a large one, so only in time."""
+        return bool(search.accepted) and self.patience.over
 
     def round(self, search: Search[Fit]) -> Round[Fit]:
         """Screen and fit causes; where joint laws failed before, they are tried again if much has gone since.
@@ -63,7 +66,9 @@ class StructureComparison:
         """
         current = search.current
         moving = leftover(current.hypothesis, self.lines) if search.accepted else self.before
-        standing = Standing(self.lines, current, search.base, moving, self.before, self.settings, self.modes_move)
+        standing = Standing(
+            self.lines, current, search.base, moving, self.before, self.settings, self.modes_move, self.patience
+        )
         spared = self._laws_failed_at(search) * self.settings.search.laws_again <= moving.size
         linear = {name: one for name, one in self.causes.items() if not isinstance(one, JointPhysics)}
         weighed = weigh(standing, linear if spared else self.causes)

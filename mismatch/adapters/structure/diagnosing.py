@@ -13,7 +13,7 @@ from modal_fit import ModalModel
 
 from ...behaviour import behaviour_of
 from ...faults import repair_faults
-from ...inference import AcceptedCause, Diagnosis, EvidenceSettings, Progress, Settings, search
+from ...inference import AcceptedCause, Diagnosis, EvidenceSettings, Patience, Progress, Search, Settings, search
 from ...location import SpindleSpeed, StructureDetails, StructureDiagnosis, located, residual_view
 from ...models import Fit, Hypothesis, ModelShape, fit, known_noise, outdoes_noise, through_structure
 from ...physics import is_fault, library, offered
@@ -113,10 +113,9 @@ def _diagnosed(
     before = leftover(base.hypothesis, mended)
     causes, left_out = offered(settings.causes or library(), model)
     behaviour = behaviour_of(base.hypothesis, mended)
-    comparison = StructureComparison(mended, causes, _beside(faults, settings), before, behaviour)
-    found = search(comparison, base, progress)
-    progress("causes behind odd modes")
-    found = with_cause_of_odd_modes(comparison, found)
+    patience = Patience(settings.search.longest)
+    comparison = StructureComparison(mended, causes, _beside(faults, settings), before, behaviour, patience)
+    found, hurried = _searched(comparison, base, progress)
     progress("held-out recording")
     proof = confirmed(comparison, recordings_of(mended, measured, base.hypothesis), found, faults)
     both = proof.recordings
@@ -152,6 +151,7 @@ def _diagnosed(
             *beyond_model(base.hypothesis, mended),
             *answer.doubts,
             *([freed.doubt] if freed.doubt else []),
+            *([hurried] if hurried else []),
         ),
         content={
             "compared_band": asdict(band),
@@ -162,6 +162,18 @@ def _diagnosed(
             "improved_model": _offered(answer, measured, last.sentence).content(),
         },
     )
+
+
+def _searched(comparison: StructureComparison, base: Fit, progress: Progress) -> tuple[Search[Fit], str]:
+    """Where the search for causes ends, and a word where it ended because it had lasted long enough."""
+    found = search(comparison, base, progress)
+    if comparison.patience.over:
+        return found, (
+            f"The search for causes ended after {comparison.patience.seconds:.4g} s: a further cause may have been "
+            "missed; --search-time lets it go on"
+        )
+    progress("causes behind odd modes")
+    return with_cause_of_odd_modes(comparison, found), ""
 
 
 def _beside(faults: Sequence[AcceptedCause], settings: Settings) -> Settings:

@@ -1,14 +1,14 @@
 """One round of the search in a structure: every cause is screened, and those that promise most are fitted."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from estimation import WindowedSpectrum
 
-from ...inference import Candidate, EvidenceSettings, Proposal, Remainder, Round, Settings, in_processes
+from ...inference import Candidate, EvidenceSettings, Patience, Proposal, Remainder, Round, Settings, in_processes
 from ...models import Cause, Fit, Hypothesis
 from ...physics import ChainPhysics, JointPhysics, ModePhysics, Physics, answer_name
 from ...remainder import leftover, share_of_response
@@ -49,6 +49,8 @@ class Standing:
         Thresholds of the diagnosis.
     modes_move
         Whether modes move with the level, which no linear cause makes them do.
+    patience
+        How long causes are looked for.
     """
 
     lines: list[WindowedSpectrum]
@@ -58,6 +60,7 @@ class Standing:
     before: Remainder
     settings: Settings
     modes_move: bool = False
+    patience: Patience = field(default_factory=lambda: Patience(float("inf")))
 
     def is_left(self, left: Remainder, hypothesis: Hypothesis) -> bool:
         """Whether more is left than noise and the form of a law make, or too much of the response for noise.
@@ -165,7 +168,10 @@ def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
             best = possible_gains(proposals, settings.evidence)
             gained = best[0].evidence if best else 0.0
             proposals += joint_candidates(lines, current, sighted, settings, least, gained)
-    if much and laws and _no_linear_cause_leads(proposals, settings.evidence) and not _explains(proposals, standing):
+    # to carry laws from level to level takes longest: for a law beside another, only while there is time
+    in_time = not (current.hypothesis.laws and standing.patience.over)
+    leads = much and in_time and _no_linear_cause_leads(proposals, settings.evidence)
+    if laws and leads and not _explains(proposals, standing):
         proposals += laws_by_level(lines, current, laws, settings)
     proposals += twin_laws(lines, current, possible_gains(proposals, settings.evidence)[:1], causes)
     weighed += [_candidate(one, settings.evidence) for one in proposals]
