@@ -17,7 +17,7 @@ from .misfit import (
 from .model_shape import ModelShape
 from .model_terms import hypothesis_of, improved_model
 from .plain_fits import even_fit, plain_fit
-from .refinement import believed, following_all, gives_one_up, settled, with_chain
+from .refinement import believed, following_all, gain_at_rest, gives_one_up, settled, with_chain
 from .slopes import jacobian
 
 __all__ = [
@@ -32,6 +32,7 @@ __all__ = [
     "fit",
     "fitted_noise",
     "following_all",
+    "gain_at_rest",
     "gives_one_up",
     "held_values",
     "hypothesis_of",

@@ -25,6 +25,22 @@ FAR_WORSE = 2.0
 """Share left of one recording over that of another from which the fit has given the first up."""
 
 
+def gain_at_rest(gained: float) -> float:
+    """Gain of a step, in score, from which a fit has come to rest.
+
+    Parameters
+    ----------
+    gained
+        What the causes of the fit have gained in score.
+
+    Examples
+    --------
+    >>> gain_at_rest(100.0), gain_at_rest(50_000.0)
+    (3.0, 25.0)
+    """
+    return max(TOLERANCE, AT_REST * gained)
+
+
 def settled(lines: list[WindowedSpectrum], fitted: Fit, gained: float = 0.0) -> Fit:
     """Fit until it rests; if the modes then look odd, fit again from the lab's model and keep the better of both.
 
@@ -40,7 +56,7 @@ def settled(lines: list[WindowedSpectrum], fitted: Fit, gained: float = 0.0) -> 
     gained
         What its causes have gained in score.
     """
-    least = max(TOLERANCE, AT_REST * gained)
+    least = gain_at_rest(gained)
     rested = fit(lines, fitted.hypothesis, fitted.noises, iterations=ITERATIONS, tolerance=least)
     if not modes_are_odd(rested) or not rested.hypothesis.has_added_physics:
         return rested

@@ -62,12 +62,17 @@ def _searched(comparison: StructureComparison, found: Search[Fit]) -> Search[Fit
     starts = [alone, *(one for pair in begun[:FOLLOWED] for one in pair)]
     tasks = [partial(fit, comparison.lines, one, last.noises, iterations=FIRST_STEPS) for one in starts]
     again, *fitted = in_processes(tasks)
-    nearest = min((one for one in fitted if np.isfinite(one.score)), key=lambda one: one.score, default=again)
-    tasks = [partial(fit, comparison.lines, one.hypothesis, one.noises, iterations=STEPS) for one in (again, nearest)]
-    again, nearest = in_processes(tasks)
+    nearest = sorted((one for one in fitted if np.isfinite(one.score)), key=lambda one: one.score)[:1]
+    tasks = [partial(fit, comparison.lines, one.hypothesis, one.noises, iterations=STEPS) for one in (again, *nearest)]
+    again, *nearest = in_processes(tasks)
     found = _rested(comparison, found, again)
-    if len(nearest.hypothesis.causes) == len(last.hypothesis.causes) or not np.isfinite(nearest.score):
+    if not nearest or not np.isfinite(nearest[0].score):
         return found
+    return _with_cause(comparison, found, nearest[0])
+
+
+def _with_cause(comparison: StructureComparison, found: Search[Fit], nearest: Fit) -> Search[Fit]:
+    """The search with a cause that was fitted, if it can be and brings modes back; or with a better last fit."""
     best = _proposal(found.current, nearest)
     if impossible(best, comparison.settings.evidence):
         return found
@@ -92,7 +97,7 @@ def _searched(comparison: StructureComparison, found: Search[Fit]) -> Search[Fit
 def _begun(
     lines: list[WindowedSpectrum], last: Fit, chains: list[ChainPhysics]
 ) -> tuple[Hypothesis, list[tuple[Hypothesis, ...]]]:
-    """The lab's model with the causes so far, fitted roughly alone, and with each linear cause, best first.
+    """The lab's model with the causes so far, fitted roughly alone, and with each linear cause that gains, best first.
 
     Each cause begins twice: at the lab's model, and at the last fit, from which a valley may lead to it. A law that is
     far from linear is not followed from everywhere. What counts is the gain over the same start without the cause.
@@ -122,7 +127,8 @@ def _begun(
         gains = [less.score - one.score for less, one in zip(without, pair, strict=True)]
         return max((one for one in gains if np.isfinite(one)), default=-np.inf)
 
-    ranked = sorted(pairs, key=gain, reverse=True)
+    # to follow a cause to its end takes longest: one that gains nothing roughly is not
+    ranked = sorted((one for one in pairs if gain(one) > 0), key=gain, reverse=True)
     begun_with = [tuple(_free(one.hypothesis) for one in pair if np.isfinite(one.score)) for pair in ranked]
     return _free(alone.hypothesis), begun_with
 

@@ -16,7 +16,7 @@ import numpy as np
 from ....faults import residual_lines
 from ....inference import AcceptedCause, Improvement, Settings, in_processes
 from ....joints import joint_in_words, tip_axes
-from ....models import Fit, Hypothesis, fit, fitted_noise, through_structure, with_free_forms
+from ....models import Fit, Hypothesis, fit, fitted_noise, gain_at_rest, through_structure, with_free_forms
 from ....physics import answer_name, families
 from ....records import Recordings
 from ..held_out import HeldOut, chance_of_no_gain, held_out_improvement
@@ -133,7 +133,7 @@ def freed_from_named(
         return None
     whole = begun.base.score - named.score
     needed = max(settings.evidence.least, settings.evidence.small * whole)
-    own, everything = _fitted(recordings, named)
+    own, everything = _fitted(recordings, named, whole)
     better = everything is not None and everything.score < own.score - MORE * whole
     for freed in (everything, own) if better else (own,):
         if freed is None or not freed.score < named.score - needed:
@@ -187,11 +187,16 @@ def freed_from_nothing(
     return best
 
 
-def _fitted(recordings: Recordings, named: Fit) -> tuple[Fit, Fit | None]:
-    """Fits with shapes of each law's own family, and with all shapes; a drift alone has no others."""
+def _fitted(recordings: Recordings, named: Fit, whole: float) -> tuple[Fit, Fit | None]:
+    """Fits with shapes of each law's own family, and with all shapes; a drift alone has no others.
+
+    Many shapes gain a little for many steps: a fit ends where that is no more than a share of the ``whole`` evidence.
+    """
     drifts = all(families(cause.law()) == "t" for cause in named.hypothesis.laws)
     starts = [with_free_forms(named.hypothesis, kinds) for kinds in (("",) if drifts else ("", ALL_SHAPES))]
-    found = in_processes([partial(fit, recordings.mended, one, named.noises, iterations=STEPS) for one in starts])
+    lines, least = recordings.mended, gain_at_rest(whole)
+    tasks = [partial(fit, lines, one, named.noises, iterations=STEPS, tolerance=least) for one in starts]
+    found = in_processes(tasks)
     return found[0], found[1] if len(found) > 1 else None
 
 
