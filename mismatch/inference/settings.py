@@ -291,7 +291,7 @@ class LocationSettings(Thresholds, shares=("family_wise", "least_spread")):
         Least relative uncertainty of the noise level, which is never known better than to two per cent.
     quiet_level, quiet_spread
         Level and spread of a noise read from the quietest bands, which lie below the mean by chance and hide its
-        colour.
+        colour; no noise is taken to be known worse.
     seen
         Standard errors above noise from which a recording's residual counts in its growth with the level.
     levels_apart

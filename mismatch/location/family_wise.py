@@ -33,8 +33,13 @@ class NoiseSpread:
         return np.asarray(fisher.sf(np.asarray(ratio) / self.level, numerator, 2 / self.spread**2))
 
 
-def noise_spread(ratio: Real, count: Real, least: float = LOCATION.least_spread) -> NoiseSpread:
+def noise_spread(
+    ratio: Real, count: Real, least: float = LOCATION.least_spread, most: float = LOCATION.quiet_spread
+) -> NoiseSpread:
     """Return level and spread of the cells that the final model leaves, by median and median deviation.
+
+    Where the model leaves much, cells scatter by what is left and not by how well noise is known: with that spread
+    nothing would ever stand out of it.
 
     Parameters
     ----------
@@ -44,12 +49,15 @@ def noise_spread(ratio: Real, count: Real, least: float = LOCATION.least_spread)
         Independent complex lines of each cell, in the shape of ``ratio``.
     least
         Least spread, however well the cells agree.
+    most
+        Largest spread, however far they scatter.
     """
     logs = np.log(np.maximum(ratio, 1e-12)).ravel()
     middle = float(np.median(logs))
     scatter = (1.4826 * float(np.median(np.abs(logs - middle)))) ** 2
     chance = float(np.median(polygamma(1, np.maximum(count, 0.5).ravel())))
-    return NoiseSpread(max(1.0, float(np.exp(middle))), float(np.sqrt(max(scatter - chance, least**2))))
+    spread = float(np.sqrt(max(scatter - chance, least**2)))
+    return NoiseSpread(max(1.0, float(np.exp(middle))), min(spread, max(most, least)))
 
 
 def holm(chances: Real) -> Real:

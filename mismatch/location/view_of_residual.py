@@ -79,7 +79,7 @@ def residual_view(
     noise = NoiseSpread(settings.quiet_level, settings.quiet_spread)
     if not unexplained:
         count = np.broadcast_to(after.count[:, :, None], after.ratio.shape)
-        noise = noise_spread(after.ratio, count, settings.least_spread)
+        noise = noise_spread(after.ratio, count, settings.least_spread, settings.quiet_spread)
     return ResidualView(
         details,
         measured,

@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfilt
 from estimation import BandRecording
 from mismatch import StructureDiagnosis
 from mismatch.inference import LocationSettings
-from mismatch.location.family_wise import holm
+from mismatch.location.family_wise import holm, noise_spread
 from mismatch.location.locate import located
 from mismatch.location.spindle_orders import SpindleSpeed
 from mismatch.location.view_of_residual import residual_view
@@ -120,6 +120,17 @@ def test_order_of_the_spindle(small_model: ModalModel, quiet: list[BandRecording
     speeds = {trial.name: SpindleSpeed(np.zeros(1), np.array([240.0])) for trial in quiet}
     assert {row["order"] for row in locate(diagnosis, speeds)["spindle_orders"]} == {3}
     assert locate(diagnosis)["spindle_orders_note"]
+
+
+def test_what_is_left_does_not_hide_itself() -> None:
+    """Cells hold far less than the inferred noise, or far more: with so wide a scatter none would stand out."""
+    ratio = np.exp(2 * np.random.default_rng(4).normal(size=200))
+    noise = noise_spread(ratio, np.full(len(ratio), 20.0))
+    assert noise.spread == 0.5
+    assert noise.chance(100.0, 20.0) < 1e-4
+    assert noise.chance(2.0, 20.0) > 0.01
+    plain = np.random.default_rng(3).chisquare(40, size=400) / 40
+    assert noise_spread(plain, np.full(400, 20.0)).spread < 0.1
 
 
 def test_holm_is_monotone_and_no_smaller() -> None:

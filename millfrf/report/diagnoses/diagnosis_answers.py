@@ -12,6 +12,18 @@ from ...tables import odds_in_words
 from .left_words import left_in_words
 from .next_tests import next_test
 
+NOWHERE = "No band, channel, time or level has more residual than noise would leave."
+"""What is said where no place stands out of a noise that an answer rests on."""
+
+NOWHERE_UNSURE = (
+    "No band, channel, time or level stands out. The noise is inferred, and may hold what is unexplained: where that "
+    "sits cannot be told."
+)
+"""What is said instead where something stayed unexplained."""
+
+NOT_WHOLE = ("partly explained", "unexplained")
+"""Verdicts that leave something unexplained."""
+
 
 def words(name: str) -> str:
     """Name of a physics as it is said.
@@ -110,7 +122,7 @@ def where(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
     located = diagnosis.located
     bands = located.get("frequency_bands", [])
     if not bands:
-        return (*said, "No band, channel, time or level has more residual than noise would leave.")
+        return (*said, NOWHERE_UNSURE if diagnosis.verdict in NOT_WHOLE else NOWHERE)
     large = [band for band in bands if band["share"] >= 0.005] or bands[:1]
     shown = "; ".join(
         f"{band['low_hz']:.3g} to {band['high_hz']:.3g} Hz ({100 * band['share']:.0f} %, strongest in the "

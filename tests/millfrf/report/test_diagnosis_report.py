@@ -2,6 +2,8 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from scipy.fft import irfft, rfft
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from millfrf.__main__ import run
+from millfrf.report.diagnoses.diagnosis_answers import where
 from millfrf.report.diagnoses.next_tests import next_test
 from mismatch.physics import answer_name, library
 from modal_fit import ModalModel, write_modal_model
@@ -80,3 +83,14 @@ def test_every_physics_has_its_own_next_test() -> None:
         "clipping",
     ]
     assert [name for name in named if next_test(name).test == other] == []
+
+
+@pytest.mark.parametrize(
+    ("verdict", "says"),
+    [("none", "than noise would leave"), ("partly explained", "cannot be told"), ("unexplained", "cannot be told")],
+)
+def test_an_answer_that_is_not_whole_calls_no_place_quiet(verdict: str, says: str) -> None:
+    """Noise that is inferred may hold what is unexplained: that no place stands out of it is no news."""
+    details = SimpleNamespace(band=SimpleNamespace(sentence="compared from 2 to 50 Hz"))
+    diagnosis: Any = SimpleNamespace(verdict=verdict, physics=(), details=details, located={"frequency_bands": []})
+    assert says in where(diagnosis)[-1]
