@@ -10,8 +10,9 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..inference import Candidate, Proposal, ScreeningSettings, Settings, in_processes
+from ..joints import JointAxis
 from ..models import Cause, Fit, following_all, gives_one_up, location_of
-from ..physics import JointPhysics, answer_name
+from ..physics import JointPhysics, LimitedPhysics, answer_name
 from .joint_places import JointPlace, joint_places
 from .joint_screening import Screened, screen_joints
 from .joint_starts import (
@@ -26,6 +27,9 @@ from .whitened_residual import linear_floor
 
 NEARLY_AS_GOOD, MOST_FOLLOWED = 0.7, 3
 """Share of the best place's gain after a few steps from which a law is followed on at a place, and how many are."""
+
+RIVAL = 0.5
+"""Share of the best law's evidence at the tip from which another law is tried inside, too."""
 
 
 @dataclass(frozen=True)
@@ -107,15 +111,54 @@ def joint_candidates(
         near += _missing_kinds(near, driven, lambda one: one.hypothesis.causes[-1])
     simulated = in_processes([partial(_simulated, lines, current, one, sighted.places, settings) for one in near])
     found = [one for one in simulated if one is not None]
-    return found + _inside_too(lines, current, max(found, key=lambda one: one.evidence), settings) if found else []
+    return found + _inside_too(lines, current, found, settings) if found else []
 
 
 def _inside_too(
-    lines: list[WindowedSpectrum], current: Fit, best: Proposal[Fit], settings: Settings
+    lines: list[WindowedSpectrum], current: Fit, found: list[Proposal[Fit]], settings: Settings
 ) -> list[Proposal[Fit]]:
-    """A law at the tip once more, inside, if the data tell the one from the other; nothing else.
+    """The best law at the tip, and its rival, once more inside, where the data tell the one place from the other.
 
-    At the tip it may gain less than modes that imitate it: what it then lacks is its place.
+    At the tip a law may gain less than modes that imitate it: what it then lacks is its place. Its rival lacks the
+    same, and at the wrong place the wrong one of the two may gain more.
+
+    Parameters
+    ----------
+    lines
+        Windowed spectra of the recordings that are compared.
+    current
+        The fit without the law.
+    found
+        Laws that were found.
+    settings
+        Thresholds of the diagnosis.
+    """
+    best, *others = sorted(found, key=lambda one: -one.evidence)
+    near = [one for one in others if one.name != best.name and one.evidence >= RIVAL * best.evidence]
+    tried = in_processes([partial(_inside, lines, current, one, settings) for one in [best, *near[:1]]])
+    return [one for one in tried if one is not None]
+
+
+def _inside(
+    lines: list[WindowedSpectrum], current: Fit, best: Proposal[Fit], settings: Settings
+) -> Proposal[Fit] | None:
+    """A law at the tip once more, inside; None where that gains too little."""
+    inside = moved_inside(lines, best.fitted, max(settings.evidence.least, settings.screening.place * best.evidence))
+    if inside is best.fitted:
+        return None
+    axis = inside.hypothesis.causes[-1].axis
+    assert axis is not None
+    # the direction along which it was found at the tip still says most to a reader
+    location = {**best.location, **location_of(axis, inside.hypothesis.model)}
+    return Proposal(best.name, location, inside, current.score - inside.score)
+
+
+def laws_beyond(
+    lines: list[WindowedSpectrum], current: Fit, best: Proposal[Fit], laws: Sequence[JointPhysics], settings: Settings
+) -> list[Proposal[Fit]]:
+    """Fit the laws beyond the limit of the best law's name, where its numbers end there: at its place, from the start.
+
+    Hysteresis whose elements yield at once is dry friction. Its fit ends at the limit, and cannot pass it.
 
     Parameters
     ----------
@@ -125,17 +168,31 @@ def _inside_too(
         The fit without the law.
     best
         The law that was found.
+    laws
+        Laws from the library that may be weighed.
     settings
         Thresholds of the diagnosis.
     """
-    inside = moved_inside(lines, best.fitted, max(settings.evidence.least, settings.screening.place * best.evidence))
-    if inside is best.fitted:
+    last = best.fitted.hypothesis.causes[-1]
+    if last.axis is None or last.motion is None or not isinstance(last.physics, LimitedPhysics):
         return []
-    axis = inside.hypothesis.causes[-1].axis
-    assert axis is not None
-    # the direction along which it was found at the tip still says most to a reader
-    location = {**best.location, **location_of(axis, inside.hypothesis.model)}
-    return [Proposal(best.name, location, inside, current.score - inside.score)]
+    if not last.physics.strained(last.values, last.motion):
+        return []
+    beyond = [one for one in laws if answer_name(one) == last.physics.beyond]
+    begun = in_processes([partial(_begun_beyond, lines, current, one, last.axis, settings) for one in beyond])
+    return [
+        Proposal(answer_name(law), best.location, one, current.score - one.score)
+        for law, one in zip(beyond, begun, strict=True)
+        if one is not None and np.isfinite(one.score)
+    ]
+
+
+def _begun_beyond(
+    lines: list[WindowedSpectrum], current: Fit, law: JointPhysics, axis: JointAxis, settings: Settings
+) -> Fit | None:
+    """A law begun at the place of another, with phases of the modes where these gain."""
+    begun = begun_at(lines, current, law, axis)
+    return None if begun is None else with_phases(lines, begun, settings.evidence.least)
 
 
 def _promising(sighted: SightedLaws, least: float, strong: bool, limits: ScreeningSettings) -> list[Screened]:

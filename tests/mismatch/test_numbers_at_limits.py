@@ -7,10 +7,11 @@ from hidden_joint import at_the_joint, law_of, moved_by, with_law
 
 from mismatch import fit
 from mismatch.adapters.structure.structure_verdict import equivalents_of_answer
-from mismatch.inference import AcceptedCause, EvidenceSettings, Proposal, Search
+from mismatch.inference import AcceptedCause, EvidenceSettings, Proposal, Search, Settings
 from mismatch.joints.joint_law import JointMotion
 from mismatch.physics import JointPhysics, LimitedPhysics, library
 from mismatch.physics.protocol import DRY
+from mismatch.screening import laws_beyond
 
 MOTION = JointMotion(reach=1e-3, speed=0.1, deflection=2e-4, velocity=0.02, stiffness=1e6)
 LEVELS = (20.0, 60.0)
@@ -91,3 +92,19 @@ def test_at_the_limit_of_its_name_a_law_is_told_with_the_law_beyond(
     told = [AcceptedCause("hysteresis", {}, {}, {}, 100.0)]
     assert equivalents_of_answer(search, told, EvidenceSettings()) == equivalents
     assert equivalents_of_answer(search, [], EvidenceSettings()) == ()
+
+
+@pytest.mark.parametrize(("name", "truth"), [("presliding_friction", [6.0, 3e-5]), ("hysteresis", [15e3, 4e-4, 0.8])])
+def test_the_law_beyond_a_limit_is_fitted_in_its_place(name: str, truth: list[float]) -> None:
+    """Friction that was fitted as hysteresis explains more under its own name; true hysteresis asks for no other."""
+    begun = with_law(law_of("hysteresis"), np.array([2e4, 3e-4, 0.8]))
+    lines = moved_by(with_law(law_of(name), np.array(truth)), LEVELS)
+    current, fitted = fit(lines, begun.without(0)), fit(lines, begun, iterations=40)
+    best = Proposal("hysteresis", {}, fitted, current.score - fitted.score)
+    laws = [one for one in library().values() if isinstance(one, JointPhysics)]
+    found = laws_beyond(lines, current, best, laws, Settings())
+    if name == "hysteresis":
+        assert found == []
+        return
+    assert {one.name for one in found} == {"coulomb_friction"}
+    assert max(one.evidence for one in found) > best.evidence + 20

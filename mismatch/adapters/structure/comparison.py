@@ -10,9 +10,9 @@ from ...inference import Patience, Proposal, Remainder, Round, Search, Settings,
 from ...models import Cause, Fit, fit, gives_one_up, settled
 from ...physics import JointPhysics, Physics, answer_name
 from ...remainder import leftover
-from ...screening import gains_beside_laws
+from ...screening import gains_beside_laws, laws_beyond
 from .acceptance import evidence_needed, impossible, plainest, possible_gains, twins_of, worth_it
-from .rounds import Standing, StructureRound, Weighed, likeliest_seen, only_modes, weigh
+from .rounds import Standing, StructureRound, Weighed, fitted_candidate, likeliest_seen, only_modes, weigh
 
 PRUNING, TO_REST = 20, 60
 """Steps at most of a fit without one of its causes, and of one with a cause that is taken."""
@@ -76,6 +76,12 @@ class StructureComparison:
             laws = {name: one for name, one in self.causes.items() if name not in linear}
             weighed = weighed.with_more(weigh(standing, laws))
         chosen = self._chosen(weighed, search)
+        if chosen is not None:
+            beyond = self._beyond_its_name(chosen, search)
+            told = [fitted_candidate(one, self.settings.evidence) for one in beyond]
+            # the chosen law has come to rest since it was weighed: its rivals are compared with it there
+            weighed = weighed.with_more(Weighed([chosen, *beyond], told, weighed.sighted)) if beyond else weighed
+            chosen = max([chosen, *beyond], key=lambda one: one.evidence)
         equivalents = () if chosen is None else self._equivalents(weighed, chosen, current)
         failed = weighed.sighted and not any(
             one.fitted.hypothesis.causes[-1].axis is not None and one.evidence >= self.settings.evidence.least
@@ -115,6 +121,13 @@ class StructureComparison:
         farther = replace(chosen, fitted=fitted, evidence=search.current.score - fitted.score)
         better = farther.evidence > chosen.evidence and not impossible(farther, self.settings.evidence)
         return farther if better else chosen
+
+    def _beyond_its_name(self, chosen: Proposal[Fit], search: Search[Fit]) -> list[Proposal[Fit]]:
+        """The laws beyond the limit at which the chosen law's numbers end, fitted to their ends at its place."""
+        laws = [one for one in self.causes.values() if isinstance(one, JointPhysics)]
+        tried = laws_beyond(self.lines, search.current, chosen, laws, self.settings)
+        rested = [self._at_rest(one, search) for one in tried]
+        return [one for one in rested if not impossible(one, self.settings.evidence)]
 
     def is_of_its_own(self, search: Search[Fit], place: int, less: Fit) -> bool:
         """Whether an accepted cause mends no law's form, and explains most of what moves with the signal without it."""
@@ -156,10 +169,8 @@ class StructureComparison:
         """
         evidence, limits = self.settings.evidence, self.settings.verdict
         possible = [one for one in weighed.proposals if not impossible(one, evidence)]
-        # only the best law is tried inside: its rivals stand at the tip, and are compared with it there
-        there = [one.evidence for one in possible if one.name == chosen.name and "participation" not in one.location]
-        if "participation" in chosen.location and "direction" in chosen.location and there:
-            chosen = replace(chosen, evidence=max(there))
+        if _moved_inside(chosen):
+            possible, chosen = _at_one_place(possible, chosen)
         near = equivalents_of(possible, chosen, evidence.as_good)
         if chosen.name not in self.laws:
             return near
@@ -183,3 +194,22 @@ class StructureComparison:
         if not failed:
             return float("inf")
         return leftover(failed[-1].hypothesis, self.lines).size
+
+
+def _moved_inside(one: Proposal[Fit]) -> bool:
+    """Whether a law was found at the tip, and tried inside then."""
+    return "participation" in one.location and "direction" in one.location
+
+
+def _at_one_place(possible: list[Proposal[Fit]], chosen: Proposal[Fit]) -> tuple[list[Proposal[Fit]], Proposal[Fit]]:
+    """Rivals of a law that was moved inside, and that law, with evidence that compares: of one place.
+
+    The rivals that were tried inside, too, are compared there, and all others at the tip, where that law once stood.
+    """
+    there = [one.evidence for one in possible if one.name == chosen.name and "participation" not in one.location]
+    if not there:
+        return possible, chosen
+    lead = chosen.evidence - max(there)
+    inside = [replace(one, evidence=one.evidence - lead) for one in possible if _moved_inside(one)]
+    names = {one.name for one in inside}
+    return [*inside, *(one for one in possible if one.name not in names)], replace(chosen, evidence=max(there))

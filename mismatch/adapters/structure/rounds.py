@@ -174,7 +174,7 @@ def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
     if laws and leads and not _explains(proposals, standing):
         proposals += laws_by_level(lines, current, laws, settings)
     proposals += twin_laws(lines, current, possible_gains(proposals, settings.evidence)[:1], causes)
-    weighed += [_candidate(one, settings.evidence) for one in proposals]
+    weighed += [fitted_candidate(one, settings.evidence) for one in proposals]
     return Weighed(proposals, weighed, stands_out)
 
 
@@ -227,8 +227,16 @@ def _of_their_own(
     )
 
 
-def _candidate(one: Proposal[Fit], evidence: EvidenceSettings) -> Candidate:
-    """A fitted cause as it is told; one whose numbers cannot be says so."""
+def fitted_candidate(one: Proposal[Fit], evidence: EvidenceSettings) -> Candidate:
+    """A fitted cause as it is told; one whose numbers cannot be says so.
+
+    Parameters
+    ----------
+    one
+        The fitted cause.
+    evidence
+        Thresholds of what is possible.
+    """
     reason = impossible(one, evidence)
     place = {**one.location, "impossible": reason} if reason else one.location
     return Candidate(one.name, one.evidence, "impossible" if reason else "fitted", place)
