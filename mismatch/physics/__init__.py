@@ -7,6 +7,7 @@ from collections.abc import Collection
 from .clipping import PHYSICS as CLIPPING
 from .free_form import FREE_FORM, FreeForm, families
 from .linear_part import WithLinearPart
+from .missing_mode import MOST_DAMPED
 from .modal_parameters import PHYSICS as MODAL_PARAMETERS
 from .protocol import (
     BeliefPhysics,
@@ -29,6 +30,7 @@ __all__ = [
     "CLIPPING",
     "FREE_FORM",
     "MODAL_PARAMETERS",
+    "MOST_DAMPED",
     "UNMEASURED_EXCITATION",
     "BeliefPhysics",
     "Chain",

@@ -211,11 +211,20 @@ def _as_good(driven: list[Fit], current: Fit, gained: float, settings: Settings)
     nearly = [limits.nearly * gain for gain in gains[:1]]
     enough = max([settings.evidence.least / 2, limits.rival * gained, *nearly])
     # forms of different causes may differ by a linear spring alone: all that are as good are simulated
-    return [
+    near = [
         one
         for place, (one, gain) in enumerate(zip(driven, gains, strict=True))
         if gain >= enough and (place < limits.most_simulated or gain > gains[0] - settings.evidence.least)
     ]
+    names = {_name(one) for one in near}
+    # of two forms of one cause neither is the other's rival
+    rivals = [one for one, gain in zip(driven, gains, strict=True) if gain >= enough and _name(one) not in names]
+    return near + rivals[:1] if len(names) == 1 else near
+
+
+def _name(fitted: Fit) -> str:
+    """Name under which the last law of a fit is told."""
+    return answer_name(fitted.hypothesis.causes[-1].physics)
 
 
 def _missing_kinds(chosen: list[Any], ranked: list[Any], cause_of: Callable[[Any], Cause]) -> list[Any]:

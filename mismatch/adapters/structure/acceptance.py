@@ -10,7 +10,7 @@ from estimation import WindowedSpectrum
 
 from ...inference import EvidenceSettings, Proposal
 from ...models import Cause, Fit, Hypothesis, fit
-from ...physics import ChainPhysics, LimitedPhysics, ModePhysics, TwinPhysics
+from ...physics import MOST_DAMPED, ChainPhysics, LimitedPhysics, ModePhysics, TwinPhysics
 from ...screening import phases_too_large
 
 Real = NDArray[np.float64]
@@ -36,7 +36,8 @@ def impossible(proposal: Proposal[Fit], settings: EvidenceSettings) -> str:
     if cause.axis is not None:
         return phases_too_large(cause.axis) or _far_modes(proposal.fitted.hypothesis, settings.farthest)
     if isinstance(cause.physics, ModePhysics):
-        return cause.physics.overdamped(complex(proposal.fitted.hypothesis.model.poles[-1]))
+        fitted = proposal.fitted.hypothesis
+        return cause.physics.overdamped(complex(fitted.model.poles[-1])) or lost_mode(fitted)
     said: Callable[[Real, Real], str] | None = getattr(cause.physics, "impossible", None)
     if said is None:
         return ""
@@ -53,6 +54,22 @@ def _far_modes(hypothesis: Hypothesis, farthest: float) -> str:
     mode = int(np.argmax(np.abs(off)))
     before, after = (model.natural_frequencies[mode] for model in (shape.nominal, hypothesis.model))
     return f"the mode at {before:.4g} Hz would have to lie at {after:.4g} Hz"
+
+
+def lost_mode(hypothesis: Hypothesis) -> str:
+    """Which of the laboratory's modes is a resonance no more: it then stands for something else; empty where none.
+
+    Parameters
+    ----------
+    hypothesis
+        A fitted hypothesis.
+    """
+    nominal = hypothesis.shape.nominal
+    pairs = zip(nominal.damping_ratios, hypothesis.model.damping_ratios, nominal.natural_frequencies, strict=False)
+    for before, now, frequency in pairs:
+        if before <= MOST_DAMPED < now:
+            return f"the mode at {frequency:.4g} Hz would have to be damped by {100 * now:.0f} %"
+    return ""
 
 
 def modes_not_seen(hypothesis: Hypothesis, lines: Sequence[WindowedSpectrum]) -> list[int]:

@@ -15,6 +15,7 @@ from ...models import Fit, fit, with_linear_part
 from ...physics import is_fault
 from ...records import Recordings
 from ...remainder import Bursts, bursts_left, leftover
+from .acceptance import lost_mode
 from .comparison import StructureComparison
 from .confirmation import fit_without
 from .form_errors import with_form_spread
@@ -50,6 +51,8 @@ class Answer:
         How modes move with the level, where nothing that was found depends on it; empty where that is not seen.
     bursts
         Recordings of which a linear answer leaves bursts.
+    lost
+        Which of the laboratory's modes is a resonance no more; empty where none.
     """
 
     verdict: str
@@ -62,12 +65,14 @@ class Answer:
     no_noise: tuple[FollowedAlone, ...] = ()
     moving: str = ""
     bursts: tuple[Bursts, ...] = ()
+    lost: str = ""
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """What speaks against the answer, or shows that it is not whole: sentences for the reader."""
         moving = [self.moving] if self.moving else []
-        return (*(one.sentence for one in self.no_noise), *moving, *(one.sentence for one in self.bursts))
+        lost = [f"{self.lost[0].upper()}{self.lost[1:]}: it stands for something that is missing"] if self.lost else []
+        return (*(one.sentence for one in self.no_noise), *moving, *(one.sentence for one in self.bursts), *lost)
 
 
 def answer_of(
@@ -130,6 +135,8 @@ def answer_of(
     if moving and verdict != "unexplained":
         stands = not found.accepted or stands_beside_moving_modes(held_out.improvement, settings.verdict)
         verdict = judged(not_whole=True) if stands else "unexplained"
+    lost = lost_mode(current.hypothesis) if verdict == "explained" else ""
+    verdict = judged(not_whole=True) if lost else verdict
     # a law of a joint may leave bursts where its form is not quite the true one
     bursts = () if current.hypothesis.laws else bursts_left(current.hypothesis, both.mended)
     verdict = "unexplained" if verdict == "none" and bursts else verdict
@@ -142,9 +149,9 @@ def answer_of(
             verdict = "unexplained"
     if verdict == "unexplained":
         none_told = _unexplained(comparison, both, found, held_out, causes)
-        return replace(none_told, no_noise=no_noise, moving=moving, bursts=bursts)
+        return replace(none_told, no_noise=no_noise, moving=moving, bursts=bursts, lost=lost)
     told = Answer(verdict, tuple(causes), current, found, left, held_out)
-    return replace(told, no_noise=no_noise, moving=moving, bursts=bursts)
+    return replace(told, no_noise=no_noise, moving=moving, bursts=bursts, lost=lost)
 
 
 def _judged_alone(

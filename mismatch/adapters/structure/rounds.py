@@ -159,6 +159,10 @@ def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
     if not _explains(proposals, standing):
         tried = bool(proposals)
         proposals += linear_candidates(lines, current, chains, mode, settings.screening, least)
+        if proposals and not possible_gains(proposals, settings.evidence):
+            # a cause that stands for two has numbers that nothing real has: the next in line may be one of them
+            others = chains[settings.screening.most_linear :]
+            proposals += linear_candidates(lines, current, others, None, settings.screening, least)
         if not tried and _joints_are_due(proposals, standing):
             if not much:
                 sighted = sighted_laws(lines, current, laws, settings)
