@@ -10,7 +10,7 @@ import pytest
 
 from estimation import BandRecording, windowed_spectrum
 from mismatch import Hypothesis, LabError, ModelShape, Settings, band_of, fit
-from mismatch.adapters.structure.acceptance import impossible, modes_not_seen, worth_it
+from mismatch.adapters.structure.acceptance import impossible, lost_mode, modes_not_seen, worth_it
 from mismatch.adapters.structure.told_causes import told_causes
 from mismatch.inference import Proposal, ScreeningSettings
 from mismatch.models import Fit, modes_are_odd
@@ -55,15 +55,33 @@ def test_a_mode_whose_place_a_labs_mode_has_taken_is_found_there(
     assert not modes_are_odd(found.fitted)
 
 
+def with_further_mode(frequency: float, damping: float, lab_damped: float = 0.0) -> Hypothesis:
+    """The lab's mode of the rig, its damping off by some lab errors, and a further one."""
+    physics, shape = library()["missing_mode"], ModelShape(Rig().model, LabError())
+    assert isinstance(physics, ModePhysics)
+    u = np.zeros(shape.size)
+    u[1] = lab_damped
+    omega = 2 * np.pi * frequency
+    pole = -damping * omega + 1j * omega * np.sqrt(1 - damping**2)
+    return Hypothesis(shape, u).with_mode(pole, np.ones(1, complex), np.ones(1, complex), physics)
+
+
 @pytest.mark.parametrize(("damping", "said"), [(0.05, ""), (0.25, ""), (0.77, "a mode damped by 77 % is no resonance")])
 def test_a_pole_without_a_peak_cannot_be_a_missing_mode(damping: float, said: str) -> None:
     """What has a slope and no peak mends the form of a law; the candidate is told with the reason."""
-    omega = 2 * np.pi * 5.9
-    pole = -damping * omega + 1j * omega * np.sqrt(1 - damping**2)
-    cause = SimpleNamespace(axis=None, physics=library()["missing_mode"])
-    hypothesis = SimpleNamespace(causes=(cause,), model=SimpleNamespace(poles=np.array([-1 + 100j, pole])))
+    proposal: Any = Proposal("missing_mode", {}, SimpleNamespace(hypothesis=with_further_mode(5.9, damping)), 2691.0)
+    assert impossible(proposal, Settings().evidence) == said
+
+
+@pytest.mark.parametrize(("errors", "lost"), [(0.0, False), (5.0, False), (25.0, True)])
+def test_a_further_mode_may_not_stand_for_one_of_the_labs(errors: float, lost: bool) -> None:
+    """The lab's mode then follows something else: a high-pass of a sensor made one of 72 % in the blind trial."""
+    hypothesis = with_further_mode(10.2, 0.03, errors)
+    assert (hypothesis.model.damping_ratios[0] > 0.3) == lost
+    said = lost_mode(hypothesis)
     proposal: Any = Proposal("missing_mode", {}, SimpleNamespace(hypothesis=hypothesis), 2691.0)
     assert impossible(proposal, Settings().evidence) == said
+    assert said.startswith("the mode at 10 Hz would have to be damped by") if lost else not said
 
 
 @pytest.mark.parametrize(

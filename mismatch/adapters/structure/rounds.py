@@ -158,11 +158,7 @@ def weigh(standing: Standing, causes: Mapping[str, Physics]) -> Weighed:
         proposals = joint_candidates(lines, current, sighted, settings, least)
     if not _explains(proposals, standing):
         tried = bool(proposals)
-        proposals += linear_candidates(lines, current, chains, mode, settings.screening, least)
-        if proposals and not possible_gains(proposals, settings.evidence):
-            # a cause that stands for two has numbers that nothing real has: the next in line may be one of them
-            others = chains[settings.screening.most_linear :]
-            proposals += linear_candidates(lines, current, others, None, settings.screening, least)
+        proposals += _linear_candidates(standing, chains, mode, least)
         if not tried and _joints_are_due(proposals, standing):
             if not much:
                 sighted = sighted_laws(lines, current, laws, settings)
@@ -198,6 +194,22 @@ def _screened(
     sighted, mode, screened = in_processes(makers)
     taken = {(cause.physics.name, cause.place) for cause in hypothesis.causes}
     return [one for one in screened if (one.cause.physics.name, one.cause.place) not in taken], mode, sighted
+
+
+def _linear_candidates(
+    standing: Standing, chains: list[ScreenedChain], mode: SightedMode | None, least: float
+) -> list[Proposal[Fit]]:
+    """Linear causes that promise most, fitted, and the next in line as long as none of them can be.
+
+    A cause that stands for two has numbers that nothing real has: what is behind it may be one of the two.
+    """
+    lines, current, limits = standing.lines, standing.current, standing.settings.screening
+    found = linear_candidates(lines, current, chains, mode, limits, least)
+    for first in range(limits.most_linear, len(chains), limits.most_linear):
+        if not found or possible_gains(found, standing.settings.evidence):
+            break
+        found += linear_candidates(lines, current, chains[first:], None, limits, least)
+    return found
 
 
 def _of_their_own(
