@@ -35,6 +35,7 @@ from .held_out import recordings_of
 from .odd_modes import with_cause_of_odd_modes
 from .predicting import OfferedModel, last_fit, offered_model
 from .structure_verdict import equivalents_of_answer
+from .told_causes import unknown_scales
 
 FIRST_FIT = 30
 """Steps at most of the modal parameters: a nominal model may be far off."""
@@ -152,6 +153,7 @@ def _diagnosed(
             *answer.doubts,
             *([freed.doubt] if freed.doubt else []),
             *([hurried] if hurried else []),
+            *unknown_scales(answer.causes),
         ),
         content={
             "compared_band": asdict(band),

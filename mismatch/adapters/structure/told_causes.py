@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from foundation import listed
+
 from ...inference import AcceptedCause, Proposal
 from ...models import Cause, Fit, held_values, location_of, modes_are_odd, oddity_of_modes
 from ...physics import MODAL_PARAMETERS, ModePhysics, answer_name
@@ -147,3 +149,28 @@ def modal_deviation(fitted: Fit) -> AcceptedCause | None:
         errors[f"damping_ratio_{k + 1}"] = float(spread[k, 1] * shape.lab.damping * nominal.damping_ratios[k])
     place = {"modes": [k + 1 for k in modes]}
     return AcceptedCause(MODAL_PARAMETERS.name, place, parameters, errors, oddity_of_modes(fitted))
+
+
+def unknown_scales(causes: Sequence[AcceptedCause]) -> tuple[str, ...]:
+    """A word about numbers of joints inside, whose own deflection no channel shows.
+
+    ``x' = x / a`` with ``g' = a g`` is the same joint: each mode's part is as much smaller, and all motions are alike.
+    The parts have the norm 1, which fixes a by convention.
+
+    Parameters
+    ----------
+    causes
+        Causes that are told.
+
+    Examples
+    --------
+    >>> unknown_scales([AcceptedCause("gain_error", {"channel": "TCP:+X"}, {}, {}, 30.0)])
+    ()
+    """
+    names = [one.name for one in causes if "participation" in one.location]
+    if not names:
+        return ()
+    return (
+        f"No channel shows the deflection of the joint inside ({listed(names)}): its scale is a convention, and "
+        "lengths a times as large with forces a times as small fit as well",
+    )
