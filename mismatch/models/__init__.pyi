@@ -18,6 +18,7 @@ from .model_shape import ModelShape
 from .model_terms import hypothesis_of, improved_model
 from .plain_fits import even_fit, plain_fit
 from .refinement import believed, following_all, gain_at_rest, gives_one_up, settled, with_chain
+from .scale_of_joints import counted_at_tip
 from .slopes import jacobian
 
 __all__ = [
@@ -28,6 +29,7 @@ __all__ = [
     "Hypothesis",
     "ModelShape",
     "believed",
+    "counted_at_tip",
     "even_fit",
     "fit",
     "fitted_noise",

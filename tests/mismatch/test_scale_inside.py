@@ -3,31 +3,44 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hidden_joint import law_of, moved_by, with_law
 
 from mismatch import predict_lines
 from mismatch.adapters.structure.told_causes import unknown_scales
 from mismatch.inference import AcceptedCause
-from mismatch.joints import ModalScales, inside_of
+from mismatch.joints import inside_of
+from mismatch.models.scale_of_joints import counted_at_tip, scale_at_tip, scaled
+
+LAWS = {
+    "backlash": [2e4, 1e-4],
+    "coulomb_friction": [6.0, 2e-3],
+    "hysteresis": [6e4, 2e-4, 0.8],
+    "pose_drift": [2e4, 0.3, 1e3],
+    "presliding_friction": [6.0, 3e-5],
+    "quadratic_damping": [3e3],
+    "stiffness_hardening": [1.0, 3.0],
+    "stiffness_softening": [3e4, 1e-4, 2.0],
+}
 
 
-def test_lengths_and_forces_of_a_joint_inside_have_no_scale_of_their_own() -> None:
-    """Play of 1.5 times the gap, of a stiffness 2.25 times as small, on modes with parts 1.5 times as large."""
-    hidden = with_law(law_of("backlash"), np.array([2e4, 1e-4]))
+@pytest.mark.parametrize("name", sorted(LAWS))
+def test_lengths_and_forces_of_a_joint_inside_have_no_scale_of_their_own(name: str) -> None:
+    """A joint at the tip, told as one inside, in another scale: all predict the same, and the tip's scale is found."""
+    hidden = with_law(law_of(name), np.array(LAWS[name]))
     cause = hidden.causes[-1]
     assert cause.axis is not None
-    assert cause.motion is not None
-    inside = inside_of(hidden.model, cause.axis)
-    assert inside.scales is not None
-    larger = replace(inside, scales=ModalScales(1.5 * inside.scales.seen, 1.5 * inside.scales.pushed))
-    motion = replace(cause.motion, reach=1.5 * cause.motion.reach, deflection=1.5 * cause.motion.deflection)
-    scaled = replace(cause, axis=larger, motion=motion, values=np.array([2e4 / 1.5**2, 1.5e-4]))
+    inside = replace(cause, axis=inside_of(hidden.model, cause.axis))
+    assert inside.axis is not None
+    assert scale_at_tip(inside.axis, hidden.model) == pytest.approx(1.0)
+    other = replace(hidden, causes=(scaled(inside, 1.7),))
+    counted = counted_at_tip(other)
+    np.testing.assert_allclose(counted.causes[-1].values, cause.values, rtol=1e-9)
     (line,) = moved_by(hidden, (40.0,))
-    one, other = (
-        predict_lines(replace(hidden, causes=(each,)), line).response for each in (replace(cause, axis=inside), scaled)
-    )
     bare = predict_lines(hidden.without(0), line).response
-    assert np.linalg.norm(one - other) < 1e-3 * np.linalg.norm(one - bare)
+    first, *others = (predict_lines(one, line).response for one in (hidden, other, counted))
+    for shown in others:
+        assert np.linalg.norm(shown - first) < 2e-3 * np.linalg.norm(first - bare)
 
 
 def test_the_answer_says_so() -> None:

@@ -15,7 +15,7 @@ from ...behaviour import behaviour_of
 from ...faults import repair_faults
 from ...inference import AcceptedCause, Diagnosis, EvidenceSettings, Patience, Progress, Search, Settings, search
 from ...location import SpindleSpeed, StructureDetails, StructureDiagnosis, located, residual_view
-from ...models import Fit, Hypothesis, ModelShape, fit, known_noise, outdoes_noise, through_structure
+from ...models import Fit, Hypothesis, ModelShape, counted_at_tip, fit, known_noise, outdoes_noise, through_structure
 from ...physics import is_fault, library, offered
 from ...records import (
     ComparedBand,
@@ -170,12 +170,22 @@ def _searched(comparison: StructureComparison, base: Fit, progress: Progress) ->
     """Where the search for causes ends, and a word where it ended because it had lasted long enough."""
     found = search(comparison, base, progress)
     if comparison.patience.over:
-        return found, (
+        return _counted_at_tip(comparison, found), (
             f"The search for causes ended after {comparison.patience.seconds:.4g} s: a further cause may have been "
             "missed; --search-time lets it go on"
         )
     progress("causes behind odd modes")
-    return with_cause_of_odd_modes(comparison, found), ""
+    return _counted_at_tip(comparison, with_cause_of_odd_modes(comparison, found)), ""
+
+
+def _counted_at_tip(comparison: StructureComparison, found: Search[Fit]) -> Search[Fit]:
+    """The search whose last fit counts the deflections of joints inside in the tip's motion; it predicts the same."""
+    last = found.current
+    hypothesis = counted_at_tip(last.hypothesis)
+    if all(one is other for one, other in zip(hypothesis.causes, last.hypothesis.causes, strict=True)):
+        return found
+    again = fit(comparison.lines, hypothesis, last.noises, iterations=0, held=True)
+    return replace(found, steps=(*found.steps[:-1], again)) if np.isfinite(again.score) else found
 
 
 def _beside(faults: Sequence[AcceptedCause], settings: Settings) -> Settings:

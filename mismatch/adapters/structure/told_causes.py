@@ -155,7 +155,7 @@ def unknown_scales(causes: Sequence[AcceptedCause]) -> tuple[str, ...]:
     """A word about numbers of joints inside, whose own deflection no channel shows.
 
     ``x' = x / a`` with ``g' = a g`` is the same joint: each mode's part is as much smaller, and all motions are alike.
-    The parts have the norm 1, which fixes a by convention.
+    It is counted in the tip's motion, by convention (:func:`mismatch.models.counted_at_tip`).
 
     Parameters
     ----------
@@ -171,6 +171,6 @@ def unknown_scales(causes: Sequence[AcceptedCause]) -> tuple[str, ...]:
     if not names:
         return ()
     return (
-        f"No channel shows the deflection of the joint inside ({listed(names)}): its scale is a convention, and "
-        "lengths a times as large with forces a times as small fit as well",
+        f"No channel shows the deflection of the joint inside ({listed(names)}): it is counted in the tip's motion, "
+        "and lengths a times as large with forces a times as small fit as well",
     )
