@@ -8,11 +8,13 @@ from numpy.typing import NDArray
 from modal_fit import ModalModel
 
 from ..joints import JointAxis, JointMotion, ModalScales, tip_axes
-from ..physics.stiffness_hardening import StiffnessHardening
 from .cause import Cause
 from .hypothesis import Hypothesis
 
 Real = NDArray[np.float64]
+
+FIXED = "force_at_1mm_n"
+"""A force that a law tells at a fixed deflection."""
 
 
 def counted_at_tip(hypothesis: Hypothesis) -> Hypothesis:
@@ -86,9 +88,10 @@ def scaled(cause: Cause, factor: float) -> Cause:
     )
     powers = np.array([power_of_scale(one.unit) for one in cause.physics.parameters])
     values = cause.values * factor**powers
-    if isinstance(cause.physics, StiffnessHardening):
-        # its force is told at a fixed deflection
-        values[0] *= factor ** cause.values[1]
+    names = [one.name for one in cause.physics.parameters]
+    if FIXED in names:
+        # a force that is told at a fixed deflection goes by the power of the law, too
+        values[names.index(FIXED)] *= factor ** cause.values[names.index("exponent")]
     return replace(cause, axis=replace(axis, scales=scales), motion=moved, values=values)
 
 

@@ -1,7 +1,7 @@
 from .beside_laws import Gains, gains_beside_laws
 from .chain_screening import ScreenedChain, screen_chains
 from .joint_direction import JointSighting, SeenMotion, find_direction, seen_motion
-from .joint_laws_fitted import SightedLaws, joint_candidates, laws_beyond, sighted_laws
+from .joint_laws_fitted import SightedLaws, joint_candidates, laws_beyond, laws_in_place, sighted_laws
 from .joint_screening import screen_joints
 from .joint_starts import phases_too_large
 from .level_continuation import laws_by_level
@@ -26,6 +26,7 @@ __all__ = [
     "joint_candidates",
     "laws_beyond",
     "laws_by_level",
+    "laws_in_place",
     "linear_candidates",
     "linear_floor",
     "noise_floor",

@@ -174,20 +174,44 @@ def laws_beyond(
         Thresholds of the diagnosis.
     """
     last = best.fitted.hypothesis.causes[-1]
-    if last.axis is None or last.motion is None or not isinstance(last.physics, LimitedPhysics):
+    if last.motion is None or not isinstance(last.physics, LimitedPhysics):
         return []
     if not last.physics.strained(last.values, last.motion):
         return []
     beyond = [one for one in laws if answer_name(one) == last.physics.beyond]
-    begun = in_processes([partial(_begun_beyond, lines, current, one, last.axis, settings) for one in beyond])
+    return laws_in_place(lines, current, best, beyond, settings)
+
+
+def laws_in_place(
+    lines: list[WindowedSpectrum], current: Fit, best: Proposal[Fit], laws: Sequence[JointPhysics], settings: Settings
+) -> list[Proposal[Fit]]:
+    """Fit other laws in the place of one that was found, each from its start.
+
+    Parameters
+    ----------
+    lines
+        Windowed spectra of the recordings that are compared.
+    current
+        The fit without the law.
+    best
+        The law that was found; a linear cause has no place for them.
+    laws
+        Laws that are fitted.
+    settings
+        Thresholds of the diagnosis.
+    """
+    axis = best.fitted.hypothesis.causes[-1].axis
+    if axis is None:
+        return []
+    begun = in_processes([partial(_begun_there, lines, current, one, axis, settings) for one in laws])
     return [
         Proposal(answer_name(law), best.location, one, current.score - one.score)
-        for law, one in zip(beyond, begun, strict=True)
+        for law, one in zip(laws, begun, strict=True)
         if one is not None and np.isfinite(one.score)
     ]
 
 
-def _begun_beyond(
+def _begun_there(
     lines: list[WindowedSpectrum], current: Fit, law: JointPhysics, axis: JointAxis, settings: Settings
 ) -> Fit | None:
     """A law begun at the place of another, with phases of the modes where these gain."""

@@ -10,7 +10,7 @@ from ...inference import Patience, Proposal, Remainder, Round, Search, Settings,
 from ...models import Cause, Fit, fit, gives_one_up, settled
 from ...physics import JointPhysics, Physics, answer_name
 from ...remainder import leftover
-from ...screening import gains_beside_laws, laws_beyond
+from ...screening import gains_beside_laws, laws_beyond, laws_in_place
 from .acceptance import evidence_needed, impossible, plainest, possible_gains, twins_of, worth_it
 from .rounds import Standing, StructureRound, Weighed, fitted_candidate, likeliest_seen, only_modes, weigh
 
@@ -112,7 +112,7 @@ class StructureComparison:
             if self._is_worth_it(chosen, search):
                 return self._at_rest(chosen, search)
             # another form of the same cause may have numbers that the data do tell
-            good = [one for one in good if one.name == best.name]
+            good = [one for one in good if one.name == best.name] or self._other_forms(chosen, weighed, search)
         return None
 
     def _at_rest(self, chosen: Proposal[Fit], search: Search[Fit]) -> Proposal[Fit]:
@@ -121,6 +121,15 @@ class StructureComparison:
         farther = replace(chosen, fitted=fitted, evidence=search.current.score - fitted.score)
         better = farther.evidence > chosen.evidence and not impossible(farther, self.settings.evidence)
         return farther if better else chosen
+
+    def _other_forms(self, chosen: Proposal[Fit], weighed: Weighed, search: Search[Fit]) -> list[Proposal[Fit]]:
+        """Forms of a law that no round has fitted yet, in its place."""
+        known = {one.fitted.hypothesis.causes[-1].physics.name for one in weighed.proposals}
+        laws = [one for one in self.causes.values() if isinstance(one, JointPhysics) and one.name not in known]
+        forms = [one for one in laws if answer_name(one) == chosen.name]
+        found = laws_in_place(self.lines, search.current, chosen, forms, self.settings)
+        weighed.proposals.extend(found)
+        return possible_gains(found, self.settings.evidence)
 
     def _beyond_its_name(self, chosen: Proposal[Fit], search: Search[Fit]) -> list[Proposal[Fit]]:
         """The laws beyond the limit at which the chosen law's numbers end, fitted to their ends at its place."""
