@@ -40,7 +40,7 @@ def diagnose(
     ] = None,
     search_time: Annotated[
         float,
-        typer.Option("--search-time", metavar="SECONDS", help="After this time no further cause is looked for."),
+        typer.Option("--search-time", metavar="SECONDS", help="Time after which no further cause is looked for, s."),
     ] = 120.0,
     stream: Annotated[str | None, typer.Option("--stream", help="Sample clock.")] = None,
     figures: Figures = None,
