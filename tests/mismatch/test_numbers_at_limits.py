@@ -11,7 +11,7 @@ from mismatch.inference import AcceptedCause, EvidenceSettings, Proposal, Search
 from mismatch.joints.joint_law import JointMotion
 from mismatch.physics import JointPhysics, LimitedPhysics, library
 from mismatch.physics.protocol import DRY
-from mismatch.screening import laws_beyond
+from mismatch.screening import laws_beyond, laws_in_place
 
 MOTION = JointMotion(reach=1e-3, speed=0.1, deflection=2e-4, velocity=0.02, stiffness=1e6)
 LEVELS = (20.0, 60.0)
@@ -108,3 +108,15 @@ def test_the_law_beyond_a_limit_is_fitted_in_its_place(name: str, truth: list[fl
         return
     assert {one.name for one in found} == {"coulomb_friction"}
     assert max(one.evidence for one in found) > best.evidence + 20
+
+
+def test_another_form_of_a_law_is_fitted_in_its_place() -> None:
+    """A power law was fitted as a spring that saturates; in its place the power law explains more, and has its exponent."""
+    power = law_of("stiffness_hardening")
+    lines = moved_by(with_law(power, np.array([1.0, 3.0])), LEVELS)
+    begun = with_law(law_of("saturating_hardening"), np.array([1e3, 2e-3, 2.0]))
+    current, fitted = fit(lines, begun.without(0)), fit(lines, begun, iterations=20)
+    best = Proposal("stiffness_hardening", {}, fitted, current.score - fitted.score)
+    (found,) = laws_in_place(lines, current, best, [power], Settings())
+    assert found.evidence > best.evidence
+    assert found.fitted.hypothesis.causes[-1].values[1] == pytest.approx(3.0, rel=0.02)

@@ -75,12 +75,11 @@ class StructureComparison:
         if spared and only_modes(possible_gains(weighed.proposals, self.settings.evidence)):
             laws = {name: one for name, one in self.causes.items() if name not in linear}
             weighed = weighed.with_more(weigh(standing, laws))
-        chosen = self._chosen(weighed, search)
+        chosen, weighed = self._chosen(weighed, search)
         if chosen is not None:
             beyond = self._beyond_its_name(chosen, search)
-            told = [fitted_candidate(one, self.settings.evidence) for one in beyond]
             # the chosen law has come to rest since it was weighed: its rivals are compared with it there
-            weighed = weighed.with_more(Weighed([chosen, *beyond], told, weighed.sighted)) if beyond else weighed
+            weighed = self._with_fitted(weighed, [chosen, *beyond]) if beyond else weighed
             chosen = max([chosen, *beyond], key=lambda one: one.evidence)
         equivalents = () if chosen is None else self._equivalents(weighed, chosen, current)
         failed = weighed.sighted and not any(
@@ -98,8 +97,11 @@ class StructureComparison:
         """Evidence that a further cause needs beside those of ``current``."""
         return evidence_needed(current, base, self.settings.evidence)
 
-    def _chosen(self, weighed: Weighed, search: Search[Fit]) -> Proposal[Fit] | None:
-        """The plainest form of the best cause, fitted until it rests and still possible there, if it is worth it."""
+    def _chosen(self, weighed: Weighed, search: Search[Fit]) -> tuple[Proposal[Fit] | None, Weighed]:
+        """The plainest form of the best cause, fitted until it rests and still possible there, if it is worth it.
+
+        With what was weighed, other forms of it that were fitted meanwhile among it.
+        """
         evidence = self.settings.evidence
         good = possible_gains(weighed.proposals, evidence)
         while (first := plainest(good, evidence.as_good)) is not None:
@@ -110,10 +112,18 @@ class StructureComparison:
             if impossible(chosen, evidence):
                 continue
             if self._is_worth_it(chosen, search):
-                return self._at_rest(chosen, search)
+                return self._at_rest(chosen, search), weighed
             # another form of the same cause may have numbers that the data do tell
-            good = [one for one in good if one.name == best.name] or self._other_forms(chosen, weighed, search)
-        return None
+            good = [one for one in good if one.name == best.name]
+            if not good:
+                forms = self._other_forms(chosen, weighed, search)
+                weighed, good = self._with_fitted(weighed, forms), possible_gains(forms, evidence)
+        return None, weighed
+
+    def _with_fitted(self, weighed: Weighed, more: list[Proposal[Fit]]) -> Weighed:
+        """What was weighed, and more that was fitted after it."""
+        told = [fitted_candidate(one, self.settings.evidence) for one in more]
+        return weighed.with_more(Weighed(more, told, weighed.sighted))
 
     def _at_rest(self, chosen: Proposal[Fit], search: Search[Fit]) -> Proposal[Fit]:
         """A cause that is taken, fitted to its end: a next one must not live on what this one left undone."""
@@ -127,9 +137,7 @@ class StructureComparison:
         known = {one.fitted.hypothesis.causes[-1].physics.name for one in weighed.proposals}
         laws = [one for one in self.causes.values() if isinstance(one, JointPhysics) and one.name not in known]
         forms = [one for one in laws if answer_name(one) == chosen.name]
-        found = laws_in_place(self.lines, search.current, chosen, forms, self.settings)
-        weighed.proposals.extend(found)
-        return possible_gains(found, self.settings.evidence)
+        return laws_in_place(self.lines, search.current, chosen, forms, self.settings)
 
     def _beyond_its_name(self, chosen: Proposal[Fit], search: Search[Fit]) -> list[Proposal[Fit]]:
         """The laws beyond the limit at which the chosen law's numbers end, fitted to their ends at its place."""
