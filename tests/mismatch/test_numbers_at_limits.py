@@ -111,7 +111,7 @@ def test_the_law_beyond_a_limit_is_fitted_in_its_place(name: str, truth: list[fl
 
 
 def test_another_form_of_a_law_is_fitted_in_its_place() -> None:
-    """A power law was fitted as a spring that saturates; in its place the power law explains more, and has its exponent."""
+    """A power law was fitted as a spring that saturates; in its place the power law explains more."""
     power = law_of("stiffness_hardening")
     lines = moved_by(with_law(power, np.array([1.0, 3.0])), LEVELS)
     begun = with_law(law_of("saturating_hardening"), np.array([1e3, 2e-3, 2.0]))
