@@ -27,11 +27,11 @@ Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
 EXCITED, SENSORS = ["EXC:+Z"], ["EXC:+Z", "WING:+Z", "PAYLOAD:+Z"]
-SEARCH = 3600.0
-"""Time for the search for causes, s: the figures must not depend on the machine."""
-
 BAND = (3.0, 11.0)
 """Hz. Compared, and all errors counted, in this band."""
+
+SEARCH = 3600.0
+"""Time for the search for causes, s: the figures must not depend on the machine."""
 
 PERIOD, TRAINED, TESTED = 8192, 5, 2
 """Samples of a period, periods read at each level, periods predicted."""

@@ -57,6 +57,8 @@ def diagnose(
 
     check_shares("--lab-error", lab_error, (0.01, 0.12, 0.03))
     check_band(band)
+    if not search_time > 0:
+        raise InputError(f"--search-time {search_time:g}: give a positive number of seconds, for example 300")
     drawn = asked_figures(figures, figure_format)
     model, recordings = (files[0], files[1:]) if simulated is None else (simulated, files)
     if not recordings:
@@ -70,8 +72,6 @@ def diagnose(
     process, doubts = read_checked_cutting(cutting) if cutting is not None else (None, [])
     for doubt in doubts:
         say(f"warning: {doubt}")
-    if not search_time > 0:
-        raise InputError(f"--search-time {search_time:g}: give a positive number of seconds, for example 300")
     settings = Settings(LabError(*lab_error), search=SearchSettings(longest=search_time))
     result = diagnose_files(
         model,

@@ -19,7 +19,7 @@ class Patience:
     Parameters
     ----------
     seconds
-        How long the search may last, s.
+        How long the search may last, s; without it for ever.
     begun
         When it began, on the clock of ``time.monotonic``, s.
 
@@ -29,7 +29,7 @@ class Patience:
     (False, True)
     """
 
-    seconds: float
+    seconds: float = float("inf")
     begun: float = field(default_factory=time.monotonic)
 
     @property

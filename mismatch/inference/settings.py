@@ -110,7 +110,8 @@ class SearchSettings(Thresholds, shares=("within_reach", "laws_again")):
     levels_apart
         Factor between the weakest and the strongest recording from which laws are carried from one to the other.
     longest
-        Time after which no further cause is looked for, s; the answer says so. What was found is judged all the same.
+        Time after which no further cause of a structure's mismatch is looked for, s; the answer says so. What was
+        found is judged all the same. Robots and cuts are searched to the end.
     """
 
     most_causes: int = 3

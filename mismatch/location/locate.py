@@ -172,7 +172,7 @@ def _growth(view: ResidualView, bands: Sequence[Mapping[str, Any]]) -> dict[str,
     """Return the growth of the residual after the refit, and of that of the final model without its joints' laws."""
     ranges = [(band["low_hz"], band["high_hz"]) for band in bands]
     if not ranges:
-        return {"note": "nothing stands above the noise, so nothing grows"}
+        return {"note": "no band stands above the noise, so no growth can be told"}
     details = view.details
     refitted = growth(details.base.hypothesis, view.reference, view.measured, ranges, view.noise.spread, view.settings)
     content = {"residual": _growth_content(refitted, view)}

@@ -10,9 +10,8 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..inference import Candidate, Proposal, ScreeningSettings, Settings, in_processes
-from ..joints import JointAxis
 from ..models import Cause, Fit, following_all, gives_one_up, location_of
-from ..physics import JointPhysics, LimitedPhysics, answer_name
+from ..physics import JointPhysics, answer_name
 from .joint_places import JointPlace, joint_places
 from .joint_screening import Screened, screen_joints
 from .joint_starts import (
@@ -151,72 +150,6 @@ def _inside(
     # the direction along which it was found at the tip still says most to a reader
     location = {**best.location, **location_of(axis, inside.hypothesis.model)}
     return Proposal(best.name, location, inside, current.score - inside.score)
-
-
-def laws_beyond(
-    lines: list[WindowedSpectrum], current: Fit, best: Proposal[Fit], laws: Sequence[JointPhysics], settings: Settings
-) -> list[Proposal[Fit]]:
-    """Fit the laws beyond the limit of the best law's name, where its numbers end there: at its place, from the start.
-
-    Hysteresis whose elements yield at once is dry friction. Its fit ends at the limit, and cannot pass it.
-
-    Parameters
-    ----------
-    lines
-        Windowed spectra of the recordings that are compared.
-    current
-        The fit without the law.
-    best
-        The law that was found.
-    laws
-        Laws from the library that may be weighed.
-    settings
-        Thresholds of the diagnosis.
-    """
-    last = best.fitted.hypothesis.causes[-1]
-    if last.motion is None or not isinstance(last.physics, LimitedPhysics):
-        return []
-    if not last.physics.strained(last.values, last.motion):
-        return []
-    beyond = [one for one in laws if answer_name(one) == last.physics.beyond]
-    return laws_in_place(lines, current, best, beyond, settings)
-
-
-def laws_in_place(
-    lines: list[WindowedSpectrum], current: Fit, best: Proposal[Fit], laws: Sequence[JointPhysics], settings: Settings
-) -> list[Proposal[Fit]]:
-    """Fit other laws in the place of one that was found, each from its start.
-
-    Parameters
-    ----------
-    lines
-        Windowed spectra of the recordings that are compared.
-    current
-        The fit without the law.
-    best
-        The law that was found; a linear cause has no place for them.
-    laws
-        Laws that are fitted.
-    settings
-        Thresholds of the diagnosis.
-    """
-    axis = best.fitted.hypothesis.causes[-1].axis
-    if axis is None:
-        return []
-    begun = in_processes([partial(_begun_there, lines, current, one, axis, settings) for one in laws])
-    return [
-        Proposal(answer_name(law), best.location, one, current.score - one.score)
-        for law, one in zip(laws, begun, strict=True)
-        if one is not None and np.isfinite(one.score)
-    ]
-
-
-def _begun_there(
-    lines: list[WindowedSpectrum], current: Fit, law: JointPhysics, axis: JointAxis, settings: Settings
-) -> Fit | None:
-    """A law begun at the place of another, with phases of the modes where these gain."""
-    begun = begun_at(lines, current, law, axis)
-    return None if begun is None else with_phases(lines, begun, settings.evidence.least)
 
 
 def _promising(sighted: SightedLaws, least: float, strong: bool, limits: ScreeningSettings) -> list[Screened]:

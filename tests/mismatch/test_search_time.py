@@ -1,8 +1,11 @@
 """A search that has lasted long enough judges what it has found, and says that more may have been missed."""
 
+from inspect import signature
+
 import numpy as np
 from one_mode_rig import Rig
 
+from millfrf.commands.diagnose import diagnose as command
 from mismatch import SearchSettings, Settings, diagnose
 
 
@@ -25,3 +28,7 @@ def test_a_search_in_time_says_nothing_of_it() -> None:
     found = diagnose(rig.model, rig.recordings((20.0, 40.0), 15.0))
     assert np.isfinite(found.improvement.after)
     assert not any("ended after" in doubt for doubt in found.doubts)
+
+
+def test_the_command_gives_the_usual_time() -> None:
+    assert signature(command).parameters["search_time"].default == SearchSettings().longest

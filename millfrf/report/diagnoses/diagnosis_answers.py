@@ -16,8 +16,8 @@ NOWHERE = "No band, channel, time or level has more residual than noise would le
 """What is said where no place stands out of a noise that an answer rests on."""
 
 NOWHERE_UNSURE = (
-    "No band, channel, time or level stands out. The noise is inferred, and may hold what is unexplained: where that "
-    "sits cannot be told."
+    "No band, channel, time or level has more residual than the noise of the fit, which may hold what is unexplained: "
+    "where that sits cannot be told."
 )
 """What is said instead where something stayed unexplained."""
 

@@ -43,7 +43,7 @@ class StructureComparison:
     settings: Settings
     before: Remainder
     behaviour: Behaviour | None = None
-    patience: Patience = field(default_factory=lambda: Patience(float("inf")))
+    patience: Patience = field(default_factory=Patience)
 
     @property
     def modes_move(self) -> bool:

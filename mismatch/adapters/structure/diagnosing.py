@@ -172,7 +172,7 @@ def _searched(comparison: StructureComparison, base: Fit, progress: Progress) ->
     if comparison.patience.over:
         return _counted_at_tip(comparison, found), (
             f"The search for causes ended after {comparison.patience.seconds:.4g} s: a further cause may have been "
-            "missed; --search-time lets it go on"
+            "missed; `millfrf diagnose --search-time` lets it go on"
         )
     progress("causes behind odd modes")
     return _counted_at_tip(comparison, with_cause_of_odd_modes(comparison, found)), ""

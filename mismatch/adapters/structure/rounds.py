@@ -60,7 +60,7 @@ class Standing:
     before: Remainder
     settings: Settings
     modes_move: bool = False
-    patience: Patience = field(default_factory=lambda: Patience(float("inf")))
+    patience: Patience = field(default_factory=Patience)
 
     def is_left(self, left: Remainder, hypothesis: Hypothesis) -> bool:
         """Whether more is left than noise and the form of a law make, or too much of the response for noise.
