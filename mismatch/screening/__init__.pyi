@@ -4,7 +4,7 @@ from .joint_direction import JointSighting, SeenMotion, find_direction, seen_mot
 from .joint_laws_fitted import SightedLaws, joint_candidates, sighted_laws
 from .joint_screening import screen_joints
 from .joint_starts import phases_too_large
-from .laws_in_place import laws_beyond, laws_in_place, twin_laws
+from .laws_at_one_place import laws_beyond, laws_in_place, twin_laws
 from .level_continuation import laws_by_level
 from .linear_causes_fitted import channel_of, linear_candidates
 from .missing_mode import SightedMode, find_mode
