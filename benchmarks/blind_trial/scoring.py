@@ -16,6 +16,7 @@ from .diagnosis_reading import Answer
 from .excitation import RATE
 from .integrator import linear_response
 from .structures import Structure
+from .tip_scale import counted_at_tip
 
 ALIASES = {
     "delay_s": ("delay", "delay_seconds", "tau", "tau_s"),
@@ -137,7 +138,7 @@ def angle_between(one: NDArray[np.float64], other: NDArray[np.float64]) -> float
 def _covered(truth: dict[str, Any], answer: Answer) -> list[tuple[str, bool]]:
     """One interval a true number: modes and tones both have frequencies, a tone harmonics; the nearest is meant."""
     found = []
-    for true in truth["parameters"]:
+    for true in counted_at_tip(truth["spec"], truth["parameters"]):
         for name, value in true.items():
             spellings = (name, *ALIASES.get(name, ()))
             if not isinstance(value, int | float):

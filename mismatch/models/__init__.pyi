@@ -18,7 +18,7 @@ from .model_shape import ModelShape
 from .model_terms import hypothesis_of, improved_model
 from .plain_fits import even_fit, plain_fit
 from .refinement import believed, following_all, gain_at_rest, gives_one_up, settled, with_chain
-from .scale_of_joints import counted_at_tip
+from .scale_of_joints import counted_at_tip, spread_with_scale
 from .slopes import jacobian
 
 __all__ = [
@@ -55,6 +55,7 @@ __all__ = [
     "response_to_joint",
     "settled",
     "shares_left",
+    "spread_with_scale",
     "surround",
     "through_structure",
     "whitened",

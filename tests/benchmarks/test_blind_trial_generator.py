@@ -27,6 +27,7 @@ from benchmarks.blind_trial.scoring import angle_between, excess_removed, outcom
 from benchmarks.blind_trial.sealed_case import case_name, open_truth, write_case
 from benchmarks.blind_trial.simulation import build_case
 from benchmarks.blind_trial.structures import Structure, draw_structure
+from benchmarks.blind_trial.tip_scale import counted_at_tip, scale_at_tip
 from mismatch.physics import library
 from modal_fit import read_modal_model
 
@@ -329,6 +330,20 @@ def test_an_interval_is_held_against_the_nearest_number_of_its_kind() -> None:
     answer = Answer("explained", ("missing_mode", "unmeasured_excitation"), (), None, (*told, ("frequency_hz", 34, 1)))
     score = score_case("case", truth, answer, {"seconds": 1.0})
     assert score.covered == (("fn", False), ("zeta", True), ("hz", True))
+
+
+def test_numbers_of_a_joint_inside_are_counted_in_the_motion_of_the_tip() -> None:
+    """A joint that moves 3 times as much as the tip: its gap is as much smaller there, and its force larger."""
+    structure = draw_structure(np.random.default_rng(4), inner_joint=True)
+    along = 3 * np.array([0.6, 0.0, 0.8])
+    tripled = replace(structure, inner=np.stack([structure.tip @ along, structure.left @ along]))
+    assert scale_at_tip(tripled) == pytest.approx(3.0)
+    (spec,) = draw_cases(1, 5, only="inner_joint")
+    own = scale_at_tip(draw_structure(np.random.default_rng(spec.seed), inner_joint=True))
+    (told,) = counted_at_tip(spec.to_json(), [{"half_gap": 1e-4, "stiffness_loss": 3e4}])
+    assert told == pytest.approx({"half_gap": 1e-4 / own, "stiffness_loss": 3e4 * own**2})
+    elsewhere = replace(spec, condition="standard").to_json()
+    assert counted_at_tip(elsewhere, [{"half_gap": 1e-4}]) == [{"half_gap": 1e-4}]
 
 
 def test_excess_and_wilson() -> None:

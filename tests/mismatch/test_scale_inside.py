@@ -5,12 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hidden_joint import law_of, moved_by, with_law
+from numpy.typing import NDArray
+from scipy.integrate import quad_vec
 
-from mismatch import predict_lines
+from mismatch import Cause, LabError, ModelShape, predict_lines
 from mismatch.adapters.structure.told_causes import unknown_scales
 from mismatch.inference import AcceptedCause
-from mismatch.joints import inside_of
+from mismatch.joints import JointAxis, JointMotion, ModalScales, inside_of
+from mismatch.models import Fit, Hypothesis, spread_with_scale
 from mismatch.models.scale_of_joints import counted_at_tip, scale_at_tip, scaled
+from modal_fit import ModalModel
 
 LAWS = {
     "backlash": [2e4, 1e-4],
@@ -22,6 +26,68 @@ LAWS = {
     "stiffness_hardening": [1.0, 3.0],
     "stiffness_softening": [3e4, 1e-4, 2.0],
 }
+
+POLES = np.array([-1.2 + 41j, -1.5 + 46j, -4 + 130j])
+"""Two of the modes are so close that one force moves both."""
+
+
+def close_modes() -> tuple[ModalModel, JointAxis]:
+    """Three modes seen along X and Y, and a joint inside that all of them move."""
+    rng = np.random.default_rng(8)
+    right = rng.normal(size=(3, 2)) + 0.1j * rng.normal(size=(3, 2))
+    left = right / (2j * POLES.imag[:, None])
+    parts = rng.normal(size=3)
+    labels = ("TCP:+X", "TCP:+Y")
+    scales = ModalScales(np.ones(3, dtype=complex), 1 / (2j * POLES.imag))
+    return ModalModel(POLES, right, left, labels, labels), JointAxis(parts / np.linalg.norm(parts), scales)
+
+
+def test_the_scale_is_that_of_a_regression_under_white_forces() -> None:
+    """Independent of Lyapunov's equation: spectra of the deflection and of the tip, integrated over frequency."""
+    model, axis = close_modes()
+    assert axis.scales is not None
+    seen = np.column_stack([model.right, axis.entries * axis.scales.seen])
+
+    def spectra(omega: float) -> NDArray[np.float64]:
+        both = (np.einsum("rp,rq,r->pq", v, w, 1 / (1j * omega - p)) for v, w, p in conjugates(model, seen))
+        receptance = sum(both, np.zeros((3, 2), dtype=complex))
+        return np.asarray((receptance @ receptance.conj().T).real)
+
+    motion = quad_vec(spectra, 0.0, np.inf, epsrel=1e-9, points=list(POLES.imag))[0]
+    expected = np.linalg.norm(np.linalg.solve(motion[:2, :2], motion[:2, 2]))
+    assert scale_at_tip(axis, model) == pytest.approx(expected, rel=1e-5)
+    # modes taken one by one are another regression
+    sizes = np.linalg.norm(model.left, axis=1) / np.sqrt(-POLES.real)
+    alone = np.linalg.lstsq((sizes[:, None] * model.right).real, sizes * axis.entries, rcond=None)[0]
+    assert abs(np.linalg.norm(alone) / expected - 1) > 0.05
+
+
+def conjugates(model: ModalModel, seen: NDArray[np.complex128]) -> list[tuple[NDArray[np.complex128], ...]]:
+    """Right vectors, left vectors and poles, and their conjugates."""
+    one = seen, model.left, model.poles
+    return [one, tuple(values.conj() for values in one)]
+
+
+def test_errors_hold_what_is_not_known_of_the_scale() -> None:
+    """Numbers of many draws from the fit's covariance, each counted in the tip of its own modes and parts."""
+    model, axis = close_modes()
+    shape = ModelShape(model, LabError())
+    motion = JointMotion(1e-3, 0.06, 1e-2, 0.6, 1e5)
+    start = Hypothesis(shape, np.zeros(shape.size))
+    hidden = counted_at_tip(start.with_cause(Cause(law_of("backlash"), np.array([2e4, 1e-4]), "", axis, motion)))
+    rng = np.random.default_rng(3)
+    sizes = np.concatenate([np.full(shape.size, 0.05), [0.1, 0.1, 0.5, 0.5]])
+    root = sizes[:, None] * rng.normal(size=(hidden.size, hidden.size))
+    covariance = root @ root.T / hidden.size
+    found = Fit(hidden, (), 0.0, 0.0, 0.0, covariance)
+    drawn = rng.multivariate_normal(np.zeros(hidden.size), covariance, size=2000)
+    told = []
+    for one in drawn:
+        there = replace(hidden, u=one[: shape.size]).with_causes(hidden.coordinates() + one[shape.size :])
+        told.append(counted_at_tip(there).causes[-1].coordinates()[:2])
+    seen = np.cov(np.array(told).T)
+    np.testing.assert_allclose(spread_with_scale(found, 0), seen, rtol=0.1)
+    assert np.all(seen.diagonal() > 1.5 * covariance[-4:-2, -4:-2].diagonal())
 
 
 @pytest.mark.parametrize("name", sorted(LAWS))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from foundation import listed
 
 from ...inference import AcceptedCause, Proposal
-from ...models import Cause, Fit, held_values, location_of, modes_are_odd, oddity_of_modes
+from ...models import Cause, Fit, held_values, location_of, modes_are_odd, oddity_of_modes, spread_with_scale
 from ...physics import MODAL_PARAMETERS, ModePhysics, answer_name
 
 Real = NDArray[np.float64]
@@ -23,8 +23,7 @@ def accepted_cause(fitted: Fit, location: Mapping[str, Any], evidence: float, pl
     """One cause of a fit, the last if not told, with its numbers and their standard errors (to first order)."""
     causes = fitted.hypothesis.causes
     cause, place = causes[place], place % len(causes)
-    first = fitted.hypothesis.size - sum(one.size for one in causes[place:])
-    covariance = fitted.covariance[first : first + cause.size, first : first + cause.size]
+    covariance = spread_with_scale(fitted, place)
     spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     parameters, errors = {}, {}
     # beyond a limit that the motion sets a number changes nothing, and its error says so
@@ -73,8 +72,7 @@ def _derived(cause: Cause, covariance: Real) -> tuple[dict[str, float], dict[str
         aside = [numbers(cause.moved(at + sign * step * np.eye(len(at))[k]).values) for sign in (1, -1)]
         for name in here:
             slopes[name][k] = (aside[0].get(name, here[name]) - aside[1].get(name, here[name])) / (2 * step)
-    own = covariance[:count, :count]
-    return here, {name: float(np.sqrt(np.maximum(slope @ own @ slope, 0.0))) for name, slope in slopes.items()}
+    return here, {name: float(np.sqrt(np.maximum(slope @ covariance @ slope, 0.0))) for name, slope in slopes.items()}
 
 
 def accepted_mode(fitted: Fit, physics: ModePhysics, evidence: float, number: int) -> AcceptedCause:
