@@ -58,6 +58,8 @@ class Limits:
         Levenberg's damping, as a share of the diagonal, above which a failed step ends the descent.
     lengthens
         Whether steps that gain more than expected are lengthened.
+    goal
+        Cost above which the fit is worth nothing: a step that many like it would not bring there counts as idle.
     """
 
     most: int = 8
@@ -66,6 +68,17 @@ class Limits:
     tries: int = 4
     most_damping: float = 1.0
     lengthens: bool = True
+    goal: float = np.inf
+
+    def least_gain(self, cost: float, left: int) -> float:
+        """Gain of a step that counts, where ``left`` more may follow.
+
+        Examples
+        --------
+        >>> Limits(goal=100.0).least_gain(500.0, 4), Limits().least_gain(500.0, 4)
+        (100.0, 3.0)
+        """
+        return max(self.tolerance, (cost - self.goal) / max(left, 1))
 
 
 @dataclass(frozen=True)
@@ -99,7 +112,7 @@ def descend(problem: Problem[State], start: State, limits: Limits) -> Descended[
     state = start
     matrix, gradient = problem.normal_equations(state)
     damping, idle = 0.0, 0
-    for _ in range(limits.most):
+    for number in range(limits.most):
         step = problem.step(state, matrix + damping * np.diag(np.diag(matrix)), gradient)
         expected = float(step @ gradient)
         # no step is taken either where a law is stiffer than its derivatives can follow
@@ -119,7 +132,8 @@ def descend(problem: Problem[State], start: State, limits: Limits) -> Descended[
         damping /= 10
         state, (matrix, gradient) = farther, equations
         # nuisance numbers may still be settling when a step gains nothing
-        idle = idle + 1 if before - problem.cost(state) < limits.tolerance else 0
+        cost = problem.cost(state)
+        idle = idle + 1 if before - cost < limits.least_gain(cost, limits.most - number - 1) else 0
         if idle == limits.idle:
             break
     return Descended(state, matrix)

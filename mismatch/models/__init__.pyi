@@ -1,5 +1,5 @@
 from .cause import Cause, held_values, location_of
-from .fitting import ENOUGH, Fit, fit, modes_are_odd, oddity_of_modes, residual
+from .fitting import ENOUGH, Fit, Rival, fit, modes_are_odd, oddity_of_modes, residual
 from .freed_laws import EVERYTHING, with_free_forms, with_linear_part
 from .hypothesis import Hypothesis, line_response, predict_lines, surround
 from .linear_lines import response_to_joint
@@ -17,7 +17,7 @@ from .misfit import (
 from .model_shape import ModelShape
 from .model_terms import hypothesis_of, improved_model
 from .plain_fits import even_fit, plain_fit
-from .refinement import believed, following_all, gain_at_rest, gives_one_up, settled, with_chain
+from .refinement import believed, following_all, gain_at_rest, gives_one_up, settled, with_chain_from_belief
 from .scale_of_joints import counted_at_tip, spread_with_scale
 from .slopes import jacobian
 
@@ -28,6 +28,7 @@ __all__ = [
     "Fit",
     "Hypothesis",
     "ModelShape",
+    "Rival",
     "believed",
     "counted_at_tip",
     "even_fit",
@@ -59,7 +60,7 @@ __all__ = [
     "surround",
     "through_structure",
     "whitened",
-    "with_chain",
+    "with_chain_from_belief",
     "with_free_forms",
     "with_linear_part",
 ]

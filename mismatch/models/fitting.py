@@ -55,6 +55,37 @@ class Fit:
     covariance: Real
 
 
+@dataclass(frozen=True)
+class Rival:
+    """A fit of the same recordings that another must come near, so that it counts for anything.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    behind
+        Cost ``misfit + |u|^2`` by which the other may stay behind; negative where it must be better.
+    """
+
+    fit: Fit
+    behind: float = 0.0
+
+    @property
+    def goal(self) -> float:
+        """Cost that the other must reach."""
+        return self.fit.misfit + self.fit.deviation + self.behind
+
+    def goal_on(self, few: list[WindowedSpectrum], lines: list[WindowedSpectrum]) -> float:
+        """The same on a few of the lines."""
+        hypothesis, share = self.fit.hypothesis, sum(map(_count, few)) / sum(map(_count, lines))
+        seen = [with_noise(one, hypothesis, noise) for one, noise in zip(few, self.fit.noises, strict=True)]
+        return sum(one.misfit for one in seen) + self.fit.deviation + share * self.behind
+
+
+def _count(lines: WindowedSpectrum) -> int:
+    return len(lines.frequencies)
+
+
 def fit(
     lines: list[WindowedSpectrum],
     start: Hypothesis,
@@ -63,6 +94,7 @@ def fit(
     iterations: int = 8,
     tolerance: float = 3.0,
     held: bool = False,
+    rival: Rival | None = None,
 ) -> Fit:
     """Fit a hypothesis to recordings.
 
@@ -84,6 +116,8 @@ def fit(
         Gain in misfit that counts: the fit ends after two smaller gains, or where less than a tenth of it is expected.
     held
         Whether ``noises`` are held, and not estimated.
+    rival
+        Another fit that this one must come near: it ends where its steps are too small for that. None: there is none.
 
     Returns
     -------
@@ -91,7 +125,7 @@ def fit(
         With an infinite misfit and score where the start runs away when it is simulated: nothing then speaks for it.
     """
     try:
-        return _fit(lines, start, noises, Limits(iterations, tolerance), held)
+        return _fit(lines, start, noises, Limits(iterations, tolerance), held, rival)
     except np.linalg.LinAlgError:
         size = start.size
         return Fit(start, noises or (), np.inf, _deviation(start), np.inf, np.zeros((size, size)))
@@ -103,15 +137,18 @@ def _fit(
     noises: tuple[NoiseModel, ...] | None,
     limits: Limits,
     held: bool,
+    rival: Rival | None,
 ) -> Fit:
     """The fit of a start that can be simulated."""
     hypothesis, known = start, noises
     with ThreadPoolExecutor(THREADS) as pool:
         rough = [one.thinned(ENOUGH) for one in lines]
-        if any(few is not one for few, one in zip(rough, lines, strict=True)):
-            state = _descended(pool, rough, hypothesis, known, limits, held).state
+        if any(some is not one for some, one in zip(rough, lines, strict=True)):
+            few = replace(limits, goal=np.inf if rival is None else rival.goal_on(rough, lines))
+            state = _descended(pool, rough, hypothesis, known, few, held).state
             hypothesis, known = state.hypothesis, tuple(one.noise for one in state.seen)
             limits = replace(limits, most=max(0, limits.most - LEFT_OUT))
+        limits = limits if rival is None else replace(limits, goal=rival.goal)
         end = _descended(pool, lines, hypothesis, known, limits, held)
         hypothesis, seen = end.state.hypothesis, end.state.seen
         if not held:

@@ -7,7 +7,6 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..physics import ChainPhysics
-from .cause import Cause
 from .fitting import Fit, fit, modes_are_odd
 from .hypothesis import Hypothesis
 from .misfit import shares_left
@@ -103,8 +102,8 @@ def following_all(lines: list[WindowedSpectrum], fitted: Fit, most: float) -> Fi
     return min(fitted, again, key=lambda one: one.score)
 
 
-def with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Fit:
-    """Fit a linear cause together with the modes: from where they are and, if they look odd, from the lab's model.
+def with_chain_from_belief(lines: list[WindowedSpectrum], fitted: Fit) -> Fit:
+    """The fit whose last cause is a linear one, or a better one from the lab's model, where the cause is absent yet.
 
     Modes that have taken up all that a cause does leave it nothing to begin with.
 
@@ -112,18 +111,15 @@ def with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Fit
     ----------
     lines
         Windowed spectra of the recordings that are compared.
-    current
-        The fit without the cause.
-    cause
-        The linear cause, with numbers to begin with.
+    fitted
+        A fit with the cause, from where the modes were.
     """
-    hypothesis = current.hypothesis
-    fitted = fit(lines, hypothesis.with_cause(cause), current.noises)
-    if not modes_are_odd(current) or not isinstance(cause.physics, ChainPhysics):
-        return fitted
-    absent = replace(cause, values=cause.physics.start(hypothesis.shape.nominal))
-    fresh = believed(hypothesis).with_cause(absent)
-    return min(fitted, fit(lines, fresh, iterations=FROM_BELIEF), key=lambda one: one.score)
+    *others, cause = fitted.hypothesis.causes
+    assert isinstance(cause.physics, ChainPhysics)
+    absent = replace(cause, values=cause.physics.start(fitted.hypothesis.shape.nominal))
+    fresh = believed(replace(fitted.hypothesis, causes=(*others, absent)))
+    again = fit(lines, fresh, iterations=FROM_BELIEF)
+    return min(fitted, again, key=lambda one: one.score)
 
 
 def believed(hypothesis: Hypothesis) -> Hypothesis:

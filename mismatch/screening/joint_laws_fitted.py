@@ -142,7 +142,8 @@ def _inside(
     lines: list[WindowedSpectrum], current: Fit, best: Proposal[Fit], settings: Settings
 ) -> Proposal[Fit] | None:
     """A law at the tip once more, inside; None where that gains too little."""
-    inside = moved_inside(lines, best.fitted, max(settings.evidence.least, settings.screening.place * best.evidence))
+    least = max(settings.evidence.least, settings.screening.place * best.evidence)
+    inside = moved_inside(lines, best.fitted, least, best.evidence)
     if inside is best.fitted:
         return None
     axis = inside.hypothesis.causes[-1].axis
@@ -204,7 +205,8 @@ def _simulated(
     lines: list[WindowedSpectrum], current: Fit, near: Fit, places: Sequence[JointPlace], settings: Settings
 ) -> Proposal[Fit] | None:
     """The law of a driven fit, now free to move as it makes the structure move; None if that runs away."""
-    law, fitted, order = near.hypothesis.causes[-1].physics, freed(lines, near), list(places)
+    law, gained, order = near.hypothesis.causes[-1].physics, current.score - near.score, list(places)
+    fitted = freed(lines, near, gained)
     most = settings.verdict.most_of_response
     assert isinstance(law, JointPhysics)
     if np.isfinite(fitted.score) and gives_one_up(lines, fitted.hypothesis, most):
@@ -213,7 +215,7 @@ def _simulated(
         order = [taken, *(one for one in places if one is not taken)]
     if not np.isfinite(fitted.score):
         return None
-    fitted = with_phases(lines, fitted, settings.evidence.least)
+    fitted = with_phases(lines, fitted, settings.evidence.least, current.score - fitted.score)
     axis = fitted.hypothesis.causes[-1].axis
     assert axis is not None
     # a direction at the tip that nothing else comes near to says all

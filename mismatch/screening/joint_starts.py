@@ -11,7 +11,7 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..joints import JointAxis, inside_of
-from ..models import Fit, Hypothesis, fit
+from ..models import Fit, Hypothesis, Rival, fit
 from ..physics import JointPhysics
 from .joint_screening import Screened, screen_joints
 from .whitened_residual import linear_floor
@@ -19,8 +19,9 @@ from .whitened_residual import linear_floor
 FEW = 1000
 """Lines of a recording on which shapes of a law are compared."""
 
-FREE_STEPS = 10
-"""Steps at most of a law that is simulated freely; the one that is accepted is fitted to the end."""
+FREE_STEPS, FREE_TOLERANCE, OF_ALL = 10, 10.0, 1e-4
+"""Steps at most of a law that is simulated freely, and gain of a step that counts: at least, and as a share of what
+the law gains. The law that is accepted is fitted to the end."""
 
 MOST_OUT_OF_PHASE = 0.5
 """Share of the parts of modes in a joint that may be out of phase (:attr:`JointAxis.out_of_phase`). A damper between
@@ -59,7 +60,18 @@ def driven_by_what_was_seen(lines: list[WindowedSpectrum], current: Fit, screene
     return fit(lines, best.hypothesis, best.noises, iterations=4)
 
 
-def freed(lines: list[WindowedSpectrum], driven: Fit) -> Fit:
+def gain_that_counts(gained: float) -> float:
+    """Gain of a step, in score, from which a law that is tried is fitted on.
+
+    Examples
+    --------
+    >>> gain_that_counts(1000.0), gain_that_counts(500_000.0)
+    (10.0, 50.0)
+    """
+    return max(FREE_TOLERANCE, OF_ALL * gained)
+
+
+def freed(lines: list[WindowedSpectrum], driven: Fit, gained: float) -> Fit:
     """The last law of a fit, some steps on, free to move as it makes the structure move.
 
     Parameters
@@ -68,10 +80,12 @@ def freed(lines: list[WindowedSpectrum], driven: Fit) -> Fit:
         Windowed spectra of the recordings that are compared.
     driven
         A fit whose last law is driven by the motion that was seen.
+    gained
+        What the law gains there in score.
     """
     causes = driven.hypothesis.causes
     free = replace(driven.hypothesis, causes=(*causes[:-1], replace(causes[-1], seen=None)))
-    return fit(lines, free, driven.noises, iterations=FREE_STEPS, tolerance=10.0)
+    return fit(lines, free, driven.noises, iterations=FREE_STEPS, tolerance=gain_that_counts(gained))
 
 
 def begun_at(lines: list[WindowedSpectrum], current: Fit, law: JointPhysics, axis: JointAxis) -> Fit | None:
@@ -94,7 +108,7 @@ def begun_at(lines: list[WindowedSpectrum], current: Fit, law: JointPhysics, axi
     if not screened:
         return None
     driven = driven_by_what_was_seen(lines, current, screened[0])
-    return freed(lines, driven) if np.isfinite(driven.score) else None
+    return freed(lines, driven, current.score - driven.score) if np.isfinite(driven.score) else None
 
 
 def with_turned_signs(lines: list[WindowedSpectrum], fitted: Fit, least: float) -> Fit:
@@ -119,14 +133,15 @@ def with_turned_signs(lines: list[WindowedSpectrum], fitted: Fit, least: float) 
         begun = min((fit(lines, one, iterations=TURN_STEPS) for one in turned), key=lambda one: one.score)
         if not np.isfinite(begun.score):
             break
-        better = fit(lines, begun.hypothesis, begun.noises, iterations=TURNED_STEPS, tolerance=10.0)
+        rival = Rival(fitted, -least)
+        better = fit(lines, begun.hypothesis, begun.noises, iterations=TURNED_STEPS, tolerance=10.0, rival=rival)
         if not better.score < fitted.score - least:
             break
         fitted, axis = better, better.hypothesis.causes[-1].axis
     return fitted
 
 
-def with_phases(lines: list[WindowedSpectrum], fitted: Fit, least: float) -> Fit:
+def with_phases(lines: list[WindowedSpectrum], fitted: Fit, least: float, gained: float = 0.0) -> Fit:
     """The fit, or a better one in which the modes' parts in the last law's joint have phases of their own.
 
     In a structure with real mode shapes all points of a mode move in phase, and its part in a joint is a real number.
@@ -140,6 +155,8 @@ def with_phases(lines: list[WindowedSpectrum], fitted: Fit, least: float) -> Fit
         A fit whose last cause is a joint's law; one at the tip, or with phases, is given back as it is.
     least
         Gain in score that counts, which pays for a number more for each mode already.
+    gained
+        What the law has gained in score.
     """
     axis = fitted.hypothesis.causes[-1].axis
     if axis is None or axis.scales is None or not np.isfinite(fitted.score):
@@ -147,11 +164,11 @@ def with_phases(lines: list[WindowedSpectrum], fitted: Fit, least: float) -> Fit
     if len(axis.entries) > len(fitted.hypothesis.model.poles):
         return fitted
     start = _along(fitted.hypothesis, axis.with_phases())
-    phased = fit(lines, start, fitted.noises, iterations=FREE_STEPS, tolerance=10.0)
+    phased = _followed(lines, start, fitted, least, gained)
     return phased if phased.score < fitted.score - least and _in_phase(phased) else fitted
 
 
-def moved_inside(lines: list[WindowedSpectrum], fitted: Fit, least: float) -> Fit:
+def moved_inside(lines: list[WindowedSpectrum], fitted: Fit, least: float, gained: float = 0.0) -> Fit:
     """The fit, or a better one in which the last law's joint at the tip sits inside, where it moves nearly alike.
 
     A direction at the tip stands for a joint between links as well as two or three numbers can: what each mode does in
@@ -165,13 +182,21 @@ def moved_inside(lines: list[WindowedSpectrum], fitted: Fit, least: float) -> Fi
         A fit whose last cause is a joint's law; one that sits inside is given back as it is.
     least
         Gain in score that counts.
+    gained
+        What the law has gained in score.
     """
     axis = fitted.hypothesis.causes[-1].axis
     if axis is None or axis.scales is not None or not np.isfinite(fitted.score):
         return fitted
     start = _along(fitted.hypothesis, inside_of(fitted.hypothesis.model, axis))
-    inside = fit(lines, start, fitted.noises, iterations=FREE_STEPS, tolerance=10.0)
+    inside = _followed(lines, start, fitted, least, gained)
     return inside if inside.score < fitted.score - least and _in_phase(inside) else fitted
+
+
+def _followed(lines: list[WindowedSpectrum], start: Hypothesis, fitted: Fit, least: float, gained: float) -> Fit:
+    """A fit from another start, as long as it may gain what counts."""
+    tolerance = gain_that_counts(gained)
+    return fit(lines, start, fitted.noises, iterations=FREE_STEPS, tolerance=tolerance, rival=Rival(fitted, -least))
 
 
 def _in_phase(fitted: Fit) -> bool:

@@ -123,4 +123,4 @@ def _begun_there(
 ) -> Fit | None:
     """A law begun at the place of another, with phases of the modes where these gain."""
     begun = begun_at(lines, current, law, axis)
-    return None if begun is None else with_phases(lines, begun, settings.evidence.least)
+    return None if begun is None else with_phases(lines, begun, settings.evidence.least, current.score - begun.score)

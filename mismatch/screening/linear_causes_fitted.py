@@ -10,14 +10,18 @@ import numpy as np
 from estimation import WindowedSpectrum
 
 from ..inference import Proposal, ScreeningSettings, in_processes
-from ..models import Cause, Fit, believed, fit, modes_are_odd, with_chain
-from ..physics import FormedPhysics, ModePhysics, answer_name
+from ..models import Cause, Fit, believed, fit, modes_are_odd, with_chain_from_belief
+from ..physics import ChainPhysics, FormedPhysics, ModePhysics, answer_name
 from .chain_screening import ScreenedChain
 from .missing_mode import SightedMode, find_mode
 from .whitened_residual import noise_floor
 
 MODE_STEPS = 12
 """Steps at most of the fit of a further mode."""
+
+BEHIND, CLEAR_LEAD = 0.1, 10.0
+"""Share of the best cause's gain below which another is not fitted from the lab's model, too, and gain of the best one
+from which that counts, over the least gain. It comes next where the best one leaves it anything."""
 
 
 def linear_candidates(
@@ -59,10 +63,32 @@ def linear_candidates(
         tasks.append(partial(_with_mode, lines, current, mode, settings.resolved))
     if mode is not None and not current.hypothesis.laws and modes_are_odd(current):
         tasks.append(partial(_with_mode_from_belief, lines, current, mode.physics, settings.resolved))
-    found = [one for one in in_processes(tasks) if one is not None and np.isfinite(one.evidence)]
+    found = [one for one in in_processes(tasks) if one is not None]
     others = [one for one in found if not _adds_mode(one)]
     modes = sorted((one for one in found if _adds_mode(one)), key=lambda one: -one.evidence)
-    return [*others, *modes[:1]]  # of one mode from two beginnings the better counts
+    if modes_are_odd(current):
+        others = _also_from_belief(lines, current, others, max((one.evidence for one in found), default=0.0), least)
+    # of one mode from two beginnings the better counts
+    return [one for one in [*others, *modes[:1]] if np.isfinite(one.evidence)]
+
+
+def _also_from_belief(
+    lines: list[WindowedSpectrum], current: Fit, found: list[Proposal[Fit]], most: float, least: float
+) -> list[Proposal[Fit]]:
+    """Causes of chains, each as it was fitted or from the lab's own model; those far behind as they were fitted.
+
+    A fit that ends far worse than the one without the cause is lost, and says nothing of the cause.
+    """
+    hopeless = BEHIND * most if most > CLEAR_LEAD * least else -np.inf
+    tasks = [
+        partial(_as_it_is, one) if -least < one.evidence < hopeless else partial(_from_belief, lines, current, one)
+        for one in found
+    ]
+    return in_processes(tasks)
+
+
+def _as_it_is(one: Proposal[Fit]) -> Proposal[Fit]:
+    return one
 
 
 def _adds_mode(proposal: Proposal[Fit]) -> bool:
@@ -70,8 +96,17 @@ def _adds_mode(proposal: Proposal[Fit]) -> bool:
 
 
 def _with_chain(lines: list[WindowedSpectrum], current: Fit, cause: Cause) -> Proposal[Fit]:
-    fitted = with_chain(lines, current, cause)
+    fitted = fit(lines, current.hypothesis.with_cause(cause), current.noises)
     return Proposal(answer_name(cause.physics), channel_of(cause), fitted, current.score - fitted.score)
+
+
+def _from_belief(lines: list[WindowedSpectrum], current: Fit, one: Proposal[Fit]) -> Proposal[Fit]:
+    """A linear cause, or a better fit of it from the lab's own model."""
+    cause = one.fitted.hypothesis.causes[-1]
+    if not isinstance(cause.physics, ChainPhysics):
+        return one
+    fitted = with_chain_from_belief(lines, one.fitted)
+    return Proposal(one.name, channel_of(fitted.hypothesis.causes[-1]), fitted, current.score - fitted.score)
 
 
 def _with_mode(lines: list[WindowedSpectrum], current: Fit, mode: SightedMode, resolved: float) -> Proposal[Fit] | None:

@@ -26,7 +26,7 @@ class _Comparison:
 
     less: Fit
 
-    def without(self, search: Search[Fit], place: int) -> Fit:
+    def refitted_without(self, search: Search[Fit], place: int) -> Fit:
         return self.less
 
 

@@ -7,7 +7,7 @@ from estimation import WindowedSpectrum
 
 from ...behaviour import Behaviour
 from ...inference import Patience, Proposal, Remainder, Round, Search, Settings, equivalents_of
-from ...models import Cause, Fit, fit, gives_one_up, settled
+from ...models import Cause, Fit, Rival, fit, gives_one_up, settled
 from ...physics import JointPhysics, Physics, answer_name
 from ...remainder import leftover
 from ...screening import gains_beside_laws, laws_beyond, laws_in_place
@@ -89,7 +89,13 @@ class StructureComparison:
         return StructureRound(tuple(weighed.proposals), chosen, tuple(weighed.candidates), equivalents, failed)
 
     def without(self, search: Search[Fit], place: int) -> Fit:
-        """The last step fitted without one of its causes."""
+        """The last step fitted without one of its causes; not to its end where it is too much worse to be taken."""
+        last = search.current
+        rival = Rival(last, self.needed(last, search.base))
+        return fit(self.lines, last.hypothesis.without(place), last.noises, iterations=PRUNING, rival=rival)
+
+    def refitted_without(self, search: Search[Fit], place: int) -> Fit:
+        """The last step without one of its causes, fitted to its end."""
         last = search.current
         return fit(self.lines, last.hypothesis.without(place), last.noises, iterations=PRUNING)
 

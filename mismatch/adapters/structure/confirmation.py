@@ -9,7 +9,7 @@ from estimation import WindowedSpectrum
 
 from ...faults import residual_lines
 from ...inference import AcceptedCause, Improvement, ProofSettings, Search, Settings, emptied, in_processes, released
-from ...models import Fit, fit, fitted_noise, least_misfit, through_structure
+from ...models import Fit, Rival, fit, fitted_noise, least_misfit, through_structure
 from ...records import Recordings
 from .acceptance import modes_not_seen
 from .comparison import StructureComparison
@@ -17,6 +17,9 @@ from .held_out import ITERATIONS, HeldOut, chance_of_no_gain, held_out_improveme
 
 SECOND_CHANCE = 0.1
 """Share of the significance that a second recording must reach, which is the one that the causes explain best."""
+
+FAR_BEHIND = 10.0
+"""Evidence that a cause needs, times which a fit without it must come near to be followed to its end."""
 
 
 @dataclass(frozen=True)
@@ -149,14 +152,16 @@ def _idle(
     """Place of a cause that the held-out recording does not confirm, and the fit on all recordings without it."""
     last, count = found.current, len(found.accepted)
     if lost := modes_not_seen(last.hypothesis, comparison.lines):
-        return lost[-1], comparison.without(found, lost[-1]) if count > 1 else found.base
+        return lost[-1], comparison.refitted_without(found, lost[-1]) if count > 1 else found.base
     if not helps(held_out.improvement, last, found.base, comparison.settings):
         return count - 1, _before_last(comparison, found)
     if count == 1:
         return None
     others = recordings.others(recordings.mended)
-    tasks = [partial(fit, others, held_out.improved.without(k), iterations=ITERATIONS) for k in range(count)]
     whole = fit(others, held_out.improved, iterations=0)
+    rival = Rival(whole, FAR_BEHIND * comparison.needed(whole, found.base))
+    without = [held_out.improved.without(k) for k in range(count)]
+    tasks = [partial(fit, others, one, iterations=ITERATIONS, rival=rival) for one in without]
     for k, less in enumerate(in_processes(tasks)):
         if _missed(comparison, recordings, (whole, less), last, held_out):
             continue
@@ -181,7 +186,7 @@ def fit_without(comparison: StructureComparison, found: Search[Fit], place: int)
     place
         Which of the accepted causes is left out.
     """
-    less = comparison.without(found, place)
+    less = comparison.refitted_without(found, place)
     step = _step_before(found) if place == len(found.accepted) - 1 else None
     return less if step is None else min(less, step, key=lambda one: one.score)
 
@@ -189,7 +194,7 @@ def fit_without(comparison: StructureComparison, found: Search[Fit], place: int)
 def _before_last(comparison: StructureComparison, found: Search[Fit]) -> Fit:
     """The fit without the last cause: the step before, if there is one."""
     step = _step_before(found)
-    return comparison.without(found, len(found.accepted) - 1) if step is None else step
+    return comparison.refitted_without(found, len(found.accepted) - 1) if step is None else step
 
 
 def _step_before(found: Search[Fit]) -> Fit | None:

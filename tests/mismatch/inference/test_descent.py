@@ -155,3 +155,14 @@ def test_bounded_steps_stay_within_bounds_and_are_free_inside() -> None:
 def test_a_singular_problem_takes_the_shortest_step() -> None:
     matrix = np.array([[1.0, 1.0], [1.0, 1.0]])
     np.testing.assert_allclose(plain_step(matrix, np.array([2.0, 2.0])), [1.0, 1.0])
+
+
+def test_a_descent_that_cannot_reach_its_goal_ends_early() -> None:
+    """``sum exp(x)^2`` falls by a share of itself at each step, towards zero and never below."""
+    problem = LeastSquares(lambda x: np.exp(x), lambda x: np.diag(np.exp(x)))
+    limits = Limits(most=6, tolerance=1e-12, idle=1, lengthens=False)
+    start = np.array([1.0])
+    to_its_end = descend(problem, start, limits).state
+    assert to_its_end[0] == pytest.approx(-5.0)  # Gauss-Newton's step is one
+    assert descend(problem, start, replace(limits, goal=-1000.0)).state[0] == pytest.approx(0.0)
+    assert descend(problem, start, replace(limits, goal=0.1)).state[0] == to_its_end[0]
