@@ -62,7 +62,7 @@ class Rival:
     Parameters
     ----------
     fit
-        The fit.
+        The fit that is to be reached: of the same recordings, on the same lines.
     behind
         Cost ``misfit + |u|^2`` by which the other may stay behind; negative where it must be better.
     """
