@@ -68,7 +68,7 @@ def behaviour_of(
     Parameters
     ----------
     base
-        Modal model fitted to all recordings, without causes.
+        Modal model fitted to all recordings; linear causes that it holds stay as they are.
     recordings
         Windowed spectra of the recordings.
     settings

@@ -76,14 +76,15 @@ def refitted_modes(start: Hypothesis, lines: WindowedSpectrum) -> RefittedModes:
     Parameters
     ----------
     start
-        Modal model that the refit begins with, without causes.
+        Modal model that the refit begins with; linear causes that it holds stay as they are.
     lines
         Windowed spectrum of the recording.
     """
     parts = _parts(lines, float((-start.model.poles.real).min()))
     few = lines.thinned(ENOUGH)
     # where recordings disagree, the fit to all of them may be far from each: the nominal model is another beginning
-    state = min((_descended(one, few) for one in (start, start.nominal)), key=lambda one: one.misfit)
+    beginnings = (start,) if start.causes else (start, start.nominal)
+    state = min((_descended(one, few) for one in beginnings), key=lambda one: one.misfit)
     slope, rest, inverse = state.slope, state.rest, state.inverse
     by_line = _line_gradients(slope, rest, inverse)
     variance = np.diag(inverse @ by_line @ inverse)

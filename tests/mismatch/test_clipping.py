@@ -6,8 +6,11 @@ from concealed_recordings import Concealed, forces, linear_acceleration, structu
 
 from estimation import WindowedSpectrum, windowed_spectrum
 from mismatch import Hypothesis, LabError, ModelShape, band_of
+from mismatch.adapters.structure.acceptance import mends_a_limit
 from mismatch.faults.clipping import find_clipping, mended
+from mismatch.inference import EvidenceSettings, Proposal
 from mismatch.models.fitting import Fit, fit
+from mismatch.physics import library
 from modal_fit import ModalModel
 
 OFF = np.array([1.01, 0.99])
@@ -71,3 +74,26 @@ def test_friction_that_keeps_a_response_small_is_no_limit() -> None:
     believed = fit(lines, Hypothesis(shape, np.zeros(shape.size)), iterations=1)
     assert find_clipping(believed, lines) is None
     assert find_clipping(fitted_to(lines, structure()), lines) is None
+
+
+@pytest.mark.parametrize(
+    ("shape", "evidence", "clipped", "mends"),
+    [
+        ((0.005, 1.0), 900.0, 1, True),
+        ((0.005, 1.0), 1100.0, 1, False),  # more than a hundredth of the limit's evidence
+        ((0.005, 1.0), 900.0, 0, False),  # another channel clips
+        ((0.5, 1.0), 900.0, 1, False),  # the other channel shows it, too
+    ],
+)
+def test_a_small_mode_that_a_clipped_channel_shows_alone_mends_it(
+    shape: tuple[float, float], evidence: float, clipped: int, mends: bool
+) -> None:
+    """Before: a mode of 748 was told beside a clipped channel of 320555 (extended seed 4602, case 16)."""
+    lines, model = cuts(np.inf, 8, duration=10.0), ModelShape(structure(), LabError())
+    base = Hypothesis(model, np.zeros(model.size))
+    physics = library()["missing_mode"]
+    right = np.array(shape, dtype=complex)
+    mode = base.with_mode(-1 + 60j, right, np.ones(len(structure().excitations), dtype=complex), physics)  # type: ignore[arg-type]
+    proposal = Proposal("missing_mode", {}, Fit(mode, (), 0.0, 0.0, 0.0, np.zeros((1, 1))), evidence)
+    assert mends_a_limit(proposal, {clipped: 1e5}, lines, EvidenceSettings()) is mends
+    assert not mends_a_limit(proposal, {}, lines, EvidenceSettings())

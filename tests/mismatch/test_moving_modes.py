@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from trial_case import diagnosed
 
-from mismatch.adapters.structure.level_check import moved_by_level, stands_beside_moving_modes
-from mismatch.behaviour import FAMILIES, Behaviour
+from mismatch.adapters.structure.level_check import moved_by_level, seen_to_stay, stands_beside_moving_modes
+from mismatch.behaviour import FAMILIES, Behaviour, ModeTrend
 from mismatch.inference import Improvement, VerdictSettings
 
 SOFTENS = Behaviour("softening", "Mode at 6.1 Hz softens by 0.9 %.", "N", ())
@@ -64,3 +64,35 @@ def test_a_linear_cause_must_halve_the_error_of_a_plain_refit(after: float, stan
     """Whatever the nominal model leaves: a refit takes much of that, too."""
     gain = Improvement("mid", 0.5, 0.1, after, 0.01, 0.001, (0.1, 0.3), against="nominal")
     assert stands_beside_moving_modes(gain, VerdictSettings()) == stands
+
+
+def _moves(shift: float, error: float, family: str) -> Behaviour:
+    """One mode whose frequency moves."""
+    levels, p_values = (50.0, 200.0), (0.001 if family == "hardening" else 0.4, 0.5)
+    frequencies, damping = (5.0, 5.0 * (1 + shift)), (0.02, 0.02)
+    numbers = (frequencies, (0.01, 0.01), damping, (1e-4, 1e-4), shift, error, 0.0, 0.01)
+    return Behaviour(family, "", "N", (ModeTrend(1, levels, *numbers, p_values, 0.0, 0.5, family, ""),))
+
+
+@pytest.mark.parametrize(
+    ("shift", "error", "family", "stays"),
+    [
+        (0.0002, 0.0005, "none", True),
+        (0.0002, 0.0020, "none", False),  # errors are so wide that the move might be there still
+        (0.0030, 0.0004, "hardening", False),
+    ],
+)
+def test_modes_stay_beside_causes_where_their_move_would_show(
+    shift: float, error: float, family: str, stays: bool
+) -> None:
+    moved = _moves(0.0034, 0.0003, "hardening")
+    assert seen_to_stay(moved, _moves(shift, error, family)) is stays
+
+
+@pytest.mark.slow
+def test_a_coupling_that_moves_the_modes_of_a_refit_is_told(tmp_path: Path) -> None:
+    """Before: the coupling and the small mode left the noise, and a mode that a refit moves by 0.34 % spoke against."""
+    found = diagnosed(tmp_path, "extended", 300, 4602, 9)
+    assert found.verdict == "explained"
+    assert [one.name for one in found.physics] == ["gyroscopic_coupling", "missing_mode"]
+    assert found.behaviour["sentence"].endswith("moved it.")

@@ -1,6 +1,6 @@
 """When a fitted cause of a structure is worth accepting, and when its law is not what its name means."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +17,9 @@ Real = NDArray[np.float64]
 
 BESIDE = 1.15
 """Factor on an end of the compared band within which a mode beyond it still shapes what lies inside."""
+
+ALONE = 0.99
+"""Share of a mode's power, each response in units of what was measured, from which one response shows it alone."""
 
 TO_REST = 60
 """Steps at most for modes to make up for a cause that is taken away."""
@@ -201,6 +204,39 @@ def evidence_needed(current: Fit, base: Fit, settings: EvidenceSettings, *, own:
     else:
         share = settings.small_after_linear
     return max(settings.least, share * (base.score - current.score))
+
+
+def mends_a_limit(
+    proposal: Proposal[Fit],
+    limits: Mapping[int, float],
+    lines: Sequence[WindowedSpectrum],
+    settings: EvidenceSettings,
+) -> bool:
+    """Whether the last cause is a mode that a clipped channel shows alone, small beside the evidence of the limit.
+
+    Where the channel clips, its signal is put back from a prediction: what is wrong there looks like a resonance of
+    this channel.
+
+    Parameters
+    ----------
+    proposal
+        A fitted cause.
+    limits
+        Evidence of each channel that clips, by its response.
+    lines
+        Windowed lines of the recordings.
+    settings
+        Thresholds of the evidence.
+    """
+    fitted = proposal.fitted.hypothesis
+    if not limits or not isinstance(fitted.causes[-1].physics, ModePhysics):
+        return False
+    size = np.sqrt(np.mean([np.mean(np.abs(one.measured) ** 2, axis=0) for one in lines], axis=0))
+    power = np.abs(fitted.model.right[-1] / size) ** 2
+    most = int(np.argmax(power))
+    if power[most] < ALONE * power.sum():
+        return False
+    return proposal.evidence < settings.small * limits.get(most, 0.0)
 
 
 def worth_it(

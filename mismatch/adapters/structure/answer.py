@@ -20,7 +20,7 @@ from .comparison import StructureComparison
 from .confirmation import fit_without
 from .form_errors import with_form_spread
 from .held_out import HeldOut, held_out_improvement, scored
-from .level_check import moved_by_level, stands_beside_moving_modes
+from .level_check import moved_by_level, stands_beside_moving_modes, stay_beside
 from .structure_verdict import has_a_sure_name, shown_faults, small_beside_the_rest, verdict_of_structure
 from .told_causes import modal_deviation, told_causes, undamped_modes
 
@@ -53,6 +53,8 @@ class Answer:
         Recordings of which a linear answer leaves bursts.
     lost
         Which of the laboratory's modes is a resonance no more; empty where none.
+    stayed
+        Whether modes that move in a linear refit are seen to stay beside the linear causes that are told.
     """
 
     verdict: str
@@ -66,6 +68,7 @@ class Answer:
     moving: str = ""
     bursts: tuple[Bursts, ...] = ()
     lost: str = ""
+    stayed: bool = False
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -132,6 +135,8 @@ def answer_of(
     )
     verdict, no_noise = _judged_alone(judged, found, both, settings.verdict)
     moving = moved_by_level(current.hypothesis, causes, comparison.behaviour)
+    stayed = bool(moving and found.accepted) and stay_beside(current.hypothesis, comparison.behaviour, both.mended)
+    moving = "" if stayed else moving
     if moving and verdict != "unexplained":
         stands = not found.accepted or stands_beside_moving_modes(held_out.improvement, settings.verdict)
         verdict = judged(not_whole=True) if stands else "unexplained"
@@ -150,7 +155,7 @@ def answer_of(
     if verdict == "unexplained":
         none_told = _unexplained(comparison, both, found, held_out, causes)
         return replace(none_told, no_noise=no_noise, moving=moving, bursts=bursts, lost=lost)
-    told = Answer(verdict, tuple(causes), current, found, left, held_out)
+    told = Answer(verdict, tuple(causes), current, found, left, held_out, stayed=stayed)
     return replace(told, no_noise=no_noise, moving=moving, bursts=bursts, lost=lost)
 
 

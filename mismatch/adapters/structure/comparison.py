@@ -11,7 +11,7 @@ from ...models import Cause, Fit, Rival, fit, gives_one_up, settled
 from ...physics import JointPhysics, Physics, answer_name
 from ...remainder import leftover
 from ...screening import gains_beside_laws, laws_beyond, laws_in_place
-from .acceptance import evidence_needed, impossible, plainest, possible_gains, twins_of, worth_it
+from .acceptance import evidence_needed, impossible, mends_a_limit, plainest, possible_gains, twins_of, worth_it
 from .rounds import Standing, StructureRound, Weighed, fitted_candidate, likeliest_seen, only_modes, weigh
 
 PRUNING, TO_REST = 20, 60
@@ -36,6 +36,8 @@ class StructureComparison:
         What modes do with the level, without any law; None: not looked at.
     patience
         How long causes are looked for.
+    limits
+        Evidence of each channel that clips, by its response.
     """
 
     lines: list[WindowedSpectrum]
@@ -44,6 +46,7 @@ class StructureComparison:
     before: Remainder
     behaviour: Behaviour | None = None
     patience: Patience = field(default_factory=Patience)
+    limits: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def modes_move(self) -> bool:
@@ -161,6 +164,8 @@ class StructureComparison:
     def _is_worth_it(self, chosen: Proposal[Fit], search: Search[Fit]) -> bool:
         """Whether a cause has enough evidence; after a law less is enough of one that mends no form."""
         current, base, evidence = search.current, search.base, self.settings.evidence
+        if mends_a_limit(chosen, self.limits, self.lines, evidence):
+            return False
         if worth_it(chosen, current, base, self.lines, evidence):
             return True
         if not current.hypothesis.laws or not worth_it(chosen, current, base, self.lines, evidence, own=True):

@@ -16,7 +16,7 @@ from ...faults import repair_faults
 from ...inference import AcceptedCause, Diagnosis, EvidenceSettings, Patience, Progress, Search, Settings, search
 from ...location import SpindleSpeed, StructureDetails, StructureDiagnosis, located, residual_view
 from ...models import Fit, Hypothesis, ModelShape, counted_at_tip, fit, known_noise, outdoes_noise, through_structure
-from ...physics import is_fault, library, offered
+from ...physics import CLIPPING, is_fault, library, offered
 from ...records import (
     ComparedBand,
     compared_band,
@@ -42,6 +42,9 @@ FIRST_FIT = 30
 
 FEWEST_LINES = 24
 """Least number of lines of a recording that are compared."""
+
+STAYED = "With the causes that are told every mode stays: a linear refit without them is what moved it."
+"""What is said of modes that move in a refit alone."""
 
 MOSTLY = 0.5
 """Share of a force's power that must be left when its noise is taken out."""
@@ -115,7 +118,9 @@ def _diagnosed(
     causes, left_out = offered(settings.causes or library(), model)
     behaviour = behaviour_of(base.hypothesis, mended)
     patience = Patience(settings.search.longest)
-    comparison = StructureComparison(mended, causes, _beside(faults, settings), before, behaviour, patience)
+    comparison = StructureComparison(
+        mended, causes, _beside(faults, settings), before, behaviour, patience, _limits(faults, mended[0])
+    )
     found, hurried = _searched(comparison, base, progress)
     progress("held-out recording")
     proof = confirmed(comparison, recordings_of(mended, measured, base.hypothesis), found, faults)
@@ -135,6 +140,7 @@ def _diagnosed(
     details = StructureDetails(base, answer.final, tuple(mended), tuple(measured), elsewhere, unseen, band)
     # faults that are not told may have been none: a resonance that was taken for a tone
     behaviour = behaviour_of(base.hypothesis, measured) if faults and answer.verdict == "unexplained" else behaviour
+    behaviour = replace(behaviour, sentence=f"{behaviour.sentence} {STAYED}") if answer.stayed else behaviour
     view = residual_view(details, answer.verdict == "unexplained", recordings, settings.location)
     candidates = sorted([*found.candidates, *answer.rejected], key=lambda one: -one.evidence)
     return Diagnosis(
@@ -186,6 +192,13 @@ def _counted_at_tip(comparison: StructureComparison, found: Search[Fit]) -> Sear
         return found
     again = fit(comparison.lines, hypothesis, last.noises, iterations=0, held=True)
     return replace(found, steps=(*found.steps[:-1], again)) if np.isfinite(again.score) else found
+
+
+def _limits(faults: Sequence[AcceptedCause], lines: WindowedSpectrum) -> dict[int, float]:
+    """Evidence of each channel that clips, by its response."""
+    names = lines.recording.channels[-lines.measured.shape[1] :]
+    found = [one for one in faults if one.name == CLIPPING.name]
+    return {names.index(one.location["channel"]): one.evidence for one in found}
 
 
 def _beside(faults: Sequence[AcceptedCause], settings: Settings) -> Settings:
