@@ -107,6 +107,8 @@ def _slopes_of_scale(hypothesis: Hypothesis, cause: Cause, first: int) -> Real:
     """Change of ln a with each number of a hypothesis, whose own numbers begin at ``first``, (size,)."""
     shape, axis, slopes = hypothesis.shape, cause.axis, np.zeros(hypothesis.size)
     assert axis is not None
+    if not (scale := scale_at_tip(axis, hypothesis.model)) > 0:
+        return slopes  # there is no tip to count at
     for number in range(shape.modal_size):
         aside = ASIDE * np.eye(shape.size)[number]
         more, less = (scale_at_tip(axis, shape.model(hypothesis.u + sign * aside)) for sign in (1, -1))
@@ -116,7 +118,7 @@ def _slopes_of_scale(hypothesis: Hypothesis, cause: Cause, first: int) -> Real:
         aside = ASIDE * np.eye(angles)[number]
         more, less = (scale_at_tip(axis.turned(sign * aside), hypothesis.model) for sign in (1, -1))
         slopes[begin + number] = (more - less) / (2 * ASIDE)
-    return slopes / scale_at_tip(axis, hypothesis.model)
+    return slopes / scale
 
 
 def scaled(cause: Cause, factor: float) -> Cause:

@@ -1,12 +1,14 @@
 """The scale of a joint's deflection is a convention where no channel shows it: a prediction does not depend on it."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hidden_joint import law_of, moved_by, with_law
 from numpy.typing import NDArray
 from scipy.integrate import quad_vec
+from trial_case import diagnosed
 
 from mismatch import Cause, LabError, ModelShape, predict_lines
 from mismatch.adapters.structure.told_causes import unknown_scales
@@ -114,3 +116,25 @@ def test_the_answer_says_so() -> None:
     (said,) = unknown_scales([inside])
     assert "backlash" in said
     assert unknown_scales([replace(inside, location={"direction": [1.0, 0.0]})]) == ()
+
+
+def test_a_joint_that_moves_with_no_tip_keeps_its_errors() -> None:
+    model, axis = close_modes()
+    assert axis.scales is not None
+    still = replace(axis, scales=replace(axis.scales, seen=np.zeros(3, dtype=complex)))
+    assert scale_at_tip(still, model) == 0.0
+    shape = ModelShape(model, LabError())
+    motion = JointMotion(1e-3, 0.06, 1e-2, 0.6, 1e5)
+    cause = Cause(law_of("backlash"), np.array([2e4, 1e-4]), "", still, motion)
+    hidden = Hypothesis(shape, np.zeros(shape.size)).with_cause(cause)
+    covariance = np.diag(np.arange(1.0, hidden.size + 1))
+    own = slice(shape.size, shape.size + 2)
+    np.testing.assert_array_equal(spread_with_scale(Fit(hidden, (), 0, 0, 0, covariance), 0), covariance[own, own])
+
+
+@pytest.mark.slow
+def test_a_law_that_is_clear_at_the_tip_alone_is_told(tmp_path: Path) -> None:
+    """Before: stiffness and knee were known to 40 % in the joint's own scale, and the answer was `unexplained`."""
+    found = diagnosed(tmp_path, "extended", 300, 4602, 50)
+    assert [one.name for one in found.physics] == ["missing_mode", "stiffness_hardening"]
+    assert found.equivalents == ("backlash",)

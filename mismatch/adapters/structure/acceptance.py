@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from estimation import WindowedSpectrum
 
 from ...inference import EvidenceSettings, Proposal
-from ...models import Cause, Fit, Hypothesis, fit
+from ...models import Cause, Fit, Hypothesis, counted_at_tip, fit, spread_with_scale
 from ...physics import MOST_DAMPED, ChainPhysics, LimitedPhysics, ModePhysics, TwinPhysics
 from ...screening import phases_too_large
 
@@ -247,6 +247,7 @@ def worth_it(
     settings: EvidenceSettings,
     *,
     own: bool = False,
+    at_tip: bool = False,
 ) -> bool:
     """Whether a cause has enough evidence, in the misfit or in what the lab believes of the modes.
 
@@ -265,6 +266,8 @@ def worth_it(
         Thresholds of the evidence.
     own
         Whether the cause is known to mend no law's form.
+    at_tip
+        Whether the numbers of a joint inside are meant as counted in the tip's motion: no channel shows its own.
     """
     fitted, needed = proposal.fitted, evidence_needed(current, base, settings, own=own)
     if isinstance(fitted.hypothesis.causes[-1].physics, ModePhysics):
@@ -273,7 +276,7 @@ def worth_it(
         needed = max(needed + _places_of_a_mode(fitted, lines), settings.stands_out * _numbers_in_a_mode(fitted, lines))
         clear = _mode_measured(fitted, settings.clear)
     else:
-        clear = _measured(fitted, settings.clear)
+        clear = _measured(fitted, settings.clear, at_tip=at_tip)
         needed *= 1.0 if clear else settings.unclear
     if proposal.evidence < needed or not (clear or _is_missed(fitted, lines, needed)):
         return False
@@ -327,18 +330,26 @@ def _mode_measured(fitted: Fit, clear: float) -> bool:
     return float(np.sqrt(np.maximum(fitted.covariance[place, place], 0.0))) * shape.lab.damping < 1 / clear
 
 
-def _measured(fitted: Fit, clear: float) -> bool:
+def _measured(fitted: Fit, clear: float, *, at_tip: bool) -> bool:
     """Whether any number of the last cause stands out of its own error: else the gain came from elsewhere."""
     cause = fitted.hypothesis.causes[-1]
     absent = cause.physics.start(fitted.hypothesis.shape.nominal) if isinstance(cause.physics, ChainPhysics) else None
+    spread = _spread_at_tip(fitted) if at_tip else _spread(fitted, cause)
     stands_out = []
-    for k, (parameter, error) in enumerate(zip(cause.physics.parameters, _spread(fitted, cause), strict=True)):
+    for k, (parameter, error) in enumerate(zip(cause.physics.parameters, spread, strict=True)):
         if parameter.logarithmic:
             stands_out.append(error * parameter.unit_step < 1 / clear)
         else:
             zero = 0.0 if absent is None else float(absent[k])
             stands_out.append(abs(float(cause.values[k]) - zero) > clear * error * parameter.unit_step)
     return any(stands_out) if isinstance(cause.physics, ChainPhysics) else stands_out[0]
+
+
+def _spread_at_tip(fitted: Fit) -> Real:
+    """Standard errors of the coordinates of the last law's numbers, counted in the tip's motion, (n_parameters,)."""
+    counted = replace(fitted, hypothesis=counted_at_tip(fitted.hypothesis))
+    covariance = spread_with_scale(counted, len(fitted.hypothesis.causes) - 1)
+    return np.sqrt(np.maximum(np.diag(covariance), 0.0))
 
 
 def _spread(fitted: Fit, cause: Cause) -> Real:

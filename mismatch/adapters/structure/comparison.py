@@ -2,13 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from estimation import WindowedSpectrum
 
 from ...behaviour import Behaviour
 from ...inference import Patience, Proposal, Remainder, Round, Search, Settings, equivalents_of
 from ...models import Cause, Fit, Rival, fit, gives_one_up, settled
-from ...physics import JointPhysics, Physics, answer_name
+from ...physics import JointPhysics, Physics, TwinPhysics, answer_name
 from ...remainder import leftover
 from ...screening import gains_beside_laws, laws_beyond, laws_in_place
 from .acceptance import evidence_needed, impossible, mends_a_limit, plainest, possible_gains, twins_of, worth_it
@@ -112,7 +113,7 @@ class StructureComparison:
         With what was weighed, other forms of it that were fitted meanwhile among it.
         """
         evidence = self.settings.evidence
-        good = possible_gains(weighed.proposals, evidence)
+        good, unclear = possible_gains(weighed.proposals, evidence), list[Proposal[Fit]]()
         while (first := plainest(good, evidence.as_good)) is not None:
             best = twins_of(first, good, evidence.small)[0]
             rested = settled(self.lines, best.fitted, search.base.score - best.fitted.score)
@@ -122,12 +123,18 @@ class StructureComparison:
                 continue
             if self._is_worth_it(chosen, search):
                 return self._at_rest(chosen, search), weighed
+            unclear.append(chosen)
             # another form of the same cause may have numbers that the data do tell
             good = [one for one in good if one.name == best.name]
             if not good:
                 forms = self._other_forms(chosen, weighed, search)
                 weighed, good = self._with_fitted(weighed, forms), possible_gains(forms, evidence)
-        return None, weighed
+        return self._clear_at_tip(unclear, search), weighed
+
+    def _clear_at_tip(self, unclear: list[Proposal[Fit]], search: Search[Fit]) -> Proposal[Fit] | None:
+        """The best law of a joint inside whose numbers stand out once they are counted in the tip's motion."""
+        laws = [one for one in unclear if one.name in self.laws and self._is_worth_it(one, search, at_tip=True)]
+        return self._at_rest(max(laws, key=lambda one: one.evidence), search) if laws else None
 
     def _with_fitted(self, weighed: Weighed, more: list[Proposal[Fit]]) -> Weighed:
         """What was weighed, and more that was fitted after it."""
@@ -142,10 +149,14 @@ class StructureComparison:
         return farther if better else chosen
 
     def _other_forms(self, chosen: Proposal[Fit], weighed: Weighed, search: Search[Fit]) -> list[Proposal[Fit]]:
-        """Forms of a law that no round has fitted yet, in its place."""
+        """Forms of a law that no round has fitted yet, in its place; then those of the law that is its twin."""
         known = {one.fitted.hypothesis.causes[-1].physics.name for one in weighed.proposals}
-        laws = [one for one in self.causes.values() if isinstance(one, JointPhysics) and one.name not in known]
-        forms = [one for one in laws if answer_name(one) == chosen.name]
+        laws = [one for one in self.causes.values() if isinstance(one, JointPhysics)]
+        own = [one for one in laws if answer_name(one) == chosen.name]
+        twins = {self.causes[one.twin] for one in own if isinstance(one, TwinPhysics) and one.twin in self.causes}
+        names = {answer_name(one) for one in twins}
+        forms = [one for one in own if one.name not in known]
+        forms = forms or [one for one in laws if answer_name(one) in names and one.name not in known]
         return laws_in_place(self.lines, search.current, chosen, forms, self.settings)
 
     def _beyond_its_name(self, chosen: Proposal[Fit], search: Search[Fit]) -> list[Proposal[Fit]]:
@@ -161,14 +172,15 @@ class StructureComparison:
         cause = search.current.hypothesis.causes[place]
         return self._mends_no_form(cause, (less, search.current), search.base)
 
-    def _is_worth_it(self, chosen: Proposal[Fit], search: Search[Fit]) -> bool:
+    def _is_worth_it(self, chosen: Proposal[Fit], search: Search[Fit], *, at_tip: bool = False) -> bool:
         """Whether a cause has enough evidence; after a law less is enough of one that mends no form."""
         current, base, evidence = search.current, search.base, self.settings.evidence
         if mends_a_limit(chosen, self.limits, self.lines, evidence):
             return False
-        if worth_it(chosen, current, base, self.lines, evidence):
+        worth = partial(worth_it, chosen, current, base, self.lines, evidence, at_tip=at_tip)
+        if worth():
             return True
-        if not current.hypothesis.laws or not worth_it(chosen, current, base, self.lines, evidence, own=True):
+        if not current.hypothesis.laws or not worth(own=True):
             return False
         return self._mends_no_form(chosen.fitted.hypothesis.causes[-1], (current, chosen.fitted), base)
 
