@@ -108,7 +108,7 @@ def _slopes_of_scale(hypothesis: Hypothesis, cause: Cause, first: int) -> Real:
     shape, axis, slopes = hypothesis.shape, cause.axis, np.zeros(hypothesis.size)
     assert axis is not None
     if not (scale := scale_at_tip(axis, hypothesis.model)) > 0:
-        return slopes  # there is no tip to count at
+        return slopes  # a joint that does not move with the tip is not counted there
     for number in range(shape.modal_size):
         aside = ASIDE * np.eye(shape.size)[number]
         more, less = (scale_at_tip(axis, shape.model(hypothesis.u + sign * aside)) for sign in (1, -1))

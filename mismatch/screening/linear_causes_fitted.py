@@ -80,15 +80,10 @@ def _also_from_belief(
     A fit that ends far worse than the one without the cause is lost, and says nothing of the cause.
     """
     hopeless = BEHIND * most if most > CLEAR_LEAD * least else -np.inf
-    tasks = [
-        partial(_as_it_is, one) if -least < one.evidence < hopeless else partial(_from_belief, lines, current, one)
-        for one in found
-    ]
-    return in_processes(tasks)
-
-
-def _as_it_is(one: Proposal[Fit]) -> Proposal[Fit]:
-    return one
+    again = [k for k, one in enumerate(found) if not -least < one.evidence < hopeless]
+    fitted = in_processes([partial(_from_belief, lines, current, found[k]) for k in again])
+    better = dict(zip(again, fitted, strict=True))
+    return [better.get(k, one) for k, one in enumerate(found)]
 
 
 def _adds_mode(proposal: Proposal[Fit]) -> bool:

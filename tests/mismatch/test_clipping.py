@@ -10,7 +10,7 @@ from mismatch.adapters.structure.acceptance import mends_a_limit
 from mismatch.faults.clipping import find_clipping, mended
 from mismatch.inference import EvidenceSettings, Proposal
 from mismatch.models.fitting import Fit, fit
-from mismatch.physics import library
+from mismatch.physics import ModePhysics, library
 from modal_fit import ModalModel
 
 OFF = np.array([1.01, 0.99])
@@ -92,8 +92,9 @@ def test_a_small_mode_that_a_clipped_channel_shows_alone_mends_it(
     lines, model = cuts(np.inf, 8, duration=10.0), ModelShape(structure(), LabError())
     base = Hypothesis(model, np.zeros(model.size))
     physics = library()["missing_mode"]
-    right = np.array(shape, dtype=complex)
-    mode = base.with_mode(-1 + 60j, right, np.ones(len(structure().excitations), dtype=complex), physics)  # type: ignore[arg-type]
+    assert isinstance(physics, ModePhysics)
+    left = np.ones(len(structure().excitations), dtype=complex)
+    mode = base.with_mode(-1 + 60j, np.array(shape, dtype=complex), left, physics)
     proposal = Proposal("missing_mode", {}, Fit(mode, (), 0.0, 0.0, 0.0, np.zeros((1, 1))), evidence)
     assert mends_a_limit(proposal, {clipped: 1e5}, lines, EvidenceSettings()) is mends
     assert not mends_a_limit(proposal, {}, lines, EvidenceSettings())

@@ -10,7 +10,8 @@ from trial_case import diagnosed
 
 from mismatch.adapters.structure.level_check import moved_by_level, seen_to_stay, stands_beside_moving_modes
 from mismatch.behaviour import FAMILIES, Behaviour, ModeTrend
-from mismatch.inference import Improvement, VerdictSettings
+from mismatch.inference import Improvement, Settings, VerdictSettings
+from mismatch.physics import JointPhysics, library
 
 SOFTENS = Behaviour("softening", "Mode at 6.1 Hz softens by 0.9 %.", "N", ())
 LINEAR: Any = SimpleNamespace(laws=())
@@ -95,4 +96,14 @@ def test_a_coupling_that_moves_the_modes_of_a_refit_is_told(tmp_path: Path) -> N
     found = diagnosed(tmp_path, "extended", 300, 4602, 9)
     assert found.verdict == "explained"
     assert [one.name for one in found.physics] == ["gyroscopic_coupling", "missing_mode"]
-    assert found.behaviour["sentence"].endswith("moved it.")
+    assert found.content["behaviour"]["sentence"].endswith("No mode moves once the causes that are told are part of the refit.")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("index", [14, 50])
+def test_linear_causes_alone_do_not_explain_a_law(tmp_path: Path, index: int) -> None:
+    """Hysteresis, and hardening inside, of the noise beside a small mode: the mode alone is told of neither."""
+    linear = {name: one for name, one in library().items() if not isinstance(one, JointPhysics)}
+    found = diagnosed(tmp_path, "extended", 300, 4602, index, Settings(causes=linear))
+    assert found.content["behaviour"]["family"] in ("softening", "hardening")
+    assert found.verdict == "unexplained"

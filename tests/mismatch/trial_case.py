@@ -4,14 +4,17 @@ from pathlib import Path
 
 from benchmarks.blind_trial.case_spec import draw_cases
 from benchmarks.blind_trial.sealed_case import write_case
-from mismatch import diagnose, read_recordings
+from mismatch import Settings, diagnose, read_recordings
 from mismatch.location import StructureDiagnosis
 from modal_fit import read_modal_model
 
 
-def diagnosed(folder: Path, group: str, cases: int, seed: int, index: int) -> StructureDiagnosis:
+def diagnosed(
+    folder: Path, group: str, cases: int, seed: int, index: int, settings: Settings | None = None
+) -> StructureDiagnosis:
     """What is told of a case of a blind trial."""
     spec = next(one for one in draw_cases(cases, seed, only=group) if one.index == index)
     given = write_case(spec, folder)
     model = read_modal_model(given / "nominal.json")
-    return diagnose(model, read_recordings([given / f"{level}.h5" for level in ("low", "mid", "high")], model))
+    files = [given / f"{level}.h5" for level in ("low", "mid", "high")]
+    return diagnose(model, read_recordings(files, model), settings)

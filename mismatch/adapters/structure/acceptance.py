@@ -222,7 +222,7 @@ def mends_a_limit(
     proposal
         A fitted cause.
     limits
-        Evidence of each channel that clips, by its response.
+        Evidence of each limit at which a channel clips, by the number of the response.
     lines
         Windowed lines of the recordings.
     settings

@@ -38,7 +38,7 @@ class StructureComparison:
     patience
         How long causes are looked for.
     limits
-        Evidence of each channel that clips, by its response.
+        Evidence of each limit at which a channel clips, by the number of the response.
     """
 
     lines: list[WindowedSpectrum]

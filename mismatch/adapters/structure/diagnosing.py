@@ -43,8 +43,8 @@ FIRST_FIT = 30
 FEWEST_LINES = 24
 """Least number of lines of a recording that are compared."""
 
-STAYED = "With the causes that are told every mode stays: a linear refit without them is what moved it."
-"""What is said of modes that move in a refit alone."""
+STAYED = "No mode moves once the causes that are told are part of the refit."
+"""What is said of modes that move in a refit without the causes alone."""
 
 MOSTLY = 0.5
 """Share of a force's power that must be left when its noise is taken out."""
@@ -195,7 +195,7 @@ def _counted_at_tip(comparison: StructureComparison, found: Search[Fit]) -> Sear
 
 
 def _limits(faults: Sequence[AcceptedCause], lines: WindowedSpectrum) -> dict[int, float]:
-    """Evidence of each channel that clips, by its response."""
+    """Evidence of each limit at which a channel clips, by the number of the response."""
     names = lines.recording.channels[-lines.measured.shape[1] :]
     found = [one for one in faults if one.name == CLIPPING.name]
     return {names.index(one.location["channel"]): one.evidence for one in found}
