@@ -96,7 +96,9 @@ def test_a_coupling_that_moves_the_modes_of_a_refit_is_told(tmp_path: Path) -> N
     found = diagnosed(tmp_path, "extended", 300, 4602, 9)
     assert found.verdict == "explained"
     assert [one.name for one in found.physics] == ["gyroscopic_coupling", "missing_mode"]
-    assert found.content["behaviour"]["sentence"].endswith("No mode moves once the causes that are told are part of the refit.")
+    assert found.content["behaviour"]["sentence"].endswith(
+        "No mode moves once the causes that are told are part of the refit."
+    )
 
 
 @pytest.mark.slow
