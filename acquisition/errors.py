@@ -1,8 +1,6 @@
 """Errors of a device or a disk while recording; each message names the device and the remedy."""
 
-from foundation import DiskFull, MillfrfError
-
-__all__ = ["DeviceError", "DeviceTimeout", "Disconnected", "DiskFull", "DriverMissing", "Overrun"]
+from millfrf.core import MillfrfError
 
 
 class DeviceError(MillfrfError):

@@ -3,12 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from foundation import InputError
-
-Real = NDArray[np.float64]
+from millfrf.core import InputError, Real
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Recording, record
-from cutting import MillingProcess
 from estimation import Frf, band_of_channels, choose_channels, cross_spectra, h1, settings_for, sum_tests
+from millfrf.cutting import MillingProcess
 from modal_fit import fit_polyreference, fit_subspace
 from replay_data import LinearSweep, MillingCell, default_structure, milling_sensors
 

@@ -18,7 +18,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import millfrf
-from robot_model import read_spatial_robot
+from millfrf.robot_model import read_spatial_robot
 
 BAND = (8.0, 95.0)
 

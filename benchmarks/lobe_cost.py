@@ -17,15 +17,16 @@ from pathlib import Path
 
 import matplotlib as mpl
 
-from foundation import TIP
+from millfrf.core import TIP
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
+from millfrf.stability import collocation_limits
+from millfrf.stability.solvers.boundary import trace_boundary
 from modal_fit import ModalModel
-from stability import collocation_limits, trace_boundary
 
 CUT = MillingProcess(2, 0.0127, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 1.5e-4)
 LOWEST, HIGHEST, DEEPEST = 2000 * pi / 30, 8000 * pi / 30, 8e-3

@@ -21,10 +21,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.plain_semi_discretisation import spectral_radii
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
+from millfrf.stability import certified_lobes, collocation
+from millfrf.stability.solvers.boundary import stability_grid, trace_boundary
 from modal_fit import ModalModel
 from replay_data import table_one_model
-from stability import certified_lobes, collocation, stability_grid, trace_boundary
 
 OMEGA, ZETA, MASS, KT, KN = 2 * pi * 922, 0.011, 0.03993, 6e8, 2e8
 SPEEDS = np.linspace(5000, 25000, 200) * pi / 30

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import Recording, RecordingWriter, record
-from cutting import MillingProcess, write_cutting_process
+from millfrf.cutting import MillingProcess, write_cutting_process
 from modal_fit import write_modal_model
 from replay_data import MillingCell, default_structure, dynamometer, housing_accelerometers, tip_accelerometers
 from replay_data import table_one_model as tip_structure

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from acquisition import Recording
 from estimation import Frf, cross_spectra, h1, settings_for, sum_tests
+from millfrf.stability import certified_lobes
 from modal_fit import ModalModel, fit_polyreference
 from replay_data import table_one_model
-from stability import certified_lobes
 
 BANDS = ((13.0, 25.0), (15.2, 22.5), (15.2, 45.0), (15.2, 69.0))
 DEEPEST = 0.01

@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cutting import MillingProcess, write_cutting_process
-from robot_model import modal_model_at, read_spatial_robot, target_of, tool_down, turned_place, wrist_solutions
-from stability import certified_lobes
+from millfrf.cutting import MillingProcess, write_cutting_process
+from millfrf.robot_model import modal_model_at, read_spatial_robot, target_of, tool_down, turned_place, wrist_solutions
+from millfrf.stability import certified_lobes
 
 CUT = MillingProcess(2, 0.012, pi / 2, 600e6, 0.3, 0.1, pi / 2, pi, 1e-4)
 """Aluminium, half immersion down: assumed."""

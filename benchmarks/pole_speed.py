@@ -23,7 +23,8 @@ from collections.abc import Callable
 import numpy as np
 
 from estimation import Frf
-from modal_fit import ModalModel, matrix_fraction_poles
+from modal_fit import ModalModel
+from modal_fit.stabilisation import matrix_fraction_poles
 
 ORDER = 60
 BAND = (10.0, 410.0)

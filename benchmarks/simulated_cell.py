@@ -8,7 +8,7 @@ import time
 from dataclasses import replace
 from math import pi
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
 from replay_data import HammerCell, LinearSweep, MillingCell, default_structure
 
 RPM = pi / 30

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
+from millfrf.core import InputError, Real
 
-if TYPE_CHECKING:  # the compiled kernels of cutting take 55 MB that spectra do without
-    from cutting import MillingProcess
+if TYPE_CHECKING:
+    from millfrf.cutting import MillingProcess
 
-Real = NDArray[np.float64]
 _HARMONICS = 6
 _STEPS = 24  # of the immersion's start over 180 degrees
 
@@ -109,7 +108,7 @@ def plan_sweeps(cutter: "MillingProcess", demand: SweepDemand) -> SweepPlan:
     InputError
         No three immersions give independent forces: the axial coefficient is zero, or the feed is.
     """
-    from cutting import force_harmonics
+    from millfrf.cutting import force_harmonics
 
     candidates = _candidates(cutter, demand)
     vectors = np.array([force_harmonics(process, 1)[1] for process in candidates]) * demand.depth
@@ -158,7 +157,7 @@ def predicted_spectra(
     -------
     (n_frequencies, 3, 3), N^2/Hz
     """
-    from cutting import force_harmonics
+    from millfrf.cutting import force_harmonics
 
     low, high = band
     total = np.zeros((len(frequencies), 3, 3), dtype=complex)

@@ -19,8 +19,8 @@ from scipy.fft import irfft, rfft
 from scipy.optimize import least_squares
 
 from estimation import BandRecording, linear_approximation, read_band_recording, steady_periods
-from figures import behaviour_figure
-from mismatch import SearchSettings, Settings, StructureDiagnosis, diagnose, improved_model_of, predict
+from millfrf.figures import behaviour_figure
+from millfrf.mismatch import SearchSettings, Settings, StructureDiagnosis, diagnose, improved_model_of, predict
 from modal_fit import ModalModel, fit_polyreference
 
 Complex = NDArray[np.complex128]

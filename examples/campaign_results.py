@@ -14,10 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
 from millfrf.campaign import MeasuredSet, write_summary
-from modal_fit import ModalModel, ModeErrors, write_modal_model
-from robot_model import (
+from millfrf.cutting import MillingProcess
+from millfrf.robot_model import (
     SpatialRobot,
     learn_postures,
     measured_modes,
@@ -26,7 +25,8 @@ from robot_model import (
     with_joint_factor,
     write_learned_postures,
 )
-from stability import write_lobes, zero_order
+from millfrf.stability import write_lobes, zero_order
+from modal_fit import ModalModel, ModeErrors, write_modal_model
 
 Real = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
+from millfrf.stability import ChatterVerdict, classify_cut, gather_evidence
 from replay_data import MillingCell, dynamometer, table_one_model, tip_accelerometers
-from stability import ChatterVerdict, classify_cut, gather_evidence
 
 RPM = pi / 30
 SPEED = 800 * RPM

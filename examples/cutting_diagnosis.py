@@ -14,10 +14,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition import record
-from cutting import MillingProcess, write_cutting_process
-from figures import cut_orders_figure, cut_turn_figure, house_style, save_figure
 from millfrf.__main__ import run
-from mismatch import diagnose_cut, read_cut_recording
+from millfrf.cutting import MillingProcess, write_cutting_process
+from millfrf.figures import cut_orders_figure, cut_turn_figure, house_style, save_figure
+from millfrf.mismatch import diagnose_cut, read_cut_recording
 from replay_data import MillingCell, default_structure, dynamometer, tip_accelerometers
 
 STATED = MillingProcess(2, 12.7e-3, math.pi / 2, 119e6, 0.17, 0.33, math.pi / 2, math.pi, 0.15e-3)

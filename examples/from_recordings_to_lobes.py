@@ -14,6 +14,7 @@ import numpy as np
 
 from acquisition import Recording, record
 from estimation import cross_spectra, h1, settings_for, sum_tests
+from millfrf.stability import StabilityLobes, certified_lobes
 from modal_fit import ModalModel, fit_polyreference
 from replay_data import (
     ACETAL_CUTTER,
@@ -24,7 +25,6 @@ from replay_data import (
     table_one_model,
     tip_accelerometers,
 )
-from stability import StabilityLobes, certified_lobes
 
 RPM = pi / 30
 CUTTER = replace(ACETAL_CUTTER, runout=0.0)

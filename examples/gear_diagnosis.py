@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 from scipy.signal import butter, filtfilt
 
 from estimation import BandRecording, channels_of
-from figures import COLOURS, house_style, new_figure
-from mismatch import SearchSettings, Settings, StructureDiagnosis, diagnose
+from millfrf.figures import COLOURS, house_style, new_figure
+from millfrf.mismatch import SearchSettings, Settings, StructureDiagnosis, diagnose
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from acquisition import Recording, record
 from estimation import exponential_window, force_window
-from foundation import TIP
 from millfrf import TapResult
+from millfrf.core import TIP
 from millfrf.taps import TapOptions, tap_recordings
 from replay_data import HammerCell, default_structure, dynamometer, select, tip_accelerometers
 

@@ -15,7 +15,7 @@ import numpy as np
 import pyuff
 from nptdms import ChannelObject, TdmsWriter
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
 from replay_data import LinearSweep, MillingCell, default_structure, tip_model
 
 RPM, G, KILO = math.pi / 30, 9.80665, 1e3

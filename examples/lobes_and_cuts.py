@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from cutting import MillingProcess
-from figures import TriedCut, lobes_figure
+from millfrf.cutting import MillingProcess
+from millfrf.figures import TriedCut, lobes_figure
+from millfrf.stability import classify_cut, collocation, zero_order
 from replay_data import MillingCell, dynamometer, table_one_model, tip_accelerometers
-from stability import classify_cut, collocation, zero_order
 
 RPM = pi / 30
 HALF_DOWN = MillingProcess(2, 12.7e-3, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 0.15e-3)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_spectrum
-from mismatch import (
+from millfrf.mismatch import (
     Hypothesis,
     JointPhysics,
     LabError,

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from estimation import Frf, reciprocity_pairs
-from figures import (
+from millfrf.figures import (
     GalleryEntry,
     assurance_figure,
     compass_figure,

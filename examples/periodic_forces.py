@@ -27,7 +27,7 @@ from estimation import (
     read_band_recording,
     steady_periods,
 )
-from figures import COLOURS, LINE_STYLES, house_style, new_figure, panel_letter
+from millfrf.figures import COLOURS, LINE_STYLES, house_style, new_figure, panel_letter
 from modal_fit import AmplitudeDependence, amplitude_dependence
 
 EXCITED, SENSORS = ["EXC:+Z"], ["EXC:+Z", "WING:+Z", "PAYLOAD:+Z"]

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import record
-from cutting import MillingProcess
 from millfrf.__main__ import run
+from millfrf.cutting import MillingProcess
+from millfrf.robot_model import SpatialRobot, cell_structure_at, read_spatial_robot, with_joint_factor, with_payload
 from replay_data import LinearSweep, MillingCell
-from robot_model import SpatialRobot, cell_structure_at, read_spatial_robot, with_joint_factor, with_payload
 
 ROBOT = "kuka_kr90_r3100"
 POSTURES = ("0,-10,100,0,90,0", "20,25,70,40,60,0", "-15,45,30,80,-50,0")

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cutting import Drill, bending_stiffness, drilling_load, fitted_to_catalogue, settled_drill
-from figures import house_style, new_figure, panel_letter, save_figure
-from robot_model import (
+from millfrf.cutting import Drill, bending_stiffness, drilling_load, fitted_to_catalogue, settled_drill
+from millfrf.figures import house_style, new_figure, panel_letter, save_figure
+from millfrf.robot_model import (
     DeviationMap,
     LoadUncertainty,
     ProcessDeviation,

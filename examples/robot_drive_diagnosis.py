@@ -25,10 +25,10 @@ from scipy.io import loadmat
 from scipy.optimize import least_squares
 from scipy.signal import butter, filtfilt, resample_poly
 
-from cutting import compiled
 from estimation import BandRecording, channels_of
-from figures import COLOURS, house_style, new_figure
-from mismatch import StructureDiagnosis, diagnose, improved_model, predict
+from millfrf.core.compilation import compiled
+from millfrf.figures import COLOURS, house_style, new_figure
+from millfrf.mismatch import StructureDiagnosis, diagnose, improved_model, predict
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]

@@ -15,8 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from modal_fit import ModalModel
-from robot_model import (
+from millfrf.robot_model import (
     LearnedPostures,
     SpatialRobot,
     choose_postures,
@@ -27,6 +26,7 @@ from robot_model import (
     read_spatial_robot,
     with_joint_factor,
 )
+from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
 

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from figures import COLOURS, LINE_STYLES, house_style, new_figure, panel_letter, save_figure
-from robot_model import frequencies_over, in_posture, read_planar_robot, read_spatial_robot, tool_down
+from millfrf.figures import COLOURS, LINE_STYLES, house_style, new_figure, panel_letter, save_figure
+from millfrf.robot_model import frequencies_over, in_posture, read_planar_robot, read_spatial_robot, tool_down
 
 STAUBLI = read_spatial_robot("staubli_rx170").robot
 CHEN = read_planar_robot("chen_2026")

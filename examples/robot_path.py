@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cutting import MillingProcess, force_harmonics
+from millfrf.cutting import MillingProcess, force_harmonics
 from millfrf.robot import (
     Loading,
     PathCut,
@@ -24,7 +24,7 @@ from millfrf.robot import (
     first_postures,
     optimised,
 )
-from robot_model import (
+from millfrf.robot_model import (
     CutPath,
     Payload,
     Redundancy,

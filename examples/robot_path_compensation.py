@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from figures import COLOURS, house_style, new_figure, panel_letter, save_figure
-from robot_model import (
+from millfrf.figures import COLOURS, house_style, new_figure, panel_letter, save_figure
+from millfrf.robot_model import (
     SpatialRobot,
     ToolPath,
     close_loops,

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from robot_model import (
+from millfrf.robot_model import (
     PlanarRobot,
     apply_identified,
     exact_receptance,

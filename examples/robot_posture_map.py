@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
 from millfrf.robot import depth_over_places, depth_over_redundancy, draw_posture_map
-from robot_model import (
+from millfrf.robot_model import (
     CutPlace,
     PostureMap,
     SpatialRobot,
@@ -25,7 +25,7 @@ from robot_model import (
     tool_down,
     wrist_solutions,
 )
-from stability import zero_order
+from millfrf.stability import zero_order
 
 HALF_DOWN = MillingProcess(2, 0.02, pi / 2, 700e6, 0.3, 0.1, pi / 2, pi, 1e-4)
 """Aluminium, assumed: Table 4 of the paper is missing."""

@@ -21,8 +21,8 @@ from scipy.optimize import least_squares
 from scipy.signal import csd, welch
 
 from estimation import BandRecording, channels_of, windowed_spectrum
-from figures import COLOURS, house_style, new_figure
-from mismatch import (
+from millfrf.figures import COLOURS, house_style, new_figure
+from millfrf.mismatch import (
     Behaviour,
     Hypothesis,
     LabError,

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import typer
 
-from foundation import InputError, LeftoverRemoved, MillfrfError, MillfrfWarning, is_disk_full
+from millfrf.core import InputError, LeftoverRemoved, MillfrfError, MillfrfWarning, is_disk_full
 
 from .commands import COMMANDS
 from .cut import cut_app

@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 
 from estimation import is_geometry_table
-from foundation import FileFormatError, InputError, conversion_advice
+from millfrf.core import FileFormatError, InputError, conversion_advice
 
 RECORDING, FRF, MODEL, LOBES, CUTTING = "recording", "frf", "modal model", "lobes", "cutting data"
 GEOMETRY, CHATTER, POLES, DIAGNOSIS = "geometry", "chatter verdicts", "picked poles", "diagnosis"

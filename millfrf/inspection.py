@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from acquisition import DEVICES, DeviceStory, Recording, device_story
 from estimation import Frf, Geometry, read_frf, read_geometry
+from millfrf.stability import STATUSES, read_lobes
 from modal_fit import read_modal_model
-from stability import STATUSES, read_lobes
 
 from .chain import read_cuts, tone_table, verdict_table
 from .file_kinds import CHATTER, CUTTING, DIAGNOSIS, FRF, GEOMETRY, LOBES, MODEL, POLES, RECORDING, kind_of
@@ -256,7 +256,7 @@ def _geometry_concerns(geometry: Geometry) -> list[str]:
 
 
 def _diagnosis(path: str | os.PathLike[str]) -> Findings:
-    from mismatch import read_diagnosis  # not above: other files are looked at without loading the diagnosis
+    from millfrf.mismatch import read_diagnosis  # not above: other files are looked at without loading the diagnosis
 
     found = read_diagnosis(path)
     causes = ", ".join(cause.name for cause in found.physics) or "no cause"

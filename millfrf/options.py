@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from foundation import InputError
+from millfrf.core import InputError
 
 from .terminal import say
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import h5py
 
-from foundation import writing_whole_file
+from millfrf.core import writing_whole_file
 
 _MADE_BY = "made_by_millfrf"
 _MADE_BY_TABLE = re.compile(rf"^\[{_MADE_BY}\]\nwarnings = \[.*\]\n?", re.MULTILINE)

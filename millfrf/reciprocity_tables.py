@@ -3,7 +3,7 @@
 import numpy as np
 
 from estimation import Frf, reciprocity_pairs
-from foundation import Band
+from millfrf.core import Band
 from modal_fit import ModalModel, mode_reciprocity
 
 from .gate import plainly_different, shown_pairs

@@ -1,5 +1,78 @@
 """Modal models, their fitting and the calibration to the tool tip: knows nothing of cutting."""
 
-import lazy_loader
+from .amplitude import AmplitudeDependence, amplitude_dependence
+from .calibration import TipCalibration, calibrate_to_tip
+from .indicators import (
+    ComplexModeIndicator,
+    MultivariateModeIndicator,
+    complex_mode_indicator,
+    multivariate_mode_indicator,
+)
+from .models.modal_model import ModalModel, ModeErrors
+from .models.model_file import read_modal_model, write_modal_model
+from .models.out_of_band import Residuals
+from .models.synthesis import (
+    ModePair,
+    Synthesis,
+    compare_modes,
+    derived_covariance,
+    frequency_and_damping_errors,
+    pack_parameters,
+    synthesis,
+    unpack_parameters,
+)
+from .pole_picking import (
+    CandidateGroup,
+    PolesFile,
+    candidate_groups,
+    fit_picked_poles,
+    read_picked_poles,
+    read_pole_groups,
+    write_pole_candidates,
+)
+from .polyreference import ModalFit, fit_polyreference
+from .shapes import ModeShapes, mode_reciprocity, mode_shapes
+from .stabilisation import StabilisationChart
+from .subspace import SubspaceFit, fit_subspace
+from .uff_reading import import_modes_uff, write_modes_uff
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__all__ = [
+    "AmplitudeDependence",
+    "CandidateGroup",
+    "ComplexModeIndicator",
+    "ModalFit",
+    "ModalModel",
+    "ModeErrors",
+    "ModePair",
+    "ModeShapes",
+    "MultivariateModeIndicator",
+    "PolesFile",
+    "Residuals",
+    "StabilisationChart",
+    "SubspaceFit",
+    "Synthesis",
+    "TipCalibration",
+    "amplitude_dependence",
+    "calibrate_to_tip",
+    "candidate_groups",
+    "compare_modes",
+    "complex_mode_indicator",
+    "derived_covariance",
+    "fit_picked_poles",
+    "fit_polyreference",
+    "fit_subspace",
+    "frequency_and_damping_errors",
+    "import_modes_uff",
+    "mode_reciprocity",
+    "mode_shapes",
+    "multivariate_mode_indicator",
+    "pack_parameters",
+    "read_modal_model",
+    "read_picked_poles",
+    "read_pole_groups",
+    "synthesis",
+    "unpack_parameters",
+    "write_modal_model",
+    "write_modes_uff",
+    "write_pole_candidates",
+]

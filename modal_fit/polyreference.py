@@ -1,24 +1,67 @@
-"""`fit_polyreference`: FRF matrix to modal model, with stabilisation, vectors, residuals and error bars."""
+"""`fit_polyreference`: modal model of an FRF matrix, with stabilisation, residuals and error bars."""
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from estimation import Frf
-from foundation import InputError, MillfrfError, Result, Summary
+from millfrf.core import Complex, InputError, MillfrfError, Result, Summary
 
-from .frf_fit import NOT_REFINED, REFINED, MatrixFit, default_order, fit_matrix
-from .maximum_likelihood import RecordSpectra
-from .models import ModalModel, fit_summary
+from .frf_fit.fit import NOT_REFINED, REFINED, MatrixFit, fit_matrix
+from .frf_fit.steady_poles import default_order
+from .maximum_likelihood.likelihood_fit import regressors
+from .maximum_likelihood.likelihood_model import Setting
+from .maximum_likelihood.whole_records import RecordSpectra
+from .models.modal_model import ModalModel
+from .models.out_of_band import out_of_band_basis
+from .models.synthesis import fit_summary
 from .stabilisation import PoleGroup, StabilisationChart, choose_poles, matrix_fraction_poles, stabilisation_chart
-from .transfer_delay import transfer_delay
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Complex = NDArray[np.complex128]
+_LONGEST = 4.0  # periods of the band's upper end
+_GRID = 160
+
+
+def transfer_delay(poles: Complex, spectra: RecordSpectra, band: tuple[float, float]) -> float:
+    """Find the delay tau (s) for which modes at ``poles`` and out-of-band terms explain ``H(s) exp(s tau)`` best.
+
+    A delay of a fraction of a period turns the phase of a mode far from its resonance, which no modal model of
+    few terms can follow. With the poles held, everything but tau is linear and is eliminated: the misfit left is a
+    function of tau alone, searched on a grid and then refined.
+
+    Parameters
+    ----------
+    poles : (n_modes,), rad/s
+        Poles that are held, in the upper half plane.
+    spectra
+        Spectra of a ``transfer``.
+    band : Hz
+        Lowest and highest frequency of the lines.
+    """
+    setting = Setting(spectra, out_of_band_basis(spectra.s, band), np.zeros((0, len(spectra.s))))
+    design = regressors(poles, setting, 0, 0)
+    design = np.concatenate([design.real, design.imag])
+    orthogonal, _ = np.linalg.qr(design / np.linalg.norm(design, axis=0))
+    size = np.sqrt(np.mean(np.abs(spectra.response) ** 2, axis=0))
+    response = spectra.response / np.where(size > 0, size, 1.0)
+
+    def misfit(delay: float) -> float:
+        advanced = response * np.exp(spectra.s * delay)[:, None]
+        return -float(np.sum((orthogonal.T @ np.concatenate([advanced.real, advanced.imag])) ** 2))
+
+    delays = np.linspace(0.0, _LONGEST / band[1], _GRID)
+    best = int(np.argmin([misfit(delay) for delay in delays]))
+    step = delays[1]
+    around = (delays[best] - step, delays[best] + step)
+    found = minimize_scalar(misfit, bounds=around, method="bounded", options={"xatol": 1e-5 * step})
+    return float(max(found.x, 0.0))
+
+
 _NO_VIBRATION = 0.5  # damping ratio above which a pole is taken for a trend
 _DELAY_ROUNDS = 4  # the first poles are found with the delay still in
 
@@ -58,7 +101,7 @@ class ModalFit(Result):
     status: str = REFINED
 
     def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
-        """Draw the FRF that the model gives and return the axes; see :func:`figures.draw_model` for the choices."""
+        """Draw the FRF that the model gives and return the axes; see `draw_model` for the choices."""
         return self.model.plot(axes, **choices)
 
     def _summary(self) -> Summary:

@@ -1,4 +1,4 @@
-"""`fit_subspace`: recordings to modal model without a spectrum in between: no window, no leakage, stacked tests."""
+"""`fit_subspace`: modal model from recordings without intermediate spectra, from stacked tests."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -6,17 +6,110 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimation import BandRecording, family_of
-from foundation import SI_UNITS, InputError, MillfrfError, Result, Summary
+from millfrf.core import SI_UNITS, InputError, MillfrfError, Result, Summary
 
-from .correlation_blocks import CorrelationBlocks, correlation_blocks
-from .maximum_likelihood import NoiseLevels, best_fit, modal_model_from, record_spectra
-from .models import ModalModel, fit_summary
+from .maximum_likelihood.likelihood_fit import best_fit, modal_model_from
+from .maximum_likelihood.whole_records import NoiseLevels, record_spectra
+from .models.modal_model import ModalModel
+from .models.synthesis import fit_summary
 from .stabilisation import OrderPoles, PoleGroup, StabilisationChart, choose_poles, stabilisation_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+
+_CHUNK = 4096
+
+
+@dataclass(frozen=True)
+class CorrelationBlocks:
+    """Sum of ``z z^T`` over tests and samples; z = (future force, past force, past response, future response).
+
+    Parameters
+    ----------
+    matrix : (n, n) with n = 2 block_rows (n_excitations + n_responses)
+        The sum, for channels scaled to unit root mean square.
+    block_rows
+        Number of samples in the past and in the future.
+    n_excitations, n_responses
+        Numbers of channels on either side.
+    response_scale : (n_responses,)
+        Root mean square of each response over all tests.
+    sample_rate : Hz
+        Samples a second.
+    n_samples
+        Number of columns z that were summed.
+    """
+
+    matrix: NDArray[np.float64]
+    block_rows: int
+    n_excitations: int
+    n_responses: int
+    response_scale: NDArray[np.float64]
+    sample_rate: float
+    n_samples: int
+
+
+def correlation_blocks(recordings: Sequence[BandRecording], block_rows: int) -> CorrelationBlocks:
+    """Sum the correlation blocks of all tests; no test's samples meet another's.
+
+    Raises
+    ------
+    InputError
+        No recording, recordings of different rates or channels, or too few samples for ``block_rows``.
+    """
+    if not recordings:
+        raise InputError("no recording to fit; give at least one recording")
+    first = recordings[0]
+    for number, recording in enumerate(recordings[1:], start=2):
+        if recording.rate != first.rate:
+            raise InputError(
+                f"test {number} has {recording.rate:g} Hz after decimation, test 1 has {first.rate:g} Hz; "
+                "stack tests of one sample rate"
+            )
+        if (recording.excitations, recording.responses) != (first.excitations, first.responses):
+            raise InputError(f"test {number} has other channels than test 1; stack tests of one set-up only")
+    excitation_scale = _root_mean_square([r.force for r in recordings])
+    response_scale = _root_mean_square([r.response for r in recordings])
+    n_in, n_out = len(excitation_scale), len(response_scale)
+    size = 2 * block_rows * (n_in + n_out)
+    matrix = np.zeros((size, size))
+    n_samples = 0
+    for recording in recordings:
+        force = (recording.force - recording.force.mean(axis=0)) / excitation_scale
+        motion = (recording.response - recording.response.mean(axis=0)) / response_scale
+        count = len(force) - 2 * block_rows + 1
+        for start in range(0, max(count, 0), _CHUNK):
+            stop = min(start + _CHUNK, count)
+            rows = _stacked(force, motion, block_rows, start, stop)
+            matrix += rows.T @ rows
+            n_samples += stop - start
+    if n_samples < 2 * size:
+        raise InputError(
+            f"{n_samples} samples after decimation are too few for {size} correlation rows; "
+            "record longer or use fewer block rows"
+        )
+    return CorrelationBlocks(matrix, block_rows, n_in, n_out, response_scale, first.rate, n_samples)
+
+
+def _root_mean_square(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    power = sum(np.sum((part - part.mean(axis=0)) ** 2, axis=0) for part in parts) / sum(len(part) for part in parts)
+    return np.asarray(np.sqrt(np.where(power > 0, power, 1.0)))
+
+
+def _stacked(
+    force: NDArray[np.float64], motion: NDArray[np.float64], block_rows: int, start: int, stop: int
+) -> NDArray[np.float64]:
+    """Rows (future force, past force, past response, future response) for samples start..stop-1."""
+    shifts = range(block_rows)
+    pieces = []
+    for samples, offset in ((force, block_rows), (force, 0), (motion, 0), (motion, block_rows)):
+        pieces += [samples[start + offset + k : stop + offset + k] for k in shifts]
+    return np.hstack(pieces)
+
 
 _BLOCK_ROWS = 25
 _SPARE_ROWS = 1.5  # observability matrix has so many times more rows than the highest order has states
@@ -55,7 +148,7 @@ class SubspaceFit(Result):
     warnings: tuple[str, ...]
 
     def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
-        """Draw the FRF that the model gives and return the axes; see :func:`figures.draw_model` for the choices."""
+        """Draw the FRF that the model gives and return the axes; see `draw_model` for the choices."""
         return self.model.plot(axes, **choices)
 
     def _summary(self) -> Summary:

@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
+from millfrf.core import InputError
 
 
 class SpeedProfile(Protocol):

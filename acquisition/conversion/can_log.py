@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
-from foundation import FileFormatError, InputError, checked_toml, writing_whole_file
+from millfrf.core import FileFormatError, InputError, checked_toml, writing_whole_file
 
-from ..drivers import CanSignal, DbcDecoder
+from ..drivers.can_bus import CanSignal, DbcDecoder
 from ..errors import DriverMissing
-from ..recordings import Recording
+from ..recordings.recording import Recording
 from .content import recording_content
 from .writers import require_writable, write_content
 

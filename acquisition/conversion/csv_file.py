@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import FileFormatError
+from millfrf.core import FileFormatError
 
-from ..recordings import check_format, stream_from_attributes
+from ..recordings.recording_format import check_format, stream_from_attributes
 from .content import ArraySamples, Content
-from .flat_fields import event_texts
+from .writers import event_texts
 
 _MISSING = ("", "-", "--", "---", "?", "*", "na", "n/a", "n.a.", "nan", "#n/a", "#nv", "null", "none", "inf", "-inf")
 """How programs mark a value that is missing."""

@@ -9,10 +9,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from foundation import SI_UNITS, InputError, checked_toml, si_factor
+from millfrf.core import SI_UNITS, InputError, checked_toml, si_factor
 
-from ..channel import Channel
-from ..channel_keys import ChannelKeys
+from ..channels import Channel, ChannelKeys
 
 _STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 

@@ -7,11 +7,11 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
-from foundation import InputError
+from millfrf.core import InputError
 
 from ..errors import DeviceError, DeviceTimeout
-from ..sources import Put, ThreadedFeed
-from .serial_line import on_line, open_line
+from ..sources.receiving import Put, ThreadedFeed
+from .serial_lines import on_line, open_line
 
 _PLACE = re.compile(r"\{(\w+)\}")
 

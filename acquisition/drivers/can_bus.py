@@ -10,11 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from foundation import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError
 
 from ..errors import DeviceTimeout, Disconnected, DriverMissing
-from ..sources import EventAxis, Events, Put, Stamped, SteadyStamps, ThreadedFeed, WallClock
-from .serial_line import LINE_FAILURES
+from ..sources.receiving import Put, ThreadedFeed
+from ..sources.source import EventAxis, Events
+from ..sources.timing import Stamped, SteadyStamps, WallClock
+from .serial_lines import LINE_FAILURES
 
 _POLL = 0.1
 

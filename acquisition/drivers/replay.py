@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recordings import Recording
-from ..sources import Block, EventAxis, Events, Pace, StreamDescription
+from ..recordings.recording import Recording
+from ..sources.source import Block, EventAxis, Events, StreamDescription
+from ..sources.timing import Pace
 
 
 class ReplaySource:

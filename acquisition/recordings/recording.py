@@ -11,15 +11,14 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import FileFormatError, InputError, Summary, counted
+from millfrf.core import FileFormatError, InputError, Summary, counted
 
-from ..file_safety import BlockTable, is_being_written, open_for_reading, reporting_damage, require_stored
 from .alignment import Alignment
-from .checked_samples import CheckedSamples, DamagedRows, block_table
-from .event_series import EventSeries
-from .recording_format import check_format, stream_from_attributes, text_attribute
-from .stream import Stream
-from .tables import summed_rows
+from .durability import is_being_written
+from .guarded_reading import open_for_reading, reporting_damage, require_stored
+from .recording_format import BlockTable, check_format, stream_from_attributes, text_attribute
+from .stream import CheckedSamples, DamagedRows, Stream, block_table
+from .tables import EventSeries, summed_rows
 
 if TYPE_CHECKING:
     import pandas
@@ -220,7 +219,7 @@ class Recording:
         self.close()
 
     def plot(self, axes: "Axes | None" = None, *, stream: str | None = None, **choices: Any) -> "Axes":
-        """Draw the channels of one stream and return the axes; see :func:`figures.draw_stream` for the choices."""
+        """Draw the channels of one stream and return the axes; see `draw_stream` for the choices."""
         return self.stream(stream).plot(axes, **choices)
 
     def to_xarray(self, stream: str | None = None) -> "xarray.DataArray":

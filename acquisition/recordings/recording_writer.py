@@ -11,11 +11,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import DiskFull, InputError, is_disk_full
+from millfrf.core import DiskFull, InputError, is_disk_full
 
 from ..errors import Overrun
-from ..file_safety import SpareSpace, Syncer, is_being_written
-from ..sources import SAMPLES_AXIS, EventAxis, Events, StreamDescription, stored_texts
+from ..sources.source import SAMPLES_AXIS, EventAxis, Events, StreamDescription, stored_texts
+from .durability import SpareSpace, Syncer, is_being_written
 from .recording_format import ENDING_BYTES, FORMAT, FORMAT_VERSION
 from .tables import Tables, append_missing, append_samples, append_summed, make_events, make_stream
 

@@ -1,4 +1,4 @@
-"""`recover`: what is sound of a recording that was left open or damaged, copied into a whole new recording."""
+"""Recovery of recordings that were left open or damaged, into a new complete file."""
 
 import os
 from collections.abc import Callable, Iterator
@@ -9,14 +9,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError, writing_whole_file
+from millfrf.core import InputError, writing_whole_file
 
-from ..file_safety import is_being_written
-from ..sources import Events
-from .checked_samples import DamagedRows
+from ..sources.source import Events
+from .durability import is_being_written
 from .recording import Recording
 from .recording_writer import RecordingWriter
-from .stream import Stream
+from .stream import DamagedRows, Stream
 
 _SPARE_BYTES = 1_000_000
 

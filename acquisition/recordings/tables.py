@@ -1,17 +1,56 @@
-"""The tables of a recording file: made empty, grown row by row, each row or block with its checksum."""
+"""Tables of a recording file: created empty, grown row by row, each row or block with its checksum."""
 
+import contextlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import FileFormatError
+from millfrf.core import DiskFull, FileFormatError, InputError, is_disk_full
 
-from ..file_safety import ENTRY, SpareSpace, entries_of, row_sums
-from ..sources import TEXT_BYTES, EventAxis, StreamDescription
-from .appending import append_rows
+from ..sources.source import TEXT_BYTES, EventAxis, StreamDescription
+from .durability import SpareSpace
+from .recording_format import ENTRY, entries_of, row_sums, text_attribute
+
+Rows = Sequence[tuple[h5py.Dataset, NDArray[np.generic]]]
+
+
+def append_rows(rows: Rows, spare: SpareSpace | None, path: object) -> None:
+    """Append to several tables and hand everything to the system.
+
+    Rows that were announced but not written must not be read as zeros: whatever interrupts, Ctrl-C included, the tables
+    get back the length they had. When the disk is full the spare space is released first, so that this succeeds.
+
+    Raises
+    ------
+    DiskFull
+        The rows may not have been kept; the tables are whole, and nothing more can be appended.
+    """
+    lengths = [table.shape[0] for table, _ in rows]
+    try:
+        for table, new in rows:
+            _extend(table, new)
+    except BaseException as error:
+        full = is_disk_full(error)
+        if full and spare is not None:
+            spare.release()
+        with contextlib.suppress(OSError, RuntimeError):
+            for (table, _), length in zip(rows, lengths, strict=True):
+                table.resize(length, axis=0)
+                table.flush()
+        if not full:
+            raise
+        raise DiskFull(f"the disk of {path} is full; the recording ends here, make room for the next one") from error
+
+
+def _extend(table: h5py.Dataset, new: NDArray[np.generic]) -> None:
+    start = table.shape[0]
+    table.resize(start + len(new), axis=0)
+    table[start:] = new
+    table.flush()
+
 
 SLOW_ROWS = 1024
 """Rows in a chunk of clock pairs and events."""
@@ -205,3 +244,104 @@ def summed_rows(group: h5py.Group, columns: Sequence[str], sums: str) -> tuple[l
         return stored, 0
     good = row_sums(stored) == checks[:count]
     return [column[good] for column in stored], int(count - good.sum())
+
+
+Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
+Columns = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64] | None]
+
+
+class EventSeries:
+    """Slow or asynchronous values: times and values, read when asked for.
+
+    Parameters
+    ----------
+    group
+        The HDF5 group ``/events/<name>``.
+    aligned
+        Function that gives the times on the samples' axis and the values; None: the stored times are taken as they are.
+    sound_only
+        Leave out values that do not match their checksums instead of refusing the series.
+    """
+
+    def __init__(
+        self, group: h5py.Group, aligned: Callable[[], Pair] | None = None, *, sound_only: bool = False
+    ) -> None:
+        self._group = group
+        self._aligned = aligned
+        self._sound_only = sound_only
+
+    @property
+    def axis(self) -> EventAxis:
+        """Clock in which the stored times are told.
+
+        Raises
+        ------
+        FileFormatError
+            The file names none that is known.
+        """
+        try:
+            defaults = (("time_axis", "samples"), ("clock", ""))
+            kind, clock = (text_attribute(self._group.attrs, name, default) for name, default in defaults)
+            texts = "text" in self._group
+        except (OSError, RuntimeError, KeyError, ValueError) as error:
+            raise FileFormatError(f"events {self._group.name} are damaged; take a copy of the file") from error
+        try:
+            return EventAxis(kind, clock, texts)  # type: ignore[arg-type]  # checked by EventAxis
+        except InputError as error:
+            raise FileFormatError(f"events {self._group.name}: {error}") from error
+
+    def read_raw(self) -> Columns:
+        """Times in the clock of `axis` (s), values, and the host's arrival times (s) or None, each (n_events,).
+
+        Raises
+        ------
+        FileFormatError
+            The series is damaged.
+        """
+        times, values, *others = (np.asarray(one, dtype=float) for one in self._sound()[: 3 if self._arrives else 2])
+        return times, values, others[0] if others else None
+
+    @property
+    def damaged(self) -> int:
+        """Number of values that do not match their checksums."""
+        return summed_rows(self._group, event_columns(self.axis), "sum")[1]
+
+    @property
+    def _arrives(self) -> bool:
+        return self.axis.kind == "device"
+
+    def _sound(self) -> list[NDArray[np.generic]]:
+        """Columns of the rows that match their checksums."""
+        columns, damaged = summed_rows(self._group, event_columns(self.axis), "sum")
+        if damaged and not self._sound_only:
+            raise FileFormatError(
+                f"{self._group.file.filename}: {damaged} values of {self._group.name} are damaged; save the sound ones "
+                "with millfrf recover"
+            )
+        return columns
+
+    def read_texts(self) -> tuple[str, ...]:
+        """The text of each value; empty texts where the series has none.
+
+        Raises
+        ------
+        FileFormatError
+            The series is damaged.
+        """
+        columns = self._sound()
+        if not self.axis.texts:
+            return ("",) * len(columns[0])
+        try:
+            return tuple(bytes(text).decode("utf-8", "replace") for text in columns[-1])
+        except (TypeError, ValueError) as error:
+            raise FileFormatError(f"events {self._group.name} have no readable 'text'; record anew") from error
+
+    def read(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Times on the samples' axis (s) and values, each (n_events,).
+
+        Raises
+        ------
+        FileFormatError
+            The series is damaged, or its clock cannot be aligned.
+        """
+        return self.read_raw()[:2] if self._aligned is None else self._aligned()

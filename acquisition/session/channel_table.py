@@ -4,11 +4,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from foundation import SI_UNITS, InputError, si_factor
+from millfrf.core import SI_UNITS, InputError, si_factor
 
-from ..channel import Channel
-from ..channel_keys import ChannelKeys
-from ..drivers import NiCounter, NiInput
+from ..channels import Channel, ChannelKeys
+from ..drivers.ni_channels import NiCounter, NiInput
 
 STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=False)
 Positive = Annotated[float, Field(gt=0)]

@@ -6,20 +6,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, model_validator
 
-from ..drivers import (
-    STANDARD_SIGNALS,
-    Amplifier,
-    CanFeed,
-    CanSignal,
-    Command,
-    ModbusFeed,
-    Register,
-    RsiFeed,
-    RsiSignal,
-    SerialLink,
-    TachometerFeed,
-    TcpLink,
-)
+from ..drivers.amplifier import Amplifier, Command
+from ..drivers.can_bus import CanFeed, CanSignal
+from ..drivers.modbus import ModbusFeed, Register, SerialLink, TcpLink
+from ..drivers.rsi import STANDARD_SIGNALS, RsiFeed, RsiSignal
+from ..drivers.serial_lines import TachometerFeed
 from .channel_table import STRICT, Name, Positive
 
 Baud = Annotated[int, Field(ge=50, le=10_000_000)]

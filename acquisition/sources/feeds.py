@@ -1,21 +1,204 @@
-"""A sampled source together with feeds of events: one source to record from."""
+"""A sampled source combined with feeds of events that are allowed to fail and reconnect."""
 
+import threading
 import time
 from collections import deque
 from collections.abc import Iterable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from foundation import InputError, MillfrfError
+from millfrf.core import InputError, MillfrfError
 
-from .around_source import AroundSource
-from .device_log import DEVICES, DEVICES_AXIS, NOTE, device_event
-from .enduring_feed import RETRY, EnduringFeed
-from .event_feed import EventFeed
-from .events import EventAxis, Events, announced_events
-from .source import Block, Finishes, Source
-from .wall_clock import WallClock
+from ..errors import DeviceTimeout
+from .source import AroundSource, Block, EventAxis, EventFeed, Events, Finishes, Source, TellsNotes, announced_events
+from .timing import WallClock
+
+DEVICES = "devices"
+"""Name of the series."""
+
+DEVICES_AXIS = EventAxis("host", texts=True)
+"""Its times are those of the host's monotonic clock."""
+
+LOST, BACK, NOTE, FAULT, CLEARED = 0.0, 1.0, 2.0, 3.0, 4.0
+"""Values of the series: a device was lost, it is back; something was noticed; an input is at fault (an overload, an
+open loop), it is well again."""
+
+
+def device_event(time: float, value: float, text: str, series: str = DEVICES) -> Events:
+    """One line of the log at a host's time (s), with its text."""
+    return Events(series, np.array([time]), np.array([value]), None, (text,))
+
+
+@dataclass(frozen=True)
+class DeviceStory:
+    """What happened to auxiliary devices during a recording, one sentence each.
+
+    Parameters
+    ----------
+    losses
+        Devices that were lost and inputs that were at fault, with time and reason, and when it was over.
+    notices
+        Whatever else was noticed: a clock that was set, packets that were lost.
+    """
+
+    losses: tuple[str, ...] = ()
+    notices: tuple[str, ...] = ()
+
+
+def device_story(times: NDArray[np.float64], values: NDArray[np.float64], texts: Sequence[str]) -> DeviceStory:
+    """Tell the log in sentences.
+
+    Parameters
+    ----------
+    times : (n,), s
+        Times of the log's lines, on any one axis.
+    values : (n,)
+        `LOST`, `BACK`, `NOTE`, `FAULT` or `CLEARED`.
+    texts
+        Text of each line, which begins with the device and a colon.
+
+    Examples
+    --------
+    >>> log = ("CAN bus can0: lost (silent)", "CAN bus can0: back")
+    >>> device_story(np.array([2.0, 5.5]), np.array([LOST, BACK]), log).losses
+    ('CAN bus can0: lost (silent) at 2.00 s, back after 3.50 s',)
+    """
+    standing: dict[str, tuple[float, int]] = {}
+    losses: list[str] = []
+    notices: list[str] = []
+    for when, value, text in zip(times, values, texts, strict=True):
+        subject = text.split(": lost")[0].split(": back")[0]
+        if value in (LOST, FAULT):
+            standing[subject] = (float(when), len(losses))
+            losses.append(f"{text} at {when:.2f} s")
+        elif value in (BACK, CLEARED):
+            begun, line = standing.pop(subject, (float(when), -1))
+            if line >= 0:
+                losses[line] += f", {'back' if value == BACK else 'over'} after {when - begun:.2f} s"
+        else:
+            notices.append(f"{text} ({when:.2f} s)")
+    for _, line in standing.values():
+        losses[line] += ", until the end" if ": lost" not in losses[line] else ", not back until the end"
+    return DeviceStory(tuple(losses), tuple(notices))
+
+
+RETRY = 1.0
+"""s between two attempts to bring a device back."""
+
+
+class EnduringFeed:
+    """A feed that gives the events of another one, and the log of its losses instead of its errors.
+
+    Opening it is strict: what is missing before the cut is told before the cut.
+
+    Parameters
+    ----------
+    feed
+        The auxiliary device.
+    log
+        Name of the event series of the log.
+    retry : s
+        Time between two attempts to bring it back.
+    """
+
+    def __init__(self, feed: EventFeed, log: str = DEVICES, retry: float = RETRY) -> None:
+        self._feed, self._log, self._retry = feed, log, retry
+        self.where = str(getattr(feed, "where", type(feed).__name__))
+        self._stop = threading.Event()
+        self._returning: threading.Thread | None = None
+        self._lost_at: float | None = None
+        self._is_open = False
+
+    def open(self) -> None:
+        """Open the device.
+
+        Raises
+        ------
+        DeviceError, InputError
+            It is not there or not as it should be.
+        """
+        self._stop.clear()
+        self._lost_at = None
+        self._feed.open()
+        self._is_open = True
+
+    def poll(self) -> list[Events]:
+        """Give the events since the last call and what there is to log; never waits and never fails."""
+        if not self._is_open:
+            return self._logged([])
+        taken: list[Events] = []
+        try:
+            taken = self._feed.poll()
+        except Exception as error:
+            return self._logged(self._lose(error))
+        if self._lost_at is not None and (taken or not self._feed.event_series):
+            taken.append(self._found(taken))
+        return self._logged(taken)
+
+    def conclude(self) -> list[Events]:
+        """Give the last events, and what the device has to tell of the whole recording."""
+        self._end_attempts()
+        if isinstance(self._feed, TellsNotes):
+            self._feed.conclude()
+        return self.poll()
+
+    def _logged(self, taken: list[Events]) -> list[Events]:
+        """The events together with the device's own notes."""
+        if isinstance(self._feed, TellsNotes):
+            taken += [device_event(at, NOTE, text, self._log) for at, text in self._feed.notes()]
+        return taken
+
+    def _lose(self, error: Exception) -> list[Events]:
+        """Start to bring the device back; the log's line, where it was not lost before."""
+        self._is_open = False
+        self._end_attempts()
+        self._stop.clear()
+        self._returning = threading.Thread(target=self._bring_back, name=f"{self.where} again", daemon=True)
+        self._returning.start()
+        if self._lost_at is not None:
+            return []
+        since = error.since if isinstance(error, DeviceTimeout) else None
+        self._lost_at = time.monotonic() if since is None else since
+        return [device_event(self._lost_at, LOST, f"{self.where}: lost ({self._reason(error)})", self._log)]
+
+    def _found(self, taken: list[Events]) -> Events:
+        """The log's line of a device that is back: the loss ends with its first value."""
+        there = [float((one.times if one.arrivals is None else one.arrivals)[0]) for one in taken]
+        self._lost_at = None
+        return device_event(min([time.monotonic(), *there]), BACK, f"{self.where}: back", self._log)
+
+    def _bring_back(self) -> None:
+        """Open the device again and again until it is there or the recording ends."""
+        feed = self._feed
+        drop, reopen = (feed.drop, feed.reopen) if isinstance(feed, TellsNotes) else (feed.close, feed.open)
+        while not self._stop.is_set():
+            with suppress(Exception):
+                drop()
+            with suppress(Exception):
+                reopen()
+                self._is_open = True
+                return
+            self._stop.wait(self._retry)
+
+    def _reason(self, error: Exception) -> str:
+        """The error without the device's name and without the remedy, which no longer helps."""
+        text = str(error) if isinstance(error, MillfrfError) else f"{type(error).__name__}: {error}"
+        return " ".join(text.split(";")[0].split()).removeprefix(self.where).lstrip(": ") or type(error).__name__
+
+    def close(self) -> None:
+        """End the attempts and release the device."""
+        self._end_attempts()
+        with suppress(Exception):
+            self._feed.close()
+
+    def _end_attempts(self) -> None:
+        self._stop.set()
+        if self._returning is not None:
+            self._returning.join()
+            self._returning = None
 
 
 class WithFeeds(AroundSource):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Recording
-from foundation import MillfrfError
+from millfrf.core import MillfrfError
 from modal_fit import read_modal_model
 
 from .diagnosis_reading import Answer

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import TIP
+from millfrf.core import TIP
 from modal_fit import ModalModel
 
 HEAD = ("HEAD:+X", "HEAD:+Y", "HEAD:+Z")

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf, FrfCovariance
-from modal_fit import REFINED, ModalFit, fit_polyreference
+from modal_fit import ModalFit, fit_polyreference
+from modal_fit.frf_fit.fit import REFINED
 
 from .problem import UNITS, Answer, FoundMode, Problem
 

@@ -21,8 +21,10 @@ from numpy.typing import NDArray
 
 from acquisition import Channel
 from estimation import BandRecording, Frf, local_polynomial
-from foundation import TIP
-from robot_model import frf_at, measured_frf, read_spatial_robot, robot_text, update_robot, updated_document
+from millfrf.core import TIP
+from millfrf.robot_model import measured_frf, read_spatial_robot, update_robot, updated_document
+from millfrf.robot_model.files.robot_files import robot_text
+from millfrf.robot_model.spatial.spatial_modes import frf_at
 
 from .cases import Case, draw_case
 from .independent_cell import cell_at, read_tables, recorded

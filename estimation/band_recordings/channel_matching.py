@@ -1,10 +1,13 @@
-"""Matching of channels to degrees of freedom, with their signs."""
+"""Matching of channels to degrees of freedom, and conversion among displacement, velocity and acceleration."""
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from acquisition import Channel, Stream
-from foundation import SI_UNITS, DegreeOfFreedom, InputError
+from millfrf.core import SI_UNITS, Complex, DegreeOfFreedom, InputError, Real
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ def channel_at(channels: Iterable[Channel], label: str, quantities: Collection[s
     label
         Degree of freedom, ``node:direction``.
     quantities
-        Any of :data:`foundation.SI_UNITS`.
+        Any of :data:`millfrf.core.SI_UNITS`.
 
     Examples
     --------
@@ -68,7 +71,7 @@ def matched_channels(stream: Stream, labels: Sequence[str], quantities: Collecti
     labels
         Degrees of freedom, ``node:direction``.
     quantities
-        Any of :data:`foundation.SI_UNITS`.
+        Any of :data:`millfrf.core.SI_UNITS`.
 
     Raises
     ------
@@ -138,7 +141,7 @@ def channels_of(quantity: str, labels: Sequence[str], names: Sequence[str] = ())
     Parameters
     ----------
     quantity
-        One of :data:`foundation.SI_UNITS`.
+        One of :data:`millfrf.core.SI_UNITS`.
     labels
         Degrees of freedom, ``node:direction``.
     names
@@ -155,3 +158,67 @@ def channels_of(quantity: str, labels: Sequence[str], names: Sequence[str] = ())
         Channel(name, quantity, SI_UNITS[quantity], place.node, place.direction)
         for name, place in zip(called, places, strict=True)
     )
+
+
+DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2, "angle": 0, "angular_velocity": 1}
+"""Times that a displacement or an angle is differentiated to give the quantity."""
+
+
+def derivative_orders(channels: Sequence[Channel]) -> NDArray[np.int64]:
+    """Derivative order of each channel, (n_channels,); 0 for a quantity that is no motion."""
+    return np.array([DERIVATIVE_ORDERS.get(channel.quantity, 0) for channel in channels], dtype=np.int64)
+
+
+def high_pass_corners(channels: Sequence[Channel]) -> tuple[float, ...]:
+    """Corner of each channel's known first-order high-pass, Hz; 0 where none is known."""
+    return tuple(channel.high_pass_hz or 0.0 for channel in channels)
+
+
+def kinematic_factor(frequencies: Real, orders: NDArray[np.int64], corners: Sequence[float]) -> Complex:
+    """Factor from displacement to what is measured, ``(i w)^order  i w / (i w + w_corner)``.
+
+    Parameters
+    ----------
+    frequencies : (n,), Hz
+        Frequencies at which the factor is wanted.
+    orders : (n_channels,)
+        Derivative orders: 0 displacement, 1 velocity, 2 acceleration.
+    corners : (n_channels,), Hz
+        Corners of known first-order high-passes; 0: none.
+
+    Returns
+    -------
+    (n, n_channels)
+
+    Examples
+    --------
+    >>> kinematic_factor(np.array([0.5 / np.pi]), np.array([0, 1, 2]), (0.0, 0.0, 0.0)).round(9).tolist()
+    [[(1+0j), 1j, (-1+0j)]]
+    """
+    s = 2j * np.pi * np.asarray(frequencies, dtype=float)[:, None]
+    factor = np.asarray(s**orders)
+    for column, corner in enumerate(corners):
+        if corner > 0:
+            factor[:, column] *= s[:, 0] / (s[:, 0] + 2 * np.pi * corner)
+    return factor
+
+
+def before_high_pass(s: Complex, corners: Sequence[float]) -> Complex:
+    """Factor from what a sensor shows to what was before its first-order high-pass, ``(s + w_corner) / s``.
+
+    Parameters
+    ----------
+    s : (n,), 1/s
+        ``i w``, or ``i w + 1/tau`` under an exponential window. At 0 Hz the factor is 1: nothing passed there.
+    corners : (n_channels,), Hz
+        Corners of known first-order high-passes; 0: none.
+
+    Returns
+    -------
+    (n, n_channels)
+    """
+    factor = np.ones((len(s), len(corners)), dtype=complex)
+    for column, corner in enumerate(corners):
+        if corner > 0:
+            np.divide(s + 2 * np.pi * corner, s, out=factor[:, column], where=s.imag > 0)
+    return factor

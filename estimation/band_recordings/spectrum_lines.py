@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, prev_fast_len, rfft
 
-from .reduced_recording import BandRecording
+from millfrf.core import Complex, Real
+
+from .band_recording import BandRecording
 
 if TYPE_CHECKING:
-    from ..repeats import MeasuredNoise
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
+    from ..repeats.noise import MeasuredNoise
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, median_filter
 from scipy.stats import chi2
 
-from .late_answers import LateAnswers, late_answers
-from .screening import FoundTaps
-from .segments import TapSettings
+from millfrf.core import Real
 
-Real = NDArray[np.float64]
+from .segments import TapSettings
+from .tap_spectra import LateAnswers, late_answers
+from .taps import FoundTaps
+
 DIED_OUT = 0.003
 """Share of an answer that may be cut off: it is the relative error of an FRF at its resonances."""
 

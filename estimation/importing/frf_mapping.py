@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from foundation import DegreeOfFreedom, InputError, checked_toml
+from millfrf.core import DegreeOfFreedom, InputError, checked_toml
 
 _STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 _RANGE = re.compile(r"(?P<prefix>.*?)(?P<first>\d+)\.\.(?P<last>\d+)(?P<rest>:.+)")

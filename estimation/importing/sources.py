@@ -1,6 +1,7 @@
-"""A file of FRFs as columns or arrays to choose from: what its parts are, where it says so, and their numbers."""
+"""Columns and arrays of a file with FRFs, their roles, and their numbers as complex values over Hz."""
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -9,12 +10,159 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import open_arrays
-from foundation import FileFormatError, InputError
+from millfrf.core import Complex, FileFormatError, InputError, Real
 
-from .column_roles import column, column_roles, described
-from .frf_mapping import TextOptions
+from .frf_mapping import FrfTable, TextOptions
 from .text_table import SUFFIXES as TEXT_SUFFIXES
 from .text_table import TextTable, read_text_table
+
+_TO_HZ = {"Hz": 1.0, "kHz": 1e3, "rad/s": 1 / (2 * np.pi)}
+_SPOKEN_PHASES = {"deg": "deg", "degree": "deg", "degrees": "deg", "°": "deg", "rad": "rad", "radian": "rad"}
+_DECIBEL = 20.0
+
+
+def complex_values(parts: Mapping[str, NDArray[np.generic]], table: FrfTable, where: str) -> Complex:
+    """The FRF's numbers, in the file's unit, for ``exp(+i w t)``.
+
+    Parameters
+    ----------
+    parts
+        Arrays of one shape: ``values``, or ``real`` and ``imaginary``, or ``magnitude`` and ``phase``.
+    table
+        Unit of the phase, decibels, sign convention.
+    where
+        File, for messages.
+
+    Raises
+    ------
+    InputError
+        No part, shapes that differ, or a phase whose unit is not said.
+    """
+    shapes = {name: array.shape for name, array in parts.items()}
+    if len(set(shapes.values())) > 1:
+        said = ", ".join(f"{name} {shape}" for name, shape in shapes.items())
+        raise InputError(f"{where}: parts of the FRF have different shapes ({said}); name parts that belong together")
+    if "values" in parts:
+        values = np.asarray(parts["values"], dtype=np.complex128)
+    elif "real" in parts:
+        values = np.asarray(parts["real"], dtype=float) + 1j * np.asarray(parts["imaginary"], dtype=float)
+    else:
+        values = _polar(np.asarray(parts["magnitude"], float), np.asarray(parts["phase"], float), table, where)
+    return np.asarray(values.conj() if table.conjugate else values)
+
+
+def _polar(magnitude: Real, phase: Real, table: FrfTable, where: str) -> Complex:
+    if table.phase_unit is None:
+        raise InputError(f'{where}: the unit of the phase is not said; write phase_unit = "deg" or "rad" under [frf]')
+    size = 10 ** (magnitude / _DECIBEL) if table.decibels else magnitude
+    if not table.decibels and (size < 0).any():
+        raise InputError(f"{where}: a magnitude is {size.min():g}; if it is in dB, write decibels = true under [frf]")
+    angle = np.radians(phase) if table.phase_unit == "deg" else phase
+    return np.asarray(size * np.exp(1j * angle))
+
+
+def hertz(frequencies: NDArray[np.generic], unit: str | None, where: str) -> Real:
+    """Frequencies (n_frequencies,) in Hz.
+
+    Raises
+    ------
+    InputError
+        Complex numbers, or values that are not finite or do not increase.
+    """
+    if np.iscomplexobj(frequencies) and not np.imag(frequencies).any():
+        frequencies = np.real(frequencies)  # MATLAB keeps a list of frequencies beside complex values as complex
+    if np.iscomplexobj(frequencies):
+        raise InputError(f"{where}: the frequencies are complex numbers; name the array or column of frequencies")
+    f = np.asarray(frequencies, dtype=float).reshape(-1) * _TO_HZ[unit or "Hz"]
+    if not len(f) or not np.isfinite(f).all():
+        raise InputError(f"{where}: frequencies are missing or not finite; mend the file")
+    if (np.diff(f) <= 0).any():
+        line = int(np.argmax(np.diff(f) <= 0))
+        raise InputError(
+            f"{where}: frequencies do not increase ({f[line]:g} Hz is followed by {f[line + 1]:g} Hz); name the right "
+            "column or array, or sort the lines"
+        )
+    return f
+
+
+def stated_frequency_unit(text: str) -> str | None:
+    """``Hz``, ``kHz`` or ``rad/s`` from a column's unit; None where it says none of them."""
+    return next((unit for unit in _TO_HZ if text.strip().lower() == unit.lower()), None)
+
+
+def stated_phase_unit(text: str) -> str | None:
+    """``deg`` or ``rad`` from a column's unit; None where it says neither."""
+    return _SPOKEN_PHASES.get(text.strip().lower()) or None
+
+
+_ROLES = {
+    "frequency": r"freq\w*",
+    "real": r"re|real\w*",
+    "imaginary": r"im|imag\w*",
+    "magnitude": r"mag\w*|amp\w*|abs|absolute|modulus|betrag",
+    "phase": r"phase|phas|phs|arg|angle",
+    "coherence": r"coh\w*|gamma2?",
+}
+_WAYS = (("real", "imaginary"), ("magnitude", "phase"))
+_WORD = r"(?:^|[\s_.:,;|(\[-])(?:{})(?:$|[\s_.:,;|(\[)\]-])"
+
+
+def column_roles(table: TextTable) -> dict[str, int]:
+    """Find the column, counted from 1, of each part that is certain.
+
+    Certain is a frequency that one heading names, and with it either a real and an imaginary part or a magnitude and a
+    phase, each named once, with the coherence.
+
+    Parameters
+    ----------
+    table
+        Table of numbers with headings.
+    """
+    found: dict[str, list[int]] = {role: [] for role in _ROLES}
+    for number, heading in enumerate(table.headings, 1):
+        for role, words in _ROLES.items():
+            if re.search(_WORD.format(words), heading, re.IGNORECASE):
+                found[role].append(number)
+    if not found["frequency"]:
+        found["frequency"] = [k for k, unit in enumerate(table.units, 1) if stated_frequency_unit(unit) is not None]
+    once = {role: places[0] for role, places in found.items() if len(places) == 1}
+    for way in _WAYS:
+        if all(len(found[role]) == 1 for role in ("frequency", *way)):
+            kept = ("frequency", *way, "coherence")
+            return {role: place for role, place in once.items() if role in kept}
+    return {role: place for role, place in once.items() if role == "frequency"}
+
+
+def column(table: TextTable, place: int | str, part: str) -> int:
+    """A column's number, counted from 0, by its number from 1 or its heading.
+
+    Raises
+    ------
+    InputError
+        No such column, or a heading that several have.
+    """
+    if isinstance(place, int) and place <= len(table.headings):
+        return place - 1
+    same = [k for k, heading in enumerate(table.headings) if heading == place]
+    if len(same) == 1:
+        return same[0]
+    raise InputError(f"{table.path}: {part} = {place!r} is no column of it; it has {described(table)}")
+
+
+def described(table: TextTable) -> str:
+    """Columns by number, heading and unit: ``1 Frequency (Hz), 2 Real``."""
+    shown = []
+    for number, (heading, unit) in enumerate(zip(table.headings, table.units, strict=True), 1):
+        told = f"({unit})" if unit and unit not in heading else ""
+        shown.append(" ".join(filter(None, (str(number), heading, told))))
+    return ", ".join(shown)
+
+
+def unit_of(table: TextTable, roles: Mapping[str, int | str]) -> str:
+    """Unit of the FRF's column: of its complex values, its real part or its magnitude; empty where none is stated."""
+    place = next((roles[part] for part in ("values", "real", "magnitude") if part in roles), None)
+    return "" if place is None else table.units[column(table, place, "unit")]
+
 
 ARRAY_SUFFIXES = (".npz", ".npy", ".mat", ".h5", ".hdf5")
 

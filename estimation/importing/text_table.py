@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError
 
 from .frf_mapping import TextOptions
 

@@ -8,13 +8,10 @@ from numpy.typing import NDArray
 from scipy.fft import rfft
 
 from acquisition import Channel
-from foundation import InputError
+from millfrf.core import Complex, InputError, Real
 
-from ..band_recordings import BandRecording
+from ..band_recordings.band_recording import BandRecording
 from .period_search import ALIKE, RepeatedForce, find_repeats
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 
 TRANSIENT = 4.0
 """Power of the change to the next period, over that of later changes, from which a period is part of a transient."""

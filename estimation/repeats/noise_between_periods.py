@@ -1,20 +1,16 @@
-"""Noise from what does not repeat: between the periods of a recording, or between recordings of one force."""
+"""Noise from repeated periods or recordings: all that does not repeat."""
 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import rfft
 
-from foundation import InputError
+from millfrf.core import Complex, InputError, Real
 
-from ..band_recordings import BandRecording
-from .cut_periods import Realisation, SteadyPeriods
-from .noise_type import PERIODS, REPEATS, MeasuredNoise, averaged_lines, parted
-from .period_search import ALIKE
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
+from ..band_recordings.band_recording import BandRecording
+from .cut_periods import Realisation, SteadyPeriods, steady_periods
+from .noise import PERIODS, REPEATS, MeasuredNoise, averaged_lines, noise_bound, noise_in_silence, parted
+from .period_search import ALIKE, find_repeats
 
 DRIFT = 0.5
 """Von Neumann's ratio below which the periods drift: white noise has 1, a straight drift 0."""
@@ -159,3 +155,30 @@ def _noise(periods: SteadyPeriods, covariance: Complex, freedom: int, kind: str,
     return MeasuredNoise(
         periods.frequencies, periods.rate, responses, forces, cross, kind, behind, share[m:], share[:m], said
     )
+
+
+def measured_noise(recordings: Sequence[BandRecording], band: tuple[float, float]) -> MeasuredNoise:
+    """Measure the noise of recordings of one level by the first of these that they allow.
+
+    Periods of the forces; recordings that repeat one force; stretches without force; else the upper bound of
+    :func:`noise_bound`.
+
+    Parameters
+    ----------
+    recordings
+        Recordings of the same channels and sample rate.
+    band : Hz
+        Lowest and highest frequency of the lines.
+
+    Raises
+    ------
+    InputError
+        No recording, or a band in which none of these can be had.
+    """
+    if not recordings:
+        raise InputError("no recording; give at least one")
+    if all(find_repeats(one.force) is not None for one in recordings):
+        return noise_of_periods(steady_periods(recordings).within(band))
+    if same_at_once(recordings):
+        return noise_of_repeats(recordings, band)
+    return noise_in_silence(recordings, band) or noise_bound(recordings, band)

@@ -3,12 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-from foundation import InputError
-
-Real = NDArray[np.float64]
+from millfrf.core import InputError, Real
 
 ALIKE = 0.99
 """Correlation of the forces with themselves a lag later from which they repeat."""

@@ -1,5 +1,1 @@
 """Averaged spectra of recordings: windows, stacking, coherence, independence of inputs, and usable samples."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,11 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
+from millfrf.core import InputError, Real
 
-from .spectral_matrix import CrossSpectra
-
-Real = NDArray[np.float64]
+from .cross_spectra import CrossSpectra
 
 
 def spectrogram(samples: Real, sample_rate: float, segment: float) -> tuple[Real, Real, Real]:

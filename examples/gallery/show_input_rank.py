@@ -19,8 +19,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from acquisition import Recording, record
-from cutting import MillingProcess
 from estimation import cross_spectra, input_independence, settings_for, sum_tests
+from millfrf.cutting import MillingProcess
 from replay_data import LinearSweep, MillingCell, default_structure
 
 RPM = pi / 30

@@ -12,7 +12,7 @@ the lowest natural frequency change by a factor over the work area.
 import matplotlib.pyplot as plt
 import numpy as np
 
-from robot_model import modal_model_at, read_spatial_robot, target_of, tool_down, wrist_solutions
+from millfrf.robot_model import modal_model_at, read_spatial_robot, target_of, tool_down, wrist_solutions
 
 robot = read_spatial_robot("kuka_kr90_r3100").robot
 reach = np.linspace(1.2, 2.6, 15)

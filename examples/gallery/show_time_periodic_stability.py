@@ -15,9 +15,9 @@ from math import acos, pi
 import matplotlib.pyplot as plt
 import numpy as np
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
+from millfrf.stability import collocation, multipliers, zero_order
 from replay_data import table_one_model
-from stability import collocation, multipliers, zero_order
 
 RPM = pi / 30
 ENTRY = pi - acos(1 - 2 * 0.1)

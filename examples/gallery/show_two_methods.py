@@ -19,7 +19,7 @@ import numpy as np
 
 import millfrf as mf
 from acquisition import record
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
 from replay_data import LinearSweep, MillingCell, default_structure
 
 RPM = pi / 30

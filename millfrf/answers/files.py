@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from estimation import SweepPlan, read_frf
+from millfrf.stability import read_lobes
 from modal_fit import read_modal_model
-from stability import read_lobes
 
 from ..file_kinds import FRF, LOBES, MODEL
 from ..inspection import Findings

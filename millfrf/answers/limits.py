@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from stability import StabilityLobes
+from millfrf.stability import StabilityLobes
 
 from ..chain import JudgedCut
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Recording, RecordingWriter, StreamDescription
-from foundation import Result, Summary, doubts_line, listed, writing_whole_file
-from mismatch import Prediction, predict, read_recording, require_room_for_comparison
+from millfrf.core import Result, Summary, doubts_line, listed, writing_whole_file
+from millfrf.mismatch import Prediction, predict, read_recording, require_room_for_comparison
 from modal_fit import ModalModel
 
 from ..gate import check_model_and_recordings, check_scales

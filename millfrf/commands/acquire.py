@@ -26,7 +26,7 @@ def acquire(
     force: bool = False,
 ) -> None:
     """Record from the devices of a session until its duration is over, Stop is pressed or Ctrl-C."""
-    from foundation import InputError
+    from millfrf.core import InputError
 
     from ..chain import open_session
     from ..options import check_output
@@ -55,7 +55,7 @@ def acquire(
 
 def _check(source: object, seconds: float) -> None:
     from acquisition import Source
-    from foundation import MillfrfError
+    from millfrf.core import MillfrfError
 
     from ..chain import listen, preflight
     from ..tables import show

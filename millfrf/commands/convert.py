@@ -27,7 +27,7 @@ def convert(
     """
     from acquisition import SUFFIXES as CAN_LOGS
     from acquisition import add_can_log
-    from foundation import InputError, refuse_replacing
+    from millfrf.core import InputError, refuse_replacing
 
     from ..chain import FRF_SUFFIXES, convert_files, is_frf_conversion, is_uff_conversion
     from ..progress import bar

@@ -60,7 +60,7 @@ def demo(
 
 def _folder(out: Path | None, what: str) -> Path:
     """Where the results go: a folder that was named must not hold such results; else the next that is free."""
-    from foundation import free_name, refuse_replacing
+    from millfrf.core import free_name, refuse_replacing
 
     if out is None:
         return free_name(DEFAULT)

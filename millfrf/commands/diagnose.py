@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from foundation import InputError
+from millfrf.core import InputError
 
 from ..options import FigureFormat, Figures, check_band, check_shares
 from ..terminal import say, tell
@@ -47,7 +47,7 @@ def diagnose(
     figure_format: FigureFormat = "svg",
 ) -> None:
     """Locate where a model and recordings disagree, name the physics left out, model it, show that the fit improves."""
-    from mismatch import LabError, SearchSettings, Settings
+    from millfrf.mismatch import LabError, SearchSettings, Settings
 
     from ..answers import stored_answer
     from ..gate import read_checked_cutting

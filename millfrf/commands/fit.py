@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from foundation import InputError
+from millfrf.core import InputError
 
 from ..options import Output, Stream, check_band, check_output, echo_warnings, names
 from ..terminal import say, tell

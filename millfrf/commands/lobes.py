@@ -30,9 +30,9 @@ def lobes(
     ] = None,
 ) -> None:
     """Stability lobes from a modal model or straight from a measured FRF."""
-    from cutting import read_cutting_process
+    from millfrf.cutting import read_cutting_process
+    from millfrf.stability import write_lobes
     from modal_fit import read_modal_model
-    from stability import write_lobes
 
     from ..answers import lobes_answer
     from ..chain import draw_lobes_of, lobes_summary, mode_coupling_line

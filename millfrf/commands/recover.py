@@ -23,7 +23,7 @@ def recover(
     Damaged samples are listed, and never copied; the old file is left as it is.
     """
     from acquisition import recover as recover_file
-    from foundation import free_name
+    from millfrf.core import free_name
 
     from ..options import check_output
     from ..progress import bar

@@ -6,9 +6,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from acquisition import Recording
-from cutting import MillingProcess
-from foundation import InputError, writing_whole_folder
-from mismatch import diagnose_cut, read_cut_recording, require_room_for_cut, write_diagnosis, write_improved_cut
+from millfrf.core import InputError, writing_whole_folder
+from millfrf.cutting import MillingProcess
+from millfrf.mismatch import diagnose_cut, read_cut_recording, require_room_for_cut, write_diagnosis, write_improved_cut
 from modal_fit import read_modal_model
 
 from ..gate import RECORD_AGAIN, check_depth, check_one_speed, check_recordings, read_checked_cutting

@@ -2,7 +2,7 @@
 
 import math
 
-from mismatch import COEFFICIENTS, AcceptedCause, CutDiagnosis
+from millfrf.mismatch import COEFFICIENTS, AcceptedCause, CutDiagnosis
 
 from ..tables import evidence_in_words, with_error
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from acquisition import record
-from foundation import InputError, MillfrfError, writing_whole_file
+from millfrf.core import InputError, MillfrfError, writing_whole_file
 from modal_fit import ModalModel
 from replay_data import (
     FINE_RATE,

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from cutting import MillingProcess, immersion_angles, write_cutting_process
+from millfrf.cutting import MillingProcess, immersion_angles, write_cutting_process
+from millfrf.stability import StabilityLobes, certified_lobes, write_lobes, zero_order
 from modal_fit import ModalModel
 from replay_data import Settling, settle
-from stability import StabilityLobes, certified_lobes, write_lobes, zero_order
 
 from ..progress import Progress, silent
 from ..provenance import made

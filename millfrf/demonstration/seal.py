@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from foundation import InputError, writing_whole_file
+from millfrf.core import InputError, writing_whole_file
 
 PADDED = 4096
 """Bytes of every sealed file, so that its length tells nothing."""

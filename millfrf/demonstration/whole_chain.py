@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import Source, record
-from cutting import write_cutting_process
 from estimation import Frf
-from figures import lobes_figure
-from foundation import writing_whole_file, writing_whole_folder
+from millfrf.core import writing_whole_file, writing_whole_folder
+from millfrf.cutting import write_cutting_process
+from millfrf.figures import lobes_figure
+from millfrf.stability import StabilityLobes, certified_lobes, read_lobes, write_lobes
 from modal_fit import ModalModel, write_modal_model
 from replay_data import (
     ACETAL_CUTTER,
@@ -25,7 +26,6 @@ from replay_data import (
     milling_sensors,
     tip_model,
 )
-from stability import StabilityLobes, certified_lobes, read_lobes, write_lobes
 
 from ..chain import (
     SUBSPACE,

@@ -2,8 +2,8 @@
 
 import os
 
-from foundation import Band, InputError
-from mismatch import Diagnosis, Settings, StructureDiagnosis
+from millfrf.core import Band, InputError
+from millfrf.mismatch import Diagnosis, Settings, StructureDiagnosis
 
 from ..progress import Progress, silent
 from ..structure import diagnose_recordings

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from acquisition import Channel
 from estimation import CrossSpectra, Frf
-from foundation import Band, DegreeOfFreedom
+from millfrf.core import Band, DegreeOfFreedom
 
 from ..chain import Estimate, EstimateOptions, estimate_recordings
 from ..progress import Progress, silent

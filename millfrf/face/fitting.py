@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from estimation import Frf
-from foundation import Band, InputError
+from millfrf.core import Band, InputError
 from modal_fit import ModalFit, ModalModel, SubspaceFit, TipCalibration
 
 from ..chain import METHODS, POLYREFERENCE, SUBSPACE, Estimate, FitOptions, calibrate_model, fit_model, fit_recordings

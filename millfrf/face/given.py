@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from acquisition import Recording, Stream
-from cutting import MillingProcess
 from estimation import Frf, read_frf
-from foundation import InputError, MillfrfWarning
+from millfrf.core import InputError, MillfrfWarning
+from millfrf.cutting import MillingProcess
 from modal_fit import ModalFit, ModalModel, SubspaceFit, TipCalibration, read_modal_model
 
 from ..chain import Estimate
@@ -26,7 +26,7 @@ HIGHEST_LEVEL = 3
 
 
 def warn_of(doubts: Iterable[str]) -> None:
-    """Give each doubt once as a :class:`foundation.MillfrfWarning` at the line that called the face."""
+    """Give each doubt once as a :class:`millfrf.core.MillfrfWarning` at the line that called the face."""
     for doubt in dict.fromkeys(doubts):
         warnings.warn(doubt, MillfrfWarning, stacklevel=HIGHEST_LEVEL)
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from cutting import MillingProcess
 from estimation import Frf
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.stability import StabilityLobes
 from modal_fit import ModalModel
-from stability import StabilityLobes
 
 from ..chain import CERTIFIED, compute_lobes, speed_axis
 from ..gate import check_depth, check_speeds, lowest_frequency, rigid_directions

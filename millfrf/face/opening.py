@@ -4,12 +4,12 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from acquisition import Recording, Stream
-from cutting import read_cutting_process
 from estimation import read_frf, read_geometry
-from foundation import FileFormatError, InputError, MillfrfError, MillfrfWarning
-from mismatch import read_diagnosis
+from millfrf.core import FileFormatError, InputError, MillfrfError, MillfrfWarning
+from millfrf.cutting import read_cutting_process
+from millfrf.mismatch import read_diagnosis
+from millfrf.stability import read_lobes
 from modal_fit import read_modal_model, read_picked_poles
-from stability import read_lobes
 
 from ..chain import read_cuts
 from ..file_kinds import CHATTER, CUTTING, DIAGNOSIS, FRF, GEOMETRY, LOBES, MODEL, POLES, RECORDING, kind_of

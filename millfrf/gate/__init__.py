@@ -1,6 +1,7 @@
 """The gate: one place decides whether what is given makes sense for a job.
 
-A function ``check_...`` raises :class:`foundation.InputError` (one line: the value and the remedy) where the job cannot
+A function ``check_...`` raises :class:`millfrf.core.InputError` (one line: the value and the remedy) where the job
+cannot
 be done with what is given, and returns doubts: sentences that a command prints as warnings and stores with the result.
 """
 

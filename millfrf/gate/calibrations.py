@@ -3,7 +3,7 @@
 import numpy as np
 
 from estimation import Frf, to_receptance
-from foundation import InputError, shared_band
+from millfrf.core import InputError, shared_band
 from modal_fit import ModalModel
 
 from .frfs import check_frf

@@ -1,7 +1,7 @@
 """Do samples agree with the host's clock? A wrong rate moves every resonance, a gap shifts what follows."""
 
 from acquisition import ClockFindings, Recording, check_clock
-from foundation import InputError
+from millfrf.core import InputError
 
 
 def clock_concerns(recording: Recording, stream: str) -> list[str]:

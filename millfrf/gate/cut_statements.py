@@ -5,8 +5,8 @@ import tomllib
 from dataclasses import dataclass
 from typing import Any
 
-from cutting import MillingProcess
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
 
 from .spindle import check_speed
 

@@ -4,8 +4,8 @@ import math
 import os
 from dataclasses import dataclass
 
-from cutting import MillingProcess, read_cutting_process
-from foundation import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError
+from millfrf.cutting import MillingProcess, read_cutting_process
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def read_checked_cutting(path: str | os.PathLike[str]) -> tuple[MillingProcess, 
     Raises
     ------
     InputError
-        What :func:`cutting.read_cutting_process` refuses, or a value that no machine has.
+        What :func:`millfrf.cutting.read_cutting_process` refuses, or a value that no machine has.
     """
     process = read_cutting_process(path)
     try:

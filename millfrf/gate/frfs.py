@@ -3,7 +3,7 @@
 import numpy as np
 
 from estimation import Frf
-from foundation import Band, InputError, shared_band
+from millfrf.core import Band, InputError, shared_band
 
 from .incoherence import incoherence_doubts
 from .passivity import DrivePoint, drive_points, returned_power, rising_phase

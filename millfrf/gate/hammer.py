@@ -9,7 +9,7 @@ import numpy as np
 
 from acquisition import Stream
 from estimation import Decay, FoundTaps, Frf, MergedTaps, TapSettings, TapTest
-from foundation import InputError
+from millfrf.core import InputError
 
 from ..progress import Progress, silent
 from .frfs import check_frf

@@ -14,7 +14,7 @@ from estimation import (
     spectra_for_judging,
     sum_tests,
 )
-from foundation import Band, InputError
+from millfrf.core import Band, InputError
 
 from .sample_rates import check_sample_rates, gain_of
 

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
 from estimation import Frf
-from foundation import Band, InputError
-from modal_fit import ModalModel
-from stability import (
+from millfrf.core import Band, InputError
+from millfrf.cutting import MillingProcess
+from millfrf.stability import (
     LimitSensitivity,
     StabilityLobes,
     known_lines,
@@ -17,6 +16,7 @@ from stability import (
     with_residual_flexibility,
     zero_order,
 )
+from modal_fit import ModalModel
 
 DECIDES = 4.0
 """Limit over the lowest of all speeds from which a mode outside the band may decide: one with a quarter of the dynamic
@@ -144,7 +144,8 @@ def _moved_from_outside(
     """A doubt where harmonics outside the band would move limits whose chatter lies inside.
 
     The shift is ``sum_q |weights[q]| u (edge / f_q)^2`` over the lines f_q of the motion outside the band, with the
-    weights of :class:`stability.LimitSensitivity`. Below the band the unknown flexibility u is a share of the largest
+    weights of :class:`millfrf.stability.LimitSensitivity`. Below the band the unknown flexibility u is a share of the
+    largest
     inside, above it no more than the upper end of the band allows. Averaged coefficients have no such lines.
     """
     if lobes.method in AVERAGED:

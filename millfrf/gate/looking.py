@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from foundation import InputError
+from millfrf.core import InputError
 
 T = TypeVar("T")
 

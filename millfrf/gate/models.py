@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf
-from foundation import InputError
+from millfrf.core import InputError
 from modal_fit import ModalModel
 
 from ..provenance import read_provenance

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf
-from foundation import DegreeOfFreedom
+from millfrf.core import DegreeOfFreedom
 
 COHERENT = 0.8
 """Multiple coherence of every response from which a line is judged."""

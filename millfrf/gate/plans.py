@@ -2,9 +2,9 @@
 
 import math
 
-from cutting import MillingProcess
 from estimation import SweepDemand, SweepPlan
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
 
 from .cutting_data import MOST_RADIANS
 from .spindle import MOST_RPM, check_depth

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from estimation import Frf, ReciprocityPair, reciprocity_pairs
-from foundation import Band
+from millfrf.core import Band
 from modal_fit import ModalModel, mode_reciprocity
 
 PLAIN = 0.3

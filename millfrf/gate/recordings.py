@@ -7,7 +7,7 @@ from pathlib import Path
 
 from acquisition import Recording, Stream
 from estimation import choose_channels
-from foundation import InputError
+from millfrf.core import InputError
 
 from ..progress import Progress, silent
 from .clocks import check_clock_of, clock_concerns

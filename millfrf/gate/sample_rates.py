@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import CrossSpectra
-from foundation import InputError
+from millfrf.core import InputError
 
 Real = NDArray[np.float64]
 

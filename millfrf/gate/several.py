@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from foundation import InputError
+from millfrf.core import InputError
 
 from ..provenance import sha256
 

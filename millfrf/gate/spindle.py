@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
 from estimation import Frf
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
 MOST_RPM = 500_000.0

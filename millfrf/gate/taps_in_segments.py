@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition import Stream
 from estimation import find_taps
-from foundation import InputError
+from millfrf.core import InputError
 
 from .signals import ChannelLevel
 

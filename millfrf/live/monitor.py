@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from acquisition import Block, Channel, Events, StreamDescription
 from estimation import Frf
-from foundation import InputError
+from millfrf.core import InputError
 
 from .enough import BandProgress, band_progress
 from .session import SPEED_EVENTS, MilledSpeeds, SessionTests, SetUp, Standing

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition import Channel
 from estimation import EXCITING, RESPONDING, CrossSpectra, Resampler, SpectralAccumulator, settings_for, whole_ratio
-from foundation import InputError
+from millfrf.core import InputError
 
 Real = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import CrossSpectra, Frf, h1, input_independence, sum_tests
-from foundation import InputError
+from millfrf.core import InputError
 
 from ..gate import driven_lines
 

@@ -72,7 +72,7 @@ def new_schemas(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the schemas.")],
 ) -> None:
     """Write a JSON schema of each TOML file, for editors that complete and check keys."""
-    from foundation import writing_whole_folder
+    from millfrf.core import writing_whole_folder
 
     from ..toml_files import json_schema, toml_files
 

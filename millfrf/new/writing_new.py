@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from foundation import writing_whole_file
+from millfrf.core import writing_whole_file
 
 
 def write_new(out: Path, text: str) -> None:

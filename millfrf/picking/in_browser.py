@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from estimation import read_frf
-from foundation import InputError
+from millfrf.core import InputError
 
 from ..chain import FitOptions, fit_model
 from ..file_kinds import FRF, kind_of

@@ -4,7 +4,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from foundation import writing_whole_file
+from millfrf.core import writing_whole_file
 
 from ..provenance import sources, versions
 from .session import Pole

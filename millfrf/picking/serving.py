@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from foundation import InputError, MillfrfError
+from millfrf.core import InputError, MillfrfError
 
 from ..live import LOOPBACK, CountedServer, Guard, Guarded, Limits, Missing, hosts_of
 from .session import PickSession, Pole, checked_choice, drawn_page, fitted_answer
@@ -83,7 +83,7 @@ async def _served(session: PickSession, say: Callable[[str], None], show: Callab
 
 
 def _content(session: PickSession) -> dict[str, tuple[bytes, str]]:
-    from figures import browser_library
+    from millfrf.figures import browser_library
 
     own = {name: (_FOLDER / name).read_bytes() for name in ("page.js", "page.css")}
     made = {"page.json": drawn_page(session).encode(), "bokeh.min.js": browser_library().encode()}

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf
-from figures import EntryCurves, picking_chart, zoomed_frfs
-from foundation import Band, InputError, MillfrfError
+from millfrf.core import Band, InputError, MillfrfError
+from millfrf.figures import EntryCurves, picking_chart, zoomed_frfs
 from modal_fit import CandidateGroup, ModalFit, ModalModel, candidate_groups, fit_picked_poles, synthesis
 
 LINES = 1500

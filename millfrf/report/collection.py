@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from acquisition import Recording
-from cutting import MillingProcess
 from estimation import Frf, Geometry, read_frf, read_geometry
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.stability import StabilityLobes, read_lobes
 from modal_fit import ModalModel, read_modal_model
-from stability import StabilityLobes, read_lobes
 
 from ..chain import KeptCut, read_cuts
 from ..file_kinds import CHATTER, CUTTING, FRF, GEOMETRY, LOBES, MODEL, RECORDING, kind_of

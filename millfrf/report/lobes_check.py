@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
 from estimation import Frf, to_receptance
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.stability import StabilityLobes, certified_lobes, zero_order
 from modal_fit import ModalModel
-from stability import StabilityLobes, certified_lobes, zero_order
 
 from .collection import Collected, SourceFile
 

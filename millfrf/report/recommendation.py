@@ -5,12 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cutting import MillingProcess
 from estimation import Frf
-from foundation import TIP, InputError
-from modal_fit import ModalModel, Residuals
-from replay_data import Settling, settle
-from stability import (
+from millfrf.core import TIP, InputError
+from millfrf.cutting import MillingProcess
+from millfrf.stability import (
     LimitBand,
     RecommendedCut,
     StabilityLobes,
@@ -21,6 +19,8 @@ from stability import (
     limit_band,
     lowered,
 )
+from modal_fit import ModalModel, Residuals
+from replay_data import Settling, settle
 
 from ..gate import check_band_of_lobes, limits_inside_band
 from .lobes_check import CheckedLobes

@@ -5,7 +5,7 @@ from typing import Literal
 
 from matplotlib.figure import Figure
 
-from figures import MovingShapes, SmallSvg, ZoomedPlot, as_data_uri
+from millfrf.figures import MovingShapes, SmallSvg, ZoomedPlot, as_data_uri
 
 from ..tables import Table
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from foundation import InputError
-from robot_model import Payload
+from millfrf.core import InputError
+from millfrf.robot_model import Payload
 
 FURTHEST = 20.0
 """Largest coordinate of a place that is taken, m."""

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from figures import COLOURS, LINE_STYLES, house_style, new_figure, panel_letter, save_figure
-from robot_model import CompensatedPath, ToolPath
+from millfrf.figures import COLOURS, LINE_STYLES, house_style, new_figure, panel_letter, save_figure
+from millfrf.robot_model import CompensatedPath, ToolPath
 
 
 def draw_compensation(path: Path, nominal: ToolPath, result: CompensatedPath) -> None:

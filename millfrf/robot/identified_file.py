@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from foundation import InputError
-from robot_model import (
+from millfrf.core import InputError
+from millfrf.robot_model import (
     ElasticParameter,
     Identification,
     JointStiffness,
@@ -31,7 +31,7 @@ KEYS = {
 def identified_values(
     robot: str, table: str, parameters: Sequence[ElasticParameter], found: Identification, prior: float
 ) -> dict[Place, Any]:
-    """New values by their place in the file, :func:`robot_model.changed_robot_text`.
+    """New values by their place in the file, :func:`millfrf.robot_model.changed_robot_text`.
 
     What the data does not fix is written too: its combination with the rest is what predicts. Its table says so.
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from foundation import InputError, MillfrfError, writing_whole_file
-from robot_model import (
+from millfrf.core import InputError, MillfrfError, writing_whole_file
+from millfrf.robot_model import (
     ElasticParameter,
     HeldOut,
     Identification,

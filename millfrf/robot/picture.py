@@ -7,9 +7,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from figures import house_style, new_figure, panel_letter
-from foundation import writing_whole_file
-from robot_model import CutPlace, DeviationMap, SpatialCase, close_loops, modes_at
+from millfrf.core import writing_whole_file
+from millfrf.figures import house_style, new_figure, panel_letter
+from millfrf.robot_model import CutPlace, DeviationMap, SpatialCase, close_loops, modes_at
 
 from .shown import mode_page, robot_figure
 

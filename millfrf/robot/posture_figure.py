@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from figures import COLOURS, SHADE, house_style, new_figure, panel_letter, save_figure
-from robot_model import PostureMap
+from millfrf.figures import COLOURS, SHADE, house_style, new_figure, panel_letter, save_figure
+from millfrf.robot_model import PostureMap
 
 
 def draw_posture_map(path: Path, found: PostureMap, max_depth: float, depth: float | None, what: str) -> None:

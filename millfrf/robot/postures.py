@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
-from robot_model import (
+from millfrf.core import InputError
+from millfrf.robot_model import (
     CutPlace,
     Mechanism,
     PlanarCase,

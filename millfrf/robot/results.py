@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import write_frf
-from figures import save_figure
-from foundation import InputError, writing_whole_file
-from modal_fit import write_modal_model
-from robot_model import (
+from millfrf.core import InputError, writing_whole_file
+from millfrf.figures import save_figure
+from millfrf.robot_model import (
     PostureResult,
     SpatialRobot,
     ToolPath,
@@ -26,6 +25,7 @@ from robot_model import (
     shown_values,
     write_compensated_path,
 )
+from modal_fit import write_modal_model
 
 from ..answers import model_answer
 from ..options import check_band, check_output

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from cutting import MillingProcess
-from figures import LobesBand, lobes_figure, save_figure
-from foundation import TIP, InputError, refuse_replacing, writing_whole_file
+from millfrf.core import TIP, InputError, refuse_replacing, writing_whole_file
+from millfrf.cutting import MillingProcess
+from millfrf.figures import LobesBand, lobes_figure, save_figure
+from millfrf.robot_model import SpatialCase, in_posture, read_robot, shown_values
+from millfrf.stability import StabilityLobes, judge_mode_coupling, with_residual_flexibility, write_lobes
 from modal_fit import ModalModel, Residuals
-from robot_model import SpatialCase, in_posture, read_robot, shown_values
-from stability import StabilityLobes, judge_mode_coupling, with_residual_flexibility, write_lobes
 
 from ..answers import lobes_answer
 from ..chain import compute_lobes, lobes_summary, speed_axis

@@ -3,9 +3,9 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
+from millfrf.stability import certified_lobes, with_static_high_modes
 from modal_fit import ModalModel
-from stability import certified_lobes, with_static_high_modes
 
 Real = NDArray[np.float64]
 

@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
 from estimation import Frf
-from foundation import InputError, writing_whole_file
-from modal_fit import ModalModel
-from robot_model import (
+from millfrf.core import InputError, writing_whole_file
+from millfrf.cutting import MillingProcess
+from millfrf.robot_model import (
     SpatialCase,
     SpatialRobot,
     close_loops,
@@ -20,7 +19,8 @@ from robot_model import (
     modal_model_at,
     modes_at,
 )
-from stability import LimitBand, StabilityLobes, limit_band
+from millfrf.stability import LimitBand, StabilityLobes, limit_band
+from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from cutting import MillingProcess
-from foundation import Band, writing_whole_folder
-from mismatch import (
+from millfrf.core import Band, writing_whole_folder
+from millfrf.cutting import MillingProcess
+from millfrf.mismatch import (
     Settings,
     SpindleSpeed,
     StructureDiagnosis,

@@ -1,6 +1,6 @@
 """The diagnosis of a structure in words: the lines that `millfrf diagnose` prints."""
 
-from mismatch import AcceptedCause, StructureDiagnosis, joint_in_words, tip_axes
+from millfrf.mismatch import AcceptedCause, StructureDiagnosis, joint_in_words, tip_axes
 
 from ..report import left_in_words
 from ..tables import evidence_in_words

@@ -14,7 +14,7 @@ from estimation import (
     noise_of_periods,
     steady_periods,
 )
-from foundation import InputError
+from millfrf.core import InputError
 
 MOST_VALUES = 1e7
 """Samples times channels up to which a recording is looked at for periods: the whole of it is held in memory."""

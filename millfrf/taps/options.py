@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from foundation import Band, InputError
+from millfrf.core import Band, InputError
 
 AUTO, NONE = "auto", "none"
 

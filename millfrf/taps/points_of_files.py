@@ -8,7 +8,7 @@ from pathlib import Path
 
 from acquisition import Channel, Recording
 from estimation import TapTest, choose_channels
-from foundation import DegreeOfFreedom, InputError
+from millfrf.core import DegreeOfFreedom, InputError
 
 from .options import TapOptions
 from .points_table import PointRow, PointsTable, read_points

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from foundation import DegreeOfFreedom, FileFormatError, InputError, mistake_in_words
+from millfrf.core import DegreeOfFreedom, FileFormatError, InputError, mistake_in_words
 
 _STRICT = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 OWN_COLUMNS = ("file", "hit", "from_s", "to_s")

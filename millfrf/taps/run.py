@@ -23,7 +23,7 @@ from estimation import (
     tap_sums,
     window_for,
 )
-from foundation import Band, InputError, Result, Summary, counted, doubts_line
+from millfrf.core import Band, InputError, Result, Summary, counted, doubts_line
 
 from ..gate import check_tap_recordings, check_taps_found, check_taps_used, doubts_of_taps
 from ..progress import Progress, silent
@@ -67,7 +67,7 @@ class TapResult(Result):
         return self.merged.frf
 
     def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
-        """Draw entries of the FRF and return the axes; see :func:`figures.draw_frf` for the choices."""
+        """Draw entries of the FRF and return the axes; see :func:`millfrf.figures.frf.draw_frf` for the choices."""
         return self.frf.plot(axes, **choices)
 
     def _summary(self) -> Summary:

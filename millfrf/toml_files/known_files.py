@@ -33,10 +33,10 @@ class TomlFile:
 def toml_files() -> tuple[TomlFile, ...]:
     """All kinds of TOML files that commands read, in the order in which a lab meets them."""
     from acquisition import LogMapping, RecordingMapping, Session
-    from cutting import CuttingTable
     from estimation import FrfMapping, GeometryTable
+    from millfrf.cutting import CuttingTable
+    from millfrf.robot_model import PlanarFile, SerialFile, SpatialFile
     from modal_fit import PolesFile
-    from robot_model import PlanarFile, SerialFile, SpatialFile
 
     from ..campaign import CampaignFile
     from ..chain import PlanTable

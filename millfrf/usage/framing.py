@@ -9,7 +9,7 @@ from typing import Annotated, Any, get_args, get_type_hints
 import typer
 from typer.models import OptionInfo
 
-from foundation import keeping_files, notices_to, refuse_replacing
+from millfrf.core import keeping_files, notices_to, refuse_replacing
 
 from ..terminal import aside, print_document, speaking
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from foundation import InputError
+from millfrf.core import InputError
 
 ONE_FOR_ALL = ("--lab-error",)
 """Options of which a single number stands for all their numbers."""

@@ -1,5 +1,1 @@
 """Modal models of FRF matrices by variable projection: selection, refinement and error bars."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,23 +1,18 @@
-"""Maximum-likelihood modal parameters from the records themselves: forces noisy, leakage modelled."""
+"""Maximum-likelihood modal parameters from whole records, with noisy forces and responses."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .likelihood_model import (
-    LikelihoodModel,
-    Setting,
-    gauge_directions,
-    jacobian,
-    prediction,
-    transfer,
-)
-from .noise_levels import NoiseLevels, flat_noise, noise_levels
-from .whole_records import RecordSpectra
+from millfrf.core import Complex, MillfrfError, Real
 
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
+from ..models.modal_model import ModalModel
+from ..models.out_of_band import ABOVE, out_of_band_basis, residuals_from
+from .likelihood_model import LikelihoodModel, Setting, gauge_directions, jacobian, prediction, transfer
+from .whole_records import NoiseLevels, RecordSpectra, flat_noise, noise_levels
+
 _NOISE_ROUNDS = 3
 _STEPS = 25
 _ENOUGH = 0.02  # gain of the cost, in units where one standard error is worth 1
@@ -162,3 +157,149 @@ def _covariance(information: Real, model: LikelihoodModel) -> Real:
     complete, _ = np.linalg.qr(gauge, mode="complete")
     free = complete[:, gauge.shape[1] :] * scale[:, None]
     return np.asarray(free @ np.linalg.inv(free.T @ information @ free) @ free.T)
+
+
+def linear_start(poles: Complex, setting: Setting, *, transients: bool = True) -> LikelihoodModel:
+    """Least-squares unknowns for fixed ``poles`` (rad/s), with residues reduced to rank one.
+
+    Responses of one kind have the same regressors, so one factorisation serves them all. The residue
+    matrices come out full and are cut to rank one by their singular vectors, which are the right and left vectors.
+    """
+    spectra = setting.spectra
+    n_modes, n_excitations, n_outside = len(poles), spectra.excitation.shape[1], len(setting.basis)
+    n_tests = spectra.n_tests if transients else 0
+    parts = []
+    for derivative in np.unique(spectra.derivative):
+        mine = spectra.derivative == derivative
+        parts.append((mine, _solve(regressors(poles, setting, int(derivative), n_tests), spectra.response[:, mine])))
+    solution = np.empty((len(parts[0][1]), spectra.response.shape[1]))
+    for mine, part in parts:
+        solution[:, mine] = part
+    ends = np.cumsum([2 * n_modes * n_excitations, n_outside * n_excitations])
+    residues, outside, free = np.split(solution, ends)
+    residues = residues.reshape(n_modes, n_excitations, 2, -1)
+    outside = np.moveaxis(outside.reshape(n_outside, n_excitations, -1), 1, 2)
+    free = free.reshape(n_tests, n_modes + len(setting.powers), 2, spectra.response.shape[1])
+    decays = free[:, :, 0] + 1j * free[:, :, 1]
+    matrices = np.moveaxis(residues[:, :, 0] + 1j * residues[:, :, 1], 1, 2)
+    return _rank_one(poles, matrices, outside, decays[:, :n_modes], decays[:, n_modes:])
+
+
+def regressors(poles: Complex, setting: Setting, derivative: int, n_tests: int) -> Complex:
+    """Columns of the linear problem, shape (n_lines, n_unknowns), for real unknowns.
+
+    First the residues, mode by mode and excitation by excitation (real and imaginary part), then the out-of-band terms,
+    then the transients of ``n_tests`` tests.
+    """
+    spectra = setting.spectra
+    s, force = spectra.s, spectra.excitation
+    factor = s**derivative
+    plus = factor[:, None] / (s[:, None] - poles)
+    minus = factor[:, None] / (s[:, None] - poles.conj())
+    residues = np.einsum("krc,kq->krqc", np.stack([plus + minus, 1j * (plus - minus)], axis=2), force)
+    outside = np.einsum("nk,kq->knq", factor * setting.basis, force)
+    member = (spectra.test[:, None] == np.arange(n_tests)).astype(float)
+    free = np.concatenate([plus, setting.powers.T], axis=1)
+    transients = np.einsum("kt,kn,c->ktnc", member, free, np.array([1, 1j]))
+    n_lines = len(s)
+    blocks = [block.reshape(n_lines, -1) for block in (residues, outside)]
+    if n_tests:
+        blocks.append(transients.reshape(n_lines, -1))
+    return np.concatenate(blocks, axis=1)
+
+
+def _solve(regressors: Complex, response: Complex) -> NDArray[np.float64]:
+    """Real least squares of a complex equation, columns scaled to unit length."""
+    design = np.concatenate([regressors.real, regressors.imag])
+    target = np.concatenate([response.real, response.imag])
+    scale = np.linalg.norm(design, axis=0)
+    scale[scale == 0] = 1.0
+    return np.asarray(np.linalg.lstsq(design / scale, target, rcond=1e-12)[0] / scale[:, None])
+
+
+def _rank_one(
+    poles: Complex, matrices: Complex, outside: NDArray[np.float64], decays: Complex, smooth: Complex
+) -> LikelihoodModel:
+    """Cut residue matrices to their leading singular pair and refer the transients to the right vectors."""
+    u, sigma, vh = np.linalg.svd(matrices)
+    root = np.sqrt(sigma[:, :1])
+    right, left = u[:, :, 0] * root, vh[:, 0] * root
+    length = np.sum(np.abs(right) ** 2, axis=1)
+    transient = np.einsum("trp,rp->tr", decays, right.conj()) / np.where(length > 0, length, 1.0)
+    return LikelihoodModel(
+        np.asarray(poles, dtype=complex), right, left, np.ascontiguousarray(outside), transient, smooth
+    )
+
+
+def best_fit(
+    poles: NDArray[np.complex128],
+    spectra: RecordSpectra,
+    band: tuple[float, float],
+    *,
+    n_smooth: int,
+) -> LikelihoodFit:
+    """Fit without, with one and with two fixed poles above the band; keep the best by Schwarz's criterion.
+
+    Raises
+    ------
+    MillfrfError
+        Neither fit gave finite numbers.
+    """
+    fits = []
+    x = 2 * (spectra.s.imag / (2 * np.pi) - band[0]) / (band[1] - band[0]) - 1
+    powers = np.array([x**k for k in range(n_smooth)]).reshape(n_smooth, len(x))
+    for above in ABOVE:
+        setting = Setting(spectra, out_of_band_basis(spectra.s, band, above), powers)
+        try:
+            start = linear_start(poles, setting, transients=n_smooth > 0)
+            fit = maximise_likelihood(start, setting)
+        except np.linalg.LinAlgError:
+            continue
+        if np.isfinite(fit.log_likelihood):
+            fits.append((_criterion(fit, spectra), fit))
+    if not fits:
+        raise MillfrfError(f"the refinement of {len(poles)} modes did not converge; choose another band or fewer modes")
+    return min(fits, key=_first)[1]
+
+
+def _first(pair: tuple[float, LikelihoodFit]) -> float:
+    return pair[0]
+
+
+def _criterion(fit: LikelihoodFit, spectra: RecordSpectra) -> float:
+    n_unknowns = fit.model.pack().size - 2 * len(fit.model.poles)
+    return -2 * fit.log_likelihood + n_unknowns * float(np.log(2 * spectra.response.size))
+
+
+def modal_model_from(
+    fit: LikelihoodFit, band: tuple[float, float], responses: Sequence[str], excitations: Sequence[str], unit: str
+) -> ModalModel:
+    """The modes in order of frequency, with residual terms and the covariance of poles and vectors.
+
+    The covariance is widened by the reduced chi-square where that is above 1: a misfit that the noise does not explain
+    is uncertainty too.
+    """
+    model = fit.model
+    order = np.argsort(np.abs(model.poles))
+    n_kept = 2 * (model.poles.size + model.right.size + model.left.size)
+    covariance = fit.covariance[:n_kept, :n_kept] * max(1.0, fit.reduced_chi_square)
+    index = _sorting_index(model, order, n_kept)
+    return ModalModel(
+        poles=model.poles[order],
+        right=model.right[order],
+        left=model.left[order],
+        responses=tuple(responses),
+        excitations=tuple(excitations),
+        quantity="receptance" if unit == "m/N" else "transfer",
+        unit=unit,
+        residuals=residuals_from(model.outside, band),
+        covariance=covariance[np.ix_(index, index)],
+        band=band,
+    )
+
+
+def _sorting_index(model: LikelihoodModel, order: NDArray[np.int64], n_kept: int) -> NDArray[np.int64]:
+    """Give the place in the unsorted model of each packed unknown of the sorted one."""
+    numbered = model.unpack(np.arange(model.pack().size, dtype=float))
+    moved = replace(numbered, poles=numbered.poles[order], right=numbered.right[order], left=numbered.left[order])
+    return moved.pack()[:n_kept].astype(np.int64)

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from acquisition import (
     HOST_AXIS,
-    Aligner,
     Block,
     Channel,
     EventAxis,
@@ -21,9 +20,10 @@ from acquisition import (
     StreamDescription,
     record,
 )
-from acquisition.clock import fit_clock
+from acquisition.clocks import fit_clock
+from acquisition.recordings.alignment import Aligner
 from acquisition.tachometer import pulse_times, shaft_angle
-from foundation import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError
 
 RATE = 1000.0
 STREAM = StreamDescription("main", RATE, 0.5, (Channel("fx", "force", "N"),))

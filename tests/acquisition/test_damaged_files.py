@@ -18,11 +18,10 @@ import pytest
 from scipy.io import savemat, wavfile
 from scipy.sparse import coo_array
 
-from acquisition import HOST_AXIS, Channel, Events, Recording, RecordingWriter, StreamDescription
-from acquisition.conversion.array_file import open_arrays
-from acquisition.file_safety import guarded_reading
+from acquisition import HOST_AXIS, Channel, Events, Recording, RecordingWriter, StreamDescription, open_arrays
+from acquisition.recordings import guarded_reading
 from estimation import write_frf_uff
-from foundation import FileFormatError
+from millfrf.core import FileFormatError
 from modal_fit import write_modes_uff
 from replay_data import table_one_model
 

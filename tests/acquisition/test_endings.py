@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
-from foundation import MillfrfError
 from millfrf.__main__ import run
 from millfrf.chain.measuring.record_session import acquire, open_session
+from millfrf.core import MillfrfError
 
 RunWithDaqmx = Callable[..., subprocess.CompletedProcess[str]]
 SESSION = """

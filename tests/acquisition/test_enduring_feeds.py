@@ -10,11 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition import HOST_AXIS, Block, Channel, Disconnected, Events, Recording, StreamDescription, WithFeeds, record
-from acquisition.sources import Stamped, SteadyStamps
-from foundation import InputError
+from acquisition import HOST_AXIS, Block, Channel, Events, Recording, StreamDescription, WithFeeds, record
+from acquisition.errors import Disconnected
+from acquisition.sources.timing import Stamped, SteadyStamps
 from millfrf.__main__ import run
 from millfrf.chain.measuring.record_session import acquire, open_session
+from millfrf.core import InputError
 
 STREAM = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))
 REPLAY = '[device]\ndriver = "replay"\nfile = "whole.h5"\nspeed = 1.0\n'

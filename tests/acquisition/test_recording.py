@@ -20,11 +20,11 @@ from acquisition import (
     Paced,
     Recording,
     RecordingWriter,
-    ReplaySource,
     StreamDescription,
     record,
 )
-from foundation import FileFormatError, InputError
+from acquisition.drivers.replay import ReplaySource
+from millfrf.core import FileFormatError, InputError
 
 CHANNELS = (
     Channel("fx", "force", "N", "TCP", "+X", full_scale=500.0),

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquisition.session import build_source, read_session
-from acquisition.session.read import session_from_text
-from foundation import InputError, MillfrfError
+from acquisition import build_source, session_from_text
+from acquisition.session.session_file import read_session
+from millfrf.core import InputError, MillfrfError
 
 GOOD = """
 title = "Sweep 1"

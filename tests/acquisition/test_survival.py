@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription, recover
-from foundation import FileFormatError, InputError
 from millfrf.__main__ import run
+from millfrf.core import FileFormatError, InputError
 
 STREAM = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))
 WRITERS = Path(__file__).with_name("killed_writers.py")
@@ -100,7 +100,8 @@ def test_three_hundred_kills_lose_nothing_acknowledged(killer: Killer, tmp_path:
 
 FULL = """
 import sys, numpy as np
-from acquisition import Channel, DiskFull, RecordingWriter, StreamDescription
+from acquisition import Channel, RecordingWriter, StreamDescription
+from millfrf.core import DiskFull
 stream = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))
 kept = 0
 try:

@@ -28,7 +28,7 @@ from benchmarks.blind_trial.sealed_case import case_name, open_truth, write_case
 from benchmarks.blind_trial.simulation import build_case
 from benchmarks.blind_trial.structures import Structure, draw_structure
 from benchmarks.blind_trial.tip_scale import counted_at_tip, scale_at_tip
-from mismatch.physics import library
+from millfrf.mismatch import library
 from modal_fit import read_modal_model
 
 SPEC = CaseSpec(3, 12345, "main", "none", "none", 0.0, 0.02, "sweeps", 1, 0.0)

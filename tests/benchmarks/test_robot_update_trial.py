@@ -16,7 +16,7 @@ from benchmarks.robot_update_trial.cases import KINDS, draw_case
 from benchmarks.robot_update_trial.independent_cell import cell_at, read_tables, recorded
 from benchmarks.robot_update_trial.run_trial import NOISE, RATE, ROBOT, SECONDS, run_case
 from millfrf.__main__ import run
-from robot_model import robot_text
+from millfrf.robot_model.files.robot_files import robot_text
 
 SEED = 11
 WITHIN = 1.2

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 SCRIPT = """
-from cutting import compiled
-from foundation import notices_to
+from millfrf.core.compilation import compiled
+from millfrf.core import notices_to
 
 @compiled
 def doubled(x):

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cutting import MillingProcess, read_cutting_process, write_cutting_process
+from millfrf.cutting import MillingProcess, read_cutting_process, write_cutting_process
 
 CUTTER = MillingProcess(
     3, 0.012, math.radians(70), 6e8, 0.3, 0.1, 0.3, 2.6, 1e-4, kte=2e4, kre=1e4, kae=3e3, runout=8e-6

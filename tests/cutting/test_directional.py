@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cutting import (
+from millfrf.core import FileFormatError, InputError
+from millfrf.cutting import (
     MillingProcess,
     average_directional_matrix,
     chip_direction,
@@ -16,7 +17,6 @@ from cutting import (
     force_direction,
     read_cutting_process,
 )
-from foundation import FileFormatError, InputError
 
 HALF_DOWN = MillingProcess(2, 0.0127, np.pi / 2, 119e6, 0.17, 0.33, np.pi / 2, np.pi, 0.15e-3)
 TOML = """[cutting]

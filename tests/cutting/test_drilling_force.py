@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cutting import Drill, SpecificForce, catalogue_load, drilling_load, fitted_to_catalogue
+from millfrf.cutting import Drill, drilling_load, fitted_to_catalogue
+from millfrf.cutting.drilling import SpecificForce, catalogue_load
 
 DRILL = Drill(8e-3)
 

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cutting import MillingProcess, force_harmonics
-from cutting.one_tooth import tooth_force
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess, force_harmonics, tooth_force
 
 
 def process(start: float, width: float, **changes: float) -> MillingProcess:

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cutting import MillingProcess
-from cutting.one_tooth import engaged_share, rigid_chip_thickness, rigid_force, tooth_force, wrapped_immersion
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess, engaged_share, tooth_force, wrapped_immersion
+from millfrf.cutting.tooth_force import rigid_chip_thickness, rigid_force
 
 QUARTER, HALF = math.pi / 2, math.pi
 immersions = st.floats(0, math.pi)

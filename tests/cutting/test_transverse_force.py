@@ -7,17 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cutting import (
-    Drill,
-    SpecificForce,
-    bending_stiffness,
-    drilling_load,
-    edge_thicknesses,
-    fitted_to_catalogue,
-    resultant_force,
-    settled_drill,
-)
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import Drill, bending_stiffness, drilling_load, fitted_to_catalogue, settled_drill
+from millfrf.cutting.drilling import SpecificForce, edge_thicknesses, resultant_force
 
 DRILL = Drill(8e-3)
 

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cutting import (
+from millfrf.core import FileFormatError, InputError
+from millfrf.cutting import (
     MillingProcess,
     average_directional_matrix,
     damping_harmonics,
@@ -19,8 +20,7 @@ from cutting import (
     read_cutting_process,
     turn_harmonics,
 )
-from cutting.one_tooth import rigid_force
-from foundation import FileFormatError, InputError
+from millfrf.cutting.tooth_force import rigid_force
 
 
 def _cutter(**changes: object) -> MillingProcess:

@@ -19,13 +19,15 @@ from estimation import (
     input_independence,
     instrumental_variable,
     local_polynomial,
+)
+from estimation.spectra.coherence_functions import (
+    independent_lines,
     multiple_coherence,
     partial_coherence,
     principal_inputs,
     virtual_coherence,
 )
-from estimation.spectra.independence import independent_lines
-from foundation import InputError
+from millfrf.core import InputError
 from modal_fit import ModalModel
 
 RATE, LENGTH = 200.0, 256

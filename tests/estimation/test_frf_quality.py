@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation import Frf, FrfCovariance, read_frf, to_receptance, write_frf
-from foundation import InputError
+from millfrf.core import InputError
 
 AXIS = np.arange(0.0, 50.0)
 

@@ -8,20 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquisition import Channel
-from estimation import (
-    SpectralAccumulator,
-    SpectralSettings,
-    displacement_from_acceleration,
-    excitation_map,
-    exponential_window,
-    find_taps,
-    force_window,
-    spectrogram,
-    track_order,
-    usable_samples,
-    without_added_damping,
-)
-from foundation import InputError
+from estimation import SpectralAccumulator, SpectralSettings, exponential_window, find_taps, force_window
+from estimation.frf.quantities import displacement_from_acceleration
+from estimation.hammer.segments import without_added_damping
+from estimation.spectra.order_tracking import excitation_map, spectrogram, track_order
+from estimation.spectra.trusted_samples import usable_samples
+from millfrf.core import InputError
 
 RATE = 10_240.0
 FORCE = Channel("fx", "force", "N", "TCP", "+X", full_scale=100.0)

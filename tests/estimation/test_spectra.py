@@ -24,14 +24,14 @@ from estimation import (
     input_coherence,
     input_independence,
     join_parts,
-    multiple_coherence,
     read_frf,
     settings_for,
     sum_tests,
     to_receptance,
     write_frf,
 )
-from foundation import FileFormatError, InputError
+from estimation.spectra.coherence_functions import multiple_coherence
+from millfrf.core import FileFormatError, InputError
 
 FORCES = tuple(Channel(f"f{a}", "force", "N", "TCP", f"+{a.upper()}") for a in "xy")
 MOTIONS = tuple(Channel(f"a{a}", "acceleration", "m/s^2", "TCP", f"+{a.upper()}") for a in "xy")

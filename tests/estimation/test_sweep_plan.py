@@ -8,17 +8,10 @@ import numpy as np
 import pytest
 
 from acquisition import Recording, record
-from cutting import MillingProcess
-from estimation import (
-    SweepDemand,
-    cross_spectra,
-    input_independence,
-    plan_sweeps,
-    predicted_spectra,
-    settings_for,
-    sum_tests,
-)
-from foundation import InputError
+from estimation import SweepDemand, cross_spectra, input_independence, plan_sweeps, settings_for, sum_tests
+from estimation.sweep_plan import predicted_spectra
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
 from replay_data import LinearSweep, MillingCell, dynamometer, table_one_model, tip_accelerometers
 
 CUTTER = MillingProcess(2, 12.7e-3, pi / 2, 119e6, 0.17, 0.33, 0.0, pi, 0.15e-3)

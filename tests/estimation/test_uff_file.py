@@ -8,7 +8,7 @@ import pytest
 import pyuff
 
 from estimation import Frf, read_frf_uff, write_frf_uff
-from foundation import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError
 from replay_data import table_one_model
 
 AXIS = np.arange(0.0625, 40.0, 0.0625)

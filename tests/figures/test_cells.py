@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.colors import LogNorm
 
-from figures import house_style, new_figure
-from figures.cells import draw_cells
+from millfrf.figures import house_style, new_figure
+from millfrf.figures.diagnosis_maps import draw_cells
 
 SHADES = LogNorm(1.0, 100.0, clip=True)
 

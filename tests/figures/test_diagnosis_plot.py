@@ -6,8 +6,8 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 import millfrf as mf
-from mismatch import AcceptedCause, Improvement, write_diagnosis
-from mismatch.inference import Remainder
+from millfrf.mismatch import AcceptedCause, write_diagnosis
+from millfrf.mismatch.inference.diagnosis import Improvement, Remainder
 
 
 def _diagnosis() -> "mf.Diagnosis[None]":

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from estimation import Frf, to_receptance
-from figures import FrfCurves, as_data_uri, frf_figures
+from millfrf.figures import FrfCurves, as_data_uri, frf_figures
 from modal_fit import ModalModel
 
 BAND = (50.0, 900.0)

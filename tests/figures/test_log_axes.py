@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 
-from figures import house_style, new_figure
-from figures.log_axes import decade_axis, plain_log_axis
+from millfrf.figures import house_style, new_figure
+from millfrf.figures.style import decade_axis, plain_log_axis
 
 
 def _axes() -> Axes:

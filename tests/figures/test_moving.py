@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation import Geometry
-from figures import moving_shapes, shapes_figure
+from millfrf.figures import moving_shapes, shapes_figure
 from modal_fit import ModalModel, mode_shapes
 
 POLES = 2 * np.pi * np.array([10.0, 25.0]) * (-0.01 + 1j)

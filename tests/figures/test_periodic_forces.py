@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from figures import house_style
+from millfrf.figures import house_style
 
 pytestmark = pytest.mark.shared_data
 

@@ -12,9 +12,9 @@ import pytest
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from estimation import CrossSpectra, Frf, SpectralSettings
-from foundation import InputError, Result
+from millfrf.core import InputError, Result
+from millfrf.stability import StabilityLobes
 from modal_fit import ModalModel
-from stability import StabilityLobes
 
 SCRIPT = "<script>alert(1)</script>"
 

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 
-from figures import SmallSvg
+from millfrf.figures import SmallSvg
 
 
 def drawn(x: np.ndarray, y: np.ndarray) -> tuple[list[np.ndarray], int]:

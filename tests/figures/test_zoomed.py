@@ -10,9 +10,17 @@ import pytest
 from numpy.typing import NDArray
 
 from estimation import Frf
-from figures import EntryCurves, FrfCurves, ZoomedPlot, browser_library, zoomed_frfs, zoomed_limits, zoomed_matrix
+from millfrf.figures import (
+    EntryCurves,
+    FrfCurves,
+    ZoomedPlot,
+    browser_library,
+    zoomed_frfs,
+    zoomed_limits,
+    zoomed_matrix,
+)
+from millfrf.stability import StabilityLobes
 from modal_fit import ModalModel
-from stability import StabilityLobes
 
 F = np.linspace(1.0, 60.0, 300)
 

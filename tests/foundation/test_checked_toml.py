@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel, ConfigDict
 
-from foundation import InputError, checked_toml
+from millfrf.core import InputError, checked_toml
 
 
 class Table(BaseModel):

@@ -14,7 +14,7 @@ COPIES = """
 import os, sys, time
 from pathlib import Path
 os.sched_getaffinity = lambda process: {0, 1}
-from mismatch.inference import in_processes
+from millfrf.mismatch import in_processes
 def sleeps(name):
     Path(sys.argv[1], name).write_text(str(os.getpid()))
     time.sleep(600)
@@ -24,7 +24,7 @@ in_processes([lambda: sleeps("a"), lambda: sleeps("b")])
 POOL = """
 import os, sys, time
 from pathlib import Path
-from foundation import process_pool
+from millfrf.core import process_pool
 def sleeps(name):
     Path(sys.argv[1], name).write_text(str(os.getpid()))
     time.sleep(600)

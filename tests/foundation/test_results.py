@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from foundation import InputError, Result, Summary, listed, optional_library, same_values
+from millfrf.core import InputError, Result, Summary, listed, optional_library, same_values
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foundation import SI_UNITS, DegreeOfFreedom, InputError, si_factor, unit_factor
+from millfrf.core import SI_UNITS, DegreeOfFreedom, InputError, si_factor, unit_factor
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimation import read_frf, write_frf
-from foundation import InputError, checked_band, shared_band
+from millfrf.core import InputError, checked_band, shared_band
 from modal_fit import ModalModel, read_modal_model, write_modal_model
 
 NAMES = ("T:+X",)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from foundation import DiskFull, InputError, LeftoverRemoved, writing_whole_file, writing_whole_folder
+from millfrf.core import DiskFull, InputError, LeftoverRemoved, writing_whole_file, writing_whole_folder
 
 
 def test_a_failure_leaves_the_old_file_and_no_litter(tmp_path: Path) -> None:

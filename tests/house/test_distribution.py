@@ -54,7 +54,7 @@ def test_every_data_file_is_packaged_and_its_kind_is_named_with_its_licence() ->
 def test_licence_files_are_there_and_robots_made_of_others_are_listed() -> None:
     assert all((ROOT / name).is_file() for name in PROJECT["project"]["license-files"])
     told = (ROOT / "THIRD_PARTY.md").read_text(encoding="utf-8")
-    robots = (ROOT / "robot_model" / "robots").glob("*.toml")
+    robots = (ROOT / "millfrf" / "robot_model" / "robots").glob("*.toml")
     others = [path.name for path in robots if "ROS-Industrial" in path.read_text(encoding="utf-8")]
     assert others
     assert not [name for name in others if f"/{name}`" not in told]

@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import SAMPLES_AXIS, Channel, Events, Recording, RecordingWriter, StreamDescription
+from acquisition import Channel, Events, Recording, RecordingWriter, StreamDescription
+from acquisition.sources.source import SAMPLES_AXIS
 from millfrf.__main__ import run
 from millfrf.chain.measuring.signal_check import preflight
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from foundation import InputError
+from millfrf.core import InputError
 from millfrf.demonstration.concealment import ConcealOptions, run_concealed
 from millfrf.demonstration.concealment_result import concealment_table, direction_error, judgement
 from millfrf.demonstration.seal import PADDED, open_seal, seal
-from replay_data.concealment.concealed_effect import FOREIGN, ConcealedEffect
+from replay_data import FOREIGN, ConcealedEffect
 
 CONTENT = {"name": "backlash", "direction": [0.6, 0.0, 0.8], "parameters": {"half_gap_m": 1e-5}}
 

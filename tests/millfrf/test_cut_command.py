@@ -8,11 +8,10 @@ from pathlib import Path
 import pytest
 
 from acquisition import record
-from cutting import MillingProcess, read_cutting_process, write_cutting_process
 from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.cutting import MillingProcess, read_cutting_process, write_cutting_process
 from modal_fit import write_modal_model
 from replay_data import (
-    DriftingSpeed,
     MillingCell,
     default_structure,
     dynamometer,
@@ -20,6 +19,7 @@ from replay_data import (
     table_one_model,
     tip_accelerometers,
 )
+from replay_data.speed_profiles import DriftingSpeed
 
 CUT = MillingProcess(2, 12.7e-3, math.pi / 2, 119e6, 0.17, 0.33, math.pi / 2, math.pi, 0.15e-3)
 SPEED = 800 * math.pi / 30

@@ -10,8 +10,8 @@ import pytest
 import typer
 
 from estimation import write_frf
-from foundation import writing_whole_file
 from millfrf.__main__ import app, run
+from millfrf.core import writing_whole_file
 from millfrf.terminal import answer, note, plain, say, speaking, tell
 from millfrf.usage import ANSWERING, commands_in, framed
 from modal_fit import ModalModel, write_modal_model

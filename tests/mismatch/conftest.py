@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 
 from estimation import BandRecording, channels_of, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, StructureDetails, StructureDiagnosis, band_of, predict_lines
-from mismatch.inference import Diagnosis, Improvement, Remainder
-from mismatch.models.fitting import Fit
-from mismatch.noise.noise_model import KNOTS, NoiseModel
-from mismatch.records.common_band import compared_band
+from millfrf.mismatch import Diagnosis, Hypothesis, LabError, ModelShape, StructureDiagnosis, predict_lines
+from millfrf.mismatch.inference.diagnosis import Improvement, Remainder
+from millfrf.mismatch.location.residual_view import StructureDetails
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.noise.noise_model import KNOTS, NoiseModel
+from millfrf.mismatch.records.bands import compared_band
+from millfrf.mismatch.records.reading import band_of
 from modal_fit import ModalModel, write_modal_model
 
 

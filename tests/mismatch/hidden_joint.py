@@ -7,10 +7,11 @@ from one_mode_rig import Real, Rig
 from scipy.fft import irfft
 
 from estimation import WindowedSpectrum, windowed_spectrum
-from mismatch import Cause, LabError, ModelShape, band_of
-from mismatch.joints import JointAxis, JointMotion
-from mismatch.models import Hypothesis, predict_lines
-from mismatch.physics import JointPhysics, library
+from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, library, predict_lines
+from millfrf.mismatch.joints.joint_axis import JointAxis
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.records.reading import band_of
 
 RIG = Rig()
 MOTION = JointMotion(1e-3, 0.06, 1e-2, 0.6, RIG.stiffness)

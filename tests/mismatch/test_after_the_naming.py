@@ -9,15 +9,23 @@ import pytest
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from estimation import BandRecording, windowed_spectrum
-from foundation import InputError
-from mismatch import Hypothesis, LabError, ModelShape, band_of
-from mismatch.adapters.structure.predicting import equivalent_receptance
-from mismatch.joints import JointAxis
-from mismatch.joints.joint_law import JointLaw, JointMotion
-from mismatch.models import with_linear_part
-from mismatch.models.cause import Cause
-from mismatch.physics import JointPhysics, Parameter, library
-from mismatch.records.reading import measured_part
+from millfrf.core import InputError
+from millfrf.mismatch import (
+    Hypothesis,
+    JointLaw,
+    JointPhysics,
+    LabError,
+    ModelShape,
+    Parameter,
+    equivalent_receptance,
+    library,
+    measured_part,
+)
+from millfrf.mismatch.joints.joint_axis import JointAxis
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.models.model_terms import with_linear_part
+from millfrf.mismatch.records.reading import band_of
 from modal_fit import ModalModel
 
 DIRECTION = np.array([0.6, 0.8])

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from one_mode_rig import Real, Rig, written
 
-from foundation import InputError
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from mismatch import diagnose, in_deflections, library, predict, rig_of
-from mismatch.physics import offered
+from millfrf.core import InputError
+from millfrf.mismatch import diagnose, library, predict, rig_of
+from millfrf.mismatch.physics.library import offered
+from millfrf.mismatch.records.reading import in_deflections
 from modal_fit import ModalModel, Residuals, read_modal_model, write_modal_model
 
 BAND = (4.0, 22.0)

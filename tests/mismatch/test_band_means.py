@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mismatch.location.band_means import band_means
+from millfrf.mismatch.location.maps import band_means
 
 
 @given(st.integers(1, 40), st.integers(1, 3), st.integers(1, 8), st.integers(0, 2**32 - 1))

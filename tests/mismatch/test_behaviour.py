@@ -8,8 +8,8 @@ import pytest
 from numpy.typing import NDArray
 
 from estimation import BandRecording, windowed_spectrum
-from figures import behaviour_figure
-from mismatch import Behaviour, Hypothesis, ModelShape, Settings, behaviour_of, fit
+from millfrf.figures import behaviour_figure
+from millfrf.mismatch import Behaviour, Hypothesis, ModelShape, Settings, behaviour_of, fit
 
 from .one_mode_rig import Rig
 

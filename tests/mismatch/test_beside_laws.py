@@ -8,12 +8,13 @@ from hidden_joint import MOTION, RIG, at_the_joint, law_of, recorded, with_law
 from one_mode_rig import Real
 
 from estimation import WindowedSpectrum
-from mismatch import fit
-from mismatch.inference import EvidenceSettings
-from mismatch.joints import JointLaw, JointMotion
-from mismatch.models import Fit, predict_lines, with_free_forms
-from mismatch.physics import Parameter, families
-from mismatch.screening import Gains, gains_beside_laws
+from millfrf.mismatch import JointLaw, Parameter, fit, predict_lines
+from millfrf.mismatch.inference.settings import EvidenceSettings
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.models.model_terms import with_free_forms
+from millfrf.mismatch.physics.free_form import families
+from millfrf.mismatch.screening.linear_causes_fitted import Gains, gains_beside_laws
 
 LEVELS = (20.0, 40.0)
 FRICTION = 3.0

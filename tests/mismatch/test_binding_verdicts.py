@@ -8,23 +8,27 @@ import pytest
 from concealed_recordings import RATE, Concealed, forces, linear_acceleration, trial
 
 from estimation import BandRecording, windowed_spectrum
-from millfrf.report.diagnoses.diagnosis_answers import named, verdict_sentence
-from mismatch import (
+from millfrf.mismatch import (
+    AcceptedCause,
     Hypothesis,
     LabError,
     ModelShape,
+    Settings,
     StructureDiagnosis,
-    band_of,
     diagnose,
+    fit,
+    library,
+    recording_errors,
 )
-from mismatch.adapters.structure.confirmation import helps
-from mismatch.adapters.structure.held_out import block_powers
-from mismatch.adapters.structure.structure_verdict import verdict_of_structure
-from mismatch.inference import AcceptedCause, Improvement, Settings, VerdictSettings, leaves_too_much, share_left
-from mismatch.location.errors_by_recording import recording_errors
-from mismatch.models.fitting import Fit, fit
-from mismatch.physics import library
-from mismatch.remainder.moving_part import leftover
+from millfrf.mismatch.inference.diagnosis import Improvement, leaves_too_much, share_left
+from millfrf.mismatch.inference.settings import VerdictSettings
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.residual.structured_residual import leftover
+from millfrf.mismatch.structure.answer import verdict_of_structure
+from millfrf.mismatch.structure.confirmation import helps
+from millfrf.mismatch.structure.held_out import block_powers
+from millfrf.report.diagnoses.diagnosis_answers import named, verdict_sentence
 from modal_fit import ModalModel
 
 TONE = 11.37

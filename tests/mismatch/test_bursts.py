@@ -7,9 +7,8 @@ import pytest
 from one_mode_rig import Rig
 
 from estimation import BandRecording, windowed_spectrum
-from mismatch import LabError, ModelShape, diagnose
-from mismatch.models import Hypothesis
-from mismatch.remainder import Bursts, bursts_left
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, diagnose
+from millfrf.mismatch.residual.bursts import Bursts, bursts_left
 
 RIG = Rig()
 BAND = (2.0, 25.0)

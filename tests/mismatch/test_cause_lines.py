@@ -4,9 +4,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from estimation import BandRecording
+from millfrf.mismatch import AcceptedCause, StructureDiagnosis
 from millfrf.structure.diagnosis_words import diagnosis_lines
-from mismatch import StructureDiagnosis
-from mismatch.inference import AcceptedCause
 from modal_fit import ModalModel
 
 

@@ -5,12 +5,14 @@ import pytest
 from concealed_recordings import Concealed, forces, linear_acceleration, structure, trial
 
 from estimation import WindowedSpectrum, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, band_of
-from mismatch.adapters.structure.acceptance import mends_a_limit
-from mismatch.faults.clipping import find_clipping, mended
-from mismatch.inference import EvidenceSettings, Proposal
-from mismatch.models.fitting import Fit, fit
-from mismatch.physics import ModePhysics, library
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, fit, library
+from millfrf.mismatch.faults.clipping_repair import find_clipping, mended
+from millfrf.mismatch.inference.search import Proposal
+from millfrf.mismatch.inference.settings import EvidenceSettings
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.physics.protocol import ModePhysics
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.structure.acceptance import mends_a_limit
 from modal_fit import ModalModel
 
 OFF = np.array([1.01, 0.99])

@@ -8,15 +8,16 @@ import pytest
 from concealed_recordings import RATE, Concealed, forces, late, trial
 
 from estimation import BandRecording
-from mismatch import LabError, ModelShape, StructureDiagnosis, diagnose
-from mismatch.adapters.structure.acceptance import worth_it
-from mismatch.faults.tones import find_tone
-from mismatch.inference import EvidenceSettings, Proposal, ScreeningSettings
-from mismatch.models.cause import Cause
-from mismatch.models.fitting import Fit, fit
-from mismatch.physics.channel_delay import PHYSICS as DELAY
-from mismatch.physics.missing_mode import PHYSICS as MISSING_MODE
-from mismatch.screening import SightedMode, linear_candidates
+from millfrf.mismatch import LabError, ModelShape, StructureDiagnosis, diagnose, fit
+from millfrf.mismatch.faults.tones import find_tone
+from millfrf.mismatch.inference.search import Proposal
+from millfrf.mismatch.inference.settings import EvidenceSettings, ScreeningSettings
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.physics.measuring_chain import CHANNEL_DELAY as DELAY
+from millfrf.mismatch.physics.structural import MISSING_MODE
+from millfrf.mismatch.screening.linear_causes_fitted import SightedMode, linear_candidates
+from millfrf.mismatch.structure.acceptance import worth_it
 from modal_fit import ModalModel
 
 

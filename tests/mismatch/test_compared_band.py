@@ -11,10 +11,9 @@ from scipy.signal import bilinear, lfilter
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from estimation import BandRecording
-from foundation import InputError
-from mismatch import LabError, ModelShape, diagnose, read_recording
-from mismatch.inference.diagnosis_file import write_diagnosis
-from mismatch.records.common_band import compared_band
+from millfrf.core import InputError
+from millfrf.mismatch import LabError, ModelShape, diagnose, read_recording, write_diagnosis
+from millfrf.mismatch.records.bands import compared_band
 from modal_fit import ModalModel, Residuals
 
 BAND = (5.0, 24.0)

@@ -9,8 +9,15 @@ import pytest
 from concealed_recordings import RATE, Concealed, Law, forces, late, linear_acceleration, trial
 
 from estimation import BandRecording
-from mismatch import Settings, StructureDiagnosis, diagnose, improved_model_of, predict, write_diagnosis
-from mismatch.physics import library
+from millfrf.mismatch import (
+    Settings,
+    StructureDiagnosis,
+    diagnose,
+    improved_model_of,
+    library,
+    predict,
+    write_diagnosis,
+)
 from modal_fit import ModalModel, read_modal_model, write_modal_model
 
 DIRECTION = np.array([0.8, -0.6])

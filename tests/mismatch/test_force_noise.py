@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from scipy.signal import firwin, lfilter
 
 from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, band_of, diagnose, predict_lines
-from mismatch.inference import VerdictSettings
-from mismatch.records.true_forces import without_force_noise
-from mismatch.remainder.moving_part import leftover
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, diagnose, predict_lines
+from millfrf.mismatch.inference.settings import VerdictSettings
+from millfrf.mismatch.records.held_out_parts import without_force_noise
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.residual.structured_residual import leftover
 from modal_fit import ModalModel
 
 RATE, SILENT = 128.0, 26.0

@@ -11,13 +11,14 @@ import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
-from mismatch import Hypothesis, JointMotion, LabError, ModelShape, band_of
-from mismatch.adapters.structure.form_errors import with_form_spread
-from mismatch.joints import JointAxis
-from mismatch.models.cause import Cause
-from mismatch.models.fitting import Fit, fit
-from mismatch.physics import library
-from mismatch.physics.pose_drift import PHYSICS
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, fit, library
+from millfrf.mismatch.joints.joint_axis import JointAxis
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.physics.joint_stiffness import POSE_DRIFT as PHYSICS
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.structure.form_errors import with_form_spread
 
 DIRECTION = np.array([0.8, -0.6])
 LEVELS = (20.0, 35.0, 60.0)

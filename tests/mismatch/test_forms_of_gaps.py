@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from mismatch.adapters.structure.acceptance import plainest, twins_of
-from mismatch.inference import EvidenceSettings, Proposal
-from mismatch.joints.joint_law import JointMotion
-from mismatch.models.cause import Cause
-from mismatch.models.fitting import Fit
-from mismatch.models.hypothesis import Hypothesis
-from mismatch.models.model_shape import LabError, ModelShape
-from mismatch.physics import JointPhysics, answer_name, library
+from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, library
+from millfrf.mismatch.inference.search import Proposal
+from millfrf.mismatch.inference.settings import EvidenceSettings
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.physics.protocol import answer_name
+from millfrf.mismatch.structure.acceptance import plainest, twins_of
 from modal_fit import ModalModel
 
 MOTION = JointMotion(reach=1e-3, speed=0.1, deflection=2e-4, velocity=0.02, stiffness=1e6)

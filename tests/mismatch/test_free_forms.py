@@ -9,34 +9,41 @@ from hidden_joint import MOTION, RIG, law_of, recorded, with_law
 from one_mode_rig import Real
 
 from estimation import windowed_spectrum
-from foundation import FileFormatError
-from millfrf.structure.diagnosis_words import diagnosis_lines
-from mismatch import (
+from millfrf.core import FileFormatError
+from millfrf.mismatch import (
+    Hypothesis,
+    JointLaw,
     LabError,
     ModelShape,
+    Parameter,
     Settings,
-    band_of,
     diagnose,
     fit,
+    improved_model,
     improved_model_of,
+    library,
+    predict_lines,
 )
-from mismatch.adapters.structure.answer import Answer
-from mismatch.adapters.structure.comparison import StructureComparison
-from mismatch.adapters.structure.free_forms import (
+from millfrf.mismatch.inference.search import Proposal, Search
+from millfrf.mismatch.inference.settings import VerdictSettings
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.models.model_terms import hypothesis_of, with_free_forms
+from millfrf.mismatch.physics.free_form import FreeForm
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.residual.structured_residual import leftover
+from millfrf.mismatch.structure.answer import Answer
+from millfrf.mismatch.structure.comparison import StructureComparison
+from millfrf.mismatch.structure.freed_laws import FreedAnswer, freed_answer
+from millfrf.mismatch.structure.freed_laws_proved import (
     Beginning,
-    FreedAnswer,
     FreedLaws,
     form_of_law,
-    freed_answer,
     freed_from_named,
     freed_from_nothing,
 )
-from mismatch.adapters.structure.held_out import held_out_improvement, recordings_of
-from mismatch.inference import Proposal, Search, VerdictSettings
-from mismatch.joints import JointLaw, JointMotion
-from mismatch.models import Fit, Hypothesis, hypothesis_of, improved_model, predict_lines, with_free_forms
-from mismatch.physics import FreeForm, Parameter, library
-from mismatch.remainder import leftover
+from millfrf.mismatch.structure.held_out import held_out_improvement, recordings_of
+from millfrf.structure.diagnosis_words import diagnosis_lines
 from modal_fit import read_modal_model, write_modal_model
 
 LEVELS = (10.0, 20.0, 40.0)

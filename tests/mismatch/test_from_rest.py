@@ -9,8 +9,8 @@ import pytest
 from one_mode_rig import Real, Rig, written
 
 from estimation import BandRecording, windowed_spectrum
-from foundation import InputError
-from mismatch import diagnose, predict, read_recording
+from millfrf.core import InputError
+from millfrf.mismatch import diagnose, predict, read_recording
 
 SECONDS = 4.0
 

@@ -9,13 +9,16 @@ import numpy as np
 import pytest
 
 from estimation import BandRecording, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, Settings, band_of, fit
-from mismatch.adapters.structure.acceptance import impossible, lost_mode, modes_not_seen, worth_it
-from mismatch.adapters.structure.told_causes import told_causes
-from mismatch.inference import Proposal, ScreeningSettings
-from mismatch.models import Fit, modes_are_odd
-from mismatch.physics import ModePhysics, library
-from mismatch.screening import find_mode, linear_candidates, noise_floor
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, Settings, fit, library
+from millfrf.mismatch.inference.search import Proposal
+from millfrf.mismatch.inference.settings import ScreeningSettings
+from millfrf.mismatch.models.fitting import Fit, modes_are_odd
+from millfrf.mismatch.physics.protocol import ModePhysics
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.screening.linear_causes_fitted import find_mode, linear_candidates
+from millfrf.mismatch.screening.whitened_residual import noise_floor
+from millfrf.mismatch.structure.acceptance import impossible, lost_mode, modes_not_seen, worth_it
+from millfrf.mismatch.structure.reported_causes import told_causes
 from modal_fit import ModalModel, ModeErrors
 
 from .one_mode_rig import Rig

@@ -6,11 +6,12 @@ from concealed_recordings import RATE
 from one_mode_rig import Rig
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, Settings, band_of, diagnose
-from mismatch.adapters.structure.held_out import recordings_of, scored
-from mismatch.faults import residual_lines
-from mismatch.models import fit, following_all, gives_one_up, plain_fit
-from mismatch.records import Recordings
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, Settings, diagnose, fit
+from millfrf.mismatch.faults.clipping_repair import residual_lines
+from millfrf.mismatch.models.refinement import following_all, gives_one_up, plain_fit
+from millfrf.mismatch.records.held_out_parts import Recordings
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.structure.held_out import recordings_of, scored
 from modal_fit import ModalModel
 
 

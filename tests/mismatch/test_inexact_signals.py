@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from trial_case import diagnosed
 
-from mismatch.noise import fit_noise, inexactness
-from mismatch.noise.noise_model import EXACT
+from millfrf.mismatch.noise.noise_model import EXACT, fit_noise, inexactness
 
 
 def test_noise_is_found_beside_an_error_of_the_signal() -> None:

@@ -7,11 +7,23 @@ import numpy as np
 import pytest
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, band_of, predict_lines
-from mismatch.joints import JointAxis, JointMotion, ModalScales, modal_scales, tip_axes
-from mismatch.models import Cause, hypothesis_of, improved_model
-from mismatch.physics import JointPhysics, library
-from mismatch.physics.missing_mode import PHYSICS as MISSING_MODE
+from millfrf.mismatch import (
+    Hypothesis,
+    JointPhysics,
+    LabError,
+    ModelShape,
+    improved_model,
+    library,
+    predict_lines,
+    tip_axes,
+)
+from millfrf.mismatch.joints.joint_axis import JointAxis, ModalScales
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.joints.joint_reach import modal_scales
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.models.model_terms import hypothesis_of
+from millfrf.mismatch.physics.structural import MISSING_MODE
+from millfrf.mismatch.records.reading import band_of
 from modal_fit import ModalModel
 
 TrialOf = Callable[[ModalModel, str, float, int], BandRecording]

@@ -7,14 +7,28 @@ import numpy as np
 import pytest
 
 from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, band_of, fit, linear_floor, predict_lines
-from mismatch.adapters.structure.acceptance import impossible
-from mismatch.inference import EvidenceSettings, Proposal, ScreeningSettings
-from mismatch.joints import JointAxis, JointMotion, joint_in_words, modal_scales
-from mismatch.models import Cause, Fit, location_of
-from mismatch.physics import JointPhysics, library
-from mismatch.screening.joint_places import JointPlace, joint_places
-from mismatch.screening.joint_starts import begun_at
+from millfrf.mismatch import (
+    Hypothesis,
+    JointPhysics,
+    LabError,
+    ModelShape,
+    fit,
+    joint_in_words,
+    library,
+    linear_floor,
+    predict_lines,
+)
+from millfrf.mismatch.inference.search import Proposal
+from millfrf.mismatch.inference.settings import EvidenceSettings, ScreeningSettings
+from millfrf.mismatch.joints.joint_axis import JointAxis
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.joints.joint_reach import modal_scales
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.models.hypothesis import Cause, location_of
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.screening.joint_places import JointPlace, joint_places
+from millfrf.mismatch.screening.joint_starts import begun_at
+from millfrf.mismatch.structure.acceptance import impossible
 from modal_fit import ModalModel
 
 TrialOf = Callable[[ModalModel, str, float, int], BandRecording]

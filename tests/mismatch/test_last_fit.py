@@ -8,14 +8,17 @@ from hidden_joint import at_the_joint, law_of
 from one_mode_rig import Rig, steady
 
 from estimation import WindowedSpectrum, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, Settings, band_of
-from mismatch.adapters.structure.answer import Answer
-from mismatch.adapters.structure.held_out import held_out_improvement, recordings_of
-from mismatch.adapters.structure.predicting import last_fit
-from mismatch.inference import Search
-from mismatch.models import Fit, even_fit, fit, plain_fit
-from mismatch.records import Recordings, compared_band, compared_lines
-from mismatch.remainder import leftover
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, Settings, fit
+from millfrf.mismatch.inference.search import Search
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.models.refinement import even_fit, plain_fit
+from millfrf.mismatch.records.bands import compared_band, compared_lines
+from millfrf.mismatch.records.held_out_parts import Recordings
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.residual.structured_residual import leftover
+from millfrf.mismatch.structure.answer import Answer
+from millfrf.mismatch.structure.held_out import held_out_improvement, recordings_of
+from millfrf.mismatch.structure.prediction import last_fit
 
 LEVELS = (1.0, 4.0)
 RIG = Rig().stiffened(0.3, 4.0)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from mismatch.remainder.cell_regression import moving_power
+from millfrf.mismatch.residual.structured_residual import moving_power
 
 
 def _plain(rest: np.ndarray, shown: np.ndarray, bins: int) -> float:

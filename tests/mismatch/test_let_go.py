@@ -8,16 +8,16 @@ from hidden_joint import law_of, with_law
 from one_mode_rig import Rig
 
 from estimation import windowed_spectrum
-from mismatch import LabError, ModelShape, Settings, band_of
-from mismatch.adapters.structure import confirmation
-from mismatch.adapters.structure.comparison import StructureComparison
-from mismatch.adapters.structure.confirmation import fit_without
-from mismatch.adapters.structure.held_out import held_out_improvement, recordings_of
-from mismatch.adapters.structure.told_causes import undamped_modes
-from mismatch.inference import Proposal, Search
-from mismatch.models import Fit, Hypothesis, fit
-from mismatch.physics import library
-from mismatch.remainder import leftover
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, Settings, fit, library
+from millfrf.mismatch.inference.search import Proposal, Search
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.residual.structured_residual import leftover
+from millfrf.mismatch.structure import confirmation
+from millfrf.mismatch.structure.comparison import StructureComparison
+from millfrf.mismatch.structure.confirmation import fit_without
+from millfrf.mismatch.structure.held_out import held_out_improvement, recordings_of
+from millfrf.mismatch.structure.reported_causes import undamped_modes
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,11 @@ import pytest
 from one_mode_rig import Rig
 
 from estimation import WindowedSpectrum, windowed_spectrum
-from foundation import InputError
-from mismatch import LabError, ModelShape, Settings, band_of, fit
-from mismatch.inference import SearchSettings
-from mismatch.models import Fit, Hypothesis
-from mismatch.physics import JointPhysics, library
-from mismatch.screening import joint_candidates, laws_by_level, sighted_laws
+from millfrf.core import InputError
+from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, SearchSettings, Settings, fit, library
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.screening.joint_laws_fitted import joint_candidates, laws_by_level, sighted_laws
 
 LEVELS = (20.0, 40.0, 60.0)
 

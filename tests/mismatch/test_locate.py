@@ -10,12 +10,10 @@ import pytest
 from scipy.signal import butter, sosfilt
 
 from estimation import BandRecording
-from mismatch import StructureDiagnosis
-from mismatch.inference import LocationSettings
-from mismatch.location.family_wise import holm, noise_spread
-from mismatch.location.locate import located
-from mismatch.location.spindle_orders import SpindleSpeed
-from mismatch.location.view_of_residual import residual_view
+from millfrf.mismatch import SpindleSpeed, StructureDiagnosis
+from millfrf.mismatch.inference.settings import LocationSettings
+from millfrf.mismatch.location.location import located
+from millfrf.mismatch.location.residual_view import holm, noise_spread, residual_view
 from modal_fit import ModalModel
 
 RATE, NOISE = 128.0, 0.02

@@ -9,12 +9,15 @@ from one_mode_rig import NOISE, PERIOD, Rig, steady
 
 from benchmarks.blind_trial.case_spec import draw_cases
 from benchmarks.blind_trial.sealed_case import write_case
-from estimation import BandRecording, measured_noise, windowed_spectrum
+from estimation import BandRecording, windowed_spectrum
+from estimation.repeats.noise_between_periods import measured_noise
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, diagnose, read_recordings
+from millfrf.mismatch.models.misfit import outdoes_noise
+from millfrf.mismatch.noise.noise_model import fit_noise
+from millfrf.mismatch.records.bands import compared_band, compared_lines
+from millfrf.mismatch.records.held_out_parts import with_measured_noise
+from millfrf.mismatch.records.reading import band_of
 from millfrf.structure.diagnosis_words import diagnosis_lines
-from mismatch import Hypothesis, LabError, ModelShape, band_of, diagnose, read_recordings
-from mismatch.models import outdoes_noise
-from mismatch.noise.noise_model import fit_noise
-from mismatch.records import compared_band, compared_lines, with_measured_noise
 from modal_fit import read_modal_model
 
 

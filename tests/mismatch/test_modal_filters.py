@@ -5,12 +5,12 @@ import pytest
 from hidden_joint import MOTION, law_of
 from scipy.fft import irfft, rfft
 
-from mismatch.joints import modal_filters
-from mismatch.joints.joint_law import JointMotion
-from mismatch.joints.loops import driven_run, filters_run, law_change_run
-from mismatch.models.cause import Cause
-from mismatch.models.slopes.law_changes import cause_slopes
-from mismatch.physics import FreeForm
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.joints.modal_filters import modal_filters
+from millfrf.mismatch.joints.time_loops import driven_run, filters_run, law_change_run
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.models.joint_tangents import cause_slopes
+from millfrf.mismatch.physics.free_form import FreeForm
 
 PADDED, STEP = 1200, 1 / 512
 

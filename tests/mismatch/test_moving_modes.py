@@ -8,10 +8,11 @@ from typing import Any
 import pytest
 from trial_case import diagnosed
 
-from mismatch.adapters.structure.level_check import moved_by_level, seen_to_stay, stands_beside_moving_modes
-from mismatch.behaviour import FAMILIES, Behaviour, ModeTrend
-from mismatch.inference import Improvement, Settings, VerdictSettings
-from mismatch.physics import JointPhysics, library
+from millfrf.mismatch import Behaviour, JointPhysics, ModeTrend, Settings, library
+from millfrf.mismatch.behaviour.behaviour_of_modes import FAMILIES
+from millfrf.mismatch.inference.diagnosis import Improvement
+from millfrf.mismatch.inference.settings import VerdictSettings
+from millfrf.mismatch.structure.implausible_modes import moved_by_level, seen_to_stay, stands_beside_moving_modes
 
 SOFTENS = Behaviour("softening", "Mode at 6.1 Hz softens by 0.9 %.", "N", ())
 LINEAR: Any = SimpleNamespace(laws=())

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from mismatch.noise.noise_loops import line_covariances, noise_likelihood
-from mismatch.noise.noise_search import Lumps, cost_of, lumped, most_likely
+from millfrf.mismatch.noise.loops import line_covariances, noise_likelihood
+from millfrf.mismatch.noise.noise_model import Lumps, cost_of, lumped, most_likely
 
 N, M, KNOTS = 2, 2, 4
 

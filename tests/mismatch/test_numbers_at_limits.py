@@ -5,13 +5,13 @@ import pytest
 from hidden_joint import MOTION as RIG_MOTION
 from hidden_joint import at_the_joint, law_of, moved_by, with_law
 
-from mismatch import fit
-from mismatch.adapters.structure.structure_verdict import equivalents_of_answer
-from mismatch.inference import AcceptedCause, EvidenceSettings, Proposal, Search, Settings
-from mismatch.joints.joint_law import JointMotion
-from mismatch.physics import JointPhysics, LimitedPhysics, library
-from mismatch.physics.protocol import DRY
-from mismatch.screening import laws_beyond, laws_in_place
+from millfrf.mismatch import AcceptedCause, JointPhysics, Settings, fit, library
+from millfrf.mismatch.inference.search import Proposal, Search
+from millfrf.mismatch.inference.settings import EvidenceSettings
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.physics.protocol import DRY, LimitedPhysics
+from millfrf.mismatch.screening.joint_alternatives import laws_beyond, laws_in_place
+from millfrf.mismatch.structure.answer import equivalents_of_answer
 
 MOTION = JointMotion(reach=1e-3, speed=0.1, deflection=2e-4, velocity=0.02, stiffness=1e6)
 LEVELS = (20.0, 60.0)

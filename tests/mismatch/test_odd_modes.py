@@ -10,7 +10,7 @@ import pytest
 from concealed_recordings import Concealed, forces, structure, trial
 
 from estimation import BandRecording
-from mismatch import StructureDiagnosis, diagnose
+from millfrf.mismatch import StructureDiagnosis, diagnose
 from modal_fit import ModalModel
 
 CUBIC, GAIN = 4e10, 1.4

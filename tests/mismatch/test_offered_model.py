@@ -8,9 +8,17 @@ import numpy as np
 import pytest
 from one_mode_rig import Rig
 
+from millfrf.mismatch import (
+    Settings,
+    StructureDiagnosis,
+    diagnose,
+    improved_model_of,
+    library,
+    predict,
+    write_diagnosis,
+)
 from millfrf.report.diagnoses.diagnosis_answers import how_sure
 from millfrf.structure.diagnosis_words import diagnosis_lines
-from mismatch import Settings, StructureDiagnosis, diagnose, improved_model_of, library, predict, write_diagnosis
 
 LEVELS = (20.0, 40.0, 60.0)
 

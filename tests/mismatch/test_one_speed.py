@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from trial_case import diagnosed
 
-from mismatch.adapters.structure.acceptance import evidence_needed
-from mismatch.inference import EvidenceSettings
+from millfrf.mismatch.inference.settings import EvidenceSettings
+from millfrf.mismatch.structure.acceptance import evidence_needed
 
 
 def test_a_strong_coupling_is_found_from_the_modes_that_the_lab_believes(tmp_path: Path) -> None:

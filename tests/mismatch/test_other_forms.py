@@ -5,12 +5,12 @@ import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 
 from estimation import WindowedSpectrum, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, band_of
-from mismatch.adapters.structure.form_errors import with_form_spread
-from mismatch.models.cause import Cause
-from mismatch.models.fitting import Fit, fit
-from mismatch.physics import library
-from mismatch.physics.ac_coupling import TWO_STAGES
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, fit, library
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.physics.measuring_chain import TWO_STAGES
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.structure.form_errors import with_form_spread
 
 
 def recorded(corner: float, stages: int, seed: int) -> list[WindowedSpectrum]:

@@ -7,9 +7,9 @@ import pytest
 from one_mode_rig import Rig
 
 from estimation import BandRecording
-from mismatch import Settings, StructureDiagnosis, diagnose, library
-from mismatch.behaviour import followed_alone
-from mismatch.inference import VerdictSettings
+from millfrf.mismatch import Settings, StructureDiagnosis, diagnose, library
+from millfrf.mismatch.behaviour.level_refit import followed_alone
+from millfrf.mismatch.inference.settings import VerdictSettings
 
 FORCES = (20.0, 40.0, 60.0)
 

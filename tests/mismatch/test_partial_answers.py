@@ -6,10 +6,11 @@ from typing import Any
 
 import pytest
 
-from mismatch.adapters.structure.structure_verdict import has_a_sure_name, shown_faults, small_beside_the_rest
-from mismatch.inference import AcceptedCause, Candidate, Improvement, Proposal, Round, Search, VerdictSettings
-from mismatch.inference.verdict import error_halved
-from mismatch.physics import library
+from millfrf.mismatch import AcceptedCause, Candidate, library
+from millfrf.mismatch.inference.diagnosis import Improvement, error_halved
+from millfrf.mismatch.inference.search import Proposal, Round, Search
+from millfrf.mismatch.inference.settings import VerdictSettings
+from millfrf.mismatch.structure.answer import has_a_sure_name, shown_faults, small_beside_the_rest
 
 LAWS = {"coulomb_friction", "hysteresis", "backlash", "stiffness_hardening"}
 

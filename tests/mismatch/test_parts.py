@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
-from mismatch import Hypothesis, JointLaw, LabError, ModelShape, band_of
-from mismatch import physics as physics_folder
-from mismatch.adapters.structure.told_causes import accepted_cause
-from mismatch.joints.joint_law import POINTS
-from mismatch.joints.joint_simulation import driven_force, joint_response
-from mismatch.models.cause import Cause
-from mismatch.models.fitting import Fit
-from mismatch.models.lines.modal_lines import receptance_at
-from mismatch.noise.noise_model import fit_noise, whitening
+from millfrf.mismatch import Hypothesis, JointLaw, LabError, ModelShape
+from millfrf.mismatch.joints.joint_law import POINTS
+from millfrf.mismatch.joints.joint_simulation import driven_force, joint_response
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.models.modal_lines import receptance_at
+from millfrf.mismatch.noise.noise_model import fit_noise, whitening
+from millfrf.mismatch.physics import library as physics_folder
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.structure.reported_causes import accepted_cause
 from modal_fit import ModalModel, Residuals
 
 
@@ -110,8 +111,8 @@ def test_every_cause_is_a_short_file_with_its_source() -> None:
 
 TOY = """
 import numpy as np
-from mismatch.joints.joint_law import JointLaw
-from mismatch.physics import Parameter
+from millfrf.mismatch import JointLaw
+from millfrf.mismatch import Parameter
 
 
 class Toy:

@@ -15,12 +15,26 @@ from scipy.linalg import eig
 from scipy.signal import resample
 
 from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, band_of, fit, predict_lines
-from mismatch.joints import JointAxis, JointMotion, inside_of, joint_in_words, modal_scales
-from mismatch.models import Cause, Fit, hypothesis_of, improved_model, location_of
-from mismatch.physics import JointPhysics, library
-from mismatch.physics.missing_mode import PHYSICS as MISSING_MODE
-from mismatch.screening.joint_starts import moved_inside, phases_too_large, with_phases
+from millfrf.mismatch import (
+    Hypothesis,
+    JointPhysics,
+    LabError,
+    ModelShape,
+    fit,
+    improved_model,
+    joint_in_words,
+    library,
+    predict_lines,
+)
+from millfrf.mismatch.joints.joint_axis import JointAxis
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.joints.joint_reach import inside_of, modal_scales
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.models.hypothesis import Cause, location_of
+from millfrf.mismatch.models.model_terms import hypothesis_of
+from millfrf.mismatch.physics.structural import MISSING_MODE
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.screening.joint_starts import moved_inside, phases_too_large, with_phases
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from mismatch import diagnose, improved_model_of, predict, read_recording, read_recordings
+from millfrf.mismatch import diagnose, improved_model_of, predict, read_recording, read_recordings
 from modal_fit import read_modal_model
 
 

@@ -11,9 +11,19 @@ import pytest
 from estimation import windowed_spectrum
 from millfrf.chain.fitting.fit import fit_recordings
 from millfrf.chain.fitting.fit_options import FitOptions
-from mismatch import Hypothesis, LabError, ModelShape, Settings, diagnose, fit, improved_model_of, read_recordings
-from mismatch.faults import repair_faults
-from mismatch.records import in_deflections, with_measured_noise
+from millfrf.mismatch import (
+    Hypothesis,
+    LabError,
+    ModelShape,
+    Settings,
+    diagnose,
+    fit,
+    improved_model_of,
+    read_recordings,
+)
+from millfrf.mismatch.faults.clipping_repair import repair_faults
+from millfrf.mismatch.records.held_out_parts import with_measured_noise
+from millfrf.mismatch.records.reading import in_deflections
 
 pytestmark = pytest.mark.shared_data
 

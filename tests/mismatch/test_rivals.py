@@ -8,8 +8,9 @@ from hidden_joint import law_of, with_law
 from one_mode_rig import Rig
 
 from estimation import WindowedSpectrum, windowed_spectrum
-from mismatch import LabError, ModelShape, band_of
-from mismatch.models import Fit, Hypothesis, Rival, fit
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, fit
+from millfrf.mismatch.models.fitting import Fit, Rival
+from millfrf.mismatch.records.reading import band_of
 
 FRICTION = np.array([3.0, 2e-3])
 

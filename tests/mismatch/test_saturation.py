@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mismatch.joints.saturation import Saturation, rounded, saturated
+from millfrf.mismatch.joints.joint_law import Saturation, rounded, saturated
 
 SIGNALS = st.floats(-1e6, 1e6)
 

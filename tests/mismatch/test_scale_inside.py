@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from scipy.integrate import quad_vec
 from trial_case import diagnosed
 
-from mismatch import Cause, LabError, ModelShape, predict_lines
-from mismatch.adapters.structure.told_causes import unknown_scales
-from mismatch.inference import AcceptedCause
-from mismatch.joints import JointAxis, JointMotion, ModalScales, inside_of
-from mismatch.models import Fit, Hypothesis, spread_with_scale
-from mismatch.models.scale_of_joints import counted_at_tip, scale_at_tip, scaled
+from millfrf.mismatch import AcceptedCause, Hypothesis, LabError, ModelShape, predict_lines
+from millfrf.mismatch.joints.joint_axis import JointAxis, ModalScales
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.joints.joint_reach import inside_of
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.models.model_terms import counted_at_tip, scale_at_tip, scaled, spread_with_scale
+from millfrf.mismatch.structure.reported_causes import unknown_scales
 from modal_fit import ModalModel
 
 LAWS = {

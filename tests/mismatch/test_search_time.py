@@ -6,7 +6,7 @@ import numpy as np
 from one_mode_rig import Rig
 
 from millfrf.commands.diagnose import diagnose as command
-from mismatch import SearchSettings, Settings, diagnose
+from millfrf.mismatch import SearchSettings, Settings, diagnose
 
 
 def test_a_search_without_time_tells_what_it_has() -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 from one_mode_rig import Rig
 
 from estimation import BandRecording
-from mismatch import diagnose
+from millfrf.mismatch import diagnose
 
 LEVELS = (20.0, 40.0, 56.0)
 

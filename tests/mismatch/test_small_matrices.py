@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mismatch.models.lines import closed_loop, line_products
+from millfrf.mismatch.models.modal_lines import closed_loop, line_products
 
 
 def _lines(rng: np.random.Generator, *shape: int) -> np.ndarray:

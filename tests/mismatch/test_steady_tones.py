@@ -7,9 +7,10 @@ import pytest
 from one_mode_rig import Rig
 
 from estimation import windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, band_of, fit
-from mismatch.faults import with_tones_settled
-from mismatch.inference import FAULTS, AcceptedCause
+from millfrf.mismatch import AcceptedCause, Hypothesis, LabError, ModelShape, fit
+from millfrf.mismatch.faults.clipping_repair import with_tones_settled
+from millfrf.mismatch.inference.settings import FAULTS
+from millfrf.mismatch.records.reading import band_of
 
 LEVELS, FREQUENCY = (1.0, 3.0, 9.0), 17.3
 

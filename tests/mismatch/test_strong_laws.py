@@ -7,8 +7,11 @@ import pytest
 from one_mode_rig import Real, Rig
 
 from estimation import BandRecording, windowed_spectrum
-from mismatch import Cause, Hypothesis, JointMotion, LabError, ModelShape, band_of, diagnose, fit, library
-from mismatch.joints import JointAxis
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, diagnose, fit, library
+from millfrf.mismatch.joints.joint_axis import JointAxis
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.records.reading import band_of
 
 LEVELS = (20.0, 40.0, 60.0)
 

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, band_of, predict_lines
-from mismatch.joints.joint_axis import JointAxis, ModalScales
-from mismatch.joints.joint_law import JointMotion
-from mismatch.joints.joint_simulation import driven_force
-from mismatch.joints.reciprocity import modal_scales
-from mismatch.models.cause import Cause
-from mismatch.models.lines.modal_lines import displacement_at
-from mismatch.models.slopes.line_slopes import jacobian
-from mismatch.noise.line_loops import whiten_lines
-from mismatch.physics import JointPhysics, library
+from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, library, predict_lines
+from millfrf.mismatch.joints.joint_axis import JointAxis, ModalScales
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.joints.joint_reach import modal_scales
+from millfrf.mismatch.joints.joint_simulation import driven_force
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.models.line_slopes import jacobian
+from millfrf.mismatch.models.modal_lines import displacement_at
+from millfrf.mismatch.noise.loops import whiten_lines
+from millfrf.mismatch.records.reading import band_of
 from modal_fit import ModalModel
 
 DIRECTION = np.array([0.8, 0.6])

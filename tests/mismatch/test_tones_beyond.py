@@ -5,12 +5,11 @@ import pytest
 from concealed_recordings import RATE, forces, linear_acceleration, structure, trial
 from numpy.typing import NDArray
 
-from estimation import WindowedSpectrum, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape
-from mismatch.faults.tones import NEAR, Tone, above_neighbours
-from mismatch.faults.tones_beyond import tones_beyond
-from mismatch.inference import FAULTS
-from mismatch.records.reading import BandRecording, band_of
+from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
+from millfrf.mismatch import Hypothesis, LabError, ModelShape
+from millfrf.mismatch.faults.tones import NEAR, Tone, above_neighbours, tones_beyond
+from millfrf.mismatch.inference.settings import FAULTS
+from millfrf.mismatch.records.reading import band_of
 
 TONE = 83.217
 LEVELS = (20.0, 40.0, 80.0)

@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 
 from estimation import BandRecording, WindowedSpectrum, channels_of, windowed_spectrum
-from mismatch import Hypothesis, LabError, ModelShape, band_of, fit, predict_lines
-from mismatch.joints import JointAxis, JointMotion, modal_scales
-from mismatch.models import Cause, Fit
-from mismatch.physics import JointPhysics, library
-from mismatch.screening.joint_starts import with_turned_signs
+from millfrf.mismatch import Hypothesis, JointPhysics, LabError, ModelShape, fit, library, predict_lines
+from millfrf.mismatch.joints.joint_axis import JointAxis
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.joints.joint_reach import modal_scales
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.screening.joint_starts import with_turned_signs
 from modal_fit import ModalModel
 
 TrialOf = Callable[[ModalModel, str, float, int], BandRecording]

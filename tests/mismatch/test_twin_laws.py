@@ -8,12 +8,14 @@ from one_mode_rig import Real, Rig
 from scipy.fft import irfft
 
 from estimation import WindowedSpectrum, windowed_spectrum
-from mismatch import Cause, LabError, ModelShape, band_of, fit
-from mismatch.inference import Proposal
-from mismatch.joints import JointAxis, JointMotion
-from mismatch.models import Fit, Hypothesis, predict_lines
-from mismatch.physics import library
-from mismatch.screening import twin_laws
+from millfrf.mismatch import Hypothesis, LabError, ModelShape, fit, library, predict_lines
+from millfrf.mismatch.inference.search import Proposal
+from millfrf.mismatch.joints.joint_axis import JointAxis
+from millfrf.mismatch.joints.joint_law import JointMotion
+from millfrf.mismatch.models.fitting import Fit
+from millfrf.mismatch.models.hypothesis import Cause
+from millfrf.mismatch.records.reading import band_of
+from millfrf.mismatch.screening.joint_alternatives import twin_laws
 
 LEVELS = (20.0, 40.0)
 

@@ -7,8 +7,8 @@ import pytest
 from concealed_recordings import RATE, Real, forces, linear_acceleration, structure, trial
 
 from estimation import BandRecording
-from mismatch import Settings, diagnose
-from mismatch.inference import ScreeningSettings
+from millfrf.mismatch import Settings, diagnose
+from millfrf.mismatch.inference.settings import ScreeningSettings
 
 RESONANCE, CORNER = 60.0, 0.8
 

@@ -5,7 +5,7 @@ import pytest
 from one_mode_rig import Rig
 
 from estimation import windowed_spectrum
-from mismatch import predict
+from millfrf.mismatch import predict
 
 
 @pytest.mark.parametrize("response", ["acceleration", "displacement"])

@@ -4,8 +4,7 @@ from pathlib import Path
 
 from benchmarks.blind_trial.case_spec import draw_cases
 from benchmarks.blind_trial.sealed_case import write_case
-from mismatch import Settings, diagnose, read_recordings
-from mismatch.location import StructureDiagnosis
+from millfrf.mismatch import Settings, StructureDiagnosis, diagnose, read_recordings
 from modal_fit import read_modal_model
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from foundation import InputError
+from millfrf.core import InputError
 from modal_fit import ModalModel, compare_modes
 from replay_data import table_one_model
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
 from estimation import BandRecording, Frf, FrfCovariance, Resampler, whole_ratio
+from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel, derived_covariance, fit_polyreference, fit_subspace
 from replay_data import LinearSweep, MillingCell, default_structure, milling_sensors, tip_model
 

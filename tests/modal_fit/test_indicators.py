@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation import Frf
-from foundation import InputError
+from millfrf.core import InputError
 from modal_fit import ModalModel, complex_mode_indicator, multivariate_mode_indicator
 
 AXIS = np.arange(1.0, 60.0, 0.05)

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from foundation import InputError
-from modal_fit import ModalModel, mode_complexity, mode_shapes
+from millfrf.core import InputError
+from modal_fit import ModalModel, mode_shapes
+from modal_fit.shapes import mode_complexity
 
 
 def model(right: np.ndarray, n_excitations: int = 1) -> ModalModel:

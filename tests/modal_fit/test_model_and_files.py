@@ -8,19 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foundation import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError
 from modal_fit import (
     ModalModel,
     Residuals,
     derived_covariance,
     frequency_and_damping_errors,
-    modal_assurance,
-    phase_collinearity,
-    phase_deviation,
     read_modal_model,
-    reciprocity_residual,
     write_modal_model,
 )
+from modal_fit.shapes import modal_assurance, phase_collinearity, phase_deviation, reciprocity_residual
 from replay_data import table_one_model
 
 

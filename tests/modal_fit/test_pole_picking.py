@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation import Frf
-from foundation import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError
 from modal_fit import (
     ModalModel,
     candidate_groups,

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimation import Frf, FrfCovariance
-from foundation import InputError, MillfrfError
+from millfrf.core import InputError, MillfrfError
 from modal_fit import ModalModel, fit_polyreference, frequency_and_damping_errors
-from modal_fit.stabilisation.matrix_fraction import matrix_fraction_poles
+from modal_fit.stabilisation import matrix_fraction_poles
 from replay_data import default_structure, table_one_model, tip_model
 
 AXIS = np.arange(0.0625, 40.0, 0.0625)

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from acquisition import Channel
-from cutting import MillingProcess
 from estimation import BandRecording, Resampler, whole_ratio
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
 from modal_fit import SubspaceFit, fit_subspace, frequency_and_damping_errors
+from modal_fit.maximum_likelihood.likelihood_fit import linear_start
 from modal_fit.maximum_likelihood.likelihood_model import Setting, gauge_directions, jacobian, prediction, transfer
-from modal_fit.maximum_likelihood.linear_start import linear_start
 from modal_fit.maximum_likelihood.whole_records import record_spectra
 from modal_fit.models.out_of_band import out_of_band_basis
 from replay_data import LinearSweep, MillingCell, default_structure, milling_sensors

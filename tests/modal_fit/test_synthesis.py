@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation import Frf
-from foundation import InputError
+from millfrf.core import InputError
 from modal_fit import ModalModel, Residuals, synthesis
 
 AXIS = np.arange(5.0, 60.0, 0.1)

@@ -9,8 +9,9 @@ import pytest
 import pyuff
 
 from estimation import Frf
-from foundation import FileFormatError, InputError
-from modal_fit import ModalModel, import_modes_uff, read_modes_uff, write_modes_uff
+from millfrf.core import FileFormatError, InputError
+from modal_fit import ModalModel, import_modes_uff, write_modes_uff
+from modal_fit.uff_reading import read_modes_uff
 from replay_data import default_structure, table_one_model
 
 

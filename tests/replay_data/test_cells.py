@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.signal import csd
 
 from acquisition import Recording, Source, StreamDescription, record
-from cutting import MillingProcess
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 from replay_data import (
     HammerCell,

@@ -9,18 +9,19 @@ from scipy.signal import csd
 from scipy.stats import chisquare
 
 from acquisition import Recording, record
-from replay_data.concealment.concealed_cell import FINE_RATE, LEVELS, RATE, ConcealedCell, milling_force
-from replay_data.concealment.concealed_chain import in_converter, through_chain
-from replay_data.concealment.concealed_effect import (
-    CHANNELS,
-    EFFECTS,
+from replay_data import (
+    FINE_RATE,
+    LEVELS,
+    ConcealedCell,
     ConcealedEffect,
     draw_effect,
     draw_name,
     joint_scale,
+    milling_force,
+    posture_robot,
+    tip_motion,
 )
-from replay_data.concealment.random_posture import posture_robot
-from replay_data.simulation.joint_march import tip_motion
+from replay_data.concealment import CHANNELS, EFFECTS, RATE, in_converter, through_chain
 
 SECONDS = 8.0
 ROBOT = posture_robot(np.random.default_rng(2))

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from replay_data.concealment.random_posture import posture_robot
-from replay_data.simulation.joint_laws import JOINT_LAWS, joint_force, stretched
-from replay_data.simulation.joint_march import LINEAR, tip_motion
+from replay_data import posture_robot, tip_motion
+from replay_data.joints import JOINT_LAWS, LINEAR, joint_force, stretched
 
 ROBOT = posture_robot(np.random.default_rng(4))
 DIRECTION = np.array([0.6, -0.48, 0.64])

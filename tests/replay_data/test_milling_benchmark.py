@@ -5,13 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
-from cutting.one_tooth import tooth_offsets
-from foundation import TIP
+from millfrf.core import TIP
+from millfrf.cutting import MillingProcess, tooth_offsets
 from modal_fit import ModalModel
-from replay_data.simulation.material import material_named
-from replay_data.simulation.milling_loop import empty_memory, mill, prepare_cut
-from replay_data.simulation.modal_integrator import discretise
+from replay_data.material import material_named
+from replay_data.milling_loop import empty_memory, mill, prepare_cut
+from replay_data.modal_integrator import discretise
 
 STEPS_PER_TOOTH = 512
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
-from cutting.one_tooth import rigid_force, tooth_force, tooth_offsets
+from millfrf.cutting import MillingProcess, tooth_force, tooth_offsets
+from millfrf.cutting.tooth_force import rigid_force
 from modal_fit import ModalModel
 from replay_data import ConstantSpeed, LinearSweep, SpeedProfile, default_structure, table_one_model, tip_model
-from replay_data.simulation.material import material_named
-from replay_data.simulation.milling_loop import empty_memory, mill, prepare_cut
-from replay_data.simulation.modal_integrator import discretise
+from replay_data.material import material_named
+from replay_data.milling_loop import empty_memory, mill, prepare_cut
+from replay_data.modal_integrator import discretise
 
 RPM = math.pi / 30
 DOWN_MILLING = MillingProcess(2, 12.7e-3, math.pi / 2, 119e6, 0.17, 0.33, math.pi / 2, math.pi, 0.15e-3)

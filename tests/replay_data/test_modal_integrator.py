@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from foundation import InputError
+from millfrf.core import InputError
 from modal_fit import ModalModel
 from replay_data import default_structure, table_one_model
-from replay_data.simulation.modal_integrator import ResponseMap, discretise, require_simulable, respond
+from replay_data.modal_integrator import ResponseMap, discretise, require_simulable, respond
 
 PLACES = ("TCP:+X", "TCP:+Y", "TCP:+Z")
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from foundation import InputError
+from millfrf.core import InputError
 from modal_fit import ModalModel, Residuals
 from replay_data import default_structure, table_one_model, tip_model
 from replay_data.robot_structure import _SENSOR_FROM_TIP

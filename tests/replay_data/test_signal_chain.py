@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foundation import InputError
+from millfrf.core import InputError
 from replay_data import Sensor
-from replay_data.laboratory.signal_chain import Decimator, SignalChain, anti_alias_filter
+from replay_data.laboratory import Decimator, SignalChain, anti_alias_filter
 
 RATE = 10240.0
 

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foundation import InputError
-from replay_data import ConstantSpeed, DriftingSpeed, LinearSweep, SpeedProfile
+from millfrf.core import InputError
+from replay_data import ConstantSpeed, LinearSweep, SpeedProfile
+from replay_data.speed_profiles import DriftingSpeed
 
 speeds = st.floats(5, 500)
 profiles = st.one_of(

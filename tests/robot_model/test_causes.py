@@ -5,18 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from foundation import InputError
-from robot_model import (
+from millfrf.core import InputError
+from millfrf.robot_model import SpatialRobot, modes_at, read_spatial_robot, with_joint_factor, with_payload
+from millfrf.robot_model.model_updating.changes import with_link_factor, with_rigid_links
+from millfrf.robot_model.model_updating.weighed_changes import (
     PostureFrequencies,
-    SpatialRobot,
     equivalent_causes,
     explain_frequencies,
-    modes_at,
-    read_spatial_robot,
-    with_joint_factor,
-    with_link_factor,
-    with_payload,
-    with_rigid_links,
 )
 
 CASE = read_spatial_robot("staubli_rx170")

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from estimation import Frf
-from robot_model import (
+from millfrf.robot_model import (
     Deflection,
     apply_joint_stiffness,
     close_loops,
-    identify_from_frfs,
     identify_joint_stiffness,
     predicted_deflections,
     read_planar_robot,
@@ -18,6 +17,7 @@ from robot_model import (
     rigid_model,
     stiffness_names,
 )
+from millfrf.robot_model.identification.planar_identification import identify_from_frfs
 
 FANUC = read_spatial_robot("fanuc_s420if").robot
 PLACES = {"radial": 0, "axial": 2, "tilting": 3, "turning": 5}

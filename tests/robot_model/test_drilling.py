@@ -8,19 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
 
-from cutting import Drill, drilling_load, fitted_to_catalogue
-from foundation import InputError
-from robot_model import (
+from millfrf.core import InputError
+from millfrf.cutting import Drill, drilling_load, fitted_to_catalogue
+from millfrf.robot_model import (
     LoadUncertainty,
-    NaturalChain,
     UncertaintyBudget,
     deformation_uncertainty,
     deviation_map,
     drilling_wrench,
-    joint_deformation,
-    joint_deviation,
     lateral_uncertainty,
-    machining_uncertainty,
     measured_machining_uncertainty,
     monte_carlo_deformation,
     position_tolerance,
@@ -30,10 +26,12 @@ from robot_model import (
     rigid_matrices,
     structure_at,
     tip_compliance,
-    tolerance_grade,
     tool_down,
     tool_jacobian,
 )
+from millfrf.robot_model.machining.drilling_deviation import joint_deformation, joint_deviation
+from millfrf.robot_model.machining.uncertainty_budget import machining_uncertainty, tolerance_grade
+from millfrf.robot_model.natural_coordinates import NaturalChain
 
 ROBOT = read_spatial_robot("staubli_rx170").robot
 READY = read_spatial_robot("staubli_rx170").poses["ready"]

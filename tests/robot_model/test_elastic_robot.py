@@ -8,29 +8,27 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foundation import FileFormatError, InputError
-from robot_model import (
+from millfrf.core import FileFormatError, InputError
+from millfrf.robot_model import (
     Deflection,
     ToolPath,
     apply_joint_stiffness,
     close_loops,
     compensate_path,
-    constrained_system,
-    coordinate_basis,
     identify_joint_stiffness,
     inverse_kinematics,
-    posture_warnings,
     predicted_deflections,
     read_spatial_robot,
     read_tool_path,
-    stiffness_matrix,
     stiffness_names,
     structure_at,
     tip_compliance,
-    tip_stiffness,
     tool_jacobian,
     write_compensated_path,
 )
+from millfrf.robot_model.finite_elements.statics import constrained_system, tip_stiffness
+from millfrf.robot_model.finite_elements.structure import coordinate_basis, stiffness_matrix
+from millfrf.robot_model.kinematics.mechanism import posture_warnings
 
 FANUC = read_spatial_robot("fanuc_s420if").robot
 READY = np.radians([0.0, 20.0, 0.0, 45.0, 0.0, 10.0])
@@ -186,7 +184,7 @@ def test_compensated_path_meets_the_nominal_one(tmp_path: Path) -> None:
     place = mechanism.transforms(q)[mechanism.index("E")]
     phase = np.linspace(0, 2 * np.pi, 8)
     positions = place[:3, 3] + 0.05 * np.column_stack([np.cos(phase) - 1, np.sin(phase), 0 * phase])
-    from robot_model.kinematics.mechanism import rotation_vector
+    from millfrf.robot_model import rotation_vector
 
     path = ToolPath(
         positions,

@@ -6,15 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from robot_model import (
-    Material,
-    Section,
+from millfrf.robot_model.dynamic_stiffness import (
     block_diagonal,
     couple_receptances,
-    hollow_circle,
     planar_dynamic_stiffness,
     spatial_dynamic_stiffness,
 )
+from millfrf.robot_model.finite_elements.beam_element import Material, Section, hollow_circle
 
 STEEL = Material(210e9, 81e9, 7850.0)
 THIN = hollow_circle(0.04, 0.02, STEEL, timoshenko=False)

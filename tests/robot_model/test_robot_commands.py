@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
 from estimation import read_frf
-from foundation import apart
 from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.core import apart
+from millfrf.cutting import MillingProcess
 from millfrf.robot.depth_maps.depth_map import depth_limits
 from millfrf.robot.depth_maps.posture_maps import depth_over_places, depth_over_redundancy
 from millfrf.robot.robot_lobes import at_the_tip
+from millfrf.robot_model import modal_model_at, read_planar_robot, read_spatial_robot, rigid_model, tool_down
+from millfrf.stability import certified_lobes, multipliers, read_lobes
 from modal_fit import read_modal_model
 from replay_data import MillingCell
-from robot_model import modal_model_at, read_planar_robot, read_spatial_robot, rigid_model, tool_down
-from stability import certified_lobes, multipliers, read_lobes
 
 STAUBLI = read_spatial_robot("staubli_rx170").robot
 HALF_DOWN = MillingProcess(2, 0.02, pi / 2, 700e6, 0.3, 0.1, pi / 2, pi, 1e-4)
@@ -226,7 +226,7 @@ def test_refusals(arguments: list[str], message: str, capsys: pytest.CaptureFixt
 
 
 def test_a_robot_file_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    import robot_model
+    from millfrf import robot_model
 
     source = Path(robot_model.__file__).parent / "robots" / "staubli_rx170.toml"
     own = tmp_path / "mine.toml"

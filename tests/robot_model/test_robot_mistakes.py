@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 from millfrf.__main__ import BAD_INPUT, run
-from robot_model import read_robot
+from millfrf.robot_model import read_robot
 
-FOLDER = Path(__file__).parents[2] / "robot_model" / "robots"
+FOLDER = Path(__file__).parents[2] / "millfrf" / "robot_model" / "robots"
 KUKA, CHEN = "kuka_kr90_r3100", "chen_2026"
 FOREIGN = ("pydantic", "numpy", "Traceback", "KeyError", "IndexError", "Field required", "Input should", "Extra inputs")
 

@@ -9,23 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foundation import InputError
-from modal_fit import ModalModel
-from robot_model import (
-    ElasticJoint,
+from millfrf.core import InputError
+from millfrf.robot_model import (
     Frame,
-    Link,
-    LumpedBody,
     Mechanism,
     SpatialRobot,
     close_loops,
-    coupled_frf_at,
-    damping_warnings,
-    exact_frf_at,
     exact_receptance,
     frequencies_over,
-    frf_at,
-    mass_matrix,
     modal_model_at,
     modes_at,
     nearest_solution,
@@ -33,13 +24,17 @@ from robot_model import (
     read_planar_robot,
     read_spatial_robot,
     rigid_model,
-    stiffness_matrix,
     structure_at,
     tip_compliance,
     tool_down,
-    with_gravity,
     wrist_solutions,
 )
+from millfrf.robot_model.dynamic_stiffness import coupled_frf_at, exact_frf_at
+from millfrf.robot_model.finite_elements.statics import with_gravity
+from millfrf.robot_model.finite_elements.structure import mass_matrix, stiffness_matrix
+from millfrf.robot_model.spatial.spatial_modes import damping_warnings, frf_at
+from millfrf.robot_model.spatial.spatial_robot import ElasticJoint, Link, LumpedBody
+from modal_fit import ModalModel
 
 CASE = read_spatial_robot("staubli_rx170")
 ROBOT = CASE.robot

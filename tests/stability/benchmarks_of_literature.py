@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
 RPM = 2 * np.pi / 60

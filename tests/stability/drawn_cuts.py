@@ -7,8 +7,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
-from foundation import TIP
+from millfrf.core import TIP
+from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]

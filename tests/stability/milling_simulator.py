@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from scipy.signal import decimate
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel
 
 Real = np.ndarray

@@ -6,7 +6,7 @@ from math import pi
 import numpy as np
 from milling_simulator import SimulatedCut, simulate
 
-from stability import multipliers
+from millfrf.stability import multipliers
 
 LEAST_CHATTER = 0.05
 """Share of the motion below which the chatter of an unstable cut counts as none."""

@@ -7,8 +7,9 @@ import pytest
 from drawn_cuts import Case, growth, random_case
 from scipy.stats import binom
 
-from foundation import InputError
-from stability import certified_cut, certified_lobes, depth_errors, limit_band, recommended_cut
+from millfrf.core import InputError
+from millfrf.stability import certified_cut, certified_lobes, depth_errors, limit_band
+from millfrf.stability.recommendation import recommended_cut
 
 MARGIN = 5e-4
 """By which a depth is moved off the end of a band, so that the integration's own error does not decide."""

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
+from millfrf.stability import collocation, collocation_limits, multipliers
 from modal_fit import ModalModel
-from stability import collocation, collocation_limits, multipliers
 
 LABELS = ("T:+X", "T:+Y", "T:+Z")
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
+from millfrf.stability import certified_lobes, delay_system, with_residual_flexibility
 from modal_fit import ModalModel, Residuals
 from replay_data import table_one_model
-from stability import certified_lobes, delay_system, with_residual_flexibility
 
 RPM = np.pi / 30
 SPEEDS = np.array([800.0, 1200.0, 1836.0]) * RPM

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from benchmarks_of_literature import HALF_DOWN, RPM, benchmark_cut, one_degree_of_freedom
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
+from millfrf.stability import StabilityLobes, certified_lobes, collocation, multipliers, nyquist_limits, zero_order
+from millfrf.stability import certification as certified
+from millfrf.stability.lobes_result import StabilityLimits
 from modal_fit import ModalModel
 from replay_data import table_one_model
-from stability import StabilityLobes, certified_lobes, collocation, multipliers, nyquist_limits, zero_order
-from stability.certification import certified
-from stability.lobes.stability_limits import StabilityLimits
 
 SLOT = MillingProcess(4, 0.0127, np.pi / 2, 700e6, 0.17, 0.33, 0.0, np.pi, 1e-4)
 SPEEDS = np.array([510.0, 528.0, 545.0]) * RPM
@@ -56,7 +56,7 @@ def test_what_no_second_discretisation_confirms_is_a_lower_bound(monkeypatch: py
     right = collocation(table_one_model(), SLOT, SPEEDS[:1], 0.024)
     wrong = _with_limits(right, np.array([np.inf]))
     monkeypatch.setattr(certified, "lowest_limits", lambda *_: wrong)
-    monkeypatch.setattr("stability.certification.second_look._confirmed", lambda *_: False)
+    monkeypatch.setattr("millfrf.stability.certification._confirmed", lambda *_: False)
     lobes = certified_lobes(table_one_model(), SLOT, SPEEDS[:1], 0.024)
     assert lobes.status == ("lower-bound",)
     assert 0.9 * right.depth_limits[0] < lobes.depth_limits[0] < right.depth_limits[0]

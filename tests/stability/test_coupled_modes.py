@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
-from foundation import TIP
+from millfrf.core import TIP
+from millfrf.cutting import MillingProcess
+from millfrf.stability import certified_lobes, judge_mode_coupling, mode_coupling_limit, with_static_high_modes
 from modal_fit import ModalModel
-from stability import certified_lobes, judge_mode_coupling, mode_coupling_limit, with_static_high_modes
 
 CUT = MillingProcess(4, 0.02, np.pi / 2, 800e6, 0.3, 0.1, 0.0, np.pi, 1e-4)
 SPEED = 6000 * np.pi / 30

@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
 from estimation import Frf
-from foundation import TIP
+from millfrf.core import TIP
+from millfrf.cutting import MillingProcess
+from millfrf.stability import certified_lobes, known_lines, multi_frequency, nyquist_limits, zero_order
+from millfrf.stability.tip_receptance import tool_receptance
 from modal_fit import ModalModel
 from replay_data import ACETAL_CUTTER, default_structure, tip_model
-from stability import certified_lobes, known_lines, multi_frequency, nyquist_limits, tool_receptance, zero_order
 
 SPEEDS = np.linspace(1000.0, 4000.0, 7) * np.pi / 30
 SLOT = replace(ACETAL_CUTTER, start_angle=0.0, exit_angle=np.pi)

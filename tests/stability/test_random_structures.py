@@ -8,9 +8,9 @@ import pytest
 from independent_floquet import Mill, spectral_radius
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
+from millfrf.stability import certified_lobes
 from modal_fit import ModalModel
-from stability import certified_lobes
 
 Real = NDArray[np.float64]
 LABELS = ("T:+X", "T:+Y", "T:+Z")

@@ -6,20 +6,15 @@ from math import pi
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
 from estimation import FrfCovariance
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.stability import StabilityLobes, certified_lobes, depth_errors, zero_order
+from millfrf.stability.recommendation import recommended_cut
+from millfrf.stability.uncertainty.interval import drawn
+from millfrf.stability.uncertainty.sensitivity import probability_of_stability
 from modal_fit import ModalModel
 from replay_data import table_one_model
-from stability import (
-    StabilityLobes,
-    certified_lobes,
-    depth_errors,
-    drawn,
-    probability_of_stability,
-    recommended_cut,
-    zero_order,
-)
 
 HALF_DOWN = MillingProcess(2, 0.0127, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 0.15e-3)
 SPEEDS = np.array([650, 800, 950, 1100, 1300, 1600, 2000, 2300]) * pi / 30

@@ -12,21 +12,15 @@ import numpy as np
 import pytest
 from drawn_cuts import RPM, TIP, growth
 
-from cutting import MillingProcess, write_cutting_process
 from millfrf.__main__ import run
+from millfrf.cutting import MillingProcess, write_cutting_process
 from millfrf.report import collect
 from millfrf.report.lobes_check import checked_lobes
 from millfrf.report.recommendation import recommendation
 from millfrf.report.sections.stability import stability_findings
+from millfrf.stability import certified_lobes, multi_frequency, read_lobes, semi_discretisation, zero_order
+from millfrf.stability.recommendation import recommended_cut
 from modal_fit import ModalModel, write_modal_model
-from stability import (
-    certified_lobes,
-    multi_frequency,
-    read_lobes,
-    recommended_cut,
-    semi_discretisation,
-    zero_order,
-)
 
 CUT = MillingProcess(2, 12.7e-3, np.pi / 2, 119e6, 0.17, 0.33, np.pi / 2, np.pi, 0.15e-3)
 """Half-immersion down-milling with two teeth, acetal of Mohammadi & Ahmadi."""

@@ -1,6 +1,7 @@
 """The causes that a case can conceal: those on the practice list, and foreign ones that no list has."""
 
-from . import chain, friction, joint, surroundings
+from benchmarks.blind_trial.effects import chain, friction, joint, surroundings
+
 from .change import Change, Effect, Scene
 
 LISTED: dict[str, Effect] = {

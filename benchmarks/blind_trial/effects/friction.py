@@ -2,7 +2,8 @@
 
 from typing import Any
 
-from .. import laws
+from benchmarks.blind_trial import laws
+
 from ..integrator import Element
 from .change import Change, Effect, Scene, fixed
 

@@ -4,7 +4,8 @@ from functools import partial
 
 import numpy as np
 
-from .. import laws
+from benchmarks.blind_trial import laws
+
 from ..excitation import BEFORE, DURATION, RATE, Test
 from ..integrator import Element
 from .change import Change, Effect, Scene, fixed

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from acquisition import Recording
-from foundation import InputError, writing_whole_file
+from millfrf.core import InputError, writing_whole_file
 
 from ...progress import Progress, silent
 from ...provenance import sha256

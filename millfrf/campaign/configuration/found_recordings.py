@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from foundation import InputError
+from millfrf.core import InputError
 
 from ...progress import Progress, silent
 from .campaign_tables import CampaignFile, RecordingsTable

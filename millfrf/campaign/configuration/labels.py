@@ -9,7 +9,7 @@ from pathlib import Path
 from string import Formatter
 from typing import Any
 
-from foundation import InputError
+from millfrf.core import InputError
 
 POSTURE = "posture_deg"
 """The one label that is a list: joint angles in degrees, of prismatic joints metres."""

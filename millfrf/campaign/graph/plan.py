@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 
-from foundation import InputError
+from millfrf.core import InputError
 
 from .recording_sets import RecordingSet
 from .task import Task
@@ -48,7 +48,7 @@ def in_order(tasks: Iterable[Task]) -> dict[str, Task]:
     >>> in_order([Task("fit", "a", needs=("lobes:a",)), Task("lobes", "a", needs=("fit:a",))])
     Traceback (most recent call last):
     ...
-    foundation.errors.InputError: tasks need each other: fit:a needs lobes:a needs fit:a; take one of them out
+    millfrf.core.errors.InputError: tasks need each other: fit:a needs lobes:a needs fit:a; take one of them out
     """
     known: dict[str, Task] = {}
     for task in tasks:

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from foundation import InputError
+from millfrf.core import InputError
 
 from ...chain import LOBE_METHODS, LOCAL, POLYREFERENCE, SUBSPACE, FitOptions, check_options
 from ..configuration import CampaignFile, FoundRecording, filled_in, labels_in

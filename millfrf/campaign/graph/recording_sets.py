@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import fmean
 
-from foundation import InputError
+from millfrf.core import InputError
 
 from ..configuration import FoundRecording, agree, shown_value
 

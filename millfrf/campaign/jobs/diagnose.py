@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mismatch import LabError, Settings
+from millfrf.mismatch import LabError, Settings
 
 from ...gate import read_checked_cutting
 from ...structure import diagnose_files

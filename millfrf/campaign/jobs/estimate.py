@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from foundation import InputError
+from millfrf.core import InputError
 
 from ...chain import (
     LOCAL,

@@ -3,7 +3,7 @@
 import warnings
 from pathlib import Path
 
-from foundation import MillfrfWarning
+from millfrf.core import MillfrfWarning
 
 from ...chain import POLYREFERENCE, FitOptions, write_calibration, write_fit
 from ...face import calibrate as calibrate_to_tip

@@ -3,8 +3,8 @@
 import warnings
 from pathlib import Path
 
-from foundation import MillfrfWarning
-from stability import write_lobes
+from millfrf.core import MillfrfWarning
+from millfrf.stability import write_lobes
 
 from ...face import lobes as lobes_of
 from ...provenance import of_lobes

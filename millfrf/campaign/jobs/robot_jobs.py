@@ -4,8 +4,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from foundation import InputError
-from mismatch import LabError
+from millfrf.core import InputError
+from millfrf.mismatch import LabError
 
 from ...robot import Asking, LearningFrom, diagnose_robot_files, learn_from_files
 from .fit import MODEL

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition import Recording
-from foundation import InputError
+from millfrf.core import InputError
 
 from ...chain import EstimateOptions, with_instruments
 from ...gate import JudgedRecording, Segmentation, judge_recording

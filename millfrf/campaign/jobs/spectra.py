@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from estimation import join_parts, sum_tests
-from foundation import InputError
+from millfrf.core import InputError
 
 from ...chain import EstimateOptions, gain_of_test, spectra_of_test, with_instruments
 from .spectra_files import read_spectra, write_spectra

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from foundation import InputError
+from millfrf.core import InputError
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
-from mismatch import read_diagnosis
+from millfrf.core import InputError
+from millfrf.mismatch import read_diagnosis
+from millfrf.stability import StabilityLobes, read_lobes
 from modal_fit import ModalModel, read_modal_model
-from stability import StabilityLobes, read_lobes
 
 from ...gate import check_model, doubts_of, stored_doubts
 from .measured_set import MeasuredSet

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError, writing_whole_file
+from millfrf.core import InputError, writing_whole_file
 
 from ...provenance import origin
 from ...report import ResultsPage, Section, write_results_page

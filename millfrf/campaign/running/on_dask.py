@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from foundation import InputError, MillfrfError
+from millfrf.core import InputError, MillfrfError
 
 from .one_task import DONE, FAILED, FOREIGN, REFUSED, Ended, Order, run_task
 from .store import read_outcome

@@ -16,7 +16,7 @@ from urllib.parse import quote
 
 from threadpoolctl import threadpool_limits
 
-from foundation import DiskFull, MillfrfError, TooLarge, is_disk_full
+from millfrf.core import DiskFull, MillfrfError, TooLarge, is_disk_full
 
 from ..jobs import JOB_OF, Outcome, Work
 from .same_program import program_digest

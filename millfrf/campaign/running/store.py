@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from foundation import writing_whole_folder
+from millfrf.core import writing_whole_folder
 
 from ..jobs import Outcome
 

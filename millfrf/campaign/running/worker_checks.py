@@ -5,7 +5,7 @@ import uuid
 from pathlib import Path
 from typing import Any
 
-from foundation import InputError
+from millfrf.core import InputError
 
 from .same_program import program_digest
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf, FrfCovariance, write_frf
-from foundation import HOUSING, TIP
+from millfrf.core import HOUSING, TIP
 from modal_fit import ModalModel, write_modal_model
 from replay_data import select
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from cutting import write_cutting_process
+from millfrf.cutting import write_cutting_process
 
 from .at_rest import BAND
 from .recordings import CUTTER

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from foundation import TIP
+from millfrf.core import TIP
 from replay_data import select
 
 from .at_rest import BAND

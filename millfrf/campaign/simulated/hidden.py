@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_model import modes_at
+from millfrf.robot_model import modes_at
 
 from .schedule import PlannedRecording
 from .true_robot import Condition, TrueRobot, energy_shares

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from foundation import InputError, process_pool, writing_whole_folder
-from robot_model import named_posture, read_spatial_robot
+from millfrf.core import InputError, process_pool, writing_whole_folder
+from millfrf.robot_model import named_posture, read_spatial_robot
 
 from ...progress import Progress, silent
 from .at_rest import write_idle_model, write_taps

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import RecordingWriter
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
 from replay_data import (
     SWEEP_IMMERSIONS,
     ConstantSpeed,

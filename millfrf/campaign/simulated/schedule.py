@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from foundation import InputError
+from millfrf.core import InputError
 from replay_data import SWEEP_IMMERSIONS
 
 LEVEL_TEST = "porous"

@@ -6,9 +6,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import HOUSING, TIP
-from modal_fit import ModalModel
-from robot_model import (
+from millfrf.core import HOUSING, TIP
+from millfrf.robot_model import (
     SpatialRobot,
     StructureModes,
     gravity_torques,
@@ -17,6 +16,7 @@ from robot_model import (
     structure_at,
     with_tool_spring,
 )
+from modal_fit import ModalModel
 
 Real = NDArray[np.float64]
 

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from foundation import InputError
-from robot_model import Mechanism, target_of, tool_down, tool_postures
+from millfrf.core import InputError
+from millfrf.robot_model import Mechanism, target_of, tool_down, tool_postures
 
 Real = NDArray[np.float64]
 

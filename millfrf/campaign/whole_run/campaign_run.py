@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from foundation import DiskFull, InputError
+from millfrf.core import DiskFull, InputError
 
 from ...progress import Progress, silent
 from ...tables import Table

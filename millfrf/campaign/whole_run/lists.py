@@ -4,7 +4,7 @@ import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from foundation import writing_whole_file
+from millfrf.core import writing_whole_file
 
 from ..running import State, folder_of, log_of, read_outcome
 from .opened import OpenedCampaign

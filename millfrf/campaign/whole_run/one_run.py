@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
-from foundation import InputError, LeftoverRemoved, remove_leftovers
+from millfrf.core import InputError, LeftoverRemoved, remove_leftovers
 
 from ..running import RESULTS, program_digest
 

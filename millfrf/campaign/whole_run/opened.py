@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from foundation import InputError, checked_toml
+from millfrf.core import InputError, checked_toml
 
 from ...progress import Progress
 from ..configuration import (

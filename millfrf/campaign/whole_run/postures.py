@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from foundation import InputError
-from robot_model import SpatialCase, read_robot
+from millfrf.core import InputError
+from millfrf.robot_model import SpatialCase, read_robot
 
 from ...robot import driven_of
 from ..configuration import FoundRecording

@@ -4,7 +4,7 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from foundation import writing_whole_file
+from millfrf.core import writing_whole_file
 
 from ..graph import ALL, RecordingSet, Task, key_of
 from ..running import State, folder_of, program_digest, read_outcome

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from acquisition import convert as convert_recording
 from estimation import import_frf, is_frf_mapping, load_frf_mapping, looks_like_frf
-from foundation import InputError
+from millfrf.core import InputError
 
 from ...gate import doubts_of_rate
 from ...provenance import made

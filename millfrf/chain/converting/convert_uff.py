@@ -7,16 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from estimation import (
-    ImportedFrf,
-    import_frf,
-    import_geometry,
-    read_frf,
-    write_frf,
-    write_frf_uff,
-    write_geometry,
-)
-from foundation import writing_whole_file
+from estimation import ImportedFrf, import_frf, import_geometry, read_frf, write_frf, write_frf_uff, write_geometry
+from millfrf.core import writing_whole_file
 from modal_fit import ModalModel, import_modes_uff, read_modal_model, write_modal_model, write_modes_uff
 
 from ...gate import check_frf

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import Channel, Recording
-from cutting import MillingProcess
 from estimation import choose_channels, derivative_orders, require_room
-from foundation import DegreeOfFreedom, InputError
+from millfrf.core import DegreeOfFreedom, InputError
+from millfrf.cutting import MillingProcess
+from millfrf.stability import ChatterVerdict, ModelledCut, classify_cut
 from modal_fit import ModalModel
-from stability import ChatterVerdict, ModelledCut, classify_cut
 
 from ...gate import check_one_speed, check_recordings
 from ...progress import Progress, silent
@@ -39,7 +39,7 @@ class CutOptions:
     speed_rpm : rpm
         Spindle speed; None: the speed that each recording states.
     runout : m
-        Radial offset of the spindle's axis; NaN: not stated, see :func:`stability.classify_cut`.
+        Radial offset of the spindle's axis; NaN: not stated, see :func:`millfrf.stability.classify_cut`.
     chip : m
         Thickest chip of the cut; NaN: not known.
     responses
@@ -82,7 +82,7 @@ class JudgedCut:
     stated_rpm : rpm
         Spindle speed that the recording or the user states.
     verdict
-        Verdict on the cut, see :class:`stability.ChatterVerdict`.
+        Verdict on the cut, see :class:`millfrf.stability.ChatterVerdict`.
     """
 
     name: str

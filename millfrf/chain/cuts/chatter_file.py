@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from foundation import FileFormatError, writing_whole_file
-from stability import ChatterVerdict, CutSpectrum, ForeignTone
+from millfrf.core import FileFormatError, writing_whole_file
+from millfrf.stability import ChatterVerdict, CutSpectrum, ForeignTone
 
 from .chatter import JudgedCut
 
@@ -34,7 +34,7 @@ class KeptCut:
     unit
         Unit of the spectrum.
     spectrum
-        Spectrum of that channel, see :class:`stability.CutSpectrum`.
+        Spectrum of that channel, see :class:`millfrf.stability.CutSpectrum`.
     """
 
     cut: JudgedCut

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from acquisition import Recording
 from estimation import choose_channels
-from stability import cut_spectrum, gather_evidence
+from millfrf.stability import cut_spectrum, gather_evidence
 
 from ...progress import Progress, silent
 from .chatter import CutOptions, JudgedCut

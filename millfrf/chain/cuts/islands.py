@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from cutting import MillingProcess
 from estimation import Frf
-from figures import StableAbove, lobes_figure, save_figure
+from millfrf.cutting import MillingProcess
+from millfrf.figures import StableAbove, lobes_figure, save_figure
+from millfrf.stability import StabilityLobes, collocation_limits
 from modal_fit import ModalModel, read_modal_model
-from stability import StabilityLobes, collocation_limits
 
 from ...file_kinds import MODEL, kind_of
 from ...gate import read_checked_cutting

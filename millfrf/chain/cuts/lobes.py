@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
 from estimation import Frf, to_receptance
-from foundation import InputError
-from modal_fit import ModalModel
-from stability import (
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.stability import (
     ModeCouplingLimit,
     StabilityLobes,
     certified_lobes,
@@ -21,6 +20,7 @@ from stability import (
     semi_discretisation,
     zero_order,
 )
+from modal_fit import ModalModel
 
 from ...gate import check_band_of_lobes, check_frf, check_model, check_window_damping, terms_left_out
 from ...progress import Progress, silent

@@ -23,7 +23,7 @@ from estimation import (
     sum_tests,
     write_frf,
 )
-from foundation import InputError
+from millfrf.core import InputError
 
 from ...gate import (
     Gain,

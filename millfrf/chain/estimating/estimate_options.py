@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from estimation import CrossSpectra, Frf, InputIndependence
-from foundation import InputError, Result, Summary, counted, doubts_line
+from millfrf.core import InputError, Result, Summary, counted, doubts_line
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,7 +79,7 @@ class Estimate(Result):
     options: EstimateOptions
 
     def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
-        """Draw entries of the FRF and return the axes; see :func:`figures.draw_frf` for the choices."""
+        """Draw entries of the FRF and return the axes; see :func:`millfrf.figures.frf.draw_frf` for the choices."""
         return self.frf.plot(axes, **choices)
 
     def _summary(self) -> Summary:

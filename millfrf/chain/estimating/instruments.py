@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from acquisition import Recording
 from estimation import CrossSpectra, choose_channels
-from foundation import InputError
+from millfrf.core import InputError
 
 
 def channels_with_instruments(

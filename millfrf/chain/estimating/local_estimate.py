@@ -5,15 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from acquisition import Recording
-from estimation import (
-    BandRecording,
-    Frf,
-    band_of_channels,
-    choose_channels,
-    local_polynomial,
-    require_room_for_band,
-)
-from foundation import Band, InputError
+from estimation import BandRecording, Frf, band_of_channels, choose_channels, local_polynomial, require_room_for_band
+from millfrf.core import Band, InputError
 
 from ...progress import Progress
 

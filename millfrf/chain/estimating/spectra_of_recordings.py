@@ -7,7 +7,7 @@ from pathlib import Path
 
 from acquisition import Recording
 from estimation import CrossSpectra, cross_spectra, settings_for
-from foundation import InputError
+from millfrf.core import InputError
 
 from ...gate import Gain, gain_of
 from ...progress import Progress, silent

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from estimation import Frf
-from foundation import writing_whole_file
+from millfrf.core import writing_whole_file
 from modal_fit import ModalModel, TipCalibration, calibrate_to_tip, write_modal_model
 
 from ...gate import check_model, check_tip_and_sensor, stored_doubts, terms_left_out

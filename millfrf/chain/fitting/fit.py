@@ -9,14 +9,8 @@ import numpy as np
 
 from acquisition import Recording, Stream
 from estimation import BandRecording, Frf, band_of_channels, choose_channels, require_room_for_band, widest_band
-from foundation import InputError, writing_whole_file
-from modal_fit import (
-    ModalFit,
-    SubspaceFit,
-    fit_polyreference,
-    fit_subspace,
-    write_modal_model,
-)
+from millfrf.core import InputError, writing_whole_file
+from modal_fit import ModalFit, SubspaceFit, fit_polyreference, fit_subspace, write_modal_model
 
 from ...gate import check_band_recordings, check_frf_for_fit, check_recordings, fit_doubts, smearing_doubts
 from ...progress import Progress, silent

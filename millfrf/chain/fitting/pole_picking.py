@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from estimation import Frf
-from foundation import InputError
+from millfrf.core import InputError
 from modal_fit import ModalFit, candidate_groups, fit_picked_poles, read_picked_poles, write_pole_candidates
 
 from ...file_kinds import FRF, kind_of

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from acquisition import Session, Source, WithFeeds, announced_events
-from foundation import MillfrfError
+from millfrf.core import MillfrfError
 
 from ...live import (
     LOOPBACK,

@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from estimation import SweepDemand, SweepPlan, plan_sweeps
-from foundation import FileFormatError, mistake_in_words
+from millfrf.core import FileFormatError, mistake_in_words
 
 from ...gate import check_demand, check_duration, read_checked_cutting
 from ...tables import Table

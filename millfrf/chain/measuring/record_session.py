@@ -16,7 +16,6 @@ from acquisition import (
     Block,
     DeviceError,
     DeviceStory,
-    DiskFull,
     Events,
     Finishes,
     Session,
@@ -28,7 +27,7 @@ from acquisition import (
     session_from_text,
     session_text,
 )
-from foundation import MillfrfError
+from millfrf.core import DiskFull, MillfrfError
 
 from ...provenance import made
 from .simulated_device import simulated_device

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from acquisition import DEVICES, FAULT, LOST, RSI_COUNTS, Channel, Events, Source, StreamDescription, announced_events
 from estimation import find_taps
-from foundation import InputError
+from millfrf.core import InputError
 
 from ...tables import Table
 

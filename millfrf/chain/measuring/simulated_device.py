@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from acquisition import AroundSource, Block, EventAxis, Events, Paced, Session, SimulatedDevice, Source
-from cutting import MillingProcess, process_from_table
+from millfrf.cutting import MillingProcess, process_from_table
 from replay_data import (
     ACETAL_CUTTER,
     ConstantSpeed,

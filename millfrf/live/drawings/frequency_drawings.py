@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from acquisition import Channel
 from estimation import Frf
-from figures import COLOURS
+from millfrf.figures import COLOURS
 
 from ..control import Mark
 from ..enough import BandProgress

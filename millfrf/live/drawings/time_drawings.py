@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from acquisition import Channel
-from figures import COLOURS
+from millfrf.figures import COLOURS
 
 from ..control import Mark
 from ..monitor import Snapshot

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Recording, StreamDescription
-from cutting import immersion_angles
 from estimation import CrossSpectra
-from foundation import InputError, MillfrfError
+from millfrf.core import InputError, MillfrfError
+from millfrf.cutting import immersion_angles
 
 from ..spectra import LiveSpectra
 from .milled_speeds import MilledSpeeds

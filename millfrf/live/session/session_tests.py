@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from estimation import CrossSpectra, sum_tests
-from foundation import MillfrfError
+from millfrf.core import MillfrfError
 
 from ..enough import BandProgress
 from .earlier_tests import SessionTest, SetUp, force_power, immersion_of, read_test, tests_beside

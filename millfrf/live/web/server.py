@@ -7,7 +7,7 @@ import threading
 from typing import Any
 
 from acquisition import DriverMissing
-from foundation import InputError
+from millfrf.core import InputError
 
 from ..control import LiveControl
 from ..monitor import LiveMonitor

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from foundation import counted
+from millfrf.core import counted
 
 from ..control import LiveControl
 from ..monitor import Snapshot

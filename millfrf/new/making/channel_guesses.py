@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from foundation import SI_UNITS, InputError, si_factor
+from millfrf.core import SI_UNITS, InputError, si_factor
 
 from .questions import Question
 

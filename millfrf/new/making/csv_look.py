@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from foundation import SI_UNITS, InputError, si_factor
+from millfrf.core import SI_UNITS, InputError, si_factor
 
 _ENCODINGS = ("utf-8-sig", "cp1252")
 _OTHER_UNITS = (

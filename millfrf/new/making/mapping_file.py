@@ -12,7 +12,7 @@ import tomlkit
 from numpy.typing import NDArray
 
 from acquisition import ArrayFile, CsvOptions, open_arrays
-from foundation import InputError
+from millfrf.core import InputError
 
 from ...toml_files import described_tables, toml_files
 from .channel_guesses import guessed_channel, split_heading

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError, MillfrfError, writing_whole_file
-from robot_model import (
+from millfrf.core import InputError, MillfrfError, writing_whole_file
+from millfrf.robot_model import (
     ReadChain,
     SerialChain,
     Told,

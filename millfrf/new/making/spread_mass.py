@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
-from robot_model import BASE, RigidPart, SerialChain
+from millfrf.core import InputError
+from millfrf.robot_model import BASE, RigidPart, SerialChain
 
 Real = NDArray[np.float64]
 

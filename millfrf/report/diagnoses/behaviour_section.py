@@ -1,7 +1,7 @@
 """What modes do with the level, whatever law stands behind it: sentences and a figure."""
 
-from figures import behaviour_figure
-from mismatch import StructureDiagnosis
+from millfrf.figures import behaviour_figure
+from millfrf.mismatch import StructureDiagnosis
 
 from ..section import Section, picture_of
 

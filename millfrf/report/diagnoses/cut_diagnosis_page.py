@@ -4,8 +4,8 @@ import os
 
 import numpy as np
 
-from figures import cut_orders_figure, cut_turn_figure, house_style
-from mismatch import COEFFICIENT_NAMES, CutDiagnosis
+from millfrf.figures import cut_orders_figure, cut_turn_figure, house_style
+from millfrf.mismatch import COEFFICIENT_NAMES, CutDiagnosis
 
 from ...tables import Table
 from ..pages import FigureFiles, ResultsPage, write_results_page

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from foundation import DegreeOfFreedom
-from mismatch import AcceptedCause, StructureDiagnosis, form_of, joint_in_words, rig_of, tip_axes
+from millfrf.core import DegreeOfFreedom
+from millfrf.mismatch import AcceptedCause, StructureDiagnosis, form_of, joint_in_words, rig_of, tip_axes
 
 from ...tables import odds_in_words
 from .left_words import left_in_words

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
-from figures import lobes_figure
-from foundation import InputError
-from mismatch import Hypothesis, StructureDiagnosis, equivalent_receptance
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.figures import lobes_figure
+from millfrf.mismatch import Hypothesis, StructureDiagnosis, equivalent_receptance
+from millfrf.stability import StabilityLobes, zero_order
 from modal_fit import ModalModel
-from stability import StabilityLobes, zero_order
 
 from ...tables import Table
 from ..section import Section, picture_of

@@ -4,8 +4,8 @@ import os
 from collections.abc import Callable
 from functools import partial
 
-from cutting import MillingProcess
-from mismatch import StructureDiagnosis, in_processes
+from millfrf.cutting import MillingProcess
+from millfrf.mismatch import StructureDiagnosis, in_processes
 
 from ..collection_paused import collection_paused
 from ..pages import FigureFiles, ResultsPage, write_results_page

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from figures import channel_map_figure, growth_figure, law_figure, spectra_figure, time_map_figure
-from foundation import InputError
-from mismatch import (
+from millfrf.core import InputError
+from millfrf.figures import channel_map_figure, growth_figure, law_figure, spectra_figure, time_map_figure
+from millfrf.mismatch import (
     Candidate,
     StructureDiagnosis,
     free_form_laws,

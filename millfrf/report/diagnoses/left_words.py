@@ -1,6 +1,6 @@
 """Why a partial answer is not whole, in words."""
 
-from mismatch import StructureDiagnosis
+from millfrf.mismatch import StructureDiagnosis
 
 
 def left_in_words(diagnosis: StructureDiagnosis) -> str:

@@ -4,8 +4,8 @@ import os
 
 import numpy as np
 
-from figures import house_style, robot_evidence_figure, robot_spectra_figure
-from mismatch import ROBOT, Candidate, RobotDiagnosis, number_of, standard_error_of
+from millfrf.figures import house_style, robot_evidence_figure, robot_spectra_figure
+from millfrf.mismatch import ROBOT, Candidate, RobotDiagnosis, number_of, standard_error_of
 
 from ...robot import UNITS, refusal, told_number, what_is_asked
 from ...tables import Table

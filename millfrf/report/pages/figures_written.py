@@ -5,8 +5,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from figures import save_figure
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.figures import save_figure
 
 from ..section import Picture, Section
 

@@ -9,8 +9,8 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from figures import SmallSvg, as_png
-from foundation import writing_whole_file
+from millfrf.core import writing_whole_file
+from millfrf.figures import SmallSvg, as_png
 
 from ...tables import Table
 from ..section import Picture, Section

@@ -11,8 +11,8 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from figures import browser_library
-from foundation import writing_whole_file
+from millfrf.core import writing_whole_file
+from millfrf.figures import browser_library
 
 from ...provenance import versions
 from ..section import Section

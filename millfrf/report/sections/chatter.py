@@ -2,7 +2,7 @@
 
 import math
 
-from figures import ShownCut, chatter_figure
+from millfrf.figures import ShownCut, chatter_figure
 
 from ...chain import KeptCut, tone_table, verdict_table
 from ..collection import Collected

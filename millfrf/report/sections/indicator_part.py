@@ -3,7 +3,7 @@
 import numpy as np
 
 from estimation import Frf
-from figures import indicator_figure, zoomed_indicators
+from millfrf.figures import indicator_figure, zoomed_indicators
 from modal_fit import ComplexModeIndicator, ModalModel, complex_mode_indicator, multivariate_mode_indicator
 
 from ..section import Picture, picture_of

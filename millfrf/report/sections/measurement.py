@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from acquisition import Recording
-from figures import time_figure
+from millfrf.figures import time_figure
 
 from ...chain import LOCAL
 from ...gate import level_table, look

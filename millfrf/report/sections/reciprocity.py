@@ -1,7 +1,7 @@
 """The section on reciprocity: FRFs measured both ways, and left against right vectors."""
 
 from estimation import reciprocity_pairs
-from figures import reciprocity_figure
+from millfrf.figures import reciprocity_figure
 
 from ...gate import shown_pairs
 from ...reciprocity_tables import pair_table, vector_table

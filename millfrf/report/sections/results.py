@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from figures import input_figure, stabilisation_figure, zoomed_chart
+from millfrf.figures import input_figure, stabilisation_figure, zoomed_chart
 from modal_fit import ModalModel
 
 from ...chain import EstimateOptions, chart_from_json, spectra_of_tests

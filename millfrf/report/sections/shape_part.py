@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from estimation import Geometry
-from figures import assurance_figure, compass_figure, mode_figure, moving_shapes, shapes_figure
+from millfrf.figures import assurance_figure, compass_figure, mode_figure, moving_shapes, shapes_figure
 from modal_fit import ModalModel, ModeShapes
 
 from ...tables import Table, shape_table, shapes_of

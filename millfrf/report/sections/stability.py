@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cutting import MillingProcess
-from figures import LobesBand, StableAbove, lobes_figure, zoomed_limits
-from foundation import InputError
-from stability import StabilityLobes
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.figures import LobesBand, StableAbove, lobes_figure, zoomed_limits
+from millfrf.stability import StabilityLobes
 
 from ...chain import stable_above
 from ...provenance import read_provenance

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from foundation import InputError
-from robot_model import CutPath, Redundancy, RotaryTable
+from millfrf.core import InputError
+from millfrf.robot_model import CutPath, Redundancy, RotaryTable
 
 from ..asked_loads import check_degrees, check_places, check_positive
 from .certified_search import Wanted

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_model import CutPath, PointPostures, Redundancy, counted_weight
+from millfrf.robot_model import CutPath, PointPostures, Redundancy, counted_weight
 
 from .objectives import Costs, FrontPoint, chosen_sequence
 from .path_state import Loading, Memory, PathState, request_at, state_of

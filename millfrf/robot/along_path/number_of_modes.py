@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_model import modes_at
+from millfrf.robot_model import modes_at
 
 from .posture_values import PathCut, Request, values_of
 

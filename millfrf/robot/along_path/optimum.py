@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
-from robot_model import CutPath, PointPostures, Redundancy, path_postures, reached_near
+from millfrf.core import InputError
+from millfrf.robot_model import CutPath, PointPostures, Redundancy, path_postures, reached_near
 
 from .certified_search import Found, PathJob, Posture, Wanted, searched
 from .number_of_modes import SETTLED, KeptModes, change_with_more, kept_modes

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_model import CutPath, Redundancy, SpatialRobot, counted_weight, limit_margin, singular_values
+from millfrf.robot_model import CutPath, Redundancy, SpatialRobot, counted_weight, limit_margin, singular_values
 
 from .posture_values import PathCut, PostureValues, Request, ValueRow, of_rows, values_of
 

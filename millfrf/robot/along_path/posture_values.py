@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
+from millfrf.robot_model import Payload, SpatialRobot, model_of_modes, modes_at, tool_deflection
+from millfrf.stability import certified_lobes
 from modal_fit import ModalModel
-from robot_model import Payload, SpatialRobot, model_of_modes, modes_at, tool_deflection
-from stability import certified_lobes
 
 Real = NDArray[np.float64]
 
@@ -108,7 +108,8 @@ class PostureValues:
 def values_of(cut: PathCut, requests: Sequence[Request], pool: Executor | None = None) -> PostureValues:
     """Evaluate postures: certified limit at the path's speed, lowest frequency, deflections.
 
-    :func:`stability.certified_lobes` of the modal model in the axes of the cut. Postures whose poles and residues agree
+    :func:`millfrf.stability.certified_lobes` of the modal model in the axes of the cut. Postures whose poles and
+    residues agree
     share one solution: on a spindle in line with the last joint, all turns about the tool.
     """
     size = max(1, min(_CHUNK, len(requests) // 4))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 
-from robot_model import PointPostures, Redundancy, limit_margin, point_postures, reached_near, singular_values
+from millfrf.robot_model import PointPostures, Redundancy, limit_margin, point_postures, reached_near, singular_values
 
 from .certified_search import PathJob, Posture
 

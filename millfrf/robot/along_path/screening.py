@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robot_model import CutPath, PointPostures, Redundancy
+from millfrf.robot_model import CutPath, PointPostures, Redundancy
 
 from .path_state import Loading, request_at
 from .posture_values import PathCut, values_of

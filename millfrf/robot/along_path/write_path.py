@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from cutting import MillingProcess, force_harmonics
-from foundation import InputError, process_pool, writing_whole_file
-from robot_model import (
+from millfrf.core import InputError, process_pool, writing_whole_file
+from millfrf.cutting import MillingProcess, force_harmonics
+from millfrf.robot_model import (
     CompensatedPath,
     CutPath,
     SpatialCase,

@@ -52,7 +52,7 @@ def deviation(
     """Deviation of drilled holes over a work area (vertical drill, aluminium), and the position tolerance they need."""
     from math import pi
 
-    from robot_model import LoadUncertainty
+    from millfrf.robot_model import LoadUncertainty
 
     from ..asked_loads import loads_of
     from ..loads import Accuracy, DrillingArea, RunningOut, show_deviation

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from foundation import InputError
+from millfrf.core import InputError
 
 from .options import At, Feed, Joints, Learned, Links, Numbers, Picture, Pose, Redundancy, Robot, Turn
 

@@ -11,7 +11,7 @@ def list_robots(
     robot: Annotated[str | None, typer.Argument(metavar="[ROBOT]", help="Show what this one assumes.")] = None,
 ) -> None:
     """Robots that come along; with a name, every number in it that is assumed, and why."""
-    from robot_model import assumptions, named_posture, read_robot, robot_names
+    from millfrf.robot_model import assumptions, named_posture, read_robot, robot_names
 
     if robot is None:
         tell(lambda: {"robots": [{"name": name, "assumed": assumptions(name)} for name in robot_names()]})

@@ -24,7 +24,7 @@ def show(
     browser: Annotated[bool, typer.Option("--browser", help="Open the page in the browser.")] = False,
 ) -> None:
     """A page with the robot, its joints, its posture and its mode shapes: one file, no network."""
-    from foundation import free_name
+    from millfrf.core import free_name
 
     from ..postures import Asked
     from ..shown import show_robot

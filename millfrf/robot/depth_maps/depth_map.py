@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
-from foundation import TIP, InputError
+from millfrf.core import TIP, InputError
+from millfrf.cutting import MillingProcess
+from millfrf.stability import certified_lobes
 from modal_fit import ModalModel
-from stability import certified_lobes
 
 Real = NDArray[np.float64]
 
@@ -16,7 +16,8 @@ Real = NDArray[np.float64]
 def depth_limits(models: Sequence[ModalModel], process: MillingProcess, spindle_speed: float, max_depth: float) -> Real:
     """Give the largest stable depth of each model at one speed, m, (n_models,); infinite above ``max_depth``.
 
-    :func:`stability.certified_lobes` of each model. Where the limit has a lower bound only, that bound; where it is
+    :func:`millfrf.stability.certified_lobes` of each model. Where the limit has a lower bound only, that bound; where
+    it is
     not resolved, zero: no depth is proven there.
 
     Parameters

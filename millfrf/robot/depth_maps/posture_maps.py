@@ -8,9 +8,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
-from foundation import process_pool, warning_lines, writing_whole_file
-from robot_model import (
+from millfrf.core import process_pool, warning_lines, writing_whole_file
+from millfrf.cutting import MillingProcess
+from millfrf.robot_model import (
     CutPlace,
     PostureMap,
     SpatialRobot,

@@ -8,8 +8,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError, process_pool, warning_lines, writing_whole_file
-from robot_model import CutPlace, Payload, SpatialRobot, read_robot, target_of, tool_down, tool_postures, typed_values
+from millfrf.core import InputError, process_pool, warning_lines, writing_whole_file
+from millfrf.robot_model import (
+    CutPlace,
+    Payload,
+    SpatialRobot,
+    read_robot,
+    target_of,
+    tool_down,
+    tool_postures,
+    typed_values,
+)
 
 from ...gate import check_depth, check_speed, read_checked_cutting
 from ...options import check_output

@@ -44,7 +44,7 @@ def diagnose(
     figure_format: FigureFormat = "svg",
 ) -> None:
     """Which is wrong in a robot's model: joint stiffness, link flexibility, payload, tool, posture, damping?"""
-    from mismatch import LabError
+    from millfrf.mismatch import LabError
 
     from ...answers import stored_answer
     from ...report import asked_figures

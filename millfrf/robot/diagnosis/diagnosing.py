@@ -9,10 +9,10 @@ import numpy as np
 from h5py import is_hdf5
 from numpy.typing import NDArray
 
-from foundation import InputError, writing_whole_folder
-from mismatch import LabError, PosedRecording, diagnose_robot, posed_channels, read_posed, write_diagnosis
+from millfrf.core import InputError, writing_whole_folder
+from millfrf.mismatch import LabError, PosedRecording, diagnose_robot, posed_channels, read_posed, write_diagnosis
+from millfrf.robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot, tool_down
 from modal_fit import write_modal_model
-from robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot, tool_down
 
 from ...file_kinds import FRF, MODEL, kind_of
 from ...gate import RECORD_AGAIN, check_channels

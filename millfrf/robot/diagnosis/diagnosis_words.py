@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mismatch import (
+from millfrf.mismatch import (
     ROBOT,
     AcceptedCause,
     Candidate,

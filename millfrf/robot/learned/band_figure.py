@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from figures import save_figure
-from stability import StabilityLobes
+from millfrf.figures import save_figure
+from millfrf.stability import StabilityLobes
 
 from .depth_band import DepthBand
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
+from millfrf.stability import lowest_limits
 from modal_fit import ModalModel
-from stability import lowest_limits
 
 Real = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from foundation import InputError, refuse_replacing, warning_lines, writing_whole_file
-from stability import StabilityLobes, write_lobes
+from millfrf.core import InputError, refuse_replacing, warning_lines, writing_whole_file
+from millfrf.stability import StabilityLobes, write_lobes
 
 from ...answers import lobes_answer
 from ...chain import compute_lobes, lobes_summary, speed_axis

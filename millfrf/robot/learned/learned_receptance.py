@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import write_frf
-from foundation import TIP, InputError, warning_lines, writing_whole_file
+from millfrf.core import TIP, InputError, warning_lines, writing_whole_file
+from millfrf.robot_model import PredictedPosture, predict_posture, read_learned_postures, read_robot, shown_values
 from modal_fit import write_modal_model
-from robot_model import PredictedPosture, predict_posture, read_learned_postures, read_robot, shown_values
 
 from ...answers import model_answer
 from ...options import check_band, check_output

@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError, writing_whole_file
-from modal_fit import read_modal_model
-from robot_model import (
+from millfrf.core import InputError, writing_whole_file
+from millfrf.robot_model import (
     LearnedPostures,
     LeftOutPosture,
     SpatialCase,
@@ -21,6 +20,7 @@ from robot_model import (
     tool_down,
     write_learned_postures,
 )
+from modal_fit import read_modal_model
 
 from ...options import check_output
 from ...progress import bar

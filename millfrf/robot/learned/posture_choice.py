@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from foundation import InputError
-from robot_model import LearnedPostures, SpatialCase, choose_postures, named_posture, shown_values, tool_down
+from millfrf.core import InputError
+from millfrf.robot_model import LearnedPostures, SpatialCase, choose_postures, named_posture, shown_values, tool_down
 
 from ...progress import bar
 from ...tables import Table, show

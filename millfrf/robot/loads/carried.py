@@ -3,8 +3,16 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
-from robot_model import STANDARD_GRAVITY, Payload, PlanarCase, SpatialCase, close_loops, payload_wrench, tool_attitude
+from millfrf.core import InputError
+from millfrf.robot_model import (
+    STANDARD_GRAVITY,
+    Payload,
+    PlanarCase,
+    SpatialCase,
+    close_loops,
+    payload_wrench,
+    tool_attitude,
+)
 
 Real = NDArray[np.float64]
 

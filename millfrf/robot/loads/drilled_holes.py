@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import Drill, DrillingLoad, drilling_load, fitted_to_catalogue
-from foundation import InputError, warning_lines, writing_whole_file
-from robot_model import (
+from millfrf.core import InputError, warning_lines, writing_whole_file
+from millfrf.cutting import Drill, DrillingLoad, drilling_load, fitted_to_catalogue
+from millfrf.robot_model import (
     NO_MASSES,
     DeviationMap,
     LoadUncertainty,

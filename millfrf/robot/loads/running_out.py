@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import Drill, SettledDrill, bending_stiffness, fitted_to_catalogue, settled_drill
-from foundation import InputError
-from robot_model import DeviationMap, SpatialRobot, orbit_radius, process_deviation, tool_down
+from millfrf.core import InputError
+from millfrf.cutting import Drill, SettledDrill, bending_stiffness, fitted_to_catalogue, settled_drill
+from millfrf.robot_model import DeviationMap, SpatialRobot, orbit_radius, process_deviation, tool_down
 
 from ...terminal import say
 from ..asked_loads import check_positive

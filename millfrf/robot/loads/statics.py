@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from figures import save_figure
-from foundation import writing_whole_file
-from robot_model import PlanarCase, PostureResult, SpatialCase, in_posture, read_robot, shown_values
+from millfrf.core import writing_whole_file
+from millfrf.figures import save_figure
+from millfrf.robot_model import PlanarCase, PostureResult, SpatialCase, in_posture, read_robot, shown_values
 
 from ...options import check_output
 from ...provenance import origin

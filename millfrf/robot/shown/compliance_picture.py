@@ -5,8 +5,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from figures import COLOURS, house_style, new_figure, panel_letter
-from robot_model import PlanarCase, PostureResult, SpatialCase, close_loops, drive_stiffness, tool_jacobian
+from millfrf.figures import COLOURS, house_style, new_figure, panel_letter
+from millfrf.robot_model import PlanarCase, PostureResult, SpatialCase, close_loops, drive_stiffness, tool_jacobian
 
 Real = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from figures import COLOURS, house_style, new_figure
-from robot_model import StructureModes
+from millfrf.figures import COLOURS, house_style, new_figure
+from millfrf.robot_model import StructureModes
 
 Real = NDArray[np.float64]
 

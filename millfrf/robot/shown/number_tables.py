@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from estimation import Frf
-from foundation import warning_lines, writing_whole_file
-from robot_model import PostureResult
+from millfrf.core import warning_lines, writing_whole_file
+from millfrf.robot_model import PostureResult
 
 from ...provenance import add_comment
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from figures import MovingShapes
-from robot_model import StructureModes
+from millfrf.figures import MovingShapes
+from millfrf.robot_model import StructureModes
 
 from ...provenance import versions
 from ...report import ResultsPage, Section, page_text, picture_of

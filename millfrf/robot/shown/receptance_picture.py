@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from estimation import Frf
-from figures import COLOURS, LINE_STYLES, house_style, new_figure, panel_letter
+from millfrf.figures import COLOURS, LINE_STYLES, house_style, new_figure, panel_letter
 
 
 def receptance_figure(frf: Frf, resonances: np.ndarray) -> Figure:

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError, writing_whole_file
-from robot_model import (
+from millfrf.core import InputError, writing_whole_file
+from millfrf.robot_model import (
     PostureResult,
     SpatialCase,
     StructureModes,

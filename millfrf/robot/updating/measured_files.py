@@ -7,9 +7,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf, is_uff_number, read_frf, read_frf_uff
-from foundation import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError
+from millfrf.robot_model import (
+    PosedReceptance,
+    SpatialCase,
+    close_loops,
+    measured_frf,
+    measured_model,
+    modes_at,
+    tool_down,
+)
 from modal_fit import read_modal_model
-from robot_model import PosedReceptance, SpatialCase, close_loops, measured_frf, measured_model, modes_at, tool_down
 
 from ...chain import LOCAL, EstimateOptions, estimate_recordings
 from ...file_kinds import FRF, MODEL, RECORDING, kind_of

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from robot_model import Mechanism, RobotUpdate, UpdateParameter, shown_values
+from millfrf.robot_model import Mechanism, RobotUpdate, UpdateParameter, shown_values
 
 from ...tables import with_error
 

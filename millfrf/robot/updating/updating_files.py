@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from foundation import InputError, MillfrfError, writing_whole_file
-from robot_model import numbered_robot_text, read_robot, update_robot, updated_document
+from millfrf.core import InputError, MillfrfError, writing_whole_file
+from millfrf.robot_model import numbered_robot_text, read_robot, update_robot, updated_document
 
 from ...options import check_output
 from ...progress import bar

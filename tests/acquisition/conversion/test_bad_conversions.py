@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription, convert
-from acquisition.conversion import load_mapping
-from foundation import InputError
+from acquisition.conversion.mapping import load_mapping
+from millfrf.core import InputError
 
 GOOD = """
 sample_rate = 100.0

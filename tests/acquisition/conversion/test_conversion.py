@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from acquisition import Channel, EventAxis, Events, Recording, RecordingWriter, StreamDescription, convert
-from foundation import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 FORCE = Channel("fx", "force", "N", "TCP", "+X", full_scale=500.0, sensor="9255B, s/n 12", extra={"gain": 2})

@@ -7,8 +7,8 @@ import pytest
 from scipy.io import wavfile
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription, convert
-from foundation import FileFormatError, InputError
 from millfrf.__main__ import run
+from millfrf.core import FileFormatError, InputError
 
 pyuff = pytest.importorskip("pyuff")
 MICROPHONE = """

@@ -7,7 +7,7 @@ import pytest
 from nptdms import ChannelObject, TdmsWriter
 
 from acquisition import Recording, convert
-from foundation import FileFormatError
+from millfrf.core import FileFormatError
 
 MAPPING = """sample_rate = 1024.0
 [[channels]]

@@ -12,7 +12,7 @@ import pytest
 from power_failures import image, logged_recording, true_rows
 
 from acquisition import HOST_AXIS, Channel, Events, Recording, RecordingWriter, StreamDescription, convert, recover
-from foundation import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="logs writes with the dynamic linker of Linux")
 CHANNELS = tuple(Channel(f"a{k}", "acceleration", "m/s^2") for k in range(4))

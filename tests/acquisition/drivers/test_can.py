@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import Block, Channel, Disconnected, Recording, StreamDescription, record
+from acquisition import Block, Channel, Recording, StreamDescription, WithFeeds, record
 from acquisition.drivers.can_bus import CanFeed, CanSignal, DbcDecoder
-from acquisition.sources.feeds import WithFeeds
-from foundation import FileFormatError, InputError
+from acquisition.errors import Disconnected
+from millfrf.core import FileFormatError, InputError
 
 can = pytest.importorskip("can")
 pytest.importorskip("cantools")

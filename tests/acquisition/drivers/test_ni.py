@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from acquisition import Recording, aligned_samples, device_story
-from acquisition.drivers.ni import ni_9234_rate
+from acquisition.drivers.ni_source import ni_9234_rate
 from estimation import band_of_channels, cross_spectra, h1, settings_for
 
 RunWithDaqmx = Callable[..., subprocess.CompletedProcess[str]]
 COMMON = """
 import sys, time
 from acquisition import Channel, record
-from foundation import MillfrfError
-from acquisition.drivers import NiClocks, NiCounter, NiInput, NiSource
+from millfrf.core import MillfrfError
+from acquisition import NiClocks, NiCounter, NiInput, NiSource
 
 def inputs(n):
     voltage = NiInput(Channel("fx", "force", "N", "TCP", "+X"), "cDAQ1Mod9/ai0", 0.5, range_volts=10.0)

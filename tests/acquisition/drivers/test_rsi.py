@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import Block, Channel, Disconnected, Recording, StreamDescription, WithFeeds, record
-from acquisition.drivers.rsi import RsiFeed, RsiSignal
-from acquisition.drivers.rsi.rsi_answering import answer
-from acquisition.drivers.rsi.rsi_packet import PacketCount, RsiPacket, understood
+from acquisition import Block, Channel, Recording, StreamDescription, WithFeeds, record
+from acquisition.drivers.rsi import PacketCount, RsiFeed, RsiPacket, RsiSignal, understood
+from acquisition.drivers.rsi_answering import answer
+from acquisition.errors import Disconnected
 
 CONTROLLER = Path(__file__).with_name("rsi_controller.py")
 STREAM = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))

@@ -9,14 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import Block, Channel, DeviceError, DeviceTimeout, Disconnected, Recording, StreamDescription, record
+from acquisition import Block, Channel, DeviceError, Events, Recording, StreamDescription, WithFeeds, record
 from acquisition.drivers.amplifier import Amplifier, Command
-from acquisition.drivers.modbus_drive import ModbusFeed, Register
-from acquisition.drivers.modbus_link import SerialLink, TcpLink
-from acquisition.drivers.tachometer_line import TachometerFeed
-from acquisition.sources.events import Events
-from acquisition.sources.feeds import WithFeeds
-from foundation import InputError
+from acquisition.drivers.modbus import ModbusFeed, Register, SerialLink, TcpLink
+from acquisition.drivers.serial_lines import TachometerFeed
+from acquisition.errors import DeviceTimeout, Disconnected
+from millfrf.core import InputError
 
 if sys.platform == "win32":
     pytest.skip("pseudo terminals need a Unix", allow_module_level=True)

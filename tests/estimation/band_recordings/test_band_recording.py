@@ -9,7 +9,7 @@ import pytest
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from estimation import BandRecording, MatchedChannel, band_of_channels, band_recording, channels_of
-from foundation import InputError
+from millfrf.core import InputError
 
 RATE = 2000.0
 CHANNELS = (*channels_of("force", ["TCP:+X"], ["fx"]), *channels_of("acceleration", ["TCP:+X"], ["ax"]))

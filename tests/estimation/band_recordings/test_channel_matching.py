@@ -8,7 +8,7 @@ import pytest
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from estimation import channel_at, channels_of, names_at, read_band_recording
-from foundation import TIP, InputError
+from millfrf.core import TIP, InputError
 
 CHANNELS = (
     Channel("fx", "force", "N", "TCP", "-X"),

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from estimation import Resampler, needed_ratio, resampled, whole_ratio
-from foundation import InputError
+from millfrf.core import InputError
 
 RATIOS = [Fraction(1, 20), Fraction(3, 20), Fraction(2, 5), Fraction(19, 200)]
 

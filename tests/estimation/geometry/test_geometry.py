@@ -8,8 +8,8 @@ import pytest
 import pyuff
 
 from estimation import Geometry, import_geometry, read_geometry, write_geometry
-from foundation import FileFormatError, InputError
 from millfrf.__main__ import run
+from millfrf.core import FileFormatError, InputError
 
 UNITS = {"type": 164, "units_code": 5, "units_description": "mm", "temp_mode": 1, "length": 1e3, "force": 1e3}
 UNITS |= {"temp": 1.0, "temp_offset": 273.15}

@@ -10,7 +10,7 @@ from simulated_taps import Bench, Hits, Structure, error_at_resonances, frf_of, 
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from estimation import choose_segments, found_taps, merge_taps, tap_sums
-from foundation import InputError
+from millfrf.core import InputError
 
 TIMES = (0.6, 2.1, 3.6)
 QUICK = Bench(rate=2560.0, seconds=5.2, noise=1e-4)

@@ -10,7 +10,7 @@ import pytest
 from scipy.io import savemat
 
 from estimation import Frf, FrfMapping, ImportedFrf, import_frf
-from foundation import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError
 from tests.estimation.importing.conftest import accelerance
 
 AXES = ("frequency", "response", "excitation")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimation import Frf, FrfMapping, ImportedFrf, import_frf
-from foundation import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError
 from tests.estimation.importing.conftest import accelerance
 
 SIGNALCALC = (

@@ -9,8 +9,8 @@ import pytest
 import pyuff
 
 from estimation import Frf, read_frf_uff, write_frf_uff
-from estimation.importing import UffChoice, import_uff, import_uffs
-from foundation import FileFormatError, InputError
+from estimation.importing.uff_frfs import UffChoice, import_uff, import_uffs
+from millfrf.core import FileFormatError, InputError
 from tests.estimation.importing.conftest import accelerance, coherence_of, function, write_sets
 
 LABELS = {"ordinate_axis_units_lab": "NONE", "orddenom_axis_units_lab": "NONE"}

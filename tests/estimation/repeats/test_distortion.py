@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from estimation import SteadyPeriods, distortion, homogeneity, linear_approximation, steady_periods
-from estimation.repeats import excited_lines
+from estimation import SteadyPeriods, distortion, excited_lines, homogeneity, linear_approximation, steady_periods
 
 from .oscillator import DAMPING, NATURAL, RATE, multisine, noisy, steady
 

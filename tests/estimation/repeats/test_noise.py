@@ -6,19 +6,10 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
-from estimation import (
-    BandRecording,
-    MeasuredNoise,
-    find_repeats,
-    measured_noise,
-    noise_bound,
-    noise_in_silence,
-    noise_of_periods,
-    noise_of_repeats,
-    steady_periods,
-    windowed_spectrum,
-)
-from foundation import InputError
+from estimation import BandRecording, MeasuredNoise, find_repeats, noise_of_periods, steady_periods, windowed_spectrum
+from estimation.repeats.noise import noise_bound, noise_in_silence
+from estimation.repeats.noise_between_periods import measured_noise, noise_of_repeats
+from millfrf.core import InputError
 
 from .oscillator import CHANNELS, PERIOD, RATE, motion, multisine, noisy, recording, steady
 

@@ -5,8 +5,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from estimation import Stretch, find_repeats, repeat_of
-from estimation.repeats import between_samples
+from estimation import find_repeats, repeat_of
+from estimation.repeats.cut_periods import between_samples
+from estimation.repeats.period_search import Stretch
 
 Real = NDArray[np.float64]
 

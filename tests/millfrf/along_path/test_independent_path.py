@@ -7,22 +7,18 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
 from millfrf.robot.along_path import Loading, PathCut, Request, Wanted, optimised, values_of
-from modal_fit import ModalModel
-from robot_model import (
+from millfrf.robot_model import (
     Payload,
     Redundancy,
     attitudes_along,
     close_loops,
-    coordinate_basis,
     cut_path,
-    mass_matrix,
     modal_model_at,
     named_posture,
     path_postures,
     read_spatial_robot,
-    stiffness_matrix,
     structure_at,
     target_of,
     tool_deflection,
@@ -30,7 +26,9 @@ from robot_model import (
     turned_place,
     wrist_solutions,
 )
-from stability import certified_lobes
+from millfrf.robot_model.finite_elements.structure import coordinate_basis, mass_matrix, stiffness_matrix
+from millfrf.stability import certified_lobes
+from modal_fit import ModalModel
 
 CASE = read_spatial_robot("kuka_kr90_angled")
 CUT = MillingProcess(2, 0.012, np.pi / 2, 600e6, 0.3, 0.1, np.pi / 2, np.pi, 1e-4)

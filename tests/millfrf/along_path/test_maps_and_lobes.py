@@ -10,8 +10,8 @@ from milling_of_a_path import CUT
 from millfrf.__main__ import run
 from millfrf.provenance import read_provenance
 from millfrf.robot.settled_modes import settled_modes
-from robot_model import modal_model_at, named_posture, read_robot
-from stability import certified_lobes
+from millfrf.robot_model import modal_model_at, named_posture, read_robot
+from millfrf.stability import certified_lobes
 
 
 @pytest.fixture(autouse=True)
@@ -60,7 +60,7 @@ def test_compensate_draws(inputs: Path) -> None:
 
 
 def test_fewer_modes_give_the_limits_of_all() -> None:
-    from cutting import read_cutting_process
+    from millfrf.cutting import read_cutting_process
 
     case = read_robot("kuka_kr90_r3100")
     model = modal_model_at(case.robot, named_posture(case, None), highest_frequency=1000.0)  # type: ignore[union-attr]

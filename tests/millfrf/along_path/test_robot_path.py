@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from milling_of_a_path import CUT
 
-from cutting import force_harmonics, read_cutting_process
 from millfrf.__main__ import run
-from robot_model import Payload, read_spatial_robot, tool_deflection, tool_down
+from millfrf.cutting import force_harmonics, read_cutting_process
+from millfrf.robot_model import Payload, read_spatial_robot, tool_deflection, tool_down
 
 
 @pytest.fixture

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from acquisition import Recording
-from foundation import InputError
 from millfrf.__main__ import BAD_INPUT, DONE, run
 from millfrf.campaign import SimulatedCampaign, make_campaign
 from millfrf.campaign.simulated import Condition, laboratory_of
@@ -17,6 +16,7 @@ from millfrf.campaign.simulated.recordings import write_recording
 from millfrf.campaign.simulated.schedule import FAULTS
 from millfrf.campaign.simulated.work_area import HIGHEST, LOWEST
 from millfrf.chain import SUBSPACE, FitOptions, fit_recordings
+from millfrf.core import InputError
 from millfrf.gate import check_recordings
 
 POSES, RECORDINGS = 6, 36

@@ -16,27 +16,26 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess, read_cutting_process
 from estimation import read_frf
-from foundation import InputError, MillfrfError
 from millfrf.campaign.simulated import Condition, Laboratory, SimulatedCampaign, laboratory_of, make_campaign
 from millfrf.campaign.simulated.schedule import PlannedRecording, pose_name
 from millfrf.campaign.simulated.work_area import spread_postures
 from millfrf.chain import SUBSPACE, FitOptions, calibrate_model, fit_recordings
+from millfrf.core import InputError, MillfrfError
+from millfrf.cutting import MillingProcess, read_cutting_process
 from millfrf.robot.learned.depth_band import depth_band
-from modal_fit import ModalModel, read_modal_model, write_modal_model
-from replay_data import tip_model
-from robot_model import (
+from millfrf.robot_model import (
     LearnedPostures,
-    MeasuredModes,
     learn_postures,
     measured_modes,
     named_posture,
     predict_posture,
     read_spatial_robot,
 )
-from robot_model.posture_process.modes import mode_pairs
-from stability import lowest_limits
+from millfrf.robot_model.posture_process.measured_modes import MeasuredModes, mode_pairs
+from millfrf.stability import lowest_limits
+from modal_fit import ModalModel, read_modal_model, write_modal_model
+from replay_data import tip_model
 
 Real = NDArray[np.float64]
 

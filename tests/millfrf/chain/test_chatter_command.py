@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from acquisition import record
-from cutting import MillingProcess
 from millfrf.__main__ import run
 from millfrf.chain.cuts.chatter_file import read_cuts
+from millfrf.cutting import MillingProcess
+from millfrf.stability import cut_spectrum, gather_evidence
 from modal_fit import write_modal_model
 from replay_data import MillingCell, dynamometer, table_one_model, tip_accelerometers
-from stability import cut_spectrum, gather_evidence
 
 SENSORS = dynamometer(0.0) + tip_accelerometers(0.0)
 CUT = """[cutting]

@@ -8,9 +8,9 @@ from scipy import signal
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from estimation import read_frf
-from foundation import InputError
 from millfrf.__main__ import run
 from millfrf.chain import EstimateOptions, estimate_recordings
+from millfrf.core import InputError
 from modal_fit import ModalModel
 
 RATE = 200.0

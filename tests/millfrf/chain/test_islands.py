@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
-from figures import StableAbove, lobes_figure
 from millfrf.chain import stable_above
+from millfrf.cutting import MillingProcess
+from millfrf.figures import StableAbove, lobes_figure
+from millfrf.stability import StabilityLobes, certified_lobes, multipliers
 from modal_fit import ModalModel
 from replay_data import default_structure, tip_model
-from stability import StabilityLobes, certified_lobes, multipliers
 
 CUT = MillingProcess(2, 12.7e-3, np.pi / 2, 119e6, 0.17, 0.33, np.pi / 2, np.pi, 0.15e-3)
 SPEEDS = np.array([1000.0, 1040.0, 1300.0]) * np.pi / 30

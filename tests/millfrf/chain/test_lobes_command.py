@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cutting import MillingProcess, write_cutting_process
 from estimation import write_frf
 from millfrf.__main__ import DONE, run
 from millfrf.chain.cuts.lobes import lobes_summary, mode_coupling_line
+from millfrf.cutting import MillingProcess, write_cutting_process
+from millfrf.stability import StabilityLobes, certified_lobes, read_lobes
 from modal_fit import write_modal_model
 from replay_data import table_one_model
-from stability import StabilityLobes, certified_lobes, read_lobes
 
 HALF_DOWN = MillingProcess(2, 0.0127, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 1.5e-4)
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from estimation import Frf, write_frf
-from foundation import Band
 from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.core import Band
 from millfrf.provenance import read_provenance
 from modal_fit import ModalModel, write_modal_model
 from replay_data import default_structure

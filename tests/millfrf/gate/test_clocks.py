@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import Block, Channel, Overrun, Recording, RecordingWriter, StreamDescription, record
+from acquisition import Block, Channel, Recording, RecordingWriter, StreamDescription, record
+from acquisition.errors import Overrun
 from millfrf.__main__ import run
 
 CHANNELS = (Channel("fx", "force", "N", "TCP", "+X"), Channel("ax", "acceleration", "m/s^2", "TCP", "+X"))

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from estimation import Frf, FrfCovariance, read_frf, to_receptance, write_frf
-from foundation import InputError
 from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.core import InputError
 from millfrf.gate import check_frf, check_model, terms_left_out
 from modal_fit import ModalModel, read_modal_model, write_modal_model
 from replay_data import default_structure, table_one_model, tip_model

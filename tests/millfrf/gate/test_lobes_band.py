@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cutting import write_cutting_process
-from foundation import Band
 from millfrf.__main__ import DONE, run
 from millfrf.chain import compute_lobes, speed_axis
+from millfrf.core import Band
+from millfrf.cutting import write_cutting_process
 from millfrf.gate import limits_inside_band
+from millfrf.stability import read_lobes
 from modal_fit import ModalModel, write_modal_model
 from replay_data import ACETAL_CUTTER, default_structure, tip_model
-from stability import read_lobes
 
 
 def fitted(band: Band | None) -> ModalModel:

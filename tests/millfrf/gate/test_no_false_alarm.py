@@ -10,8 +10,8 @@ import pytest
 
 from acquisition import convert
 from estimation import Frf
-from foundation import InputError
 from millfrf.chain import EstimateOptions, estimate_recordings
+from millfrf.core import InputError
 from millfrf.gate import check_frf, check_model, check_recordings
 from modal_fit import read_modal_model
 

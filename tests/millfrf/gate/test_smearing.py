@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimation import Frf, FrfCovariance, SpectralSettings, read_frf, write_frf
-from estimation.spectra import spectral_width
+from estimation.spectra.cross_spectra import spectral_width
 from millfrf.chain import FitOptions, fit_model
 
 FREQUENCY, DAMPING = 11.3, 0.045

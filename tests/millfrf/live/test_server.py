@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from foundation import InputError
+from millfrf.core import InputError
 from millfrf.live import LiveControl, LiveMonitor, LiveServer
 
 

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from acquisition import Block, Channel, Recording, ReplaySource
+from acquisition import Block, Channel, Recording
+from acquisition.drivers.replay import ReplaySource
 from estimation import CrossSpectra, SpectralAccumulator, settings_for, to_receptance
 from millfrf.__main__ import run
 from millfrf.chain import open_session, plan_from_file

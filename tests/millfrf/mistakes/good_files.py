@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import record
-from cutting import MillingProcess
 from estimation import Frf, write_frf
-from foundation import HOUSING, TIP
+from millfrf.core import HOUSING, TIP
+from millfrf.cutting import MillingProcess
 from modal_fit import ModalModel, write_modal_model
 from replay_data import (
     SWEEP_IMMERSIONS,
@@ -19,10 +19,10 @@ from replay_data import (
     default_structure,
     dynamometer,
     housing_accelerometers,
+    select,
     tip_accelerometers,
 )
 from replay_data import table_one_model as tip_structure
-from replay_data.robot_structure import select
 
 RPM = math.pi / 30
 RATE = 512.0

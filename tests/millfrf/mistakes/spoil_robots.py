@@ -40,7 +40,7 @@ def rail(folder: Path, limits: str) -> None:
     """A robot on a rail, whose file states the rail's limits by this line."""
     from importlib.resources import files
 
-    text = (files("robot_model") / "robots" / "kuka_kr90_r3100.toml").read_text(encoding="utf-8")
+    text = (files("millfrf.robot_model") / "robots" / "kuka_kr90_r3100.toml").read_text(encoding="utf-8")
     text = text.replace('antecedent = "0"\nr_m = 0.675', 'antecedent = "carriage"\nr_m = 0.675')
     head, tail = text.split("[[frames]]", 1)
     tail = tail.replace("nodes = [0, 1]", "nodes = [13, 1]", 1)
@@ -54,6 +54,6 @@ def robot(folder: Path, *lines: str) -> None:
     """A robot's file beside the others, lines replaced as :func:`toml` does."""
     from importlib.resources import files
 
-    content = (files("robot_model") / "robots" / "staubli_rx170.toml").read_text(encoding="utf-8")
+    content = (files("millfrf.robot_model") / "robots" / "staubli_rx170.toml").read_text(encoding="utf-8")
     (folder / "robot.toml").write_text(content, encoding="utf-8")
     toml(folder, "robot.toml", *lines)

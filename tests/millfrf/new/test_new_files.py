@@ -8,9 +8,9 @@ import pytest
 from scipy.io import savemat
 
 from acquisition import Recording
-from cutting import read_cutting_process
-from foundation import InputError
 from millfrf.__main__ import run
+from millfrf.core import InputError
+from millfrf.cutting import read_cutting_process
 from millfrf.new.making import mapping_for
 from millfrf.toml_files import described_tables, toml_files
 

@@ -11,8 +11,8 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
 from acquisition import Recording, open_arrays
-from foundation import FileFormatError, InputError
 from millfrf.__main__ import run
+from millfrf.core import FileFormatError, InputError
 from millfrf.new.making import mapping_for
 
 N = 40

@@ -7,8 +7,8 @@ import pytest
 import typer
 from writing_commands import COMMANDS, Writing
 
-from foundation import InputError, keeping_files, writing_whole_file, writing_whole_folder
 from millfrf.__main__ import app, run
+from millfrf.core import InputError, keeping_files, writing_whole_file, writing_whole_folder
 from millfrf.usage import FOLDERS, OWN_FOLDER, WRITING, commands_in, framed
 
 OLD = "a result that somebody may need"

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from estimation import write_frf
-from foundation import InputError, MillfrfError
 from millfrf.__main__ import run
+from millfrf.core import InputError, MillfrfError
 from millfrf.picking import (
     PickSession,
     check_pick,

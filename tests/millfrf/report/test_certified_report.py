@@ -6,15 +6,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cutting import MillingProcess, write_cutting_process
+from millfrf.cutting import MillingProcess, write_cutting_process
 from millfrf.provenance import of_lobes
 from millfrf.report import ReportOptions, collect, page_text
 from millfrf.report.lobes_check import checked_lobes
 from millfrf.report.page import report_page
 from millfrf.report.recommendation import recommendation
 from millfrf.report.sections.stability import stability_findings
+from millfrf.stability import certified_lobes, multipliers, write_lobes, zero_order
 from modal_fit import ModalModel, write_modal_model
-from stability import certified_lobes, multipliers, write_lobes, zero_order
 
 RPM = np.pi / 30
 HALF = MillingProcess(2, 0.01, np.pi / 2, 6e8, 1 / 3, 0.0, np.pi / 2, np.pi, 0.1e-3)

@@ -11,9 +11,10 @@ from scipy.fft import irfft, rfft
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from millfrf.__main__ import run
+from millfrf.mismatch import library
+from millfrf.mismatch.physics.protocol import answer_name
 from millfrf.report.diagnoses.diagnosis_answers import where
 from millfrf.report.diagnoses.next_tests import next_test
-from mismatch.physics import answer_name, library
 from modal_fit import ModalModel, write_modal_model
 
 RATE, SECONDS, DELAY = 128.0, 40.0, 0.005

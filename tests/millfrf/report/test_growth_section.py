@@ -5,8 +5,8 @@ from typing import Any, cast
 
 import pytest
 
+from millfrf.mismatch import StructureDiagnosis
 from millfrf.report.diagnoses.diagnosis_sections import growth_section
-from mismatch import StructureDiagnosis
 
 
 def told(amplitude: list[float | None], recordings: int = 3, **more: Any) -> Any:

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from figures import GalleryEntry, SmallSvg, gallery_page, house_style, new_figure, save_figure
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.figures import GalleryEntry, SmallSvg, gallery_page, house_style, new_figure, save_figure
 from millfrf.report import (
     FigureFiles,
     Fold,

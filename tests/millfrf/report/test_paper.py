@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from figures import house_style, new_figure
 from millfrf.__main__ import BAD_INPUT, run
+from millfrf.figures import house_style, new_figure
 from millfrf.report import ResultsPage, Section, picture_of, write_results_pdf
 from millfrf.tables import Table
 

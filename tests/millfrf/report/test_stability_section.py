@@ -6,7 +6,7 @@ import numpy as np
 
 from millfrf.report.pages.table_columns import of_numbers
 from millfrf.report.sections.stability import advice_table, lobes_table
-from stability import StabilityLobes
+from millfrf.stability import StabilityLobes
 
 
 def lobes(depth: np.ndarray, rpm: np.ndarray) -> StabilityLobes:

@@ -19,7 +19,7 @@ SHIPPED = {
     "examples/fsm_mapping.toml": "mapping",
     **{
         str(path.relative_to(ROOT)): f"robot-{tomllib.loads(path.read_text(encoding='utf-8'))['robot']['kind']}"
-        for path in sorted((ROOT / "robot_model" / "robots").glob("*.toml"))
+        for path in sorted((ROOT / "millfrf" / "robot_model" / "robots").glob("*.toml"))
     },
 }
 CUT = {"teeth": 2, "diameter_m": 0.0127, "ktc_pa": 119e6, "krc": 0.17, "start_angle_deg": 90.0, "exit_angle_deg": 180.0}

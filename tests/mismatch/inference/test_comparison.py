@@ -7,16 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mismatch.inference import (
-    Candidate,
-    EvidenceSettings,
-    Proposal,
-    Round,
-    Search,
-    best_first,
-    equivalents_of,
-    released,
-)
+from millfrf.mismatch import Candidate
+from millfrf.mismatch.inference.search import Proposal, Round, Search, best_first, equivalents_of, released
+from millfrf.mismatch.inference.settings import EvidenceSettings
 
 
 @dataclass(frozen=True)

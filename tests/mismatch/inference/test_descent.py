@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
-from mismatch.inference import Limits, bounded_step, descend, plain_step
+from millfrf.mismatch.inference.descent import Limits, bounded_step, descend, plain_step
 
 Real = NDArray[np.float64]
 

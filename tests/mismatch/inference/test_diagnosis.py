@@ -16,27 +16,13 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from estimation import BandRecording
-from foundation import same_values
-from mismatch import StructureDiagnosis
-from mismatch.inference import (
-    VERDICTS,
-    AcceptedCause,
-    Candidate,
-    Diagnosis,
-    Findings,
-    HeldOutError,
-    Improvement,
-    Proposal,
-    Remainder,
-    Round,
-    Search,
-    Settings,
-    VerdictSettings,
-    search,
-    signed_ranks,
-    verdict_of,
-)
-from mismatch.location import residual_view
+from millfrf.core import same_values
+from millfrf.mismatch import AcceptedCause, Candidate, Diagnosis, Settings, StructureDiagnosis
+from millfrf.mismatch.inference.diagnosis import VERDICTS, Findings, HeldOutError, Improvement, Remainder, verdict_of
+from millfrf.mismatch.inference.paired_tests import signed_ranks
+from millfrf.mismatch.inference.search import Proposal, Round, Search, search
+from millfrf.mismatch.inference.settings import VerdictSettings
+from millfrf.mismatch.location.residual_view import residual_view
 from modal_fit import ModalModel
 
 Real = NDArray[np.float64]

@@ -7,18 +7,10 @@ from typing import Any
 
 import pytest
 
-from foundation import FileFormatError
-from mismatch.inference import (
-    AcceptedCause,
-    Candidate,
-    Diagnosis,
-    HeldOutError,
-    Improvement,
-    Remainder,
-    diagnosis_content,
-    read_diagnosis,
-    write_diagnosis,
-)
+from millfrf.core import FileFormatError
+from millfrf.mismatch import AcceptedCause, Candidate, Diagnosis, read_diagnosis, write_diagnosis
+from millfrf.mismatch.inference.diagnosis import HeldOutError, Improvement, Remainder
+from millfrf.mismatch.inference.diagnosis_file import diagnosis_content
 
 
 def made(**changed: Any) -> Diagnosis[None]:

@@ -8,20 +8,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mismatch.inference import (
-    Candidate,
-    EvidenceSettings,
+from millfrf.mismatch import Candidate, SearchSettings, Settings
+from millfrf.mismatch.inference.search import (
     Proposal,
     Round,
     Search,
-    SearchSettings,
-    Settings,
     best_first,
     emptied,
     equivalents_of,
     released,
     search,
 )
+from millfrf.mismatch.inference.settings import EvidenceSettings
 
 Real = NDArray[np.float64]
 Terms = tuple[str, ...]

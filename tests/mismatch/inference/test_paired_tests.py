@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import stdtr
 
-from mismatch.inference import ratio_interval, signed_ranks, students_test
+from millfrf.mismatch.inference.paired_tests import ratio_interval, signed_ranks, students_test
 
 
 def test_signed_ranks_agree_with_the_enumeration_of_all_signs() -> None:

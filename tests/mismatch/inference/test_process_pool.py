@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from mismatch.inference import in_processes
+from millfrf.mismatch import in_processes
 
 HERE = os.getpid()
 

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mismatch.inference import Findings, Remainder, VerdictSettings, verdict_of
+from millfrf.mismatch.inference.diagnosis import Findings, Remainder, verdict_of
+from millfrf.mismatch.inference.settings import VerdictSettings
 
 POWER = st.floats(1e-6, 1e6)
 

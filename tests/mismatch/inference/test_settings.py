@@ -11,30 +11,24 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
-import mismatch
-from mismatch.adapters.cut import CUT
-from mismatch.adapters.robot import ROBOT
-from mismatch.adapters.robot.settings import LIMITS
-from mismatch.faults.tones import sharp_contrast
-from mismatch.inference import (
+from millfrf import mismatch
+from millfrf.mismatch import ROBOT, LabError, SearchSettings, Settings
+from millfrf.mismatch.cut.settings import CUT
+from millfrf.mismatch.faults.tones import sharp_contrast
+from millfrf.mismatch.inference.paired_tests import signed_ranks
+from millfrf.mismatch.inference.search import Proposal, Round, Search, search
+from millfrf.mismatch.inference.settings import (
     FAULTS,
     LOCATION,
     EvidenceSettings,
     FaultSettings,
-    LabError,
     LocationSettings,
     ProofSettings,
-    Proposal,
-    Round,
     ScreeningSettings,
-    Search,
-    SearchSettings,
-    Settings,
     VerdictSettings,
-    search,
-    signed_ranks,
 )
-from mismatch.location.family_wise import NoiseSpread, holm
+from millfrf.mismatch.location.residual_view import NoiseSpread, holm
+from millfrf.mismatch.robot.posed import LIMITS
 
 Real = NDArray[np.float64]
 

@@ -9,21 +9,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from foundation import InputError
-from mismatch import ModelShape
-from mismatch.adapters.cut import CutSettings
-from mismatch.adapters.robot.settings import RobotLimits
-from mismatch.inference import (
+from millfrf.core import InputError
+from millfrf.mismatch import LabError, ModelShape, SearchSettings
+from millfrf.mismatch.cut.settings import CutSettings
+from millfrf.mismatch.inference.settings import (
     EvidenceSettings,
     FaultSettings,
-    LabError,
     LocationSettings,
     ProofSettings,
     ScreeningSettings,
-    SearchSettings,
     Thresholds,
     VerdictSettings,
 )
+from millfrf.mismatch.robot.posed import RobotLimits
 from modal_fit import ModalModel
 
 CLASSES = (

@@ -7,29 +7,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mismatch.inference import (
-    AcceptedCause,
-    Candidate,
-    Diagnosis,
-    Findings,
-    Improvement,
-    Limits,
-    Proposal,
-    Remainder,
-    Round,
-    Search,
-    Settings,
-    best_first,
-    descend,
-    equivalents_of,
-    plain_step,
-    ratio_interval,
-    read_diagnosis,
-    search,
-    signed_ranks,
-    verdict_of,
-    write_diagnosis,
-)
+from millfrf.mismatch import AcceptedCause, Candidate, Diagnosis, Settings, read_diagnosis, write_diagnosis
+from millfrf.mismatch.inference.descent import Limits, descend, plain_step
+from millfrf.mismatch.inference.diagnosis import Findings, Improvement, Remainder, verdict_of
+from millfrf.mismatch.inference.paired_tests import ratio_interval, signed_ranks
+from millfrf.mismatch.inference.search import Proposal, Round, Search, best_first, equivalents_of, search
 
 Real = NDArray[np.float64]
 

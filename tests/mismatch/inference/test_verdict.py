@@ -4,15 +4,15 @@ from itertools import product
 
 import pytest
 
-from mismatch.inference import (
+from millfrf.mismatch.inference.diagnosis import (
     Findings,
     Improvement,
     Remainder,
-    VerdictSettings,
     leaves_too_much,
     share_left,
     verdict_of,
 )
+from millfrf.mismatch.inference.settings import VerdictSettings
 
 LIMITS = VerdictSettings(noise_like=2.0, explained=0.9, partly=0.5)
 BEFORE = {True: Remainder(1.9, 1.9), False: Remainder(40.0, 40.0)}

@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimation import Realisation, SteadyPeriods, channels_of, read_band_recording, steady_periods
-from foundation import InputError
-from modal_fit import amplitude_dependence, fit_level
+from estimation import SteadyPeriods, channels_of, read_band_recording, steady_periods
+from estimation.repeats.cut_periods import Realisation
+from millfrf.core import InputError
+from modal_fit import amplitude_dependence
+from modal_fit.amplitude import fit_level
 
 RATE, PERIOD = 256.0, 8.0
 CHANNELS = channels_of("force", ["P:+X"], ["fx"]), channels_of("acceleration", ["P:+X", "Q:+X"], ["ap", "aq"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation import Frf
-from foundation import Band, InputError
+from millfrf.core import Band, InputError
 from modal_fit import ModalModel, calibrate_to_tip, fit_polyreference
 from replay_data import default_structure, table_one_model, tip_model
 

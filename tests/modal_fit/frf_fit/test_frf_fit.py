@@ -7,13 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from estimation import Frf
-from modal_fit import ModalFit, fit_polyreference
-from modal_fit.frf_fit.variable_projection.elimination import Modes, eliminate
-from modal_fit.frf_fit.variable_projection.noise_of_entries import neighbour_noise
-from modal_fit.frf_fit.variable_projection.refinement import normal_equations, without_response
-from modal_fit.frf_fit.variable_projection.whitened_lines import measured_lines
-from modal_fit.models.modal_model import ModalModel
-from modal_fit.models.modal_model_file import read_modal_model, write_modal_model
+from modal_fit import ModalFit, ModalModel, fit_polyreference, read_modal_model, write_modal_model
+from modal_fit.frf_fit.elimination import Modes, eliminate
+from modal_fit.frf_fit.measured_lines import measured_lines, neighbour_noise
+from modal_fit.frf_fit.refinement import normal_equations, without_response
 
 Complex = NDArray[np.complex128]
 AXIS = np.arange(0.25, 120.0, 0.125)

@@ -10,30 +10,26 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
 
-from foundation import FileFormatError, InputError
-from robot_model import (
-    ElasticJoint,
+from millfrf.core import FileFormatError, InputError
+from millfrf.robot_model import (
     Frame,
-    JointDrive,
-    Link,
-    LumpedBody,
     Mechanism,
     SpatialRobot,
     changed_robot_text,
-    coupled_frf_at,
     drive_stiffness,
-    exact_frf_at,
-    frf_at,
-    gravity_hessian,
     in_posture,
-    joint_deviation,
     modes_at,
     read_spatial_robot,
     structure_at,
     tip_compliance,
     tool_jacobian,
 )
-from robot_model.posture_process.modes import basis_at, part_names
+from millfrf.robot_model.dynamic_stiffness import coupled_frf_at, exact_frf_at
+from millfrf.robot_model.finite_elements.statics import gravity_hessian
+from millfrf.robot_model.machining.drilling_deviation import joint_deviation
+from millfrf.robot_model.posture_process.modal_basis import basis_at, part_names
+from millfrf.robot_model.spatial.spatial_modes import frf_at
+from millfrf.robot_model.spatial.spatial_robot import ElasticJoint, JointDrive, Link, LumpedBody
 
 KUKA = read_spatial_robot("kuka_kr90_r3100")
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foundation import FileFormatError, InputError
-from robot_model import SpatialCase, changed_robot_text, read_robot, read_spatial_robot, robot_names
+from millfrf.core import FileFormatError, InputError
+from millfrf.robot_model import SpatialCase, changed_robot_text, read_robot, read_spatial_robot, robot_names
 
-FOLDER = Path(__file__).resolve().parents[3] / "robot_model" / "robots"
+FOLDER = Path(__file__).resolve().parents[3] / "millfrf" / "robot_model" / "robots"
 
 
 @pytest.mark.parametrize("name", robot_names())

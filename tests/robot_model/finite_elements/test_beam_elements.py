@@ -6,17 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import eigh
 
-from robot_model import (
+from millfrf.robot_model.dynamic_stiffness import spatial_dynamic_stiffness
+from millfrf.robot_model.finite_elements.beam_element import Material, Section, beam_mass, beam_stiffness, hollow_circle
+from millfrf.robot_model.finite_elements.structure import (
     Beam,
-    Material,
-    Section,
     Structure,
-    beam_mass,
-    beam_stiffness,
     coordinate_basis,
-    hollow_circle,
     mass_matrix,
-    spatial_dynamic_stiffness,
     stiffness_matrix,
 )
 

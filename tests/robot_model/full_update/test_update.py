@@ -8,24 +8,24 @@ import tomlkit
 from numpy.typing import NDArray
 
 from estimation import Frf, FrfCovariance
-from foundation import TIP
-from robot_model import (
+from millfrf.core import TIP
+from millfrf.robot_model import (
     PosedReceptance,
     SpatialCase,
     SpatialRobot,
-    changed_by,
-    free_parameters,
-    frf_at,
     in_posture,
     measured_frf,
     measured_model,
     modal_model_at,
     read_spatial_robot,
-    robot_text,
     update_robot,
     updated_document,
 )
-from robot_model.full_update.response import answer, posture_system, receptance_of
+from millfrf.robot_model.files.robot_files import robot_text
+from millfrf.robot_model.full_update.changed_structure import changed_by, free_parameters
+from millfrf.robot_model.full_update.matrices import posture_system
+from millfrf.robot_model.full_update.posture_response import answer, receptance_of
+from millfrf.robot_model.spatial.spatial_modes import frf_at
 
 Real = NDArray[np.float64]
 Q = np.radians([0.0, -10.0, 100.0, 20.0, 60.0, 10.0])

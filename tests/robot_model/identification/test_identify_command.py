@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from millfrf.__main__ import BAD_INPUT, DONE, FAILED, run
+from millfrf.robot_model import assumptions, in_posture, modes_at, read_deflections, read_robot, read_spatial_robot
 from modal_fit import frequency_and_damping_errors
-from robot_model import assumptions, in_posture, modes_at, read_deflections, read_robot, read_spatial_robot
 
-FOLDER = Path(__file__).resolve().parents[3] / "robot_model" / "robots"
+FOLDER = Path(__file__).resolve().parents[3] / "millfrf" / "robot_model" / "robots"
 TRUE = np.array([0.7e7, 2.0e7, 0.9e7, 1.5e6, 0.8e6, 0.75e6])
 """Stiffness of each joint, N m/rad; the file has 1.03e7, 1.5e7, 1.1e7, 1.2e6, 1.0e6, 0.6e6."""
 
@@ -142,7 +142,7 @@ def test_what_is_open_goes_on_into_modes(robot: Path, tmp_path: Path, capsys: py
 
 def test_error_bars_cover(robot: Path, tmp_path: Path) -> None:
     """Twelve tables of six numbers: 95 % intervals hold most of the 72 truths (57 or more with 99.9 % chance)."""
-    from robot_model import identify_elastic, joint_parameters
+    from millfrf.robot_model import identify_elastic, joint_parameters
 
     case = read_spatial_robot(robot)
     clean = read_deflections(write_table(tmp_path / "d.csv", 25, 0.0), case.robot.mechanism)

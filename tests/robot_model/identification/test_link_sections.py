@@ -7,23 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foundation import InputError
-from robot_model import (
+from millfrf.core import InputError
+from millfrf.robot_model import (
     Deflection,
-    ElasticJoint,
     Frame,
-    Link,
-    Material,
     Mechanism,
     SpatialRobot,
     apply_elastic,
-    hollow_circle,
     identify_elastic,
     joint_parameters,
     link_parameters,
     predicted_deflections,
     tube_diameters,
 )
+from millfrf.robot_model.finite_elements.beam_element import Material, hollow_circle
+from millfrf.robot_model.spatial.spatial_robot import ElasticJoint, Link
 
 LENGTH, STEEL = 1.2, Material(210e9, 81e9, 7850.0)
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "robot_stiffness_identification.py"
@@ -78,7 +76,7 @@ def test_slopes_are_those_of_differences() -> None:
     parameters = (*joint_parameters(robot), *link_parameters(robot))
     cases = example.measure(robot, example.postures(robot, 3, 5), (800.0, 600.0), 0.0, 2)
     values = np.array([one.value(robot) for one in parameters])
-    from robot_model.identification.stiffness_identification import _Problem
+    from millfrf.robot_model.identification.stiffness_identification import _Problem
 
     jacobian = _Problem(robot, tuple(cases), 1.0, parameters).jacobian(values)
     for column in range(len(parameters)):

@@ -5,22 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foundation import FileFormatError, InputError
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from robot_model import (
-    Frame,
-    Mechanism,
-    gravity_hessian,
-    in_posture,
-    joint_deviation,
-    modes_at,
-    read_spatial_robot,
-    structure_at,
-    tip_compliance,
-    with_gravity,
-)
+from millfrf.core import FileFormatError, InputError
+from millfrf.robot_model import Frame, Mechanism, in_posture, modes_at, read_spatial_robot, structure_at, tip_compliance
+from millfrf.robot_model.finite_elements.statics import gravity_hessian, with_gravity
+from millfrf.robot_model.machining.drilling_deviation import joint_deviation
 
-KUKA = Path(__file__).parents[3] / "robot_model" / "robots" / "kuka_kr90_r3100.toml"
+KUKA = Path(__file__).parents[3] / "millfrf" / "robot_model" / "robots" / "kuka_kr90_r3100.toml"
 RAIL = """
 [[frames]]
 name = "rail"

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robot_model import Frame, Mechanism, wrist_solutions
+from millfrf.robot_model import Frame, Mechanism, wrist_solutions
 
 SIGN = st.sampled_from([-pi / 2, pi / 2])
 LENGTH = st.floats(0.1, 1.5)

@@ -9,20 +9,19 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from foundation import InputError
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from robot_model import (
-    ElasticJoint,
+from millfrf.core import InputError
+from millfrf.robot_model import (
     Frame,
-    LumpedBody,
     Mechanism,
     SpatialRobot,
     UncertaintyBudget,
-    joint_deviation,
     measured_machining_uncertainty,
     orbit_radius,
     read_spatial_robot,
 )
+from millfrf.robot_model.machining.drilling_deviation import joint_deviation
+from millfrf.robot_model.spatial.spatial_robot import ElasticJoint, LumpedBody
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "robot_drilling_maps.py"
 SHAPE = (4, 3)

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cutting import MillingProcess, average_directional_matrix
-from robot_model import couple_receptances, rayleigh_constants
+from millfrf.cutting import MillingProcess, average_directional_matrix
+from millfrf.robot_model.dynamic_stiffness import couple_receptances
+from millfrf.robot_model.finite_elements.reduction import rayleigh_constants
 
 
 def test_damping_ratio_of_mousavi_has_its_constants_swapped() -> None:

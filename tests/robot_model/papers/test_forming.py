@@ -7,7 +7,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from robot_model import inverse_kinematics, named_posture, rotation_vector, tool_jacobian
+from millfrf.robot_model import inverse_kinematics, named_posture, rotation_vector, tool_jacobian
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "robot_path_compensation.py"
 

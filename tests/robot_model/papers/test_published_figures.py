@@ -8,10 +8,17 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
 from millfrf.robot.depth_maps.posture_maps import depth_over_redundancy
-from robot_model import exact_receptance, in_posture, modal_model_at, read_spatial_robot, tool_down, turned_place
-from stability import multipliers
+from millfrf.robot_model import (
+    exact_receptance,
+    in_posture,
+    modal_model_at,
+    read_spatial_robot,
+    tool_down,
+    turned_place,
+)
+from millfrf.stability import multipliers
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "robot_paper_figures.py"
 

@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cutting import read_cutting_process
 from estimation import Frf
-from foundation import TIP
 from millfrf.__main__ import DONE, run
-from robot_model import exact_receptance, flexible_chain, in_posture, read_planar_robot, rigid_matrices
-from stability import read_lobes, zero_order
+from millfrf.core import TIP
+from millfrf.cutting import read_cutting_process
+from millfrf.robot_model import exact_receptance, in_posture, read_planar_robot, rigid_matrices
+from millfrf.robot_model.planar import flexible_chain
+from millfrf.stability import read_lobes, zero_order
 
 CHEN = read_planar_robot("chen_2026")
 

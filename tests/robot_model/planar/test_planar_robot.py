@@ -8,20 +8,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from estimation import Frf
-from foundation import FileFormatError, InputError
-from robot_model import (
+from millfrf.core import FileFormatError, InputError
+from millfrf.robot_model import (
     PlanarRobot,
-    Section,
     apply_identified,
     assumptions,
-    coupled_receptance,
     exact_receptance,
     identify_from_frequencies,
-    identify_from_frfs,
     read_planar_robot,
     rigid_matrices,
     rigid_model,
 )
+from millfrf.robot_model.dynamic_stiffness import coupled_receptance
+from millfrf.robot_model.finite_elements.beam_element import Section
+from millfrf.robot_model.identification.planar_identification import identify_from_frfs
 
 CHEN = read_planar_robot("chen_2026")
 

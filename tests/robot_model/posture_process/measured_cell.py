@@ -7,9 +7,11 @@ from independent_robot import Lump
 from nonlinear_cell import NonlinearCell, drawn_cell, drawn_postures
 from numpy.typing import NDArray
 
-from foundation import TIP
+from millfrf.core import TIP
+from millfrf.robot_model import SpatialRobot, measured_modes, read_spatial_robot
+from millfrf.robot_model.posture_process.measured_modes import MeasuredModes
+from millfrf.robot_model.spatial.spatial_robot import LumpedBody
 from modal_fit import ModalModel, ModeErrors
-from robot_model import LumpedBody, MeasuredModes, SpatialRobot, measured_modes, read_spatial_robot
 
 Real = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[3]))  # examples are no installed package
 
 from examples.robot_learned_postures import HIGH, LOW, draw, learned_postures, movement
-from robot_model import read_spatial_robot
+from millfrf.robot_model import read_spatial_robot
 
 
 def test_the_band_holds_the_movement_and_grows_beyond_the_measured_range(tmp_path: Path) -> None:

@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cutting import read_cutting_process
 from estimation import read_frf
 from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.cutting import read_cutting_process
+from millfrf.robot_model import modal_model_at, read_spatial_robot, with_joint_factor
+from millfrf.stability import certified_lobes, read_lobes
 from modal_fit import read_modal_model, write_modal_model
-from robot_model import modal_model_at, read_spatial_robot, with_joint_factor
-from stability import certified_lobes, read_lobes
 
 ROBOT = "kuka_kr90_r3100"
 POSTURES = ("0,-10,100,0,90,0", "20,25,70,40,60,0", "-15,45,30,80,-50,0", "10,5,85,20,75,30")

@@ -8,8 +8,8 @@ import pytest
 from measured_cell import MeasuredCell, measured_cell, true_model
 from nonlinear_cell import drawn_postures
 
-from foundation import FileFormatError, InputError
-from robot_model import (
+from millfrf.core import FileFormatError, InputError
+from millfrf.robot_model import (
     LearnedPostures,
     choose_postures,
     learn_postures,
@@ -20,7 +20,7 @@ from robot_model import (
     with_joint_factor,
     write_learned_postures,
 )
-from robot_model.posture_process.modes import mode_pairs
+from millfrf.robot_model.posture_process.measured_modes import mode_pairs
 
 
 @pytest.fixture(scope="module")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from measured_cell import MeasuredCell, measured_cell
 
-from robot_model import measured_modes, modal_model_at, modes_at, read_spatial_robot, with_joint_factor
-from robot_model.posture_process.hyperparameters import MEDIANS, Evidence, log_posterior
-from robot_model.posture_process.learning import assembled
-from robot_model.posture_process.modes import basis_at, corrected_modes, mode_pairs, part_names, shape_slopes
-from robot_model.posture_process.posture_kernels import joint_kernels, whole_kernel
+from millfrf.robot_model import measured_modes, modal_model_at, modes_at, read_spatial_robot, with_joint_factor
+from millfrf.robot_model.posture_process.learning import assembled
+from millfrf.robot_model.posture_process.measured_modes import mode_pairs
+from millfrf.robot_model.posture_process.modal_basis import basis_at, corrected_modes, part_names, shape_slopes
+from millfrf.robot_model.posture_process.process import MEDIANS, Evidence, joint_kernels, log_posterior, whole_kernel
 
 KUKA = read_spatial_robot("kuka_kr90_r3100").robot
 Q = np.radians([10.0, -15.0, 95.0, 30.0, 70.0, 20.0])

@@ -20,14 +20,14 @@ from nonlinear_cell import drawn_postures
 from numpy.typing import NDArray
 from plain_process import PlainProcess, plain_process
 
-from cutting import MillingProcess
+from millfrf.cutting import MillingProcess
 from millfrf.robot.learned.depth_band import depth_band
+from millfrf.robot_model import LearnedPostures, learn_postures, predict_posture
+from millfrf.robot_model.posture_process.learning import assembled
+from millfrf.robot_model.posture_process.measured_modes import mode_pairs
+from millfrf.robot_model.posture_process.process import MEDIANS, best_hyperparameters, drawn_hyperparameters
+from millfrf.stability import lowest_limits
 from modal_fit import ModalModel
-from robot_model import LearnedPostures, learn_postures, predict_posture
-from robot_model.posture_process.hyperparameters import MEDIANS, best_hyperparameters, drawn_hyperparameters
-from robot_model.posture_process.learning import assembled
-from robot_model.posture_process.modes import mode_pairs
-from stability import lowest_limits
 
 Real = NDArray[np.float64]
 

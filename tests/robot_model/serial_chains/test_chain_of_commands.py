@@ -7,7 +7,7 @@ import pytest
 
 from millfrf.__main__ import DONE, run
 from millfrf.robot.compensation_figure import compensation_figure
-from robot_model import CompensatedPath, ToolPath
+from millfrf.robot_model import CompensatedPath, ToolPath
 
 ROBOT = "staubli_rx160"
 CUT = """[cutting]

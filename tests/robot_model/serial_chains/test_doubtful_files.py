@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from foundation import InputError
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from robot_model import in_posture, read_robot
+from millfrf.core import InputError
+from millfrf.robot_model import in_posture, read_robot
 
 UR10E = Path(__file__).parent / "robots" / "ur10e.urdf"
 TOOL = ["--tool", "0", "0", "0.2", "--spindle-mass", "4"]

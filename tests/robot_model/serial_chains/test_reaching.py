@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foundation import InputError
 from millfrf.__main__ import DONE, run
-from robot_model import SpatialCase, nearest_solution, reach, read_robot, tool_postures
+from millfrf.core import InputError
+from millfrf.robot_model import SpatialCase, nearest_solution, reach, read_robot, tool_postures
 
 ROBOTS = Path(__file__).parent / "robots"
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from estimation import read_frf
-from foundation import apart
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from robot_model import in_posture, named_posture, read_robot
+from millfrf.core import apart
+from millfrf.robot_model import in_posture, named_posture, read_robot
 
 ROBOT = "abb_irb1200_5_90"
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from robot_model import SpatialCase, modes_at, read_robot, read_urdf
-from robot_model.finite_elements import coordinate_basis, mass_matrix
-from robot_model.spatial import structure_at
-from stability import read_lobes
+from millfrf.robot_model import SpatialCase, modes_at, read_robot, read_urdf, structure_at
+from millfrf.robot_model.finite_elements.structure import coordinate_basis, mass_matrix
+from millfrf.stability import read_lobes
 
 ROBOTS = Path(__file__).parent / "robots"
 SIX, SEVEN = "3e4,3e4,3e4,1e4,1e4,1e4", "5e7,4e5,4e5,3e5,8e4,8e4,5e4"

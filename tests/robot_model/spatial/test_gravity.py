@@ -7,19 +7,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foundation import InputError
-from robot_model import (
+from millfrf.core import InputError
+from millfrf.robot_model import (
     SpatialRobot,
-    explain_frequencies,
-    gravity_hessian,
     modes_at,
     possible_changes,
     read_spatial_robot,
     structure_at,
     tip_compliance,
-    with_gravity,
-    with_rigid_links,
 )
+from millfrf.robot_model.finite_elements.statics import gravity_hessian, with_gravity
+from millfrf.robot_model.model_updating.changes import with_rigid_links
+from millfrf.robot_model.model_updating.weighed_changes import explain_frequencies
 
 ROBOT = read_spatial_robot("staubli_rx170").robot
 READY = read_spatial_robot("staubli_rx170").poses["ready"]

@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foundation import InputError
-from robot_model import joint_deformation, joint_deviation, natural_robot, read_spatial_robot
+from millfrf.core import InputError
+from millfrf.robot_model import read_spatial_robot
+from millfrf.robot_model.machining.drilling_deviation import joint_deformation, joint_deviation
+from millfrf.robot_model.natural_coordinates import natural_robot
 
 CASE = read_spatial_robot("staubli_rx170")
 ROBOT, READY = CASE.robot, CASE.poses["ready"]

@@ -6,24 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foundation import InputError
-from robot_model import (
-    ElasticJoint,
+from millfrf.core import InputError
+from millfrf.robot_model import (
     Frame,
-    Link,
-    LumpedBody,
     Mechanism,
     SpatialRobot,
-    coordinate_basis,
-    coupled_frf_at,
-    exact_frf_at,
     in_posture,
     modes_at,
     read_spatial_robot,
-    stiffness_matrix,
     structure_at,
     tip_compliance,
 )
+from millfrf.robot_model.dynamic_stiffness import coupled_frf_at, exact_frf_at
+from millfrf.robot_model.finite_elements.structure import coordinate_basis, stiffness_matrix
+from millfrf.robot_model.spatial.spatial_robot import ElasticJoint, Link, LumpedBody
 
 QUARTER = np.pi / 2
 TURNING = (2e5, 1e5, 5e4)
@@ -103,7 +99,7 @@ def test_shared_nodes_are_a_rigid_link_between_separate_ones() -> None:
 
 
 def test_what_is_taken_as_rigid_is_said(tmp_path: Path) -> None:
-    source = Path(__file__).parents[3] / "robot_model" / "robots" / "kuka_kr90_r3100.toml"
+    source = Path(__file__).parents[3] / "millfrf" / "robot_model" / "robots" / "kuka_kr90_r3100.toml"
     text = source.read_text(encoding="utf-8")
     own = tmp_path / "shared.toml"
     elbow = "\n[[points]]\nnode = 3\nframe = '1'\nat_m = [0.35, 0.0, 0.0]\nsource = 'test'\n"

@@ -18,12 +18,12 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from foundation import apart
 from millfrf.__main__ import DONE, run
+from millfrf.core import apart
 
 Real = NDArray[np.float64]
 NAME = "kuka_kr90_r3100"
-FILE: dict[str, Any] = tomllib.loads(files("robot_model").joinpath("robots", f"{NAME}.toml").read_text("utf-8"))
+FILE: dict[str, Any] = tomllib.loads(files("millfrf.robot_model").joinpath("robots", f"{NAME}.toml").read_text("utf-8"))
 READY = np.radians(FILE["poses"][0]["driven_deg"])
 DOWN = np.array([0.0, 0.0, -9.80665])
 PLACES = np.array([[1.2, 0.0, 0.8], [1.5, 0.0, 0.4], [2.3, 0.6, 0.8]])

@@ -8,14 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from foundation import InputError, apart
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from robot_model import (
-    ElasticJoint,
+from millfrf.core import InputError, apart
+from millfrf.robot_model import (
     Frame,
-    Link,
-    LumpedBody,
-    Material,
     Mechanism,
     Payload,
     SpatialRobot,
@@ -23,19 +19,19 @@ from robot_model import (
     compensate_path,
     counted_weight,
     deviation_map,
-    hollow_circle,
     in_posture,
     nearest_solution,
     read_planar_robot,
     read_spatial_robot,
-    sag_at,
-    static_response,
     structure_at,
     tip_compliance,
     tool_down,
     with_payload,
-    with_rigid_links,
 )
+from millfrf.robot_model.finite_elements.beam_element import Material, hollow_circle
+from millfrf.robot_model.model_updating.changes import with_rigid_links
+from millfrf.robot_model.spatial.spatial_robot import ElasticJoint, Link, LumpedBody
+from millfrf.robot_model.spatial.weight import sag_at, static_response
 
 KUKA = read_spatial_robot("kuka_kr90_r3100")
 G = 9.80665
@@ -173,7 +169,7 @@ def test_compensation_takes_weight_and_payload_along() -> None:
 
 
 def test_drilled_holes_sink_with_the_robot() -> None:
-    from cutting import Drill, drilling_load, fitted_to_catalogue
+    from millfrf.cutting import Drill, drilling_load, fitted_to_catalogue
 
     drill = Drill(8e-3)
     load = drilling_load(drill, 0.2e-3, *fitted_to_catalogue(drill))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from foundation import FileFormatError, InputError
-from robot_model import RotaryTable, attitudes_along, cut_path, read_cut_path, tool_down
+from millfrf.core import FileFormatError, InputError
+from millfrf.robot_model import RotaryTable, attitudes_along, cut_path, read_cut_path, tool_down
 
 
 def test_axes_are_those_of_a_vertical_tool() -> None:

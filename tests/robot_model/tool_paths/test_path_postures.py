@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robot_model import (
+from millfrf.robot_model import (
     CutPath,
     Payload,
     Redundancy,

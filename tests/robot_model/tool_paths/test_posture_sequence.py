@@ -5,7 +5,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from robot_model import best_sequence
+from millfrf.robot_model import best_sequence
 
 Real = np.ndarray
 

@@ -7,16 +7,9 @@ import numpy as np
 import pytest
 
 from millfrf.robot.update_bands import frequency_errors
-from robot_model import (
-    RobotUncertainty,
-    SpatialCase,
-    drawn_robots,
-    free_parameters,
-    in_posture,
-    modes_at,
-    numbered_robot_text,
-    read_robot,
-)
+from millfrf.robot_model import SpatialCase, in_posture, modes_at, numbered_robot_text, read_robot
+from millfrf.robot_model.full_update.changed_structure import free_parameters
+from millfrf.robot_model.uncertain_robot.bands import RobotUncertainty, drawn_robots
 
 OPEN = ("joint joint_6 damping", "joint joint_6 stiffness")
 

@@ -6,10 +6,10 @@ from math import pi
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.stability import ChatterVerdict, classify_cut, collocation
 from replay_data import MillingCell, dynamometer, table_one_model, tip_accelerometers
-from stability import ChatterVerdict, classify_cut, collocation
 
 HALF_DOWN = MillingProcess(2, 0.0127, pi / 2, 119e6, 0.17, 0.33, pi / 2, pi, 0.15e-3)
 RATE = 2048.0

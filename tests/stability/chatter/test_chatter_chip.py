@@ -8,8 +8,8 @@ import pytest
 from milling_simulator import SimulatedCut, simulate
 from random_cuts import largest_multiplier
 
-from cutting import MillingProcess
-from stability import ModelledCut, classify_cut
+from millfrf.cutting import MillingProcess
+from millfrf.stability import ModelledCut, classify_cut
 
 RATE, SPEED, TEETH, CHIP = 400.0, 20 * pi, 4, 1e-4
 TIME = np.arange(int(30 * RATE)) / RATE

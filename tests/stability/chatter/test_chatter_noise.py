@@ -8,7 +8,7 @@ import pytest
 from milling_simulator import SimulatedCut, simulate
 from random_cuts import largest_multiplier
 
-from stability import classify_cut
+from millfrf.stability import classify_cut
 
 CUT = SimulatedCut(
     np.array([18.0, 27.0]),

@@ -7,7 +7,7 @@ import pytest
 from milling_simulator import simulate
 from random_cuts import DisturbedCut, depth_with, fitted, random_cut, random_structure
 
-from stability import ChatterVerdict, ModelledCut, classify_cut
+from millfrf.stability import ChatterVerdict, ModelledCut, classify_cut
 
 CHATTER = ("hopf", "period-doubling")
 BY_MODEL = ("near a mode", "with the model")

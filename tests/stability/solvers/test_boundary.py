@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from benchmarks_of_literature import HALF_DOWN, RPM, benchmark_cut, one_degree_of_freedom
 
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.stability import collocation_limits, multipliers
+from millfrf.stability.solvers.boundary import stability_grid, trace_boundary
 from replay_data import table_one_model
-from stability import collocation_limits, multipliers, stability_grid, trace_boundary
 
 
 def test_straight_lines_between_traced_points_hold_the_tolerance() -> None:

@@ -13,11 +13,11 @@ from benchmarks_of_literature import (
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cutting import MillingProcess
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.stability import collocation, collocation_limits, lowest_limits, multi_frequency, multipliers
 from modal_fit import ModalModel, Residuals
 from replay_data import table_one_model
-from stability import collocation, collocation_limits, lowest_limits, multi_frequency, multipliers
 
 
 @pytest.mark.parametrize("cut", CONVERGED_MM)

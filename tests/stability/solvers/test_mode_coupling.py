@@ -5,10 +5,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from cutting import MillingProcess, average_directional_matrix
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess, average_directional_matrix
+from millfrf.stability import mode_coupling_limit
 from modal_fit import ModalModel, Residuals
-from stability import mode_coupling_limit
 
 CUT = MillingProcess(2, 0.0127, np.pi / 2, 2e8, 0.3, 0.0, np.pi / 2, np.pi, 1e-4)
 

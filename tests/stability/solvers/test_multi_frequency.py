@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from benchmarks_of_literature import CONVERGED_MM, HALF_DOWN, RPM, SPEEDS_RPM, benchmark_cut, one_degree_of_freedom
 
-from cutting import MillingProcess
 from estimation import Frf
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.stability import collocation, multi_frequency, zero_order
+from millfrf.stability.solvers.multi_frequency import multi_frequency_limits
 from modal_fit import ModalModel
 from replay_data import table_one_model
-from stability import collocation, multi_frequency, multi_frequency_limits, zero_order
 
 
 def test_the_notch_of_table_1_from_frf_samples_without_a_fit() -> None:

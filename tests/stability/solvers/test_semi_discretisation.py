@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from benchmarks_of_literature import HALF_DOWN, RPM, benchmark_cut, one_degree_of_freedom
 
-from cutting import MillingProcess
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.stability import collocation, multipliers, semi_discretisation
+from millfrf.stability.solvers.semi_discretisation import semi_discretised_multipliers
 from replay_data import table_one_model
-from stability import collocation, multipliers, semi_discretisation, semi_discretised_multipliers
 
 
 def radius(steps: int, order: int, cut: tuple[float, str], rpm: float, depth: float) -> float:

@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from cutting import MillingProcess, average_directional_matrix, damping_harmonics
-from foundation import InputError
-from modal_fit import ModalModel
-from stability import (
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess, average_directional_matrix, damping_harmonics
+from millfrf.stability import (
     collocation_limits,
     delay_system,
-    multi_frequency_limits,
     multipliers,
     nyquist_limits,
     semi_discretisation,
     zero_order,
 )
-from stability.solvers.varied_limits import varied_limits
+from millfrf.stability.solvers.collocation import varied_limits
+from millfrf.stability.solvers.multi_frequency import multi_frequency_limits
+from modal_fit import ModalModel
 
 RPM = np.pi / 30
 LABELS = ("T:+X", "T:+Y", "T:+Z")

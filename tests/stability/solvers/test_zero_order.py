@@ -7,21 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cutting import MillingProcess, average_directional_matrix
 from estimation import Frf
-from foundation import FileFormatError, InputError
+from millfrf.core import FileFormatError, InputError
+from millfrf.cutting import MillingProcess, average_directional_matrix
+from millfrf.stability import StabilityLobes, collocation, nyquist_limits, read_lobes, write_lobes, zero_order
+from millfrf.stability.solvers.zero_order import is_stable
+from millfrf.stability.tip_receptance import tool_receptance
 from modal_fit import ModalModel
 from replay_data import table_one_model
-from stability import (
-    StabilityLobes,
-    collocation,
-    is_stable,
-    nyquist_limits,
-    read_lobes,
-    tool_receptance,
-    write_lobes,
-    zero_order,
-)
 
 HALF_DOWN = MillingProcess(2, 0.0127, np.pi / 2, 119e6, 0.17, 0.33, np.pi / 2, np.pi, 0.15e-3)
 RPM = 2 * np.pi / 60

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import DegreeOfFreedom
+from millfrf.core import DegreeOfFreedom
 
 from ..read_set import SetResults
 

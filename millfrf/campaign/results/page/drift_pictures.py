@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from figures import save_figure
+from millfrf.figures import save_figure
 
 from ....report import Picture, picture_of
 from ..drift import Drifts

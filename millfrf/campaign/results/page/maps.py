@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from figures import save_figure
+from millfrf.figures import save_figure
 
 from ....report import Picture, Section, picture_of
 from ..drift import DAMPING, DEPTH, FREQUENCY, Series

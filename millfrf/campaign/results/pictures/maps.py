@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from figures import house_style, new_figure
+from millfrf.figures import house_style, new_figure
 
 from .places import MapPlane
 from .written_values import free_sides

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from foundation import InputError
-from robot_model import PlanarCase, close_loops, read_robot
+from millfrf.core import InputError
+from millfrf.robot_model import PlanarCase, close_loops, read_robot
 
 from ..read_set import SetResults
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy.stats import t as student
 
-from figures import COLOURS, SHADE, house_style, new_figure, panel_letter
+from millfrf.figures import COLOURS, SHADE, house_style, new_figure, panel_letter
 
 from ..drift import Drift, Series, Trend
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import false_discovery_control, norm
 
-from robot_model import (
+from millfrf.robot_model import (
     LearnedPostures,
     LeftOutPosture,
     left_out_postures,

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from figures import COLOURS, house_style, new_figure, panel_letter
+from millfrf.figures import COLOURS, house_style, new_figure, panel_letter
 
 from .coverage import PostureCoverage
 

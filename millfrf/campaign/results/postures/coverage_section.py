@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from figures import save_figure
+from millfrf.figures import save_figure
 
 from ....report import Section, picture_of
 from ....tables import Table

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from foundation import optional_library, warning_lines, writing_whole_file
+from millfrf.core import optional_library, warning_lines, writing_whole_file
 
 from .rows_of_modes import Cell
 

@@ -1,7 +1,7 @@
 """Choice of what is drawn of an FRF: its quantity, its frequency axis, the band of its model."""
 
 from estimation import Frf, to_receptance
-from figures import coherent_lines
+from millfrf.figures import coherent_lines
 from modal_fit import ModalModel
 
 from ...collection import SourceFile

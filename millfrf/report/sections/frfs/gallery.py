@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf
-from figures import ENTRIES_PER_PAGE, EntryCurves, GalleryEntry, gallery_page, zoomed_frfs
+from millfrf.figures import ENTRIES_PER_PAGE, EntryCurves, GalleryEntry, gallery_page, zoomed_frfs
 from modal_fit import Synthesis
 
 from ...section import Fold, picture_of

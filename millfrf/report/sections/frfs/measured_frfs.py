@@ -3,8 +3,8 @@
 import numpy as np
 
 from estimation import Frf
-from figures import FrfCurves, frf_figures, synthesis_figure, zoomed_matrix, zoomed_sums
-from foundation import InputError
+from millfrf.core import InputError
+from millfrf.figures import FrfCurves, frf_figures, synthesis_figure, zoomed_matrix, zoomed_sums
 from modal_fit import ModalModel, Synthesis, synthesis
 
 from ...collection import Collected, SourceFile

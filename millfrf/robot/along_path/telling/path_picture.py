@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from figures import COLOURS, LINE_STYLES, SHADE, house_style, new_figure, panel_letter, save_figure
-from robot_model import CutPath
+from millfrf.figures import COLOURS, LINE_STYLES, SHADE, house_style, new_figure, panel_letter, save_figure
+from millfrf.robot_model import CutPath
 
 from ..path_state import PathState
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from foundation import warning_lines
-from robot_model import Mechanism, typed_values
+from millfrf.core import warning_lines
+from millfrf.robot_model import Mechanism, typed_values
 
 from ..path_state import PathState
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from robot_model import CutPath
+from millfrf.robot_model import CutPath
 
 from ..certified_search import Wanted
 from ..optimum import PathOptimum

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from foundation import InputError
 from millfrf.__main__ import run
 from millfrf.campaign import RunOptions, Task, run_campaign
 from millfrf.campaign.graph import in_order
 from millfrf.campaign.running import worker_checks
+from millfrf.core import InputError
 
 
 def rename(folder: Path) -> None:

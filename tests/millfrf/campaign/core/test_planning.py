@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from foundation import InputError
 from millfrf.__main__ import run
 from millfrf.campaign.configuration import EstimateTable, FileLook, FoundRecording, Labels, without_copies
 from millfrf.campaign.configuration.labels import joined_labels, labels_of_setup, read_label_table
@@ -16,6 +15,7 @@ from millfrf.campaign.graph.spectra_tasks import estimate_tasks
 from millfrf.campaign.running import DONE, REFUSED, Ended, ProgressLines, left_to_run, measured_rates, note_time
 from millfrf.campaign.whole_run.dry_run import longest_chain
 from millfrf.campaign.whole_run.one_run import PROGRAM, only_run
+from millfrf.core import InputError
 
 
 def recording(name: str, seconds: float = 60.0, **values: str | float) -> FoundRecording:

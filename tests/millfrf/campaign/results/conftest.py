@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from foundation import TIP
 from millfrf.campaign.results import MeasuredSet
+from millfrf.core import TIP
+from millfrf.stability import StabilityLobes, write_lobes
 from modal_fit import ModalModel, ModeErrors, write_modal_model
-from stability import StabilityLobes, write_lobes
 
 Real = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from millfrf.campaign import write_summary
-from robot_model import read_spatial_robot
+from millfrf.robot_model import read_spatial_robot
 
 EXAMPLE = Path(__file__).resolve().parents[4] / "examples" / "campaign_results.py"
 

@@ -6,11 +6,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cutting import MillingProcess
-from mismatch.adapters.cut.fits import CutHypothesis, MeasuredCut
-from mismatch.adapters.cut.force import Belief, force_spectra
-from mismatch.adapters.cut.physics import library
-from mismatch.adapters.cut.recordings import CutRecording, SpindleLaw, TipMotion
+from millfrf.cutting import MillingProcess
+from millfrf.mismatch import library
+from millfrf.mismatch.cut.force import Belief
+from millfrf.mismatch.cut.hypothesis import CutHypothesis, MeasuredCut
+from millfrf.mismatch.cut.recordings import CutRecording
+from millfrf.mismatch.cut.spectra import force_spectra
+from millfrf.mismatch.cut.spindle_law import SpindleLaw
+from millfrf.mismatch.cut.tip_motion import TipMotion
 
 Real = NDArray[np.float64]
 

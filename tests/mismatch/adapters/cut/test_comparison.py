@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from small_cut import small_cut, stated
 
-from mismatch.adapters.cut import CUT
-from mismatch.adapters.cut.comparison import UNCONFIRMED, CutComparison, covariance_with_usual_error
-from mismatch.adapters.cut.fits import fit_turned
-from mismatch.inference import Search, search
+from millfrf.mismatch.cut.comparison import UNCONFIRMED, CutComparison, covariance_with_usual_error
+from millfrf.mismatch.cut.fitting import fit_turned
+from millfrf.mismatch.cut.settings import CUT
+from millfrf.mismatch.inference.search import Search, search
 
 NAMES = ("process_damping", "regenerative_feedback", "runout")
 

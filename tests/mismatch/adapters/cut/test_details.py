@@ -9,17 +9,13 @@ import numpy as np
 import pytest
 from small_cut import PROCESS, small_cut, stated
 
-from cutting import read_cutting_process
-from mismatch.adapters.cut import CUT, CutChatter, CutDetails, write_improved_cut
-from mismatch.adapters.cut.fits import fit_cut
-from mismatch.inference import (
-    AcceptedCause,
-    Diagnosis,
-    Improvement,
-    Remainder,
-    read_diagnosis,
-    write_diagnosis,
-)
+from millfrf.cutting import read_cutting_process
+from millfrf.mismatch import AcceptedCause, Diagnosis, read_diagnosis, write_diagnosis, write_improved_cut
+from millfrf.mismatch.cut.diagnose_cut import CutDetails
+from millfrf.mismatch.cut.fitting import fit_cut
+from millfrf.mismatch.cut.recordings import CutChatter
+from millfrf.mismatch.cut.settings import CUT
+from millfrf.mismatch.inference.diagnosis import Improvement, Remainder
 
 
 def _diagnosis() -> Diagnosis[CutDetails]:

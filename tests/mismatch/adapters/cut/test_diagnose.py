@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from independent_cut import Mill, simulated
 
-from cutting import MillingProcess
-from foundation import InputError
-from mismatch.adapters.cut import CutDiagnosis, CutRecording, SpindleLaw, cut_recording, diagnose_cut
-from mismatch.inference import AcceptedCause
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.mismatch import AcceptedCause, CutDiagnosis, diagnose_cut
+from millfrf.mismatch.cut.recordings import CutRecording, cut_recording
+from millfrf.mismatch.cut.spindle_law import SpindleLaw
 from modal_fit import ModalModel
 from replay_data import (
     LinearSweep,

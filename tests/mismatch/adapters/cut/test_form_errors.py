@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from small_cut import small_cut, stated
 
-from mismatch.adapters.cut.fits import fit_cut
-from mismatch.adapters.cut.form_errors import form_errors
-from mismatch.adapters.cut.held_out import fit_halves
-from mismatch.inference import Proposal
+from millfrf.mismatch.cut.errors import fit_halves, form_errors
+from millfrf.mismatch.cut.fitting import fit_cut
+from millfrf.mismatch.inference.search import Proposal
 
 FREED = ("regenerative_feedback",)
 

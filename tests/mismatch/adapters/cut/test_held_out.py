@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from small_cut import small_cut, stated
 
-from mismatch.adapters.cut import CUT
-from mismatch.adapters.cut.fits import fit_cut
-from mismatch.adapters.cut.held_out import fit_halves, held_out_misfits, held_out_powers, improvement, lowers
+from millfrf.mismatch.cut.errors import fit_halves, held_out_misfits, held_out_powers, improvement, lowers
+from millfrf.mismatch.cut.fitting import fit_cut
+from millfrf.mismatch.cut.settings import CUT
 
 TRUTH = stated(runout=[12e-6])
 CUT_OF_TRUTH = small_cut(TRUTH)

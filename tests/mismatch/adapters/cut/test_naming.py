@@ -4,12 +4,18 @@ import numpy as np
 import pytest
 from small_cut import PROCESS, small_cut, stated
 
-from mismatch.adapters.cut import COEFFICIENTS, CUT
-from mismatch.adapters.cut.comparison import UNCONFIRMED, CutComparison
-from mismatch.adapters.cut.fits import fit_cut, fit_turned
-from mismatch.adapters.cut.held_out import fit_halves
-from mismatch.adapters.cut.naming import accepted_causes, odd_coefficients, weighed_candidates
-from mismatch.inference import search
+from millfrf.mismatch import COEFFICIENTS
+from millfrf.mismatch.cut.comparison import (
+    UNCONFIRMED,
+    CutComparison,
+    accepted_causes,
+    odd_coefficients,
+    weighed_candidates,
+)
+from millfrf.mismatch.cut.errors import fit_halves
+from millfrf.mismatch.cut.fitting import fit_cut, fit_turned
+from millfrf.mismatch.cut.settings import CUT
+from millfrf.mismatch.inference.search import search
 
 
 def test_accepted_causes_hold_the_truth_within_errors_whose_parts_add_as_squares() -> None:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from small_cut import small_cut, stated
 
-from mismatch.adapters.cut import CUT
-from mismatch.adapters.cut.remainder import cut_remainder
+from millfrf.mismatch.cut.errors import cut_remainder
+from millfrf.mismatch.cut.settings import CUT
 
 TRUTH = stated(runout=[12e-6])
 

@@ -4,9 +4,10 @@ from dataclasses import fields
 
 import numpy as np
 
-from mismatch.adapters.cut import CUT, CutSettings
-from mismatch.adapters.cut.physics import library
-from mismatch.inference import Findings, Remainder, students_test, verdict_of
+from millfrf.mismatch import library
+from millfrf.mismatch.cut.settings import CUT, CutSettings
+from millfrf.mismatch.inference.diagnosis import Findings, Remainder, verdict_of
+from millfrf.mismatch.inference.paired_tests import students_test
 
 
 def test_the_thresholds_are_those_of_the_documentation() -> None:

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from independent_cut import Mill, simulated
 
-from cutting import MillingProcess
 from millfrf.cut.diagnosis_words import summary
-from mismatch.adapters.cut import CutDiagnosis, CutRecording, SpindleLaw, cut_recording, diagnose_cut
-from mismatch.adapters.cut.recordings import chatter_of
+from millfrf.cutting import MillingProcess
+from millfrf.mismatch import CutDiagnosis, diagnose_cut
+from millfrf.mismatch.cut.recordings import CutRecording, chatter_of, cut_recording
+from millfrf.mismatch.cut.spindle_law import SpindleLaw
 
 CUT = MillingProcess(2, 12.7e-3, math.pi / 2, 119e6, 0.17, 0.33, math.pi / 2, math.pi, 0.15e-3)
 HELIX = math.radians(30)

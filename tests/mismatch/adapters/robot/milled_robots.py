@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import BandRecording, channels_of
-from mismatch.adapters.robot import ROBOT as ROBOT_SETTINGS
-from mismatch.adapters.robot import PosedRecording, PosedRobot, posed
-from mismatch.adapters.robot.fit_state import FitProblem, FitState
-from mismatch.adapters.robot.posed_robot import Changes
-from mismatch.adapters.robot.receptance import RobotModes
-from robot_model import SpatialRobot, frf_at, read_spatial_robot
+from millfrf.mismatch import ROBOT as ROBOT_SETTINGS
+from millfrf.mismatch import PosedRecording
+from millfrf.mismatch.robot.fit import FitProblem, FitState
+from millfrf.mismatch.robot.posed import Changes, PosedRobot
+from millfrf.mismatch.robot.receptance import RobotModes, posed
+from millfrf.robot_model import SpatialRobot, read_spatial_robot
+from millfrf.robot_model.spatial.spatial_modes import frf_at
 
 Real = NDArray[np.float64]
 

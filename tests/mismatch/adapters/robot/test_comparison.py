@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from milled_robots import ROBOT, small_case
 
-from mismatch.adapters.robot import RobotFit
-from mismatch.adapters.robot import comparison as module
-from mismatch.adapters.robot.comparison import NO_GAIN, RobotComparison
-from mismatch.adapters.robot.held_out import HeldOutTest, folds_of
-from mismatch.adapters.robot.posed_robot import Changes
-from mismatch.adapters.robot.settings import ROBOT as SETTINGS
-from mismatch.adapters.robot.start import FreeFit, fit_from, free_fit, numbered
-from mismatch.inference import Proposal, Round, Search
-from robot_model import possible_changes, with_joint_factor
+from millfrf.mismatch import ROBOT as SETTINGS
+from millfrf.mismatch.inference.search import Proposal, Round, Search
+from millfrf.mismatch.robot import diagnosis as module
+from millfrf.mismatch.robot.diagnosis import NO_GAIN, RobotComparison
+from millfrf.mismatch.robot.fit import RobotFit
+from millfrf.mismatch.robot.held_out import HeldOutTest, folds_of
+from millfrf.mismatch.robot.posed import Changes
+from millfrf.mismatch.robot.start import FreeFit, fit_from, free_fit, numbered
+from millfrf.robot_model import possible_changes, with_joint_factor
 
 CHANGES = {change.name: change for change in possible_changes(ROBOT)}
 FIRST, SECOND, THIRD = "joint 3 stiffness", "payload", "links"

@@ -9,10 +9,17 @@ import numpy as np
 import pytest
 from milled_robots import ROBOT, in_postures
 
-from mismatch.adapters.robot import ROBOT as SETTINGS
-from mismatch.adapters.robot import RobotDiagnosis, diagnose_robot, number_of, standard_error_of
-from mismatch.inference import LabError, read_diagnosis, write_diagnosis
-from robot_model import with_joint_factor
+from millfrf.mismatch import ROBOT as SETTINGS
+from millfrf.mismatch import (
+    LabError,
+    RobotDiagnosis,
+    diagnose_robot,
+    number_of,
+    read_diagnosis,
+    standard_error_of,
+    write_diagnosis,
+)
+from millfrf.robot_model import with_joint_factor
 
 FEW = replace(SETTINGS, causes={"joint 3 stiffness": None, "joint 5 stiffness": None})
 

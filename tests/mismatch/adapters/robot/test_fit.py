@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from milled_robots import ROBOT, cost_at, shifted, small_case, white_noise
 
-from mismatch.adapters.robot import fit_robot
-from mismatch.adapters.robot.fit_state import FitProblem
-from mismatch.adapters.robot.receptance import predicted_spectrum
-from mismatch.adapters.robot.start import numbered
-from robot_model import Companion, SpatialRobot, possible_changes, with_joint_factor, with_payload
+from millfrf.mismatch import predicted_spectrum
+from millfrf.mismatch.robot.fit import FitProblem, fit_robot
+from millfrf.mismatch.robot.start import numbered
+from millfrf.robot_model import Companion, SpatialRobot, possible_changes, with_joint_factor, with_payload
 
 CHANGES = {change.name: change for change in possible_changes(ROBOT)}
 PAYLOAD = with_payload(ROBOT, 12.0)

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from milled_robots import ROBOT, cost_at, shifted, small_case, white_noise
 
-from mismatch.adapters.robot.fit_state import FitProblem, doubt_of
-from mismatch.adapters.robot.receptance import predicted_spectrum
-from mismatch.adapters.robot.start import numbered
-from robot_model import possible_changes, with_joint_factor
+from millfrf.mismatch import predicted_spectrum
+from millfrf.mismatch.robot.fit import FitProblem, doubt_of
+from millfrf.mismatch.robot.start import numbered
+from millfrf.robot_model import possible_changes, with_joint_factor
 
 CHANGES = {change.name: change for change in possible_changes(ROBOT)}
 SOFTER = with_joint_factor(ROBOT, "3", 0.7)

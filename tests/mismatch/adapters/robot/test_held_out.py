@@ -7,7 +7,9 @@ import pytest
 from milled_robots import ROBOT, small_case
 
 from estimation import WindowedSpectrum
-from mismatch.adapters.robot.held_out import (
+from millfrf.mismatch import ROBOT as SETTINGS
+from millfrf.mismatch import predicted_spectrum
+from millfrf.mismatch.robot.held_out import (
     HeldOutTest,
     block_errors,
     folds_of,
@@ -17,10 +19,9 @@ from mismatch.adapters.robot.held_out import (
     lowers,
     raised,
 )
-from mismatch.adapters.robot.receptance import RobotModes, predicted_spectrum
-from mismatch.adapters.robot.settings import ROBOT as SETTINGS
-from mismatch.adapters.robot.start import free_fit
-from robot_model import possible_changes, with_joint_factor
+from millfrf.mismatch.robot.receptance import RobotModes
+from millfrf.mismatch.robot.start import free_fit
+from millfrf.robot_model import possible_changes, with_joint_factor
 
 JOINT = next(one for one in possible_changes(ROBOT) if one.name == "joint 3 stiffness")
 SOFTER = with_joint_factor(ROBOT, "3", 0.7)

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from milled_robots import ROBOT, small_case
 
-from mismatch.adapters.robot import RobotFit
-from mismatch.adapters.robot import number_errors as module
-from mismatch.adapters.robot.held_out import HeldOutTest
-from mismatch.adapters.robot.number_errors import NumberErrors, number_errors
-from mismatch.adapters.robot.posed_robot import Changes, PosedRobot
-from mismatch.adapters.robot.start import FreeFit
-from robot_model import possible_changes, unnamed_changes
+from millfrf.mismatch.robot import held_out as module
+from millfrf.mismatch.robot.fit import RobotFit
+from millfrf.mismatch.robot.held_out import HeldOutTest, NumberErrors, number_errors
+from millfrf.mismatch.robot.posed import Changes, PosedRobot
+from millfrf.mismatch.robot.start import FreeFit
+from millfrf.robot_model import possible_changes, unnamed_changes
 
 CHANGES = {change.name: change for change in possible_changes(ROBOT)}
 JOINT, DAMPING, LINKS = (CHANGES[name] for name in ("joint 3 stiffness", "damping", "links"))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from milled_robots import BAND, NOTHING, POSTURES, ROBOT, TIP, milled
 
-from foundation import InputError
-from mismatch.adapters.robot import diagnose_robot, posed
-from mismatch.adapters.robot.posed_recording import halves
+from millfrf.core import InputError
+from millfrf.mismatch import diagnose_robot
+from millfrf.mismatch.robot.receptance import halves, posed
 
 
 def test_recordings_that_do_not_fit_are_refused() -> None:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from milled_robots import BAND, POSTURES, ROBOT, in_postures, small_case
 
-from foundation import InputError
-from mismatch.adapters.robot import posed
-from mismatch.adapters.robot.posed_robot import posed_robot
-from mismatch.adapters.robot.settings import ROBOT as SETTINGS
-from robot_model import modes_at, possible_changes, with_joint_factor
+from millfrf.core import InputError
+from millfrf.mismatch import ROBOT as SETTINGS
+from millfrf.mismatch.robot.posed import posed_robot
+from millfrf.mismatch.robot.receptance import posed
+from millfrf.robot_model import modes_at, possible_changes, with_joint_factor
 
 CHANGES = {change.name: change for change in possible_changes(ROBOT)}
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from milled_robots import BAND, NOTHING, POSTURES, ROBOT, in_postures, milled
 
-from mismatch.adapters.robot import PosedRecording, posed
-from mismatch.adapters.robot.receptance import RobotModes, predicted_spectrum, robot_modes
-from mismatch.inference import LabError
-from robot_model import SpatialRobot, cell_structure_at, frf_at, with_joint_factor
+from millfrf.mismatch import LabError, PosedRecording, predicted_spectrum
+from millfrf.mismatch.robot.receptance import RobotModes, posed, robot_modes
+from millfrf.robot_model import SpatialRobot, cell_structure_at, with_joint_factor
+from millfrf.robot_model.spatial.spatial_modes import frf_at
 
 
 def some_modes(robot: SpatialRobot = ROBOT) -> tuple[RobotModes, PosedRecording]:

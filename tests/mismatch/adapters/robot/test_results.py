@@ -6,19 +6,13 @@ import numpy as np
 import pytest
 from milled_robots import ROBOT, small_case
 
-from mismatch.adapters.robot import RobotFit, companions_of, number_of, standard_error_of
-from mismatch.adapters.robot.number_errors import NumberErrors
-from mismatch.adapters.robot.results import (
-    CompanionNumber,
-    RobotDetails,
-    accepted_cause,
-    candidate_of,
-    content_of,
-    location_of,
-)
-from mismatch.adapters.robot.start import FreeFit
-from mismatch.inference import Proposal
-from robot_model import modes_at, possible_changes, with_joint_factor
+from millfrf.mismatch import CompanionNumber, companions_of, number_of, standard_error_of
+from millfrf.mismatch.inference.search import Proposal
+from millfrf.mismatch.robot.fit import RobotFit
+from millfrf.mismatch.robot.held_out import NumberErrors
+from millfrf.mismatch.robot.results import RobotDetails, accepted_cause, candidate_of, content_of, location_of
+from millfrf.mismatch.robot.start import FreeFit
+from millfrf.robot_model import modes_at, possible_changes, with_joint_factor
 
 CHANGES = {change.name: change for change in possible_changes(ROBOT)}
 JOINT, PAYLOAD = CHANGES["joint 3 stiffness"], CHANGES["payload"]

@@ -11,16 +11,12 @@ from milled_robots import NAME, POSTURES, RATE, ROBOT, heavy_elbow, in_postures,
 from acquisition import Channel, RecordingWriter, StreamDescription
 from estimation import BandRecording
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from mismatch.adapters.robot import RobotDiagnosis, diagnose_robot, number_of, posed, standard_error_of
+from millfrf.mismatch import RobotDiagnosis, diagnose_robot, number_of, standard_error_of
+from millfrf.mismatch.robot.receptance import posed
+from millfrf.robot_model import SpatialRobot, modes_at, with_joint_factor, with_payload
+from millfrf.robot_model.finite_elements.statics import with_gravity
+from millfrf.robot_model.model_updating.changes import with_damping_factor
 from modal_fit import read_modal_model
-from robot_model import (
-    SpatialRobot,
-    modes_at,
-    with_damping_factor,
-    with_gravity,
-    with_joint_factor,
-    with_payload,
-)
 
 
 def assert_named(found: RobotDiagnosis, name: str, number: float) -> None:

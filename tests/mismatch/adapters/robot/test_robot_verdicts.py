@@ -9,30 +9,24 @@ from numpy.typing import NDArray
 from payload_information import Recorded, mass_errors
 
 from estimation import BandRecording, channels_of
-from foundation import TIP
-from millfrf.robot.diagnosis.diagnosis_words import describe, summary
-from mismatch.adapters.robot import (
+from millfrf.core import TIP
+from millfrf.mismatch import (
+    AcceptedCause,
     PosedRecording,
     RobotDiagnosis,
     companions_of,
     diagnose_robot,
     number_of,
-    posed,
     standard_error_of,
 )
-from mismatch.adapters.robot.held_out import chance
-from mismatch.inference import AcceptedCause
-from robot_model import (
-    LumpedBody,
-    SpatialRobot,
-    cell_structure_at,
-    frf_at,
-    read_spatial_robot,
-    with_gravity,
-    with_lighter_end,
-    with_payload,
-    with_tool_spring,
-)
+from millfrf.mismatch.robot.held_out import chance
+from millfrf.mismatch.robot.receptance import posed
+from millfrf.robot.diagnosis.diagnosis_words import describe, summary
+from millfrf.robot_model import SpatialRobot, cell_structure_at, read_spatial_robot, with_payload, with_tool_spring
+from millfrf.robot_model.finite_elements.statics import with_gravity
+from millfrf.robot_model.model_updating.changes import with_lighter_end
+from millfrf.robot_model.spatial.spatial_modes import frf_at
+from millfrf.robot_model.spatial.spatial_robot import LumpedBody
 
 Real = NDArray[np.float64]
 

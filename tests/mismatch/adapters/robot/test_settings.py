@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import wilcoxon
 
-from mismatch.adapters.robot.settings import LIMITS, ROBOT
-from mismatch.inference import EvidenceSettings, ProofSettings, SearchSettings
+from millfrf.mismatch import ROBOT, SearchSettings
+from millfrf.mismatch.inference.settings import EvidenceSettings, ProofSettings
+from millfrf.mismatch.robot.posed import LIMITS
 
 
 def test_equivalents_are_within_a_likelihood_ratio_of_20() -> None:

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from milled_robots import POSTURES, ROBOT, in_postures, milled, small_case
 
-from foundation import InputError
-from mismatch.adapters.robot import posed
-from mismatch.adapters.robot.fit import fit_robot
-from mismatch.adapters.robot.receptance import predicted_spectrum, quick_spectrum
-from mismatch.adapters.robot.start import (
+from millfrf.core import InputError
+from millfrf.mismatch import predicted_spectrum
+from millfrf.mismatch.robot.fit import fit_robot
+from millfrf.mismatch.robot.receptance import posed, quick_spectrum
+from millfrf.mismatch.robot.start import (
     FreeFit,
     best_start,
     fit_from,
@@ -20,7 +20,7 @@ from mismatch.adapters.robot.start import (
     what_is_left,
     whiteners_of,
 )
-from robot_model import possible_changes, with_joint_factor
+from millfrf.robot_model import possible_changes, with_joint_factor
 
 CHANGES = {change.name: change for change in possible_changes(ROBOT)}
 JOINT = CHANGES["joint 3 stiffness"]

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 from small_cut import small_cut, stated
 
-from mismatch.adapters.cut.fits import FreeNumbers, fit_cut
+from millfrf.mismatch.cut.fitting import FreeNumbers, fit_cut
 
 FREED = ("runout", "regenerative_feedback", "process_damping")
 NUMBERS = {"runout": [12e-6], "regenerative_feedback": [1.0], "process_damping": [2e5]}

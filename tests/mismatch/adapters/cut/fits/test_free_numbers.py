@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_cut import small_cut, stated
 
-from mismatch.adapters.cut.fits import FreeNumbers
+from millfrf.mismatch.cut.fitting import FreeNumbers
 
 TRUTH = stated(np.array([0.5, -1.0, 0.2, 0.0, 0.1, 0.3]), runout=[12e-6], process_damping=[2e5])
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_cut import PROCESS, small_cut, stated
 
-from mismatch.adapters.cut.fits import fit_turned, started
+from millfrf.mismatch.cut.fitting import fit_turned, started
 
 
 @pytest.mark.parametrize("angle", [0.1, 1.3, 2.9])

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
-from foundation import InputError
-from mismatch.adapters.cut import COEFFICIENT_NAMES
-from mismatch.adapters.cut.force import Belief
+from millfrf.core import InputError
+from millfrf.cutting import MillingProcess
+from millfrf.mismatch import COEFFICIENT_NAMES
+from millfrf.mismatch.cut.force import Belief
 
 SLOT = MillingProcess(2, 0.01, math.pi / 2, 1e8, 0.3, 0.02, 0.0, math.pi, 1e-4, kte=2e4, kre=1e3, kae=0.0)
 

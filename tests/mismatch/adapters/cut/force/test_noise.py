@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_cut import small_cut, stated
 
-from mismatch.adapters.cut.force import noise_of, whitened
+from millfrf.mismatch.cut.spectra import noise_of, whitened
 
 SPECTRA = small_cut(stated()).spectra[0]
 

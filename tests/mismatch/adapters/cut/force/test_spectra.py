@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from mismatch.adapters.cut import CutRecording, SpindleLaw
-from mismatch.adapters.cut.force import ForceSpectra, force_spectra
+from millfrf.mismatch.cut.recordings import CutRecording
+from millfrf.mismatch.cut.spectra import ForceSpectra, force_spectra
+from millfrf.mismatch.cut.spindle_law import SpindleLaw
 
 RATE, LAW = 2000.0, SpindleLaw(5.0, 0.0, 84.0)
 

@@ -6,18 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
-from mismatch.adapters.cut import CutRecording, SpindleLaw
-from mismatch.adapters.cut import physics as physics_folder
-from mismatch.adapters.cut.force import computed_force, view_of
+from millfrf.cutting import MillingProcess
+from millfrf.mismatch.cut import library as physics_folder
+from millfrf.mismatch.cut.force import computed_force, view_of
+from millfrf.mismatch.cut.recordings import CutRecording
+from millfrf.mismatch.cut.spindle_law import SpindleLaw
 
 CUTTER = MillingProcess(3, 0.012, math.radians(70), 6e8, 0.3, 0.1, 0.3, 2.6, 1e-4)
 LAW = SpindleLaw(0.5, 0.2, 90.0)
 
 TOY = """
 import numpy as np
-from mismatch.adapters.cut.physics import CutPhysics
-from mismatch.physics import Parameter
+from millfrf.mismatch import CutPhysics
+from millfrf.mismatch import Parameter
 
 
 class Toy(CutPhysics):

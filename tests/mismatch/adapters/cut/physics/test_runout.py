@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from cutting import MillingProcess
-from mismatch.adapters.cut import CutRecording, SpindleLaw
-from mismatch.adapters.cut.force import view_of
-from mismatch.adapters.cut.physics import library
+from millfrf.cutting import MillingProcess
+from millfrf.mismatch import library
+from millfrf.mismatch.cut.force import view_of
+from millfrf.mismatch.cut.recordings import CutRecording
+from millfrf.mismatch.cut.spindle_law import SpindleLaw
 
 RUNOUT = library()["runout"]
 LAW = SpindleLaw(0.5, 0.2, 90.0)

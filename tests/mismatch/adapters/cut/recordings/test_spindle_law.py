@@ -5,9 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from foundation import InputError
-from mismatch.adapters.cut import SpindleLaw
-from mismatch.adapters.cut.recordings import found_law
+from millfrf.core import InputError
+from millfrf.mismatch.cut.spindle_law import SpindleLaw, found_law
 
 
 def test_the_speed_is_found_from_the_forces_through_noise_and_sweep() -> None:

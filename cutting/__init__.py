@@ -1,5 +1,0 @@
-"""Milling and drilling forces, and directional coefficients: knows nothing of structures."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,5 +1,0 @@
-"""Estimators of the FRF: least squares, errors in variables, local polynomials."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,1 @@
+"""`Frf`, the matrix of frequency response functions: quantity, known band, files, reciprocity."""

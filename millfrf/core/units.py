@@ -1,0 +1,119 @@
+"""Conversion of units where data enters; everything else works in SI units."""
+
+import re
+from functools import cache
+from tokenize import TokenError
+from typing import TYPE_CHECKING
+
+from .errors import InputError
+
+if TYPE_CHECKING:
+    import pint
+
+
+SI_UNITS = {
+    "force": "N",
+    "acceleration": "m/s^2",
+    "velocity": "m/s",
+    "displacement": "m",
+    "moment": "N m",
+    "angle": "rad",
+    "angular_velocity": "rad/s",
+    "voltage": "V",
+    "temperature": "K",
+    "dimensionless": "1",
+}
+"""Quantities a channel may have, with the unit each is kept in."""
+
+_LETTERS = re.compile(r"[\w\s.*/^()+-]+")
+"""What units are written with; pint reads other texts by Python's rules, quotation marks and all."""
+
+_UNREADABLE = (AttributeError, ValueError, AssertionError, TypeError, ArithmeticError, SyntaxError, TokenError)
+"""What pint raises besides its own, since it reads units with Python's tokenizer and calculates with them."""
+
+_SPOKEN = {
+    "acceleration": {"g": "standard_gravity", "g0": "standard_gravity", "gn": "standard_gravity"},
+    "dimensionless": {"1": ""},
+    "angular_velocity": {"rev/min": "rpm", "U/min": "rpm"},
+    "moment": {"Nm": "N m", "kNm": "kN m", "Nmm": "N mm"},
+}
+"""Units as labs write them, for the quantity of which they are."""
+
+_TURNS = ("radian", "degree", "revolution", "turn", "revolutions_per_minute", "arcminute", "arcsecond", "grade")
+"""Parts of the names of units that tell an angle; `1/min`, `Hz` and `count` leave open how large one of it is."""
+
+
+@cache
+def _registry() -> "pint.UnitRegistry[float]":
+    import pint
+
+    return pint.UnitRegistry()
+
+
+def si_factor(quantity: str, unit: str) -> float:
+    """Return the factor that takes a value in ``unit`` to the SI unit of ``quantity``.
+
+    Parameters
+    ----------
+    quantity
+        Name of the quantity, one of :data:`SI_UNITS`.
+    unit
+        Unit as a lab writes it: ``N``, ``kN``, ``m/s^2``, ``mm/s**2``, ``g`` (standard gravity when the quantity is an
+        acceleration), ``um``, ``mV`` ...
+
+    Raises
+    ------
+    InputError
+        Unknown quantity, unknown unit, a unit of another dimension, one with an offset (degC), or one of an angle that
+        leaves the angle open (1/min, Hz, counts).
+
+    Examples
+    --------
+    >>> si_factor("force", "kN"), si_factor("moment", "Nm")
+    (1000.0, 1.0)
+    >>> round(si_factor("acceleration", "g"), 5)
+    9.80665
+    """
+    if quantity not in SI_UNITS:
+        raise InputError(f"unknown quantity {quantity!r}; use one of {', '.join(SI_UNITS)}")
+    target = SI_UNITS[quantity]
+    if unit == target:
+        return 1.0
+    import pint
+
+    spoken = _SPOKEN.get(quantity, {})
+    try:
+        found = _registry().Quantity(1.0, spoken.get(unit, unit))
+        factor = float(found.to(spoken.get(target, target)).magnitude)
+    except (pint.PintError, *_UNREADABLE) as error:
+        raise InputError(f"unit {unit!r} is not a unit of {quantity}; use {target} or one convertible to it") from error
+    if quantity in ("angle", "angular_velocity") and not any(turn in str(found.units) for turn in _TURNS):
+        remedy = "rpm for 1/min, or turn/s for Hz" if quantity == "angular_velocity" else "rad, deg or turn"
+        raise InputError(f"unit {unit!r} does not say how large an angle one of it is; write {remedy}")
+    return factor
+
+
+def unit_factor(unit: str, target: str) -> float | None:
+    """Return the factor that takes a value in ``unit`` to ``target``; None where ``unit`` is no such unit.
+
+    Parameters
+    ----------
+    unit
+        Unit to convert from, such as one read from a file; unlike in :func:`si_factor`, ``g`` is gram here.
+    target
+        A unit that is known to be one, such as ``m/s^2/N``.
+
+    Examples
+    --------
+    >>> unit_factor("mm/kN", "m/N"), unit_factor("mm/kN", "m/s/N"), unit_factor("dB!", "m/N")
+    (1e-06, None, None)
+    """
+    if not _LETTERS.fullmatch(unit):
+        return None
+    import pint
+
+    try:
+        found = _registry().Quantity(1.0, unit)
+        return float(found.to(target).magnitude) if found.is_compatible_with(target) else None
+    except (pint.PintError, *_UNREADABLE):
+        return None

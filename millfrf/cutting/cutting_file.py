@@ -1,0 +1,252 @@
+"""Cutting files: the table ``[cutting]`` of a TOML file, read, checked and written."""
+
+import math
+import os
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Strict, ValidationError
+
+from millfrf.core import FileFormatError, InputError, mistake_in_words, writing_whole_file
+
+from .process import MillingProcess, immersion_angles
+
+Number = Annotated[float, Strict()]
+"""No text, and no true or false, is taken for a number."""
+
+
+class CuttingTable(BaseModel):
+    """The table ``[cutting]``: cutter, engagement and force coefficients.
+
+    Parameters
+    ----------
+    teeth
+        Number of cutting edges, 1 or more.
+    diameter_m : m
+        Diameter of the cutter, above 0.
+    edge_angle_deg : deg
+        Cutting edge angle, above 0 to 90: 90 for a square end mill, less for a chamfer or face mill.
+    ktc_pa : Pa
+        Tangential force coefficient (specific cutting force), above 0. Typical: 0.5e9 to 1e9 for aluminium, 2e9 to
+        3e9 for steel, some 1e8 for porous material.
+    krc
+        Radial force coefficient as a share of ``ktc_pa``; positive: the chip pushes the tooth away from the surface.
+        Published: 0.17 for acetal at 0.15 mm a tooth (Mohammadi & Ahmadi), 0.33 for aluminium of 6e8 Pa (Insperger &
+        Stepan); the limits hang on it, so measure it for your material.
+    kac
+        Axial force coefficient as a share of ``ktc_pa``; positive: the chip pulls the tool along -Z, out of the
+        spindle, as a right-hand helix does (square end mill).
+    start_angle_deg : deg
+        Immersion angle at which a tooth enters the cut, 0 to below ``exit_angle_deg``, from +Y (normal to the feed) in
+        the sense of rotation; or instead ``immersion``.
+    exit_angle_deg : deg
+        Immersion angle at which a tooth leaves the cut, at most 180, likewise.
+    immersion
+        Way the cutter is led: ``up`` (conventional: the chip starts thin), ``down`` (climb: it ends thin), ``central``
+        (each with ``radial_depth_m``) or ``slot``.
+    radial_depth_m : m
+        Radial depth of cut, at most the diameter; half immersion is half the diameter.
+    feed_per_tooth_m : m
+        Feed per tooth, 0 or more; it decides whether teeth leave the cut, not the depth limit.
+    kte_n_per_m : N/m
+        Tangential edge coefficient, 0 or more: force per metre of engaged edge beside that of the chip.
+    kre_n_per_m : N/m
+        Radial edge coefficient, likewise.
+    kae_n_per_m : N/m
+        Axial edge coefficient, likewise; its sense is that of ``kac``.
+    runout_m : m
+        Radial offset of the cutter from the spindle's axis, 0 or more; tooth j, from 0, runs
+        ``runout_m cos(2 pi j / teeth)`` large.
+    helix_angle_deg : deg
+        Helix angle of the edges, 0 to below 90; 0: straight edges.
+    pitch_angles_deg : deg
+        Angle from each tooth to the one before it in the cut, one a tooth, 360 together; empty: equal pitch.
+    process_damping_n_per_m : N/m
+        Coefficient C of process damping, 0 or more: the flank takes ``C v_n / V`` per metre of edge, with v_n the speed
+        into the surface and V the cutting speed; 0: none, which is on the safe side.
+    ktc_std_pa : Pa
+        Standard error of ``ktc_pa``, below it; it goes into the bands of the limits. 0: not known.
+    krc_std
+        Standard error of ``krc``, likewise.
+    kac_std
+        Standard error of ``kac``, likewise.
+    """
+
+    model_config = ConfigDict(extra="forbid", strict=False, allow_inf_nan=False)
+
+    teeth: Annotated[int, Strict()]
+    diameter_m: Number
+    edge_angle_deg: Number = 90.0
+    ktc_pa: Number
+    krc: Number
+    kac: Number = 0.0
+    start_angle_deg: Number | None = None
+    exit_angle_deg: Number | None = None
+    immersion: str | None = None
+    radial_depth_m: Number | None = None
+    feed_per_tooth_m: Number = 0.0
+    kte_n_per_m: Number = 0.0
+    kre_n_per_m: Number = 0.0
+    kae_n_per_m: Number = 0.0
+    runout_m: Number = 0.0
+    helix_angle_deg: Number = 0.0
+    pitch_angles_deg: tuple[Number, ...] = ()
+    process_damping_n_per_m: Number = 0.0
+    ktc_std_pa: Number = 0.0
+    krc_std: Number = 0.0
+    kac_std: Number = 0.0
+
+
+def read_cutting_process(path: str | os.PathLike[str]) -> MillingProcess:
+    """Read a cutter, its engagement and coefficients from ``CUT.toml``.
+
+    The engagement is ``start_angle_deg`` and ``exit_angle_deg``, or ``immersion`` (up, down, central: with
+    ``radial_depth_m``; slot).
+
+    Raises
+    ------
+    InputError
+        No such file, or a value out of its range.
+    FileFormatError
+        Not TOML, no table ``[cutting]``, a key unknown, missing or of the wrong type.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"no file {path}; check the name")
+    try:
+        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FileFormatError(f"{path} is not TOML: {error}") from error
+    table = content.get("cutting")
+    if not isinstance(table, dict):
+        raise FileFormatError(f"{path} has no table [cutting]; add one with teeth, diameter_m, ktc_pa, krc, ...")
+    return process_from_table(table, os.fspath(path))
+
+
+def process_from_table(table: Mapping[str, Any], name: str) -> MillingProcess:
+    """Give the process of a table ``[cutting]`` that was read already.
+
+    Parameters
+    ----------
+    table
+        Keys and values of the table.
+    name
+        Name of the file, for messages.
+
+    Raises
+    ------
+    InputError
+        A value out of its range.
+    FileFormatError
+        A key unknown, missing or of the wrong type.
+    """
+    try:
+        cutting = CuttingTable.model_validate(table)
+    except ValidationError as error:
+        raise FileFormatError(f"{name}: cutting.{mistake_in_words(error, CuttingTable)}") from error
+    return _process(cutting, name)
+
+
+def _process(cutting: CuttingTable, path: object) -> MillingProcess:
+    try:
+        start, leave = _engagement(cutting)
+        return MillingProcess(
+            teeth=cutting.teeth,
+            diameter=cutting.diameter_m,
+            edge_angle=math.radians(cutting.edge_angle_deg),
+            ktc=cutting.ktc_pa,
+            krc=cutting.krc,
+            kac=cutting.kac,
+            start_angle=start,
+            exit_angle=leave,
+            feed_per_tooth=cutting.feed_per_tooth_m,
+            kte=cutting.kte_n_per_m,
+            kre=cutting.kre_n_per_m,
+            kae=cutting.kae_n_per_m,
+            runout=cutting.runout_m,
+            helix_angle=math.radians(cutting.helix_angle_deg),
+            pitch_angles=tuple(math.radians(angle) for angle in cutting.pitch_angles_deg),
+            process_damping=cutting.process_damping_n_per_m,
+            ktc_std=cutting.ktc_std_pa,
+            krc_std=cutting.krc_std,
+            kac_std=cutting.kac_std,
+        )
+    except InputError as error:
+        raise type(error)(f"{path}: {error}") from error
+
+
+def _engagement(cutting: CuttingTable) -> tuple[float, float]:
+    """Start and exit angle, rad, from the two angles or from immersion and radial depth."""
+    angles = (cutting.start_angle_deg, cutting.exit_angle_deg)
+    if cutting.immersion is not None:
+        if angles != (None, None):
+            raise InputError("give either immersion or start_angle_deg and exit_angle_deg, not both")
+        if cutting.radial_depth_m is None and cutting.immersion != "slot":
+            raise InputError(f"immersion {cutting.immersion!r} needs radial_depth_m")
+        return immersion_angles(cutting.immersion, cutting.radial_depth_m or 0.0, cutting.diameter_m)
+    for name, angle in zip(("start_angle_deg", "exit_angle_deg"), angles, strict=True):
+        if angle is None:
+            raise FileFormatError(f"cutting.{name} is missing; give both angles, or immersion and radial_depth_m")
+    start, leave = angles
+    assert start is not None
+    assert leave is not None
+    return math.radians(start), math.radians(leave)
+
+
+def write_cutting_process(path: str | os.PathLike[str], process: MillingProcess, comments: Sequence[str] = ()) -> None:
+    """Write a process to a cutting file; the engagement is written as its two angles.
+
+    Parameters
+    ----------
+    path
+        Cutting file to write, such as ``CUT.toml``.
+    process
+        Cutter, engagement and coefficients.
+    comments
+        Lines of comment for the head of the file.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+    """
+    rows = [f"# {line}" for line in comments]
+    rows += ["[cutting]", *(f"{key} = {value}" for key, value in _entries(process).items())]
+    with writing_whole_file(path) as temporary:
+        temporary.write_text("\n".join(rows) + "\n", encoding="utf-8")
+
+
+def _entries(process: MillingProcess) -> dict[str, str]:
+    always = {
+        "teeth": str(process.teeth),
+        "diameter_m": repr(float(process.diameter)),
+        "edge_angle_deg": _degrees(process.edge_angle),
+        "ktc_pa": repr(float(process.ktc)),
+        "krc": repr(float(process.krc)),
+        "kac": repr(float(process.kac)),
+        "start_angle_deg": _degrees(process.start_angle),
+        "exit_angle_deg": _degrees(process.exit_angle),
+        "feed_per_tooth_m": repr(float(process.feed_per_tooth)),
+    }
+    where_any = {
+        "kte_n_per_m": process.kte,
+        "kre_n_per_m": process.kre,
+        "kae_n_per_m": process.kae,
+        "runout_m": process.runout,
+        "process_damping_n_per_m": process.process_damping,
+        "ktc_std_pa": process.ktc_std,
+        "krc_std": process.krc_std,
+        "kac_std": process.kac_std,
+    }
+    entries = always | {key: repr(float(value)) for key, value in where_any.items() if value}
+    if process.helix_angle:
+        entries["helix_angle_deg"] = _degrees(process.helix_angle)
+    if process.pitch_angles:
+        entries["pitch_angles_deg"] = "[" + ", ".join(_degrees(angle) for angle in process.pitch_angles) + "]"
+    return entries
+
+
+def _degrees(angle: float) -> str:
+    """Rounded where a conversion to and from radians would not come back."""
+    return repr(round(math.degrees(angle), 9))

@@ -1,0 +1,360 @@
+"""Thrust, torque and transverse force of a twist drill, integrated along its edges."""
+
+from dataclasses import dataclass
+from math import pi, radians
+
+import numpy as np
+from scipy.optimize import root
+
+from millfrf.core import InputError, Real
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(32)
+
+
+@dataclass(frozen=True)
+class Drill:
+    """Geometry of a drill with straight edges.
+
+    Parameters
+    ----------
+    diameter : m
+        Diameter of the drill.
+    edge_angle : rad
+        Angle chi_r between edge and axis: half the point angle.
+    rake : rad
+        Normal rake gamma_n0 at the periphery.
+    inclination : rad
+        Inclination lambda_s0 of the edge at the periphery.
+    edges
+        Number of cutting edges.
+
+    Raises
+    ------
+    InputError
+        Diameter or edges not positive, or an edge angle outside 0 to 90 degrees.
+    """
+
+    diameter: float
+    edge_angle: float = radians(70.0)
+    rake: float = radians(30.0)
+    inclination: float = radians(-5.0)
+    edges: int = 2
+
+    def __post_init__(self) -> None:
+        if not (self.diameter > 0 and self.edges >= 1 and 0 < self.edge_angle <= pi / 2):
+            raise InputError(
+                f"drill: diameter {self.diameter!r} m, {self.edges!r} edges, edge angle {self.edge_angle!r} rad; "
+                "give a positive diameter, 1 edge or more, 0 < edge angle <= pi / 2"
+            )
+
+
+@dataclass(frozen=True)
+class SpecificForce:
+    """Specific pressure ``k0 (a + b gamma_n + c lambda_s) h^-m`` in Pa, with h in mm as in the makers' tables.
+
+    ``a + b gamma_n + c lambda_s`` (angles in rad) has no unit (Ferreras-Higuero et al., Eqs. 17-19).
+    """
+
+    k0: float
+    m: float
+    a: float = 1.0
+    b: float = -0.86
+    c: float = 0.0
+
+
+@dataclass(frozen=True)
+class DrillingLoad:
+    """Thrust along the tool, N, and torque about it, N m."""
+
+    thrust: float
+    torque: float
+
+
+def drilling_load(
+    drill: Drill, feed: float, tangential: SpecificForce, axial: SpecificForce, depth: float = np.inf
+) -> DrillingLoad:
+    """Give the load on a drill whose point is ``depth`` (m) below the surface; at infinite depth the whole edge cuts.
+
+    ``F_a = N int k_a h^(1-m) dr / sin chi``, ``M = N int k_t h^(1-m) r dr / sin chi`` with ``h = f / N sin chi`` and
+    ``tan gamma_n = r / (D / 2) tan gamma_n0`` (Ferreras-Higuero et al., Eqs. 16-19). The edge is in the work as far
+    as ``r = depth tan chi``. An edge that is straight and beside the axis has constant ``r sin lambda``; inside the
+    chisel, where that has no solution, lambda is held at +-90 degrees.
+
+    Parameters
+    ----------
+    drill
+        Geometry of the drill.
+    feed : m
+        Feed per revolution.
+    tangential, axial
+        Specific pressures of the cutting force and of the thrust.
+    depth : m
+        Depth of the drill's point below the surface, 0 or more.
+
+    Raises
+    ------
+    InputError
+        A feed that is not positive, or a negative depth.
+    """
+    if not feed > 0 or not depth >= 0:
+        raise InputError(f"drilling: feed {feed!r} m/rev must be positive and depth {depth!r} m zero or more")
+    thickness = feed / drill.edges * np.sin(drill.edge_angle)
+    r, cut, thrust = _along_edge(drill, thickness, tangential, axial, depth)
+    return DrillingLoad(drill.edges * float(thrust.sum()), drill.edges * float(r @ cut))
+
+
+def edge_forces(
+    drill: Drill, thickness: float, tangential: SpecificForce, axial: SpecificForce, depth: float = np.inf
+) -> tuple[float, float]:
+    """Cutting force and thrust of one edge that cuts chips of ``thickness`` (m, normal to the edge), N."""
+    _, cut, thrust = _along_edge(drill, thickness, tangential, axial, depth)
+    return float(cut.sum()), float(thrust.sum())
+
+
+def _along_edge(
+    drill: Drill, thickness: float, tangential: SpecificForce, axial: SpecificForce, depth: float
+) -> tuple[Real, Real, Real]:
+    """Radius, m, and cutting force and thrust, N, of the pieces of one edge that is in the work."""
+    radius = drill.diameter / 2
+    outer = min(radius, depth * np.tan(drill.edge_angle)) if np.isfinite(depth) else radius
+    r = outer * (_POINTS + 1) / 2
+    weight = outer * _WEIGHTS / 2 / np.sin(drill.edge_angle)
+    rake = np.arctan(r / radius * np.tan(drill.rake))
+    sine = radius / np.maximum(r, 1e-12) * np.sin(drill.inclination)
+    inclination = np.arcsin(np.clip(sine, -1, 1))
+
+    def per_length(force: SpecificForce) -> Real:
+        shape = force.a + force.b * rake + force.c * inclination
+        return np.asarray(force.k0 * shape * 1e-3 * (1e3 * thickness) ** (1 - force.m))
+
+    return r, weight * per_length(tangential), weight * per_length(axial)
+
+
+def catalogue_load(diameter: float, feed: float, material: float = 1.01) -> DrillingLoad:
+    """Give a maker's load for twist drills: ``570 K D f^0.85`` N and ``K D^2 (0.630 + 16.84 f) / 100`` N m.
+
+    D in mm, f in mm per revolution; K = 1.01: aluminium. Arguments here in m.
+
+    Examples
+    --------
+    >>> load = catalogue_load(8e-3, 0.2e-3)
+    >>> round(load.thrust), round(load.torque, 2)
+    (1173, 2.58)
+    """
+    d, f = 1e3 * diameter, 1e3 * feed
+    return DrillingLoad(570 * material * d * f**0.85, material * d**2 * (0.630 + 16.84 * f) / 100)
+
+
+def fitted_to_catalogue(
+    drill: Drill, feeds: tuple[float, float] = (0.1e-3, 0.3e-3)
+) -> tuple[SpecificForce, SpecificForce]:
+    """Tangential and axial pressure that give the catalogue's torque and thrust for aluminium over a range of feeds.
+
+    ``m`` from the catalogue's slope between the two feeds (m per revolution), ``k0`` from the value between them. The
+    influence of the rake, 1.5 % a degree, is the usual one for Kienzle's formula (assumed: the paper prints none).
+    """
+    low, high = feeds
+    middle = float(np.sqrt(low * high))
+    unit = SpecificForce(1.0, 0.0)
+    pressures = []
+    for name in ("torque", "thrust"):
+        values = [getattr(catalogue_load(drill.diameter, feed), name) for feed in (low, high, middle)]
+        m = 1 - float(np.log(values[1] / values[0]) / np.log(high / low))
+        trial = SpecificForce(1.0, m, unit.a, unit.b, unit.c)
+        scale = values[2] / getattr(drilling_load(drill, middle, trial, trial), name)
+        pressures.append(SpecificForce(scale, m, unit.a, unit.b, unit.c))
+    return pressures[0], pressures[1]
+
+
+@dataclass(frozen=True)
+class TransverseForce:
+    """Force across a drill, in axes that turn with it: x along the first edge, y in the sense of rotation.
+
+    Parameters
+    ----------
+    force : (2,), N
+        Sum of all edges' forces on the drill. It turns with the spindle: its mean over a revolution is 0.
+    thicknesses : (edges,), m
+        Chip thickness of each edge, normal to it; equal for a drill that runs true.
+    """
+
+    force: Real
+    thicknesses: Real
+
+    @property
+    def size(self) -> float:
+        """Size F_r of the transverse force, N."""
+        return float(np.hypot(*self.force))
+
+
+def edge_thicknesses(drill: Drill, feed: float, runout: float, direction: float = 0.0) -> Real:
+    """Chip thickness of each edge, m, (edges,), for a drill whose axis stands beside the axis of rotation.
+
+    Edge i, at the angle ``theta_i = 2 pi i / N``, leaves a cone that the eccentricity e lowers by ``e c_i cot chi``,
+    ``c_i = cos(direction - theta_i)``. Edge i + k has passed k / N of a revolution before; of all that have, the lowest
+    counts: ``h_i = sin chi max(0, min_k (k f / N + e cot chi (c_i - c_(i+k))))``, k = 1 to N (as runout in milling:
+    Kline & DeVor 1983). For two edges ``h = (f / 2 +- 2 e cot chi cos(direction)) sin chi``.
+
+    Parameters
+    ----------
+    drill
+        Geometry of the drill.
+    feed : m
+        Feed per revolution.
+    runout : m
+        Runout rho: total indicator reading at the drill's tip, twice its eccentricity.
+    direction : rad
+        Angle of the eccentricity from the first edge, in the sense of rotation.
+
+    Raises
+    ------
+    InputError
+        A feed that is not positive, or a runout that is negative or larger than the drill's radius.
+
+    Examples
+    --------
+    >>> (1e6 * edge_thicknesses(Drill(8e-3, edge_angle=pi / 4), 0.2e-3, 20e-6)).round(2).tolist()
+    [84.85, 56.57]
+    """
+    if not feed > 0 or not 0 <= runout <= drill.diameter / 2:
+        raise InputError(
+            f"drilling: feed {feed!r} m/rev must be positive, runout {runout!r} m from 0 to half the drill's diameter"
+        )
+    edges = drill.edges
+    lowered = runout / 2 / np.tan(drill.edge_angle) * np.cos(direction - 2 * pi * np.arange(edges) / edges)
+    left = [k * feed / edges + lowered - np.roll(lowered, -k) for k in range(1, edges + 1)]
+    return np.asarray(np.sin(drill.edge_angle) * np.maximum(np.min(left, axis=0), 0.0))
+
+
+def resultant_force(
+    drill: Drill,
+    feed: float,
+    tangential: SpecificForce,
+    axial: SpecificForce,
+    runout: float,
+    *,
+    direction: float = 0.0,
+    depth: float = np.inf,
+) -> TransverseForce:
+    """Sum the edges' forces across the drill: what remains of them under runout.
+
+    Every edge carries the cutting force ``F_t`` against its motion and, as a chip's pressure acts normal to the edge,
+    ``F_a cot chi`` towards the axis beside its thrust ``F_a``. On a true drill both cancel; with runout a residual
+    turns with the spindle (Ferreras-Higuero et al., section 3 and Fig. 7a; they print no formula). Edges are taken
+    as radial; their levers are those of the true drill: the error is of the order of runout over diameter. The drill
+    is stiff here; one that gives way centres itself and carries far less: :func:`settled_drill`.
+
+    Parameters
+    ----------
+    drill, feed, tangential, axial, depth
+        Drill, feed per revolution (m), specific pressures and depth of the point, as in
+        :func:`millfrf.cutting.drilling_load`.
+    runout, direction
+        Runout (m) and its angle from the first edge (rad), as in :func:`edge_thicknesses`.
+
+    Examples
+    --------
+    >>> resultant_force(Drill(8e-3), 2e-4, SpecificForce(1e9, 0.0), SpecificForce(1e9, 0.0), 0.0).size < 1e-9
+    True
+    """
+    thicknesses = edge_thicknesses(drill, feed, runout, direction)
+    along = np.zeros(2)
+    for index, thickness in enumerate(thicknesses):
+        if thickness > 0:
+            cut, thrust = edge_forces(drill, float(thickness), tangential, axial, depth)
+            angle = 2 * pi * index / drill.edges
+            outwards = np.array([np.cos(angle), np.sin(angle)])
+            forwards = np.array([-outwards[1], outwards[0]])
+            along += -cut * forwards - thrust / np.tan(drill.edge_angle) * outwards
+    return TransverseForce(along, thicknesses)
+
+
+@dataclass(frozen=True)
+class SettledDrill:
+    """A drill that gives way under its transverse force, in axes that turn with it (:class:`TransverseForce`).
+
+    Parameters
+    ----------
+    force
+        Transverse force in equilibrium.
+    eccentricity : (2,), m
+        Place of the tip beside the axis of rotation in equilibrium.
+    bending : (2,), m
+        How far the tip gave way from its eccentricity at rest.
+    """
+
+    force: TransverseForce
+    eccentricity: Real
+    bending: Real
+
+
+def settled_drill(
+    drill: Drill,
+    feed: float,
+    tangential: SpecificForce,
+    axial: SpecificForce,
+    runout: float,
+    compliance: float,
+    *,
+    direction: float = 0.0,
+) -> SettledDrill:
+    """Solve ``e = e_0 + C F(e)``: the deeper edge is pushed back towards the axis, so the point centres itself.
+
+    For two edges and constant pressures ``F = -(K_r, K_t) e_x`` with ``K_r = 2 k_a D cot^2 chi`` and
+    ``K_t = 2 k_t D cot chi``: ``e_x = e_0x / (1 + C K_r)``, ``e_y = e_0y - C K_t e_x``. Long drills have C K_r of 3 to
+    30, so their tip goes sideways by K_t / K_r times its eccentricity at most, and the force is what bends it so far.
+    The walls of the hole, which hold the drill once it is in, are left out.
+
+    Parameters
+    ----------
+    drill, feed, tangential, axial, runout, direction
+        As in :func:`resultant_force`; the runout is that at rest.
+    compliance : m/N
+        Compliance C of the tip across the drill, the same in all directions.
+
+    Raises
+    ------
+    InputError
+        A compliance that is negative, or no equilibrium (the tip would leave the drill's radius).
+    """
+    if not compliance >= 0:
+        raise InputError(f"compliance {compliance!r} m/N of a drill must be zero or more")
+    at_rest = runout / 2 * np.array([np.cos(direction), np.sin(direction)])
+
+    def force_at(place: Real) -> TransverseForce:
+        size, angle = 2 * float(np.hypot(*place)), float(np.arctan2(place[1], place[0]))
+        return resultant_force(drill, feed, tangential, axial, min(size, drill.diameter / 2), direction=angle)
+
+    unit = max(runout, 1e-9)
+    found = root(lambda x: x - (at_rest + compliance * force_at(unit * x).force) / unit, at_rest / unit, tol=1e-12)
+    place = unit * np.asarray(found.x)
+    left = place - at_rest - compliance * force_at(place).force
+    if not np.abs(left).max() <= 1e-6 * unit or np.hypot(*place) > drill.diameter / 4:
+        raise InputError(
+            f"a drill of {1e3 * drill.diameter:g} mm with {compliance:g} m/N settles nowhere; make it shorter"
+        )
+    return SettledDrill(force_at(place), place, place - at_rest)
+
+
+def bending_stiffness(drill: Drill, overhang: float, *, young: float = 600e9, core: float = 0.7) -> float:
+    """Stiffness of a clamped drill against a force across its tip, N/m: ``3 E I / L^3``, ``I = pi (core D)^4 / 64``.
+
+    Parameters
+    ----------
+    drill
+        Drill whose diameter counts.
+    overhang : m
+        Length L out of its holder.
+    young : Pa
+        Young's modulus; 600 GPa: cemented carbide.
+    core
+        Diameter of the round bar that bends as the fluted drill does, over D (assumed: 0.7 is usual).
+
+    Raises
+    ------
+    InputError
+        An overhang that is not positive, or shorter than half the diameter.
+    """
+    if not overhang >= drill.diameter / 2:
+        raise InputError(f"overhang {overhang!r} m: give the drill's length out of its holder in metres")
+    return 3 * young * pi * (core * drill.diameter) ** 4 / 64 / overhang**3

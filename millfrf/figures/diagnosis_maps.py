@@ -1,0 +1,282 @@
+"""Maps and spectra of the residual of a diagnosis."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from numpy.typing import NDArray
+
+from millfrf.core import Real
+from millfrf.mismatch import (
+    BlockResidual,
+    HeldOutSpectra,
+    ResidualMap,
+    ResidualView,
+    RobotDiagnosis,
+    band_edges,
+    predicted_spectrum,
+)
+
+from .style import COLOURS, WIDTH_MM, decade_axis, house_style, legend_above, new_figure, plain_log_axis, power_of_ten
+
+MOST_LINES = 250
+"""Points of a drawn spectrum."""
+
+
+def robot_spectra_figure(found: RobotDiagnosis) -> Figure:
+    """Response over force, all channels together, a panel a posture: measured, as modelled, with the changes."""
+    recordings = found.details.robot.recordings
+    figure = new_figure(62.0 + 12.0 * (len(recordings) > 3))
+    panels = figure.subplots(1, len(recordings), squeeze=False, sharey=True)[0]
+    before, after = (found.details.robot.modes(one.changes) for one in (found.details.nominal, found.details.final))
+    for number, (axes, recording) in enumerate(zip(panels, recordings, strict=True)):
+        spectrum = recording.spectrum
+        drawn: list[tuple[Any, dict[str, Any]]] = [
+            (spectrum.measured, {"color": "0.65", "linewidth": 2.2, "label": "measured"}),
+            (
+                predicted_spectrum(before[number], spectrum),
+                {"color": COLOURS[2], "linestyle": (0, (4, 1.5)), "label": "as modelled"},
+            ),
+        ]
+        if found.physics:
+            changed = predicted_spectrum(after[number], spectrum)
+            drawn.append((changed, {"color": COLOURS[1], "label": "with the change"}))
+        force = _averaged(np.sum(np.abs(spectrum.force_here) ** 2, axis=1))
+        at = _averaged(spectrum.frequencies)
+        shift = _averaged(np.abs(spectrum.kinematic[:, 0]))
+        for values, look in drawn:
+            power = _averaged(np.sum(np.abs(values) ** 2, axis=1))
+            axes.semilogy(at, 1e6 * np.sqrt(power / force) / shift, **look)
+        axes.set_title(recording.name)
+        axes.set_xlabel("Frequency (Hz)")
+    panels[0].set_ylabel("Receptance, all channels (µm/N)")
+    legend_above(figure, panels[0])
+    return figure
+
+
+def _averaged(values: Real) -> Real:
+    """Means of neighbouring lines."""
+    size = max(1, len(values) // MOST_LINES)
+    kept = len(values) // size * size
+    return np.asarray(values[:kept].reshape(-1, size).mean(axis=1))
+
+
+def robot_evidence_figure(found: RobotDiagnosis) -> Figure:
+    """Evidence of every candidate, best on top; on a symmetric logarithmic scale."""
+    causes = found.candidates[::-1]
+    figure = new_figure(18.0 + 5.0 * len(causes))
+    axes = figure.subplots()
+    accepted = {cause.name for cause in found.physics} | set(found.equivalents)
+    colours = [COLOURS[1] if cause.name in accepted else "0.7" for cause in causes]
+    axes.barh([cause.name for cause in causes], [cause.evidence for cause in causes], color=colours, height=0.7)
+    axes.set_xscale("symlog", linthresh=20.0, linscale=0.5)
+    reach = max(20.0, causes[-1].evidence)
+    ticks = [tick for tick in (-10, 0, 10, 20, 50, 100, 200, 500, 1e3, 1e4, 1e5, 1e6) if tick <= 1.2 * reach]
+    axes.set_xticks(ticks, [f"{tick:g}".replace("-", "−") for tick in ticks], minor=False)
+    axes.set_xticks([], minor=True)
+    axes.axvline(20.0, color="k", linewidth=0.8, linestyle="--")
+    axes.text(20.0, len(causes) - 0.35, " least that is accepted", va="bottom", ha="left")
+    axes.set_xlim(left=min(-20.0, 1.2 * causes[0].evidence))
+    axes.set_ylim(top=len(causes) + 0.6)
+    axes.set_xlabel("Evidence: gain in score over the robot as modelled")
+    axes.grid(axis="y", visible=False)
+    return figure
+
+
+MOST_CHANNELS = 6
+
+
+def spectra_figure(spectra: HeldOutSpectra) -> Figure:
+    """A row a response, the first six: amplitude spectral densities over frequency."""
+    count = min(len(spectra.channels), MOST_CHANNELS)
+    with house_style():
+        height = 18.0 + 46.0 * count
+        figure = new_figure(height, None)
+        room = {"left": 17 / WIDTH_MM, "right": 1 - 2 / WIDTH_MM, "top": 1 - 7 / height, "bottom": 11 / height}
+        panels = figure.add_gridspec(count, 1, hspace=0.06, **room).subplots(squeeze=False, sharex=True)[:, 0]
+        for p, axes in enumerate(panels):
+            x = spectra.frequencies
+            axes.fill_between(x, 1e-30, spectra.noise[:, p], color="#dddddd", linewidth=0, label="Noise")
+            axes.plot(x, spectra.measured[:, p], color=COLOURS[0], linewidth=1.8, label="Measured")
+            axes.plot(x, spectra.predicted[:, p], color=COLOURS[5], linewidth=0.9, linestyle="--", label="Final model")
+            axes.plot(x, spectra.before[:, p], color=COLOURS[1], linestyle=":", label="Left by nominal, refitted")
+            axes.plot(x, spectra.after[:, p], color=COLOURS[2], linewidth=1.0, label="Left by final model")
+            shown = [spectra.measured[:, p], spectra.after[:, p], spectra.noise[:, p]]
+            decade_axis(axes, "y", 0.4 * float(np.nanmin(shown)), 2.0 * float(np.nanmax(shown)))
+            unit = spectra.units[p].replace("^2", "²")
+            axes.set_ylabel(f"{spectra.channels[p]} ({unit}/√Hz)")
+        plain_log_axis(panels[-1], "x", spectra.frequencies[0], spectra.frequencies[-1])
+        panels[-1].set_xlabel("Frequency (Hz)")
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="upper center", ncols=len(labels), borderaxespad=0.2)
+    return figure
+
+
+PIXELS = 600
+"""Pixels along an axis on which the cells have different widths: less than a tenth of a millimetre each."""
+
+LEAST_PIXELS = 150
+"""Pixels along an axis on which all cells have one width, so that viewers which smooth pictures blur no edge."""
+
+
+def draw_cells(axes: Axes, x_edges: Real, y_edges: Real, values: Real, shades: Normalize, cmap: str) -> None:
+    """Draw cells as one picture, which is placed by the scales and limits that the axes have at the call.
+
+    Parameters
+    ----------
+    axes
+        Axes with linear or logarithmic scales; their limits are set before.
+    x_edges, y_edges : (n_x + 1,), (n_y + 1,)
+        Edges of the cells along both axes.
+    values : (n_x, n_y)
+        A value for each cell.
+    shades, cmap
+        Scale of the values, and its colours.
+    """
+    left, right, columns = _sampled(_fractions(axes, "x", x_edges))
+    bottom, top, rows = _sampled(_fractions(axes, "y", y_edges))
+    image = AxesImage(axes, cmap=cmap, norm=shades, interpolation="none", origin="lower", zorder=0.5)
+    image.set_data(values[np.ix_(columns, rows)].T)
+    image.set_transform(axes.transAxes)  # a picture cannot be stretched along a logarithmic axis
+    image.set_clip_path(axes.patch)
+    image.set_extent((left, right, bottom, top))
+    axes.add_image(image)
+
+
+def _fractions(axes: Axes, side: str, edges: Real) -> Real:
+    """Places of the edges as shares of the axes' width or height."""
+    low, high = getattr(axes, f"get_{side}lim")()
+    if getattr(axes, f"get_{side}scale")() == "log":
+        low, high, edges = np.log(low), np.log(high), np.log(edges)
+    return np.asarray((edges - low) / (high - low))
+
+
+def _sampled(edges: Real) -> tuple[float, float, NDArray[np.int64]]:
+    """Lower and upper end of cells, and the number of the cell that each pixel between them shows."""
+    widths = np.diff(edges)
+    if np.allclose(widths, widths[0], rtol=1e-3):
+        place = np.repeat(np.arange(len(widths)), -(-LEAST_PIXELS // len(widths)))
+    else:
+        middles = (np.arange(PIXELS) + 0.5) / PIXELS
+        place = np.searchsorted((edges[1:-1] - edges[0]) / (edges[-1] - edges[0]), middles)
+    low, high = float(edges[0]), float(edges[-1])
+    return (low, high, place) if low < high else (high, low, place[::-1])
+
+
+SHADES = "Greys"
+STAGES = ("Nominal model, refitted", "Final model")
+DARK = 0.55
+"""Shade from which on a dot is white."""
+
+LEAST_TOP = 10.0
+"""Least upper end of the scale: less than ten times the noise is not drawn black."""
+
+
+def channel_map_figure(view: ResidualView, significant: NDArray[np.bool_]) -> Figure:
+    """Draw residual power over noise power, a column a recording, upper row before and lower row after the causes.
+
+    Parameters
+    ----------
+    view
+        Maps of the residual before and after the causes.
+    significant : (n_recordings, n_bands, n_responses), bool
+        Whether a cell gets a dot in the upper row.
+    """
+    maps = (view.before, view.after)
+    shades = _shades([one.ratio for one in maps])
+    columns = len(view.before.recordings)
+    with house_style():
+        figure, panels, side = _panels(columns, 24.0 + 2 * (8.0 + 6.5 * len(view.before.channels)))
+        plain_log_axis(panels[0, 0], "x", view.before.edges[0], view.before.edges[-1])
+        for row, one in enumerate(maps):
+            for k in range(columns):
+                _channel_axis(panels[row, k], one)
+                rows = np.arange(len(one.channels) + 1, dtype=np.float64) - 0.5
+                draw_cells(panels[row, k], one.edges, rows, one.ratio[k], shades, SHADES)
+            panels[row, 0].set_ylabel(STAGES[row].replace(", ", ",\n"))
+        for k, name in enumerate(view.before.recordings):
+            _dots(panels[0, k], view.before, view.before.ratio[k], significant[k], shades)
+            panels[0, k].set_title(f"{name} ({view.measured[k].recording.level:.3g} N rms)", pad=3)
+            panels[1, k].set_xlabel("Frequency (Hz)")
+        _bar(figure, shades, side)
+    return figure
+
+
+def time_map_figure(view: ResidualView) -> Figure:
+    """Residual power over noise power in blocks of time, a column a recording; before above, after below."""
+    edges = band_edges(view.measured, 4, 1)
+    stages = (view.blocks_before, view.blocks_after)
+    shades = _shades([blocks.banded(edges)[0] for stage in stages for blocks in stage])
+    with house_style():
+        figure, panels, side = _panels(len(view.measured), 105.0)
+        plain_log_axis(panels[0, 0], "y", edges[0], edges[-1])
+        ends = [blocks.times[[0, -1]] for stage in stages for blocks in stage]
+        panels[0, 0].set_xlim(np.min(ends), np.max(ends))
+        for row, stage in enumerate(stages):
+            for k, blocks in enumerate(stage):
+                _draw_blocks(panels[row, k], blocks, edges, shades)
+            panels[row, 0].set_ylabel(f"{STAGES[row]}\nFrequency (Hz)")
+        for k, one in enumerate(view.measured):
+            panels[0, k].set_title(f"{one.recording.name} ({one.recording.level:.3g} N rms)", pad=3)
+            panels[1, k].set_xlabel("Time (s)")
+        _bar(figure, shades, side)
+    return figure
+
+
+def _draw_blocks(axes: Axes, blocks: BlockResidual, edges: Real, shades: LogNorm) -> None:
+    power = blocks.banded(edges)[0]
+    seen = np.isfinite(power[0])
+    steps = np.concatenate([edges[:-1][seen], edges[-1:]])
+    draw_cells(axes, blocks.times, steps, power[:, seen], shades, SHADES)
+
+
+def _channel_axis(axes: Axes, one: ResidualMap) -> None:
+    axes.set_yticks(range(len(one.channels)), one.channels)
+    axes.set_ylim(len(one.channels) - 0.5, -0.5)
+    axes.hlines(np.arange(len(one.channels) - 1) + 0.5, one.edges[0], one.edges[-1], color="white", linewidth=1.5)
+
+
+def _dots(axes: Axes, one: ResidualMap, ratio: Real, cells: NDArray[np.bool_], shades: LogNorm) -> None:
+    """A dot in every significant cell, white on dark shades."""
+    middle = np.sqrt(one.edges[1:] * one.edges[:-1])
+    dark = np.asarray(shades(ratio)) > DARK
+    for colour, chosen in (("white", cells & dark), ("black", cells & ~dark)):
+        bands, channels = np.nonzero(chosen)
+        axes.plot(middle[bands], channels, ".", color=colour, markersize=2.2)
+
+
+def _shades(ratios: Sequence[Real]) -> LogNorm:
+    largest = max(float(np.nanmax(ratio)) for ratio in ratios)
+    return LogNorm(1.0, max(largest, LEAST_TOP), clip=True)
+
+
+def _panels(columns: int, height: float) -> tuple[Figure, NDArray[np.object_], Axes]:
+    """Two rows of panels placed in millimetres, and the axes of the scale at their right."""
+    figure = new_figure(height, None)
+    top, bottom = 1 - 6 / height, 11 / height
+    grid = figure.add_gridspec(
+        2, columns, left=21 / WIDTH_MM, right=1 - 20 / WIDTH_MM, top=top, bottom=bottom, wspace=0.05, hspace=0.08
+    )
+    with rc_context({"axes.grid": False}):
+        panels = grid.subplots(squeeze=False, sharex=True, sharey=True)
+        side = figure.add_axes((1 - 17.5 / WIDTH_MM, bottom, 3.2 / WIDTH_MM, top - bottom))
+    for axes in panels[:, 1:].ravel():
+        axes.yaxis.set_visible(False)
+    for axes in panels[0]:
+        axes.xaxis.set_visible(False)
+    return figure, panels, side
+
+
+def _bar(figure: Figure, shades: LogNorm, side: Axes) -> None:
+    bar = figure.colorbar(ScalarMappable(shades, SHADES), cax=side)
+    bar.set_label("Residual power / noise power")
+    powers = range(math.floor(math.log10(shades.vmax or LEAST_TOP) + 1e-9) + 1)
+    bar.set_ticks([10.0**power for power in powers], labels=[power_of_ten(power) for power in powers])
+    bar.ax.minorticks_off()

@@ -1,0 +1,394 @@
+"""FRF matrix: magnitude, phase and coherence, with fit and reference."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
+from numpy.typing import NDArray
+
+from estimation import FRF_ORDERS, Frf, to_receptance
+from millfrf.core import InputError
+from modal_fit import ModalModel
+
+from .style import FITTED, MEASURED, TRUE, WIDTH_MM, given_or_new, house_style, legend_beside, line_style, new_figure
+
+PER_PAGE = 3
+"""Responses, and excitations, on one page."""
+
+_MANY = 2000
+"""Points from which on dots are drawn as pixels: as outlines they would make a page of tens of megabytes."""
+
+_AROUND = np.concatenate([-np.geomspace(0.05, 30, 25)[::-1], [0.0], np.geomspace(0.05, 30, 25)])
+"""Half widths of a mode's peak around which its curve has points."""
+
+SYMBOLS = {"receptance": "H", "mobility": "Y", "accelerance": "A"}
+"""Letter of each quantity."""
+
+
+@dataclass(frozen=True)
+class FrfCurves:
+    """The FRF, models and bands that one figure shows.
+
+    Parameters
+    ----------
+    measured
+        Measured FRF of any quantity; the models must give the same unit.
+    band : (low, high), Hz
+        Limits of the frequency axis.
+    fitted, reference
+        Models that are drawn over it where they are given.
+    fit_band : Hz
+        Band in which the fitted model holds; None: the whole axis.
+    """
+
+    measured: Frf
+    band: tuple[float, float]
+    fitted: ModalModel | None = None
+    reference: ModalModel | None = None
+    fit_band: tuple[float, float] | None = None
+
+
+def frf_figures(curves: FrfCurves) -> tuple[Figure, ...]:
+    """One page for every three responses by three excitations; columns are responses, rows are excitations.
+
+    Raises
+    ------
+    InputError
+        No line lies in the band.
+    """
+    frf = curves.measured
+    if not ((frf.frequencies >= curves.band[0]) & (frf.frequencies <= curves.band[1])).any():
+        raise InputError(
+            f"no line of the FRF lies between {curves.band[0]:g} and {curves.band[1]:g} Hz; "
+            f"it has {frf.frequencies[0]:g} to {frf.frequencies[-1]:g} Hz"
+        )
+    pages = []
+    with house_style():
+        for q in range(0, len(frf.excitations), PER_PAGE):
+            for p in range(0, len(frf.responses), PER_PAGE):
+                rows = range(q, min(q + PER_PAGE, len(frf.excitations)))
+                pages.append(_page(curves, range(p, min(p + PER_PAGE, len(frf.responses))), rows))
+    return tuple(pages)
+
+
+def _page(curves: FrfCurves, responses: range, excitations: range) -> Figure:
+    measured = curves.measured
+    with_coherence = measured.multiple_coherence is not None or measured.coherence is not None
+    page = _Page(len(responses), len(excitations), with_coherence)
+    limits = _magnitude_limits(curves)
+    for column, p in enumerate(responses):
+        for row, q in enumerate(excitations):
+            magnitude, phase = page.panel(row, column, MAGNITUDE), page.panel(row, column, PHASE)
+            _draw_entry(magnitude, phase, curves, p, q)
+            magnitude.set_ylim(*limits)
+            _label(magnitude, phase, curves.measured, p, q, outer=column == 0)
+        bottom = phase
+        if with_coherence:
+            bottom = page.panel(len(excitations), column, COHERENCE)
+            _draw_coherence(bottom, curves, p, excitations, outer=column == 0)
+        bottom.tick_params(labelbottom=True)
+        bottom.set_xlabel("Frequency (Hz)")
+    page.first.set_xlim(*curves.band)
+    handles, labels = page.first.get_legend_handles_labels()
+    page.figure.legend(handles, labels, loc="upper center", ncols=len(labels), borderaxespad=0.1)
+    return page.figure
+
+
+MAGNITUDE, PHASE, COHERENCE = (0.0, 34.0), (36.5, 17.0), (0.0, 20.0)
+"""Top edge and height of a panel within its entry, mm."""
+
+
+class _Page:
+    """Panels placed in millimetres: phase close under its magnitude, entries apart."""
+
+    left, right, gap, top, entry, foot = 16.0, 4.5, 3.5, 11.0, 60.0, 10.0
+
+    def __init__(self, n_columns: int, n_rows: int, with_coherence: bool) -> None:
+        coherence = COHERENCE[1] if with_coherence else -4.0
+        self.height = self.top + self.entry * n_rows + coherence + self.foot
+        self.figure = new_figure(self.height, None)
+        self.width = (WIDTH_MM - self.left - self.right - self.gap * (n_columns - 1)) / n_columns
+        self._first: Axes | None = None
+
+    @property
+    def first(self) -> Axes:
+        """The panel whose frequency axis all others share."""
+        assert self._first is not None
+        return self._first
+
+    def panel(self, row: int, column: int, place: tuple[float, float]) -> Axes:
+        """A new panel of an entry."""
+        x = self.left + column * (self.width + self.gap)
+        bottom = self.height - self.top - row * self.entry - place[0] - place[1]
+        corner = (x / WIDTH_MM, bottom / self.height, self.width / WIDTH_MM, place[1] / self.height)
+        axes = self.figure.add_axes(corner, sharex=self._first)
+        self._first = self._first or axes
+        return axes
+
+
+def coherent_lines(frf: Frf) -> NDArray[np.bool_]:
+    """Valid lines on which some response is mostly explained by the inputs; all valid ones where that is unknown."""
+    coherence = frf.multiple_coherence
+    if coherence is None and frf.coherence is not None:
+        coherence = frf.coherence.max(axis=2)
+    if coherence is None:
+        return frf.valid
+    coherent = frf.valid & (np.nan_to_num(coherence).max(axis=1) > 0.8)
+    return np.asarray(coherent) if coherent.any() else frf.valid
+
+
+def lines_in_band(curves: FrfCurves) -> tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64] | None]:
+    """Frequencies, values and standard deviation inside the band; not a number where there is no FRF."""
+    frf = curves.measured
+    inside = (frf.frequencies >= curves.band[0]) & (frf.frequencies <= curves.band[1])
+    values = np.where(frf.valid[:, None, None], frf.values, np.nan)[inside]
+    deviation = None
+    known = frf.entry_variance()
+    if known is not None:
+        variance = np.where(frf.valid[:, None, None] & np.isfinite(known), known, np.nan)
+        deviation = np.sqrt(np.maximum(variance[inside], 0.0))
+    return frf.frequencies[inside], values, deviation
+
+
+def model_axis(model: ModalModel, model_band: tuple[float, float]) -> NDArray[np.float64]:
+    """Frequencies (Hz) dense enough for every peak: evenly over the band, and around each mode."""
+    low, high = max(model_band[0], 1e-3), model_band[1]
+    width = np.abs(model.poles.real) / (2 * np.pi)
+    near = model.natural_frequencies[:, None] + width[:, None] * _AROUND
+    every = np.concatenate([np.linspace(low, high, 600), near.ravel()])
+    return np.unique(every[(every >= low) & (every <= high)])
+
+
+def _models(curves: FrfCurves) -> list[tuple[str, ModalModel, tuple[float, float], dict[str, Any]]]:
+    models: list[tuple[str, ModalModel, tuple[float, float], dict[str, Any]]] = []
+    if curves.reference is not None:
+        dotted = {"color": TRUE, "linestyle": (0, (1, 1.2)), "linewidth": 1.6}
+        models.append(("Reference model", curves.reference, curves.band, dotted))
+    if curves.fitted is not None:
+        low, high = curves.fit_band or curves.band
+        band = (max(low, curves.band[0]), min(high, curves.band[1]))
+        models.append(("Fitted model", curves.fitted, band, {"color": FITTED, "linestyle": (0, (5, 1.5))}))
+    return models
+
+
+def _draw_entry(magnitude: Axes, phase: Axes, curves: FrfCurves, p: int, q: int) -> None:
+    frequencies, values, deviation = lines_in_band(curves)
+    size, angle = np.abs(values[:, p, q]), np.angle(values[:, p, q], deg=True)
+    if deviation is not None:
+        spread = 2 * deviation[:, p, q]
+        magnitude.fill_between(
+            frequencies,
+            np.maximum(size - spread, 1e-3 * size),
+            size + spread,
+            color="#bdbdbd",
+            linewidth=0,
+            label="± 2 standard deviations",
+        )
+    magnitude.plot(frequencies, size, color=MEASURED, linewidth=0.9, label="Measured")
+    phase.plot(frequencies, angle, ".", color=MEASURED, markersize=1.8, rasterized=len(frequencies) > _MANY)
+    for label, model, band, style in _models(curves):
+        axis = model_axis(model, band)
+        entry = model_entry(model, axis, curves.measured, p, q)
+        if entry is None:
+            continue
+        magnitude.plot(axis, np.abs(entry), label=label, **style)
+        phase.plot(axis, _without_jumps(np.angle(entry, deg=True)), **style)
+    magnitude.set_yscale("log")
+
+
+def model_entry(
+    model: ModalModel, axis: NDArray[np.float64], like: Frf, p: int, q: int
+) -> NDArray[np.complex128] | None:
+    """The model's entry of the same degrees of freedom, under the same exponential window; None where it has none."""
+    if like.responses[p] not in model.responses or like.excitations[q] not in model.excitations:
+        return None
+    row, column = model.responses.index(like.responses[p]), model.excitations.index(like.excitations[q])
+    tau = like.exponential_time_constant
+    s = np.asarray(2j * np.pi * axis + (0.0 if tau is None else 1 / tau), dtype=np.complex128)
+    return np.asarray(model.at(s)[:, row, column])
+
+
+def _without_jumps(angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Break the line where the phase passes from +180 to -180 degrees."""
+    broken = angle.copy()
+    broken[1:][np.abs(np.diff(angle)) > 180] = np.nan
+    return broken
+
+
+def _magnitude_limits(curves: FrfCurves) -> tuple[float, float]:
+    """One scale for all entries, six decades at most, so that strong and weak can be compared.
+
+    By the lines of the fit where there is one: below them a receptance made of accelerations is noise over w^2.
+    """
+    frf = curves.measured
+    low, high = curves.fit_band or curves.band
+    low, high = max(low, curves.band[0]), min(high, curves.band[1])
+    inside = (frf.frequencies >= low) & (frf.frequencies <= high)
+    size = np.abs(frf.values[inside & coherent_lines(frf)])
+    size = size[np.isfinite(size) & (size > 0)]
+    if not len(size):
+        return 1e-9, 1e-3
+    top = float(size.max()) * 2.5
+    return max(float(np.percentile(size, 1)) / 2.5, top * 1e-6), top
+
+
+def _label(magnitude: Axes, phase: Axes, frf: Frf, p: int, q: int, *, outer: bool) -> None:
+    magnitude.set_title(f"{frf.responses[p]} / {frf.excitations[q]}", pad=3)
+    magnitude.tick_params(labelbottom=False, labelleft=outer)
+    phase.tick_params(labelbottom=False, labelleft=outer)
+    phase.set_ylim(-230, 230)  # room for the labels at 180
+    phase.yaxis.set_major_locator(MultipleLocator(90))
+    phase.set_yticks([-180, 0, 180])
+    if outer:
+        symbol = SYMBOLS.get(frf.quantity, "H")
+        magnitude.set_ylabel(f"|{symbol}| ({frf.unit})")
+        phase.set_ylabel("Phase (°)")
+        for axes in (magnitude, phase):
+            axes.yaxis.set_label_coords(-11.5 / (axes.bbox.width / axes.figure.dpi * 25.4), 0.5)
+
+
+def _draw_coherence(axes: Axes, curves: FrfCurves, p: int, excitations: range, *, outer: bool) -> None:
+    """The multiple coherence of a response, or the ordinary ones with the excitations of this page."""
+    frf = curves.measured
+    if frf.multiple_coherence is not None:
+        axes.plot(frf.frequencies, frf.multiple_coherence[:, p], color=MEASURED, linewidth=0.9)
+    elif frf.coherence is not None:
+        for q, dashes in zip(excitations, ("-", "--", ":"), strict=False):
+            axes.plot(frf.frequencies, frf.coherence[:, p, q], dashes, color=MEASURED, linewidth=0.9)
+    axes.set_ylim(0, 1.05)
+    axes.set_yticks([0, 0.5, 1])
+    kind = "Coherence" if frf.multiple_coherence is None else "Multiple coherence"
+    axes.set_title(f"{kind} of {frf.responses[p]}", pad=3)
+    axes.tick_params(labelleft=outer)
+    if outer:
+        axes.set_ylabel("γ² (1)")
+        axes.yaxis.set_label_coords(-11.5 / (axes.bbox.width / axes.figure.dpi * 25.4), 0.5)
+
+
+MOST_ENTRIES = 9
+"""Entries that are drawn where none is named."""
+
+PARTS: Mapping[str, tuple[Callable[[NDArray[np.complex128]], NDArray[np.float64]], str]] = {
+    "magnitude": (np.abs, "Magnitude of {quantity} ({unit})"),
+    "phase": (lambda values: np.angle(values, deg=True), "Phase of {quantity} (deg)"),
+    "real": (np.real, "Real part of {quantity} ({unit})"),
+    "imaginary": (np.imag, "Imaginary part of {quantity} ({unit})"),
+}
+"""What can be drawn of an FRF, and the label of its axis."""
+
+
+def draw_frf(
+    frf: Frf,
+    axes: Axes | None = None,
+    *,
+    response: str | None = None,
+    excitation: str | None = None,
+    part: str = "magnitude",
+    quantity: str | None = None,
+    **line: Any,
+) -> Axes:
+    """Entries of an FRF over frequency; lines that are not valid are gaps.
+
+    Parameters
+    ----------
+    frf
+        FRF matrix of any quantity.
+    axes
+        To draw into; None: new ones.
+    response, excitation
+        Degrees of freedom to draw; None: all, of more than nine entries the first nine.
+    part
+        ``magnitude`` (logarithmic), ``phase``, ``real`` or ``imaginary``.
+    quantity
+        ``receptance``, ``mobility`` or ``accelerance`` to draw; None: what the given axes show, by their label, else
+        the FRF's own.
+    line
+        Settings of matplotlib's lines, such as ``color`` or ``label``.
+
+    Raises
+    ------
+    InputError
+        A degree of freedom, a part or a quantity that is not there.
+    """
+    frf = in_quantity(frf, quantity or _shown_in(axes))
+    if part not in PARTS:
+        raise InputError(f"unknown part {part!r} of an FRF; use one of {', '.join(PARTS)}")
+    entries = chosen_entries(frf, response, excitation)
+    taken, name = PARTS[part]
+    with given_or_new(axes) as shown:
+        for number, (p, q) in enumerate(entries[:MOST_ENTRIES]):
+            values = np.where(frf.valid, taken(frf.values[:, p, q]), np.nan)
+            label = line.get("label", f"{frf.responses[p]} / {frf.excitations[q]}")
+            if "label" in line and number:
+                label = "_nolegend_"  # one name for all entries stands in the legend once
+            shown.plot(frf.frequencies, values, **{**line_style(number), **line, "label": label})
+        if part == "magnitude":
+            shown.set_yscale("log")
+        shown.set_xlabel("Frequency (Hz)")
+        shown.set_ylabel(name.format(quantity=frf.quantity, unit=frf.unit.replace("^2", "²")))
+        if axes is None:
+            shown.set_xlim(*_band(frf))
+        few = None if len(entries) <= MOST_ENTRIES else f"{MOST_ENTRIES} of {len(entries)} entries"
+        legend_beside(shown, few)
+    return shown
+
+
+def _shown_in(axes: Axes | None) -> str | None:
+    """The quantity that the label of axes with something in them names."""
+    if axes is None or not axes.has_data():
+        return None
+    return next((name for name in FRF_ORDERS if re.search(rf"\b{name}\b", axes.get_ylabel())), None)
+
+
+def in_quantity(frf: Frf, quantity: str | None) -> Frf:
+    """An FRF of motion over force as receptance, mobility or accelerance: ``s^n`` times the receptance.
+
+    None, and a ``transfer``, which has no other form, leave it as it is.
+
+    Raises
+    ------
+    InputError
+        No such quantity.
+    """
+    if quantity is None or quantity == frf.quantity or frf.quantity not in FRF_ORDERS:
+        return frf
+    if quantity not in FRF_ORDERS:
+        raise InputError(f"unknown quantity {quantity!r} of an FRF; use one of {', '.join(FRF_ORDERS)}")
+    receptance, order = to_receptance(frf), FRF_ORDERS[quantity]
+    unit = receptance.unit.replace("m/", f"m/{('', 's/', 's^2/')[order]}", 1)
+    factor = (receptance.laplace**order)[:, None, None]
+    return replace(receptance, values=receptance.values * factor, quantity=quantity, unit=unit, covariance=None)
+
+
+def chosen_entries(frf: Frf, response: str | None, excitation: str | None) -> list[tuple[int, int]]:
+    """Row and column of each entry that is asked for.
+
+    Raises
+    ------
+    InputError
+        A degree of freedom that the FRF does not have.
+    """
+    rows = _places("response", frf.responses, response)
+    columns = _places("excitation", frf.excitations, excitation)
+    return [(p, q) for p in rows for q in columns]
+
+
+def _places(kind: str, there: Sequence[str], asked: str | None) -> list[int]:
+    if asked is None:
+        return list(range(len(there)))
+    if asked not in there:
+        raise InputError(f"no {kind} {asked}; there are {', '.join(there)}")
+    return [there.index(asked)]
+
+
+def _band(frf: Frf) -> tuple[float, float]:
+    """The band in which the FRF holds, or that of its valid lines, Hz."""
+    if frf.band is not None:
+        return frf.band
+    lines = frf.frequencies[frf.valid] if frf.valid.any() else frf.frequencies
+    return float(lines[0]), float(lines[-1])

@@ -1,0 +1,1 @@
+"""Modal parameters over the level of excitation, without any assumed law."""

@@ -1,0 +1,1 @@
+"""Faults of the recording itself: foreign tones and saturated channels."""

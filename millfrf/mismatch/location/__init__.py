@@ -1,0 +1,1 @@
+"""Location of a mismatch: frequency bands, channels, times, levels, spindle orders."""

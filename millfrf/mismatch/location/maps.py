@@ -1,0 +1,345 @@
+"""Maps of residual power over noise power: frequency, channel, time, spindle order."""
+
+import os
+import tomllib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.fft import irfft, rfft
+from scipy.signal.windows import hann
+
+from acquisition import Recording
+from estimation import WindowedSpectrum
+from millfrf.core import Complex, Real
+
+from ..models.fitting import Fit
+from ..models.hypothesis import Hypothesis, predict_lines
+from ..models.misfit import fitted_noise, through_structure
+from ..noise.noise_model import whitening
+
+
+def band_means(frequencies: Real, power: Real, edges: Real) -> tuple[Real, Real]:
+    """Return the mean power in each band, (n_bands, n), and the number of lines that each holds, (n_bands,).
+
+    A line on an edge belongs to the band above it; lines beyond the first and the last edge belong to the first and
+    the last band. The mean of a band without lines is nan.
+
+    Parameters
+    ----------
+    frequencies : (n_lines,), Hz
+        Frequencies of the lines.
+    power : (n_lines, n)
+        Power of each line, in n columns.
+    edges : (n_bands + 1,), Hz
+        Edges of the bands, rising.
+
+    Examples
+    --------
+    >>> means, held = band_means(np.array([1.0, 2.0, 3.0]), np.array([[4.0], [2.0], [8.0]]), np.array([1.0, 3.0, 4.0]))
+    >>> means.tolist(), held.tolist()
+    ([[3.0], [8.0]], [2.0, 1.0])
+    """
+    place = np.digitize(frequencies, edges[1:-1])
+    held = np.bincount(place, minlength=len(edges) - 1).astype(float)
+    sums = np.array([np.bincount(place, column, len(held)) for column in power.T]).T
+    return np.where(held[:, None] > 0, sums / np.maximum(held, 1)[:, None], np.nan), held
+
+
+BANDS_PER_OCTAVE = 6
+LEAST_LINES = 12
+"""Least number of lines of a band in every recording."""
+
+
+@dataclass(frozen=True)
+class ResidualMap:
+    """Mean of ``|residual|^2`` over noise variance in cells; 1 where only noise is left.
+
+    Parameters
+    ----------
+    edges : (n_bands + 1,), Hz
+        Edges of the frequency bands.
+    channels
+        Names of the responses.
+    recordings
+        Names of the recordings, weakest force first.
+    ratio : (n_recordings, n_bands, n_responses)
+        Residual power of each channel over the variance of its own noise.
+    joint : (n_recordings, n_bands)
+        Mean residual power of all channels together, whitened.
+    count : (n_recordings, n_bands)
+        Independent complex lines of a cell of one channel.
+    """
+
+    edges: Real
+    channels: tuple[str, ...]
+    recordings: tuple[str, ...]
+    ratio: Real
+    joint: Real
+    count: Real
+
+    def pooled(self, axis: tuple[int, ...]) -> tuple[Real, Real]:
+        """Return the means of ``ratio`` over ``axis``, weighted by the lines of the cells, and the number of lines."""
+        weight = np.broadcast_to(self.count[:, :, None], self.ratio.shape)
+        total = weight.sum(axis=axis)
+        return np.asarray((self.ratio * weight).sum(axis=axis) / np.maximum(total, 1e-9)), np.asarray(total)
+
+    def pooled_joint(self, axis: int) -> tuple[Real, Real]:
+        """Return the weighted means of ``joint`` over ``axis``, and the number of lines of all channels."""
+        total = self.count.sum(axis=axis)
+        ratio = (self.joint * self.count).sum(axis=axis) / np.maximum(total, 1e-9)
+        return np.asarray(ratio), np.asarray(total * len(self.channels))
+
+
+def overlap(window: Real) -> float:
+    """Return how many neighbouring lines of a windowed spectrum count as one, ``N sum w^4 / (sum w^2)^2``."""
+    return float(len(window) * np.sum(window**4) / np.sum(window**2) ** 2)
+
+
+def band_edges(lines: Sequence[WindowedSpectrum], per_octave: int = BANDS_PER_OCTAVE, least: int = LEAST_LINES) -> Real:
+    """Return edges (Hz) of bands evenly wide on a logarithmic axis, each with ``least`` lines in every recording."""
+    low = max(float(one.frequencies[0]) for one in lines)
+    high = min(float(one.frequencies[-1]) for one in lines)
+    fine = np.geomspace(low, high, max(2, round(per_octave * np.log2(high / low)) + 1))
+    step = max(one.recording.rate / len(one.window) for one in lines)
+    edges = [fine[0]]
+    for edge in fine[1:]:
+        if edge - edges[-1] >= least * step:
+            edges.append(edge)
+    if len(edges) < 2:
+        return np.array([low, high])
+    edges[-1] = fine[-1]
+    return np.array(edges)
+
+
+def normalised(
+    hypothesis: Hypothesis, reference: Fit, number: int, lines: WindowedSpectrum
+) -> tuple[Complex, Complex, Real]:
+    """Return the residual lines of one recording in units of the noise.
+
+    Parameters
+    ----------
+    hypothesis
+        Hypothesis about the structure whose residual is taken.
+    reference
+        Fit whose noise is the unit.
+    number
+        Place of the recording in that fit, from 0.
+    lines
+        Windowed spectrum of the recording.
+
+    Returns
+    -------
+    single, white : (n_lines, n_responses)
+        Residual with each channel divided by its own noise, and with all channels whitened together.
+    variance : (n_lines, n_responses)
+        Variance of the noise of each line and channel.
+    """
+    rest = lines.measured - predict_lines(hypothesis, lines).response
+    through = through_structure(reference.hypothesis, lines)
+    covariance = fitted_noise(lines, through, reference.noises[number])
+    variance = np.real(np.einsum("kii->ki", covariance))
+    return rest / np.sqrt(variance), np.einsum("kij,kj->ki", whitening(covariance), rest), variance
+
+
+def residual_map(hypothesis: Hypothesis, reference: Fit, lines: Sequence[WindowedSpectrum], edges: Real) -> ResidualMap:
+    """Return the map of one hypothesis's residual over all recordings, with the noise of ``reference``."""
+    ratio, joint, count = [], [], []
+    for number, one in enumerate(lines):
+        single, white, _ = normalised(hypothesis, reference, number, one)
+        alone, held = band_means(one.frequencies, np.abs(single) ** 2, edges)
+        together, _ = band_means(one.frequencies, np.abs(white) ** 2, edges)
+        ratio.append(np.where(held[:, None] > 0, alone, 1.0))
+        joint.append(np.where(held[:, None] > 0, together, 1.0).mean(axis=1))
+        count.append(held / overlap(one.window))
+    first = lines[0]
+    names = first.recording.channels[-first.measured.shape[1] :]
+    return ResidualMap(
+        edges, names, tuple(one.recording.name for one in lines), np.array(ratio), np.array(joint), np.array(count)
+    )
+
+
+BLOCKS = 24
+"""Most blocks of a recording."""
+
+LEAST_PERIODS = 6.0
+"""Least length of a block, in periods of the lowest frequency."""
+
+
+@dataclass(frozen=True)
+class BlockResidual:
+    """Short spectra of one recording's residual, whitened by the noise.
+
+    Parameters
+    ----------
+    recording
+        Name of the recording.
+    times : (n_blocks + 1,), s
+        Edges of the blocks, from the beginning of the recording.
+    frequencies : (n_lines,), Hz
+        Frequencies of the lines of a block.
+    power : (n_blocks, n_lines)
+        Mean residual power over the responses, 1 where only noise is left.
+    channels
+        Number of responses.
+    overlap
+        Number of neighbouring lines that count as one.
+    """
+
+    recording: str
+    times: Real
+    frequencies: Real
+    power: Real
+    channels: int
+    overlap: float
+
+    def banded(self, edges: Real) -> tuple[Real, Real]:
+        """Return mean power (n_blocks, n_bands) and independent lines (n_bands,) in bands; nan in empty bands."""
+        means, held = band_means(self.frequencies, self.power.T, edges)
+        return means.T, np.asarray(held * self.channels / self.overlap)
+
+
+def block_residual(hypothesis: Hypothesis, reference: Fit, number: int, lines: WindowedSpectrum) -> BlockResidual:
+    """Return the residual of a hypothesis block by block, without the lines that a mended tone has removed.
+
+    Parameters
+    ----------
+    hypothesis
+        Hypothesis about the structure whose residual is taken.
+    reference
+        Fit whose noise is the unit.
+    number
+        Place of the recording in that fit, from 0.
+    lines
+        Windowed spectrum of the recording.
+    """
+    rate, n = lines.recording.rate, len(lines.recording.force)
+    rest = _kept(lines, lines.recording.response - lines.signal(predict_lines(hypothesis, lines).spectrum))
+    rest = rest[lines.start : n - max(int(rate) // 2, 1)]
+    length = int(rate * max(len(rest) / rate / BLOCKS, LEAST_PERIODS / lines.frequencies[0]))
+    length = max(16, min(length, len(rest)))
+    count = len(rest) // length
+    window = hann(length, sym=False)
+    window /= np.sqrt(np.sum(window**2))
+    axis = np.arange(length // 2 + 1) * rate / length
+    inside = (axis >= lines.frequencies[0]) & (axis <= lines.frequencies[-1])
+    blocks = rest[: count * length].reshape(count, length, -1)
+    spectra = rfft(blocks * window[:, None], axis=1)[:, inside]
+    white = _whitening_at(reference, number, lines, axis[inside])
+    small = np.einsum("kij,bkj->bki", white, spectra)
+    times = (lines.start + length * np.arange(count + 1)) / rate
+    power = np.mean(np.abs(small) ** 2, axis=2)
+    return BlockResidual(lines.recording.name, times, axis[inside], power, rest.shape[1], overlap(window))
+
+
+def _kept(lines: WindowedSpectrum, rest: Real) -> Real:
+    """Return the residual without the frequencies in the gaps between the lines that are compared."""
+    step = lines.recording.rate / len(lines.window)
+    if not (np.diff(lines.frequencies) > 1.5 * step).any():
+        return rest
+    axis = np.arange(len(rest) // 2 + 1) * lines.recording.rate / len(rest)
+    right = np.clip(np.searchsorted(lines.frequencies, axis), 1, len(lines.frequencies) - 1)
+    gap = lines.frequencies[right] - lines.frequencies[right - 1]
+    between = (gap > 1.5 * step) & (axis > lines.frequencies[right - 1]) & (axis < lines.frequencies[right])
+    return np.asarray(irfft(rfft(rest, axis=0) * ~between[:, None], n=len(rest), axis=0))
+
+
+def _whitening_at(reference: Fit, number: int, lines: WindowedSpectrum, axis: Real) -> Complex:
+    """Return the whitening at other frequencies, from the mean of the noise's covariance over the nearest lines."""
+    through = through_structure(reference.hypothesis, lines)
+    covariance = fitted_noise(lines, through, reference.noises[number])
+    nearest = np.clip(np.searchsorted(0.5 * (axis[1:] + axis[:-1]), lines.frequencies), 0, len(axis) - 1)
+    held = np.maximum(np.bincount(nearest, minlength=len(axis)), 1)
+    mean = np.zeros((len(axis), *covariance.shape[1:]), dtype=complex)
+    np.add.at(mean, nearest, covariance)
+    mean /= held[:, None, None]
+    empty = np.bincount(nearest, minlength=len(axis)) == 0
+    if empty.any():
+        fullest = np.flatnonzero(~empty)
+        mean[empty] = mean[fullest[np.argmin(np.abs(fullest[None] - np.flatnonzero(empty)[:, None]), axis=1)]]
+    return whitening(mean)
+
+
+SPEED = "spindle_speed_rpm"
+MOST_ORDERS = 24
+NEAR = 1.5
+"""Distance from an order within which lines belong to it, in spacings of a block's lines."""
+LONGEST_GAP, USUAL_GAPS = 2.0, 20.0
+"""A gap between two statements of the speed longer than this, in s and in median gaps, is a device that was lost."""
+
+
+@dataclass(frozen=True)
+class SpindleSpeed:
+    """Speed of the spindle over time as a recording states it.
+
+    Parameters
+    ----------
+    time : (n,), s
+        Times at which the speed is stated, from the beginning of the recording.
+    rpm : (n,)
+        Speed at these times, revolutions a minute.
+    """
+
+    time: Real
+    rpm: Real
+
+    def hertz(self, start: float, stop: float) -> tuple[float, float]:
+        """Return the mean speed between two times, and its range there, revolutions a second.
+
+        Both are NaN where nobody stated the speed for so long that its device must have been lost.
+        """
+        steps = np.diff(self.time)
+        if len(steps) and self._lost(steps, start, stop):
+            return float("nan"), float("nan")
+        at = np.interp(np.linspace(start, stop, 9), self.time, self.rpm) / 60
+        return float(at.mean()), float(np.ptp(at))
+
+    def _lost(self, steps: Real, start: float, stop: float) -> bool:
+        """Whether a gap between two statements, longer than all usual ones, reaches into the stretch of time."""
+        gaps = steps > max(LONGEST_GAP, USUAL_GAPS * float(np.median(steps)))
+        return bool((gaps & (self.time[:-1] < stop) & (self.time[1:] > start)).any())
+
+
+def spindle_speed(path: str | os.PathLike[str]) -> SpindleSpeed | None:
+    """Return the speed from a recording's events, or a constant one from its set-up; None where neither states one."""
+    with Recording(Path(path)) as recording:
+        if SPEED in recording.events:
+            time, rpm = recording.events[SPEED].read()
+            good = np.isfinite(time) & np.isfinite(rpm)
+            if good.any():
+                return SpindleSpeed(time[good], rpm[good])
+        setup = recording.setup
+    try:
+        tables = [table for table in tomllib.loads(setup).values() if isinstance(table, dict)]
+    except tomllib.TOMLDecodeError:
+        return None
+    for table in tables:
+        stated = table.get(SPEED)
+        if isinstance(stated, int | float) and table.get("speed_profile", "constant") == "constant":
+            return SpindleSpeed(np.zeros(1), np.array([float(stated)]))
+    return None
+
+
+def order_powers(blocks: BlockResidual, speed: SpindleSpeed) -> tuple[Real, Real, Real]:
+    """Return the residual power at each order, that beside it, and the independent lines, each (MOST_ORDERS,).
+
+    An order leaves out the blocks in which the speed moves it by more than the resolution. The lines midway between
+    neighbouring orders lie "beside" them.
+    """
+    step = float(blocks.frequencies[1] - blocks.frequencies[0])
+    sums = np.zeros((3, MOST_ORDERS))
+    for row, start, stop in zip(blocks.power, blocks.times[:-1], blocks.times[1:], strict=True):
+        rotation, change = speed.hertz(float(start), float(stop))
+        if not rotation >= 4 * NEAR * step:  # too slow, or unknown (NaN)
+            continue
+        for k in range(MOST_ORDERS):
+            order = k + 1
+            if order * change > 2 * NEAR * step:
+                break
+            on = np.abs(blocks.frequencies - order * rotation) <= NEAR * step
+            off = np.abs(np.abs(blocks.frequencies - order * rotation) - rotation / 2) <= NEAR * step
+            if on.any() and off.any():
+                sums[:, k] += row[on].sum(), row[off].mean() * on.sum(), on.sum()
+    held = np.maximum(sums[2], 1)
+    return sums[0] / held, sums[1] / held, sums[2] * blocks.channels / blocks.overlap

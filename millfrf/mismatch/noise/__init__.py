@@ -1,0 +1,1 @@
+"""The noise of responses and forces, inferred from residual lines."""

@@ -1,0 +1,295 @@
+"""Recordings at the degrees of freedom of a model, resampled to the rate of the comparison."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+
+from acquisition import Recording
+from estimation import (
+    DERIVATIVE_ORDERS,
+    BandRecording,
+    channel_at,
+    family_of,
+    quantities_of_unit,
+    read_band_recording,
+    require_room_at_rate,
+)
+from millfrf.core import SI_UNITS, Band, InputError
+from modal_fit import ModalModel, Residuals
+
+from .bands import ABOVE, compared_band, reach_of
+
+SHORTEST = 20.0
+"""Least length of a recording, in periods of the lowest mode."""
+
+KEPT = 6.0
+"""Sample rate that is kept, in times the highest frequency of interest: tones above the band are looked for there."""
+
+
+def band_of(model: ModalModel, rate: float) -> tuple[float, float]:
+    """Return the band (Hz) in which a model and a recording are compared: both edges of ``compared_band``.
+
+    Parameters
+    ----------
+    model
+        Model of the structure, with or without a band of its own.
+    rate
+        Sample rate of the recording, Hz.
+
+    Raises
+    ------
+    InputError
+        The recording is sampled too slowly for the model.
+    """
+    return compared_band(model, rate).edges
+
+
+def read_recording(
+    path: str | os.PathLike[str], model: ModalModel, *, stream: str | None = None, band: Band | None = None
+) -> BandRecording:
+    """Read one recording at the degrees of freedom of a model.
+
+    Parameters
+    ----------
+    path
+        Recording with a channel of what drives the model at each of its excitations (by its unit: force, moment,
+        voltage, acceleration of a base), and one of the model's motion or its derivatives at each of its responses.
+    model
+        Model with which the recordings are compared.
+    stream
+        Name of the sample clock; None for the only one.
+    band
+        Lowest and highest frequency that are compared, Hz; None: the model's own band.
+
+    Raises
+    ------
+    InputError
+        A channel is missing, values are not finite, or the recording is too short or sampled too slowly.
+    """
+    return read_at(path, model.excitations, model.responses, model, stream=stream, band=band)
+
+
+def read_at(
+    path: str | os.PathLike[str],
+    excitations: Sequence[str],
+    responses: Sequence[str],
+    model: ModalModel,
+    *,
+    stream: str | None = None,
+    band: Band | None = None,
+) -> BandRecording:
+    """Read one recording at given degrees of freedom; the model's modes say how fast and how long it must be.
+
+    Parameters
+    ----------
+    path
+        Recording file with the channels at these degrees of freedom.
+    excitations, responses
+        Degrees of freedom of the columns, ``node:direction``.
+    model
+        Model whose modes and band set the least sample rate and length.
+    stream
+        Name of the sample clock; None for the only one.
+    band
+        Lowest and highest frequency that are compared, Hz; None: the model's own band.
+
+    Raises
+    ------
+    InputError
+        The recording has a flaw that :func:`read_recording` refuses.
+    """
+    response, excitation = quantities_of_unit(model.unit)
+    recording = read_band_recording(
+        path,
+        excitations,
+        responses,
+        _needed_rate(model, band),
+        stream=stream,
+        exciting=(excitation,),
+        responding=family_of(response),
+    )
+    reach_of(model, recording.rate)
+    compared_band(model, recording.rate, band)
+    least = SHORTEST / float(model.natural_frequencies.min())
+    if recording.duration < least:
+        raise InputError(
+            f"{Path(path).name} lasts {recording.duration:.3g} s; {SHORTEST:g} periods of the lowest mode, "
+            f"{least:.3g} s, are the least"
+        )
+    return recording
+
+
+def _needed_rate(model: ModalModel, band: Band | None) -> float:
+    """Sample rate that a comparison needs, Hz."""
+    bands = [one for one in (model.band, band) if one is not None]
+    return KEPT * max(ABOVE * float(model.natural_frequencies.max()), *(high for _, high in bands), 0.0)
+
+
+def require_room_for_comparison(
+    paths: Sequence[str | os.PathLike[str]],
+    model: ModalModel,
+    *,
+    stream: str | None = None,
+    band: Band | None = None,
+) -> None:
+    """Refuse recordings that :func:`read_recordings` has no memory for, before a sample is read.
+
+    Parameters
+    ----------
+    paths
+        Recordings that will be compared with the model.
+    model
+        Model whose degrees of freedom and band say what is read.
+    stream
+        Name of the sample clock; None for the only one of each recording.
+    band
+        Lowest and highest frequency that are compared, Hz; None: the model's own band.
+
+    Raises
+    ------
+    InputError
+        A recording is too long; the line says how long it may be.
+    """
+    for path in paths:
+        count = len(model.excitations) + len(model.responses)
+        require_room_at_rate(path, count, _needed_rate(model, band), stream=stream)
+
+
+def read_recordings(
+    paths: Sequence[str | os.PathLike[str]],
+    model: ModalModel,
+    *,
+    stream: str | None = None,
+    band: Band | None = None,
+) -> list[BandRecording]:
+    """Read recordings for a diagnosis, weakest force first.
+
+    Parameters
+    ----------
+    paths
+        Recordings that are compared, in any order.
+    model
+        Model with which the recordings are compared.
+    stream
+        Name of the sample clock; None for the only one of each recording.
+    band
+        Lowest and highest frequency that are compared, Hz; None: the model's own band.
+
+    Raises
+    ------
+    InputError
+        No recording is given, the model's unit does not say what drives the rig, or :func:`read_recording` refuses a
+        recording.
+    """
+    if not paths:
+        raise InputError("no recording given; name one or more")
+    quantities_of_unit(model.unit)
+    found = (read_recording(path, model, stream=stream, band=band) for path in paths)
+    return sorted(found, key=lambda recording: recording.level)
+
+
+def measured_part(
+    model: ModalModel, paths: Sequence[str | os.PathLike[str]], *, stream: str | None = None
+) -> ModalModel:
+    """Return the model reduced to the responses that every recording has, as not every sensor need be mounted.
+
+    Parameters
+    ----------
+    model
+        Model with which the recordings are compared.
+    paths
+        Recordings that are compared, in any order.
+    stream
+        Name of the sample clock; None for the only one of each recording.
+
+    Raises
+    ------
+    InputError
+        No response of the model is in all recordings.
+    """
+    rows, motions = list(range(len(model.responses))), family_of(quantities_of_unit(model.unit)[0])
+    for path in paths:
+        with Recording(path) as recording:
+            channels = recording.stream(stream).channels
+            rows = [k for k in rows if channel_at(channels, model.responses[k], motions) is not None]
+    if not rows:
+        wanted = " or ".join([", ".join(motions[:-1]), motions[-1]] if motions[1:] else motions)
+        raise InputError(
+            f"no {wanted} at {', '.join(model.responses)} is in every recording; "
+            "give recordings of the model's degrees of freedom"
+        )
+    if len(rows) == len(model.responses):
+        return model
+    residuals = model.residuals
+    if residuals is not None:
+        kept = None if residuals.residues is None else residuals.residues[:, rows]
+        residuals = replace(residuals, upper=residuals.upper[rows], lower=residuals.lower[rows], residues=kept)
+    labels = tuple(model.responses[k] for k in rows)
+    return replace(model, right=model.right[:, rows], responses=labels, residuals=residuals, covariance=None)
+
+
+LINES = 200
+"""Frequencies at which what lies outside the band is matched."""
+
+
+def in_deflections(model: ModalModel) -> ModalModel:
+    """A model of velocities or accelerations as one of deflections, ``H(s) / s^n``.
+
+    Residues are divided by ``pole^n``. What is left in the model's band (its own residual terms, and what the division
+    leaves at 0 Hz) is matched there by ``upper + lower / s^2``. A model of deflections is returned as it is.
+
+    Parameters
+    ----------
+    model
+        Modal model; its unit says what it gives.
+
+    Raises
+    ------
+    InputError
+        A unit that does not say what drives the rig and what answers.
+    """
+    response, excitation = quantities_of_unit(model.unit)
+    order = DERIVATIVE_ORDERS.get(response, 0)
+    if order == 0:
+        return model
+    natural = model.natural_frequencies
+    low, high = model.band or (0.5 * float(natural.min()), 1.5 * float(natural.max()))
+    s = np.asarray(2j * np.pi * np.linspace(max(low, 0.02 * high), high, LINES), dtype=complex)
+    plain = replace(model, delay=0.0, physics=(), covariance=None)
+    unit = f"{SI_UNITS[family_of(response)[0]]}/{SI_UNITS[excitation]}"
+    bare = replace(plain, right=model.right / model.poles[:, None] ** order, residuals=None, unit=unit, errors=None)
+    rest = (plain.at(s) / s[:, None, None] ** order - bare.at(s)).reshape(LINES, -1)
+    basis = np.column_stack([np.ones(LINES), (1 / s**2).real])
+    upper, lower = np.linalg.lstsq(basis, rest.real, rcond=None)[0].reshape(2, *plain.at(s[:1]).shape[1:])
+    return replace(bare, residuals=Residuals(upper, lower), delay=model.delay, physics=model.physics)
+
+
+def without_delay(
+    model: ModalModel, recordings: Sequence[BandRecording]
+) -> tuple[ModalModel, tuple[BandRecording, ...]]:
+    """A model without the delay of its chain, and recordings whose excitations are as much later.
+
+    Parameters
+    ----------
+    model
+        Modal model of a transfer with or without a delay.
+    recordings
+        Recordings that it is compared with.
+    """
+    if not model.delay:
+        return model, tuple(recordings)
+    return replace(model, delay=0.0), tuple(_later(one, model.delay) for one in recordings)
+
+
+def _later(recording: BandRecording, delay: float) -> BandRecording:
+    """A recording whose excitations come later, s; what would come in from before its beginning is nothing."""
+    n = len(recording.force)
+    padded = next_fast_len(n + int(2 * delay * recording.rate) + 64, real=True)
+    turn = np.exp(-2j * np.pi * rfftfreq(padded, 1 / recording.rate) * delay)[:, None]
+    mean = recording.force.mean(axis=0)
+    late = irfft(rfft(recording.force - mean, n=padded, axis=0) * turn, n=padded, axis=0)[:n]
+    return replace(recording, force=np.asarray(late + mean))

@@ -1,0 +1,1 @@
+"""The residual of a hypothesis, and whether it is noise."""

@@ -1,0 +1,1 @@
+"""Finite elements of a robot: sections, beams, gravity, constraints, damping and reduction to modes."""

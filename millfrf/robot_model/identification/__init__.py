@@ -1,0 +1,1 @@
+"""Parameters of a robot from measured FRFs, frequencies or deflections, with standard errors."""

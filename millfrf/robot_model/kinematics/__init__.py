@@ -1,0 +1,1 @@
+"""Kinematics of any mechanism: frames, loops, joint values and inverse solutions."""

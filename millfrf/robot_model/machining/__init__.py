@@ -1,0 +1,1 @@
+"""Effects of a robot on a part: deviation of drilled holes, its uncertainty, compensated paths."""

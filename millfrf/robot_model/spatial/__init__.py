@@ -1,0 +1,1 @@
+"""Robots in space: structure in a posture, modes, weight, and a compliant tool."""

@@ -1,0 +1,1 @@
+"""Robots with uncertain parameters: their files after an update, and confidence bands."""

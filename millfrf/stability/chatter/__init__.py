@@ -1,0 +1,1 @@
+"""Chatter verdicts: was a recorded cut stable?"""

@@ -1,0 +1,1 @@
+"""The tooth period as a linear operator, and its Floquet multipliers."""

@@ -1,0 +1,325 @@
+"""`StabilityLobes`: depth limit over spindle speed, all limits at one speed, and their files."""
+
+import csv
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from millfrf.core import (
+    FileFormatError,
+    Index,
+    InputError,
+    Real,
+    Result,
+    Summary,
+    apart,
+    counted,
+    drawing,
+    optional_library,
+    warning_lines,
+    writing_whole_file,
+)
+
+if TYPE_CHECKING:
+    import pandas
+    from matplotlib.axes import Axes
+
+
+BIFURCATIONS = ("hopf", "period-doubling", "fold", "none")
+STATUSES = ("verified", "not-verified", "lower-bound", "unresolved")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StabilityLobes(Result):
+    """Largest stable axial depth at each spindle speed.
+
+    Parameters
+    ----------
+    spindle_speeds : (n_speeds,), rad/s
+        Spindle speeds of the limits.
+    depth_limits : (n_speeds,), m
+        Largest stable axial depth; infinite where the cut is stable at every depth that was asked for, NaN where
+        ``status`` is ``unresolved``.
+    chatter_frequencies : (n_speeds,), Hz
+        Chatter frequency at the limit; NaN exactly where ``bifurcations`` is ``none``.
+    bifurcations
+        Kind of instability, one word a speed: ``hopf``, ``period-doubling``, ``fold`` or ``none``.
+    method
+        Name of the solver: ``zero-order``, ``nyquist`` ...
+    warnings
+        Doubts that a user should know before trusting the limits; one sentence each.
+    status
+        Worth of each limit, one word a speed. ``verified``: Floquet multipliers agree below, above and on a ladder
+        beneath the limit (or up to the largest depth, where there is no limit). ``not-verified``: nothing but the
+        solver says so. ``lower-bound``: cuts up to the depth given are stable, the limit itself was not found.
+        ``unresolved``: the depth is NaN, nothing is known. If it is left empty, it becomes ``not-verified`` at every
+        speed.
+    """
+
+    spindle_speeds: NDArray[np.float64]
+    depth_limits: NDArray[np.float64]
+    chatter_frequencies: NDArray[np.float64]
+    bifurcations: tuple[str, ...]
+    method: str
+    warnings: tuple[str, ...] = ()
+    status: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.status:
+            object.__setattr__(self, "status", ("not-verified",) * len(self.spindle_speeds))
+        lengths = {
+            len(self.spindle_speeds),
+            len(self.depth_limits),
+            len(self.chatter_frequencies),
+            len(self.bifurcations),
+            len(self.status),
+        }
+        if len(lengths) != 1:
+            raise InputError(f"stability lobes: columns of unequal lengths {sorted(lengths)}")
+        if foreign := set(self.status) - set(STATUSES):
+            raise InputError(f"stability lobes: unknown status {sorted(foreign)}; use one of {STATUSES}")
+        unknown = set(self.bifurcations) - set(BIFURCATIONS)
+        if unknown:
+            raise InputError(f"stability lobes: unknown bifurcation {sorted(unknown)}; use one of {BIFURCATIONS}")
+
+    @property
+    def spindle_speeds_rpm(self) -> NDArray[np.float64]:
+        """Spindle speeds in revolutions per minute, for the user's edge."""
+        return self.spindle_speeds * 60 / (2 * np.pi)
+
+    def plot(self, axes: "Axes | None" = None, *, label: str | None = None) -> "Axes":
+        """Draw the depth limits over spindle speed and return the axes; see :func:`millfrf.figures.cuts.draw_lobes`."""
+        return drawing("draw_lobes")(self, axes, label=label)
+
+    def to_frame(self) -> "pandas.DataFrame":
+        """One row a spindle speed, with the columns of the file of lobes.
+
+        Raises
+        ------
+        InputError
+            pandas is not installed.
+        """
+        columns = {
+            "spindle_speed_rpm": self.spindle_speeds_rpm,
+            "depth_limit_m": self.depth_limits,
+            "chatter_frequency_hz": self.chatter_frequencies,
+            "bifurcation": list(self.bifurcations),
+            "status": list(self.status),
+        }
+        return optional_library("pandas", "StabilityLobes.to_frame").DataFrame(columns)
+
+    def _summary(self) -> Summary:
+        rpm, known = self.spindle_speeds_rpm, np.isfinite(self.depth_limits)
+        span = f", {rpm.min():.5g} to {rpm.max():.5g} rpm" if len(rpm) else ""
+        counts = [f"{self.status.count(name)} {name}" for name in STATUSES if name in self.status]
+        lowest = "no depth limit at any speed"
+        if known.any():
+            least = int(np.where(known, self.depth_limits, np.inf).argmin())
+            lowest = f"lowest limit {1e3 * self.depth_limits[least]:.4g} mm at {rpm[least]:.5g} rpm"
+            lowest += f", {self.bifurcations[least]}, {self.status[least]}"
+        doubts = f"; {counted(len(self.warnings), 'warning')}" if self.warnings else ""
+        columns = (rpm, 1e3 * self.depth_limits, self.chatter_frequencies, self.bifurcations, self.status)
+        rows = tuple(
+            (f"{speed:.5g}", f"{depth:.4g}", f"{chatter:.4g}", kind, status)
+            for speed, depth, chatter, kind, status in zip(*columns, strict=True)
+        )
+        return Summary(
+            f"StabilityLobes: {self.method}, {counted(len(rpm), 'spindle speed')}{span}",
+            (lowest, f"status: {', '.join(counts) or 'none'}{doubts}"),
+            ("speed (rpm)", "depth limit (mm)", "chatter (Hz)", "bifurcation", "status"),
+            rows,
+        )
+
+
+@dataclass(frozen=True)
+class StabilityLimits:
+    """All crossings of the unit circle below a largest depth, sorted by speed and then by depth.
+
+    Parameters
+    ----------
+    spindle_speeds : (n_speeds,), rad/s
+        Speeds that were looked at, whether or not they have a limit.
+    max_depth : m
+        Largest depth that was searched.
+    speed : (n_limits,)
+        Index of each limit's speed in ``spindle_speeds``.
+    depth : (n_limits,), m
+        Axial depth of each limit.
+    frequency : (n_limits,), Hz
+        Frequency of the strongest line of the tool's motion at the limit.
+    bifurcation
+        ``hopf``, ``period-doubling`` or ``fold``, one a limit.
+    change : (n_limits,)
+        Change of the number of unstable multipliers just above the depth: 2 or -2 (Hopf), 1 or -1 (the other two).
+    error : (n_limits,), m
+        Estimated numerical error of the depth.
+    method
+        Name of the solver.
+    warnings
+        Doubts about the limits, one sentence each.
+    resolved : (n_speeds,), m
+        Depth below which the search left nothing unresolved; infinite where that is so up to ``max_depth``. If it is
+        left empty, it becomes infinite everywhere.
+    """
+
+    spindle_speeds: Real
+    max_depth: float
+    speed: Index
+    depth: Real
+    frequency: Real
+    bifurcation: tuple[str, ...]
+    change: Index
+    error: Real
+    method: str
+    warnings: tuple[str, ...] = ()
+    resolved: Real = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        if not len(self.resolved):
+            object.__setattr__(self, "resolved", np.full(len(self.spindle_speeds), np.inf))
+
+    def lowest(self) -> StabilityLobes:
+        """The lowest limit at each speed: below it every cut is stable.
+
+        Where the search left something unresolved below it, the depth down to which nothing was left stands in its
+        place, as a lower bound.
+        """
+        depths = np.full(len(self.spindle_speeds), np.inf)
+        frequencies = np.full(len(self.spindle_speeds), np.nan)
+        kinds = ["none"] * len(self.spindle_speeds)
+        present, first = np.unique(self.speed, return_index=True)
+        depths[present], frequencies[present] = self.depth[first], self.frequency[first]
+        for speed, limit in zip(present, first, strict=True):
+            kinds[speed] = self.bifurcation[limit]
+        bounded = (self.resolved < depths) & (self.resolved < self.max_depth)
+        depths, frequencies = np.where(bounded, self.resolved, depths), np.where(bounded, np.nan, frequencies)
+        status = np.where(bounded, "lower-bound", "not-verified").tolist()
+        warnings = self.warnings
+        if bounded.any():
+            warnings += (
+                f"at {bounded.sum()} of {len(depths)} speeds of this search, what lies deeper than the depth given "
+                "could not be resolved",
+            )
+            kinds = ["none" if here else kind for here, kind in zip(bounded, kinds, strict=True)]
+        return StabilityLobes(
+            self.spindle_speeds, depths, frequencies, tuple(kinds), self.method, warnings, tuple(status)
+        )
+
+    def unstable_multipliers(self, depths: Real) -> Index:
+        """Number of unstable multipliers at every speed and depth, shape (n_speeds, n_depths).
+
+        Zero is stable: an island of instability has stable depths above it.
+        """
+        depths = np.asarray(depths, dtype=float)
+        total = np.zeros((len(self.spindle_speeds), len(depths)), dtype=np.int64)
+        above = np.where(depths[None, :] > self.depth[:, None], self.change[:, None], 0)
+        np.add.at(total, self.speed, above)
+        return total
+
+    def stable_intervals(self, speed: int) -> list[tuple[float, float]]:
+        """Depths (m) between which cuts at the speed of that index are stable, lowest first, up to ``max_depth``."""
+        here = self.speed == speed
+        edges = np.concatenate([[0.0], self.depth[here], [self.max_depth]])
+        unstable = np.concatenate([[0], np.cumsum(self.change[here])])
+        return [(float(a), float(b)) for a, b, n in zip(edges, edges[1:], unstable, strict=False) if n == 0]
+
+
+COLUMNS = ("spindle_speed_rpm", "depth_limit_m", "chatter_frequency_hz", "bifurcation", "status")
+PROVENANCE = "# provenance: "
+OLDER_COLUMNS = COLUMNS[:4]
+"""Of files written before limits had a status; it is ``not-verified`` there."""
+
+
+def write_lobes(path: str | os.PathLike[str], lobes: StabilityLobes, *, provenance: str = "") -> None:
+    """Write one line a speed; a depth without limit is ``inf`` and its frequency empty.
+
+    Parameters
+    ----------
+    path
+        Lobes file to write, CSV.
+    lobes
+        Limits to write; their warnings are written above the headings, one ``# warning: ...`` a line.
+    provenance
+        Sources and versions as JSON without line breaks, written as ``# provenance: ...``; empty: none.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+    """
+    with writing_whole_file(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        file.writelines(warning_lines(lobes.warnings))
+        file.writelines([f"{PROVENANCE}{provenance}\n"] if provenance else [])
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        rows = zip(
+            lobes.spindle_speeds_rpm,
+            lobes.depth_limits,
+            lobes.chatter_frequencies,
+            lobes.bifurcations,
+            lobes.status,
+            strict=True,
+        )
+        for rpm, depth, frequency, kind, status in rows:
+            line = "" if np.isnan(frequency) else f"{frequency:.8g}"
+            writer.writerow([f"{rpm:.10g}", f"{depth:.8g}", line, kind, status])
+
+
+def read_lobes(path: str | os.PathLike[str]) -> StabilityLobes:
+    """Read what :func:`write_lobes` wrote.
+
+    Raises
+    ------
+    InputError
+        No such file.
+    FileFormatError
+        Other columns, a value that is no number, or a speed or depth that is not positive.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"no file {path}; check the name")
+    try:
+        with Path(path).open(encoding="utf-8", newline="") as file:
+            warnings, lines = apart(file)
+        rows = list(csv.reader(lines))
+        if not rows or tuple(rows[0]) not in (COLUMNS, OLDER_COLUMNS):
+            raise FileFormatError(
+                f"{path} has columns {rows[:1]}, lobes have {', '.join(COLUMNS)}; give a file that lobes wrote"
+            )
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise FileFormatError(f"{path} is not a table of lobes: it is no text; give a file that lobes wrote") from error
+    try:
+        return _lobes(rows, warnings)
+    except InputError as error:
+        raise FileFormatError(f"{path} is not a table of lobes: {error}") from error
+
+
+def _lobes(rows: list[list[str]], warnings: tuple[str, ...]) -> StabilityLobes:
+    for number, row in enumerate(rows[1:], 1):
+        if len(row) != len(rows[0]):
+            raise InputError(f"row {number} has {len(row)} entries, not {len(rows[0])}; write the lobes anew")
+    columns = list(zip(*rows[1:], strict=True)) or [()] * len(COLUMNS)
+    speeds, depths, frequencies = (_numbers(columns[i], COLUMNS[i]) for i in range(3))
+    for name, values in zip(COLUMNS, (speeds, depths), strict=False):
+        if (values <= 0).any():
+            raise InputError(f"{name} = {values[values <= 0][0]:g} must be above 0; write the lobes anew")
+    status = tuple(columns[4]) if len(columns) > len(OLDER_COLUMNS) else ()
+    return StabilityLobes(
+        speeds * 2 * np.pi / 60, depths, frequencies, tuple(columns[3]), "file", warnings, status=status
+    )
+
+
+def _numbers(texts: Sequence[str], name: str) -> NDArray[np.float64]:
+    """A column; an empty entry is NaN."""
+    values = np.full(len(texts), np.nan)
+    for i, text in enumerate(texts):
+        if text:
+            try:
+                values[i] = float(text)
+            except ValueError as error:
+                raise InputError(f"{name} = {text!r} in row {i + 1} is no number; write the lobes anew") from error
+    return values

@@ -1,0 +1,1 @@
+"""Stability solvers, one method a file, and the boundary that they trace over spindle speed."""

@@ -1,0 +1,1 @@
+"""Error bars of stability limits: sensitivities, drawn samples, confidence intervals."""

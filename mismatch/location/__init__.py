@@ -1,5 +1,0 @@
-"""Where a mismatch sits: frequency bands, channels, times, levels, spindle orders."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,3 +1,0 @@
-from .line_slopes import Slopes, jacobian, slopes
-
-__all__ = ["Slopes", "jacobian", "slopes"]

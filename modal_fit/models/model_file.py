@@ -1,0 +1,163 @@
+"""Modal model files: JSON, format ``millfrf.modal_model`` version 1."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from millfrf.core import FileFormatError, InputError, writing_whole_file
+
+from .modal_model import ModalModel, ModeErrors
+from .out_of_band import Residuals
+
+FORMAT = "millfrf.modal_model"
+FORMAT_VERSION = 1
+
+
+def write_modal_model(path: str | os.PathLike[str], model: ModalModel) -> None:
+    """Write a model whole, complex numbers as ``[re, im]``, vectors ``(n_modes, n_dof)``.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+    """
+    content: dict[str, Any] = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "quantity": model.quantity,
+        "unit": model.unit,
+        "responses": list(model.responses),
+        "excitations": list(model.excitations),
+        "poles_rad_per_s": _pairs(model.poles),
+        "right": _pairs(model.right),
+        "left": _pairs(model.left),
+    }
+    if model.residuals is not None:
+        content["residuals"] = {"upper": model.residuals.upper.tolist(), "lower": model.residuals.lower.tolist()}
+        if model.residuals.poles is not None and model.residuals.residues is not None:
+            content["residuals"]["poles_rad_per_s"] = _pairs(model.residuals.poles)
+            content["residuals"]["residues"] = _pairs(model.residuals.residues)
+    if model.covariance is not None:
+        content["covariance"] = model.covariance.tolist()
+    if model.errors is not None:
+        content["mode_errors"] = _errors_to_json(model.errors)
+    if model.delay:
+        content["delay_s"] = model.delay
+    if model.band is not None:
+        content["band_hz"] = list(model.band)
+    if model.physics:
+        content["physics"] = list(model.physics)
+    with writing_whole_file(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
+
+
+def read_modal_model(path: str | os.PathLike[str]) -> ModalModel:
+    """Read what :func:`write_modal_model`, or another program, wrote in this format.
+
+    Raises
+    ------
+    InputError
+        No such file.
+    FileFormatError
+        Not JSON, another format or version, a missing field, or shapes that disagree.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"no file {path}; check the name")
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+    except (json.JSONDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise FileFormatError(f"{path} is not JSON; give a modal model made by fit") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        found = content.get("format", "not given") if isinstance(content, dict) else "not given"
+        raise FileFormatError(f"{path} is no modal model: its format is {found!r}, expected {FORMAT!r}; run fit first")
+    if content.get("format_version") != FORMAT_VERSION:
+        raise FileFormatError(
+            f"{path} has format_version {content.get('format_version')!r}, this program reads {FORMAT_VERSION}; "
+            "use the program that wrote it"
+        )
+    try:
+        return _model(content)
+    except KeyError as error:
+        raise FileFormatError(f"{path} lacks the field {error.args[0]}; fit anew") from error
+    except (TypeError, ValueError, IndexError, AttributeError) as error:
+        raise FileFormatError(f"{path}: {_wrong_field(content)}; fit anew") from error
+    except InputError as error:
+        raise FileFormatError(f"{path}: {error}") from error
+
+
+def _model(content: dict[str, Any]) -> ModalModel:
+    responses, excitations = tuple(content["responses"]), tuple(content["excitations"])
+    n_modes = len(content["poles_rad_per_s"])
+    residuals = None
+    if content.get("residuals") is not None:
+        stored = content["residuals"]
+        shape = (len(responses), len(excitations))
+        residuals = Residuals(
+            np.asarray(stored["upper"], dtype=float).reshape(shape),
+            np.asarray(stored["lower"], dtype=float).reshape(shape),
+            _complex(stored["poles_rad_per_s"], (-1,)) if "poles_rad_per_s" in stored else None,
+            _complex(stored["residues"], (-1, *shape)) if "residues" in stored else None,
+        )
+    covariance = content.get("covariance")
+    return ModalModel(
+        poles=_complex(content["poles_rad_per_s"], (n_modes,)),
+        right=_complex(content["right"], (n_modes, len(responses))),
+        left=_complex(content["left"], (n_modes, len(excitations))),
+        responses=responses,
+        excitations=excitations,
+        quantity=str(content["quantity"]),
+        unit=str(content["unit"]),
+        residuals=residuals,
+        covariance=None if covariance is None else np.asarray(covariance, dtype=float),
+        physics=tuple(content.get("physics", ())),
+        delay=float(content.get("delay_s", 0.0)),
+        band=_band(content),
+        errors=_errors_from_json(content.get("mode_errors")),
+    )
+
+
+def _errors_to_json(errors: ModeErrors) -> dict[str, Any]:
+    """Pairs [frequency in Hz, damping ratio] of each mode; null where a part was not examined."""
+    parts = {"noise": errors.noise, "points": errors.points, "band": errors.band, "terms": errors.terms}
+    return {
+        name: [[None if np.isnan(value) else value for value in pair] for pair in part.tolist()]
+        for name, part in parts.items()
+    }
+
+
+def _errors_from_json(stored: dict[str, Any] | None) -> ModeErrors | None:
+    if stored is None:
+        return None
+    parts = [np.asarray(stored[name], dtype=float).reshape(-1, 2) for name in ("noise", "points", "band", "terms")]
+    return ModeErrors(*parts)
+
+
+def _wrong_field(content: dict[str, Any]) -> str:
+    """Name the field that holds no pairs of numbers in the shape that the others ask for."""
+    for name in ("poles_rad_per_s", "right", "left"):
+        try:
+            pairs = np.asarray(content.get(name), dtype=float)
+        except (TypeError, ValueError):
+            return f"field {name} holds something that is no number"
+        if pairs.ndim < 1 or pairs.shape[-1:] != (2,):
+            return f"field {name} must hold pairs [re, im]"
+    return "a field has not the shape that responses, excitations and poles_rad_per_s ask for"
+
+
+def _band(content: dict[str, Any]) -> tuple[float, float] | None:
+    """As the file states it; files written before models carried a band state that of the fit they come from."""
+    stored = content.get("band_hz") or (content.get("provenance") or {}).get("band_hz")
+    return None if stored is None else (float(stored[0]), float(stored[1]))
+
+
+def _pairs(array: NDArray[np.complex128]) -> list[Any]:
+    return list(np.stack([array.real, array.imag], axis=-1).tolist())
+
+
+def _complex(stored: Any, shape: tuple[int, ...]) -> NDArray[np.complex128]:
+    pairs = np.asarray(stored, dtype=float).reshape(*shape, 2)
+    return np.asarray(pairs[..., 0] + 1j * pairs[..., 1])

@@ -1,5 +1,0 @@
-"""The freed numbers of a robot, and its response with derivatives over them."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,5 +1,0 @@
-"""Kinematics of any mechanism: frames, loops, joint values and inverse solutions."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,5 +1,0 @@
-"""Planar robots: rigid links on joint springs, flexible links, and natural coordinates."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,5 +1,0 @@
-"""Gaussian processes over postures: measured modes in some postures, predicted modes with bands in all."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
