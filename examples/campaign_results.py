@@ -14,7 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.campaign import MeasuredSet, write_summary
+from millfrf.campaign.results.sets import MeasuredSet
+from millfrf.campaign.results.summary import write_summary
 from millfrf.cutting import MillingProcess
 from millfrf.robot_model import (
     SpatialRobot,

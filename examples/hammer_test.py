@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from acquisition import Recording, record
 from estimation import exponential_window, force_window
-from millfrf import TapResult
 from millfrf.core import TIP
-from millfrf.taps import TapOptions, tap_recordings
+from millfrf.steps.tap import TapResult, tap_recordings
+from millfrf.steps.tap_points import TapOptions
 from replay_data import HammerCell, default_structure, dynamometer, select, tip_accelerometers
 
 RATE, SECONDS = 2048.0, 1.0

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from PIL import Image
 
-from millfrf.chain import plan_from_file
+from millfrf.steps.plan import plan_from_file
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser

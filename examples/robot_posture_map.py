@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 from millfrf.cutting import MillingProcess
-from millfrf.robot import depth_over_places, depth_over_redundancy, draw_posture_map
 from millfrf.robot_model import (
     CutPlace,
     PostureMap,
@@ -26,6 +25,8 @@ from millfrf.robot_model import (
     wrist_solutions,
 )
 from millfrf.stability import zero_order
+from millfrf.steps.robot.maps import depth_over_places, depth_over_redundancy
+from millfrf.steps.robot.pictures import draw_posture_map
 
 HALF_DOWN = MillingProcess(2, 0.02, pi / 2, 700e6, 0.3, 0.1, pi / 2, pi, 1e-4)
 """Aluminium, assumed: Table 4 of the paper is missing."""

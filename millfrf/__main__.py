@@ -13,12 +13,12 @@ from typing import Annotated, Any
 import typer
 
 from millfrf.core import InputError, LeftoverRemoved, MillfrfError, MillfrfWarning, is_disk_full
+from millfrf.core.terminal import manner, printable, say
 
 from .commands import COMMANDS
-from .cut import cut_app
-from .new import new_app
-from .robot import robot_app
-from .terminal import manner, printable, say
+from .cut.commands import cut_app
+from .new.new_commands import new_app
+from .robot.commands import robot_app
 from .usage import framed, options_of_several, usage_in_words, with_examples, with_lists_apart, with_names_of_today
 from .version import __version__
 

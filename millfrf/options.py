@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from millfrf.core import InputError
-
-from .terminal import say
+from millfrf.core.terminal import say
 
 if TYPE_CHECKING:  # the commands start without loading the room of FRFs
     from estimation import Frf

@@ -32,7 +32,7 @@ from .pole_picking import (
 )
 from .polyreference import ModalFit, fit_polyreference
 from .shapes import ModeShapes, mode_reciprocity, mode_shapes
-from .stabilisation import StabilisationChart
+from .stabilisation import StabilisationChart, chart_from_json, chart_to_json
 from .subspace import SubspaceFit, fit_subspace
 from .uff_reading import import_modes_uff, write_modes_uff
 
@@ -55,6 +55,8 @@ __all__ = [
     "amplitude_dependence",
     "calibrate_to_tip",
     "candidate_groups",
+    "chart_from_json",
+    "chart_to_json",
     "compare_modes",
     "complex_mode_indicator",
     "derived_covariance",

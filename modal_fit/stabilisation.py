@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -339,3 +340,26 @@ def _why_dropped(chart: StabilisationChart, members: NDArray[np.int64], group: P
     if spread > 0.5:
         return f"damping scatters by {100 * spread:.0f} % between orders"
     return ""
+
+
+def chart_to_json(chart: StabilisationChart) -> dict[str, Any]:
+    """A chart as lists, without vectors."""
+    return {
+        "orders": chart.orders.tolist(),
+        "poles_rad_per_s": np.stack([chart.poles.real, chart.poles.imag], axis=1).round(6).tolist(),
+        "stability": chart.stability.tolist(),
+        "band_hz": list(chart.band),
+    }
+
+
+def chart_from_json(stored: dict[str, Any]) -> StabilisationChart:
+    """The chart that :func:`chart_to_json` stored, without vectors (no figure needs them)."""
+    poles = np.asarray(stored["poles_rad_per_s"], dtype=float).reshape(-1, 2)
+    low, high = stored["band_hz"]
+    return StabilisationChart(
+        np.asarray(stored["orders"], dtype=np.int64),
+        poles[:, 0] + 1j * poles[:, 1],
+        np.asarray(stored["stability"], dtype=np.int64),
+        np.zeros((len(poles), 0), dtype=complex),
+        (float(low), float(high)),
+    )

@@ -1,6 +1,6 @@
 """The page of one kind of TOML file: its tables, each key with type, unit, default and meaning."""
 
-from millfrf.toml_files import DescribedKey, TomlFile, described_tables
+from millfrf.core.described_tables import DescribedKey, TomlFile, described_tables
 
 
 def file_page(file: TomlFile) -> str:

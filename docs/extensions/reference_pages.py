@@ -11,7 +11,7 @@ from typing import Any
 from command_pages import command_page, commands
 from file_pages import file_page
 
-from millfrf.toml_files import toml_files
+from millfrf.new.toml_files import toml_files
 
 ROOMS = (
     "millfrf",

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..terminal import say
+from millfrf.core.terminal import say
 
 
 def acquire(
@@ -27,8 +27,8 @@ def acquire(
 ) -> None:
     """Record from the devices of a session until its duration is over, Stop is pressed or Ctrl-C."""
     from millfrf.core import InputError
+    from millfrf.steps.acquire import open_session
 
-    from ..chain import open_session
     from ..options import check_output
 
     if (out is None) == (not check):
@@ -43,7 +43,7 @@ def acquire(
     if out is None:
         _check(opened.source, seconds)
     elif live:
-        from ..chain import acquire_live
+        from millfrf.steps.acquire import acquire_live
 
         tally = acquire_live(
             opened, out, address=live_address, port=live_port, at_once=at_once, overwrite=force, say=say
@@ -56,9 +56,8 @@ def acquire(
 def _check(source: object, seconds: float) -> None:
     from acquisition import Source
     from millfrf.core import MillfrfError
-
-    from ..chain import listen, preflight
-    from ..tables import show
+    from millfrf.core.terminal import show
+    from millfrf.steps.signal_check import listen, preflight
 
     assert isinstance(source, Source)
     heard = listen(source, seconds)
@@ -75,8 +74,8 @@ def _check(source: object, seconds: float) -> None:
 
 
 def _record(opened: object, out: Path, overwrite: bool) -> None:
-    from ..chain import OpenedSession, acquire
-    from ..progress import bar
+    from millfrf.core.progress import bar
+    from millfrf.steps.acquire import OpenedSession, acquire
 
     assert isinstance(opened, OpenedSession)
     with bar(f"recording {out.name}", opened.source.n_samples) as update:
@@ -85,8 +84,8 @@ def _record(opened: object, out: Path, overwrite: bool) -> None:
 
 
 def _report(tally: object, out: Path) -> None:
-    from ..chain import Tally
-    from ..gate import doubts_of_rate
+    from millfrf.gate import doubts_of_rate
+    from millfrf.steps.acquire import Tally
 
     if not isinstance(tally, Tally):
         say("stopped before Start; nothing was recorded")

@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from millfrf.core.terminal import say, tell
+
 from ..options import Output, check_output, echo_warnings
-from ..terminal import say, tell
 
 
 def calibrate(
@@ -16,11 +17,12 @@ def calibrate(
     out: Output,
 ) -> None:
     """Carry an in-process model from the sensor to the tool tip by two hammer FRFs."""
-    from ..answers import model_answer
-    from ..chain import write_calibration
-    from ..face import calibrate as calibrate_to_tip
-    from ..progress import bar
-    from ..tables import mode_table, show
+    from millfrf.core.progress import bar
+    from millfrf.core.terminal import show
+    from millfrf.report.tables import mode_table
+    from millfrf.steps.answers import model_answer
+    from millfrf.steps.calibrate import write_calibration
+    from millfrf.steps.face_fit import calibrate as calibrate_to_tip
 
     check_output(out, (".json",), [model, tip, sensor])
     result = calibrate_to_tip(model, tip, sensor, progress=bar)

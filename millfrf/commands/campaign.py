@@ -31,11 +31,10 @@ def campaign(
     Results are kept by the content of their inputs: a second run computes only what is new or was left. What fails is
     listed with its reason and hides nothing else; exit code 1 says that tasks are left which the next run tries again.
     """
-    from ..answers import tables_answer
-    from ..campaign import RunOptions, dry_run_lines, run_campaign
-    from ..progress import bar
-    from ..tables import show
-    from ..terminal import say, tell
+    from millfrf.campaign.campaign_run import RunOptions, dry_run_lines, run_campaign
+    from millfrf.core.progress import bar
+    from millfrf.core.terminal import say, show, tell
+    from millfrf.steps.answers import tables_answer
 
     options = RunOptions(out or campaign.with_name(f"{campaign.stem}_results"), scheduler, workers, retry)
     if dry_run:

@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from millfrf.core.terminal import say, tell
+
 from ..options import Stream, check_output, names
-from ..terminal import say, tell
 
 
 def chatter(
@@ -37,23 +38,15 @@ def chatter(
     """
     from math import nan
 
+    from millfrf.core.progress import bar
+    from millfrf.core.provenance import of_chatter
+    from millfrf.core.terminal import show
+    from millfrf.gate import read_checked_cutting
+    from millfrf.report.tables import tone_table, verdict_table
+    from millfrf.stability import write_cuts
+    from millfrf.steps.answers import cuts_answer
+    from millfrf.steps.chatter import CutOptions, doubts_of_cuts, judge_recordings, keep_spectra, stated_runout
     from modal_fit import read_modal_model
-
-    from ..answers import cuts_answer
-    from ..chain import (
-        CutOptions,
-        doubts_of_cuts,
-        judge_recordings,
-        keep_spectra,
-        stated_runout,
-        tone_table,
-        verdict_table,
-        write_cuts,
-    )
-    from ..gate import read_checked_cutting
-    from ..progress import bar
-    from ..provenance import of_chatter
-    from ..tables import show
 
     if out is not None:
         check_output(out, (".json",), [*recordings, cutting, *([] if model is None else [model])])

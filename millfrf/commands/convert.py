@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from millfrf.core.terminal import say, tell
+
 from ..options import check_output
-from ..terminal import say, tell
 
 
 def convert(
@@ -28,10 +29,9 @@ def convert(
     from acquisition import SUFFIXES as CAN_LOGS
     from acquisition import add_can_log
     from millfrf.core import InputError, refuse_replacing
-
-    from ..chain import FRF_SUFFIXES, convert_files, is_frf_conversion, is_uff_conversion
-    from ..progress import bar
-    from ..provenance import made
+    from millfrf.core.progress import bar
+    from millfrf.core.provenance import made
+    from millfrf.steps.convert import FRF_SUFFIXES, convert_files, is_frf_conversion, is_uff_conversion
 
     if len(files) < 2:
         raise InputError(f"{files[0]} alone: give files to read and a file to write: millfrf convert IN... OUT")

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..terminal import note, say
+from millfrf.core.terminal import note, say
 
 DEFAULT = Path("millfrf-demo")
 FILES = {
@@ -48,9 +48,9 @@ def demo(
     if conceal:
         _concealed(out, noise, seed)
         return
-    from ..demonstration import DemoOptions, comparison_tables, run_demo
-    from ..progress import bar
-    from ..tables import show
+    from millfrf.core.progress import bar
+    from millfrf.core.terminal import show
+    from millfrf.steps.demo import DemoOptions, comparison_tables, run_demo
 
     result = run_demo(DemoOptions(out, noise, 0 if seed is None else seed), bar, note)
     for table in comparison_tables(result):
@@ -70,9 +70,9 @@ def _folder(out: Path | None, what: str) -> Path:
 
 
 def _concealed(out: Path, noise: float, seed: int | None) -> None:
-    from ..demonstration import ConcealOptions, concealment_table, run_concealed
-    from ..progress import bar
-    from ..tables import show
+    from millfrf.core.progress import bar
+    from millfrf.core.terminal import show
+    from millfrf.steps.concealment import ConcealOptions, concealment_table, run_concealed
 
     result = run_concealed(ConcealOptions(out, noise, seed), bar, note)
     show(concealment_table(result))
@@ -80,8 +80,8 @@ def _concealed(out: Path, noise: float, seed: int | None) -> None:
 
 
 def _campaign(out: Path, recordings: int, poses: int, seed: int) -> None:
-    from ..campaign import SimulatedCampaign, make_campaign
-    from ..progress import bar
+    from millfrf.campaign.simulated.make import SimulatedCampaign, make_campaign
+    from millfrf.core.progress import bar
 
     make_campaign(SimulatedCampaign(out, recordings, poses, seed), bar)
     say(f"wrote {out}: {recordings} recordings; run it: millfrf campaign {out / 'campaign.toml'}")

@@ -6,9 +6,9 @@ from typing import Annotated
 import typer
 
 from millfrf.core import InputError
+from millfrf.core.terminal import say, tell
 
 from ..options import FigureFormat, Figures, check_band, check_shares
-from ..terminal import say, tell
 
 
 def diagnose(
@@ -47,13 +47,12 @@ def diagnose(
     figure_format: FigureFormat = "svg",
 ) -> None:
     """Locate where a model and recordings disagree, name the physics left out, model it, show that the fit improves."""
+    from millfrf.core.progress import bar
+    from millfrf.gate import read_checked_cutting
     from millfrf.mismatch import LabError, SearchSettings, Settings
-
-    from ..answers import stored_answer
-    from ..gate import read_checked_cutting
-    from ..progress import bar
-    from ..report import asked_figures
-    from ..structure import diagnose_files, nominal_from_simulation
+    from millfrf.report.results_page import asked_figures
+    from millfrf.steps.answers import stored_answer
+    from millfrf.steps.diagnose import diagnose_files, nominal_from_simulation
 
     check_shares("--lab-error", lab_error, (0.01, 0.12, 0.03))
     check_band(band)

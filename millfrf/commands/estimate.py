@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from millfrf.core.terminal import say, tell
+
 from ..options import Band, Output, Responding, Stream, check_band, check_output, echo_warnings, names, size_of
-from ..terminal import say, tell
 
 
 def estimate(
@@ -42,10 +43,10 @@ def estimate(
     and, by feedback, the force; --instrument names what it does not reach. local-polynomial: whole records instead of
     segments, without leakage, for short records and forces that are rough in frequency.
     """
-    from ..answers import frf_answer
-    from ..chain import write_estimate
-    from ..face import estimate as estimate_frf
-    from ..progress import bar
+    from millfrf.core.progress import bar
+    from millfrf.steps.answers import frf_answer
+    from millfrf.steps.estimate import write_estimate
+    from millfrf.steps.face_estimate import estimate as estimate_frf
 
     check_output(out, (".h5", ".hdf5"), recordings)
     result = estimate_frf(

@@ -6,9 +6,9 @@ from typing import Annotated
 import typer
 
 from millfrf.core import InputError
+from millfrf.core.terminal import say, tell
 
 from ..options import Output, Stream, check_band, check_output, echo_warnings, names
-from ..terminal import say, tell
 
 
 def fit(
@@ -47,10 +47,13 @@ def fit(
     heavily damped modes. --poles fits exactly the poles that a file names; --candidates writes the poles to pick from;
     --pick shows them in the browser, and writes such a file.
     """
-    from modal_fit import ModalFit
-
-    from ..answers import model_answer
-    from ..chain import (
+    from millfrf.core.progress import bar
+    from millfrf.core.terminal import show
+    from millfrf.live.picking_server import check_pick, pick_in_browser
+    from millfrf.report.tables import error_table, mode_table
+    from millfrf.steps.answers import model_answer
+    from millfrf.steps.face_fit import fit as fit_model
+    from millfrf.steps.fit import (
         POLYREFERENCE,
         SUBSPACE,
         FitOptions,
@@ -59,10 +62,7 @@ def fit(
         write_candidates,
         write_fit,
     )
-    from ..face import fit as fit_model
-    from ..picking import check_pick, pick_in_browser
-    from ..progress import bar
-    from ..tables import error_table, mode_table, show
+    from modal_fit import ModalFit
 
     check_output(out, (".json",), [*files, *([poles] if poles else [])])
     if candidates is not None:

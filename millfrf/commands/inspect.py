@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..terminal import answer, say, tell
+from millfrf.core.terminal import answer, say, tell
 
 
 def inspect(
@@ -17,10 +17,10 @@ def inspect(
 
     Where forces repeat: their period, the noise between periods, and distortion.
     """
-    from ..answers import inspected
-    from ..inspection import inspect_file
-    from ..progress import bar
-    from ..tables import show
+    from millfrf.core.progress import bar
+    from millfrf.core.terminal import show
+    from millfrf.steps.answers import inspected
+    from millfrf.steps.inspect import inspect_file
 
     findings = inspect_file(file, bar)
     tell(lambda: inspected(file, findings))

@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from millfrf.core.terminal import say, tell
+
 from ..options import Output, check_output, echo_warnings
-from ..terminal import say, tell
 
 
 def lobes(
@@ -30,16 +31,15 @@ def lobes(
     ] = None,
 ) -> None:
     """Stability lobes from a modal model or straight from a measured FRF."""
+    from millfrf.core.file_kinds import MODEL, kind_of
+    from millfrf.core.progress import bar
+    from millfrf.core.provenance import of_lobes
     from millfrf.cutting import read_cutting_process
     from millfrf.stability import write_lobes
+    from millfrf.steps.answers import lobes_answer
+    from millfrf.steps.face_lobes import lobes as lobes_of
+    from millfrf.steps.lobes import draw_lobes_of, lobes_summary, mode_coupling_line
     from modal_fit import read_modal_model
-
-    from ..answers import lobes_answer
-    from ..chain import draw_lobes_of, lobes_summary, mode_coupling_line
-    from ..face import lobes as lobes_of
-    from ..file_kinds import MODEL, kind_of
-    from ..progress import bar
-    from ..provenance import of_lobes
 
     check_output(out, (".csv",))
     if picture is not None:

@@ -5,16 +5,16 @@ from typing import Annotated
 
 import typer
 
-from ..terminal import say, tell
+from millfrf.core.terminal import say, tell
 
 
 def plan(
     session: Annotated[Path, typer.Argument(metavar="SESSION.toml", help="File with tables [cutting] and [plan].")],
 ) -> None:
     """Propose three speed sweeps whose forces are independent, long enough for the FRF error that is wanted."""
-    from ..answers import plan_answer
-    from ..chain import plan_from_file, plan_tables
-    from ..tables import show
+    from millfrf.core.terminal import show
+    from millfrf.steps.answers import plan_answer
+    from millfrf.steps.plan import plan_from_file, plan_tables
 
     found, doubts = plan_from_file(session)
     for doubt in doubts:

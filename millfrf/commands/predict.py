@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from millfrf.core.terminal import say, tell
+
 from ..options import Output, check_output, echo_warnings
-from ..terminal import say, tell
 
 if TYPE_CHECKING:
-    from ..chain import Predicted
+    from millfrf.steps.predict import Predicted
 
 
 def predict(
@@ -19,8 +20,8 @@ def predict(
     stream: Annotated[str | None, typer.Option("--stream", help="Sample clock.")] = None,
 ) -> None:
     """Simulate a recording's forces through a model; print how far measured responses are off."""
-    from ..chain import prediction_lines, write_prediction
-    from ..face import predict as predict_responses
+    from millfrf.steps.face_predict import predict as predict_responses
+    from millfrf.steps.predict import prediction_lines, write_prediction
 
     check_output(out, (".h5",), [recording])
     found = predict_responses(model, recording, stream=stream)

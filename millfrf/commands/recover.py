@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..terminal import answer, say, tell
+from millfrf.core.terminal import answer, say, tell
 
 if TYPE_CHECKING:
     from acquisition import Recovered
@@ -24,10 +24,10 @@ def recover(
     """
     from acquisition import recover as recover_file
     from millfrf.core import free_name
+    from millfrf.core.progress import bar
+    from millfrf.core.provenance import made
 
     from ..options import check_output
-    from ..progress import bar
-    from ..provenance import made
 
     if out is not None:
         check_output(out, (".h5", ".hdf5"), [recording])

@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from millfrf.core.terminal import say
+
 from ..options import Band, FigureFormat, Figures, Output, check_band, check_output
-from ..terminal import say
 
 
 def report(
@@ -30,8 +31,9 @@ def report(
     figure_format: FigureFormat = "svg",
 ) -> None:
     """The modal-fitting report of a test: set-up, settings, modes, figures, lobes, versions."""
-    from ..progress import bar
-    from ..report import ReportOptions, asked_figures, write_report
+    from millfrf.core.progress import bar
+    from millfrf.report.page import ReportOptions, write_report
+    from millfrf.report.results_page import asked_figures
 
     check_output(out, (".html", ".htm"), files)
     if pdf is not None:

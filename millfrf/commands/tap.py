@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from millfrf.core.terminal import say, tell
+
 from ..options import Band, Output, Responding, Stream, check_band, check_output, echo_warnings, names, size_of
-from ..terminal import say, tell
 
 
 def tap(
@@ -49,11 +50,11 @@ def tap(
     one point are averaged; files that hit or measure different points become columns and rows of one matrix. Which
     point was hit is taken from --points, --point, the recording's set-up, or the force channel.
     """
-    from ..answers import frf_answer
-    from ..face import tap as frf_of_taps
-    from ..progress import bar
-    from ..tables import show
-    from ..taps import tap_tables, write_taps
+    from millfrf.core.progress import bar
+    from millfrf.core.terminal import show
+    from millfrf.steps.answers import frf_answer
+    from millfrf.steps.face_estimate import tap as frf_of_taps
+    from millfrf.steps.tap import tap_tables, write_taps
 
     check_output(out, (".h5", ".hdf5"), [*recordings, *([points] if points else [])])
     result = frf_of_taps(

@@ -5,7 +5,7 @@ from .bands import Band, checked_band, shared_band
 from .degrees_of_freedom import HOUSING, TIP, DegreeOfFreedom, checked_names
 from .errors import DiskFull, FileFormatError, InputError, MillfrfError, MillfrfWarning, TooLarge, conversion_advice
 from .leftovers import LeftoverRemoved, remove_leftovers
-from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library, same_values
+from .results import Result, Summary, counted, doubts_line, drawing, listed, optional_library
 from .runtime import allowed_bytes, end_with, notices_to, process_pool, require_memory
 from .tables import apart, checked_toml, mistake_in_words, warning_lines
 from .units import SI_UNITS, si_factor, unit_factor
@@ -57,7 +57,6 @@ __all__ = [
     "refuse_replacing",
     "remove_leftovers",
     "require_memory",
-    "same_values",
     "shared_band",
     "si_factor",
     "unit_factor",

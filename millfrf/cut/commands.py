@@ -5,8 +5,9 @@ from typing import Annotated
 
 import typer
 
+from millfrf.core.terminal import say, tell
+
 from ..options import FigureFormat, Figures
-from ..terminal import say, tell
 from ..usage import framed
 
 cut_app = typer.Typer(
@@ -48,9 +49,9 @@ def diagnose(
     figure_format: FigureFormat = "svg",
 ) -> None:
     """Which physics does the computed cutting force leave out: runout, regenerative feedback, process damping?"""
-    from ..answers import stored_answer
-    from ..report import asked_figures
-    from .diagnosing import Asking, diagnose_cut_files
+    from millfrf.report.results_page import asked_figures
+    from millfrf.steps.answers import stored_answer
+    from millfrf.steps.cut_diagnose import Asking, diagnose_cut_files
 
     asking = Asking(depth, speed, model, coefficient_error, force_error, stream)
     drawn = asked_figures(figures, figure_format)

@@ -1,14 +1,81 @@
-"""FRFs that a job uses: ordered axes, coherence from 0 to 1, some motion, sign convention, passive drive points."""
+"""Checks of FRFs and of the inputs that they are estimated from."""
+
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
-from estimation import Frf
-from millfrf.core import Band, InputError, shared_band
+from estimation import (
+    RANK_TOLERANCE,
+    BandRecording,
+    CrossSpectra,
+    Frf,
+    bands_text,
+    input_independence,
+    local_half_width,
+    spectra_for_judging,
+    sum_tests,
+)
+from millfrf.core import Band, InputError, Real, shared_band
 
-from .incoherence import incoherence_doubts
-from .passivity import DrivePoint, drive_points, returned_power, rising_phase
-from .reciprocity import check_reciprocity
-from .sizes import size_doubts
+from .clocks import check_sample_rates, gain_of
+from .passivity import POWERS, DrivePoint, check_reciprocity, drive_points, returned_power, rising_phase, size_doubts
+
+COHERENT = 0.5
+"""Coherence from which a line says something of the structure; `estimate` states the band of such lines."""
+
+KNOWN = 0.5
+"""Share of a response's energy on such lines below which it is doubted."""
+
+
+def incoherence_doubts(frf: Frf) -> list[str]:
+    """Judge the coherence of an FRF without covariance or averages.
+
+    The random error of a value from n averages is ``sqrt((1 - c) / (2 n c))`` of it, c being the coherence (Bendat &
+    Piersol, Random Data, 4th ed., section 9.2.4). Where n is known, or a covariance, fit and limits carry that error;
+    where it is not, nothing that is made of the FRF knows that it is mostly noise.
+
+    Parameters
+    ----------
+    frf
+        Lines that are valid and in its stated band are judged, weighted by the energy of the mobility.
+
+    Returns
+    -------
+    list of str
+        One doubt with the responses whose energy lies mostly on lines of a coherence below a half; empty where there
+        is none, or where nothing is known of the coherence.
+    """
+    coherence = _coherence(frf)
+    if coherence is None or frf.entry_variance() is not None:
+        return []
+    low, high = frf.band or (0.0, np.inf)
+    f = frf.frequencies
+    inside = frf.valid & (f > 0) & (f >= low) & (f <= high)
+    weight = np.where(f > 0, f, 1.0) ** (2 * POWERS.get(frf.quantity, 0))
+    energy = (np.abs(frf.values) ** 2 * weight[:, None, None])[inside]
+    known = coherence[inside]
+    energy = np.where(np.isnan(known), 0.0, energy)
+    total = energy.sum(axis=(0, 2))
+    coherent = (energy * (known >= COHERENT)).sum(axis=(0, 2))
+    poor = [p for p in range(len(frf.responses)) if total[p] > 0 and coherent[p] < KNOWN * total[p]]
+    if not poor:
+        return []
+    share = 100 * (1 - coherent[poor].sum() / total[poor].sum())
+    names = ", ".join(frf.responses[p] for p in poor)
+    return [
+        f"{names}: {share:.0f} % of the motion lies on lines whose coherence is below {COHERENT:g} (median "
+        f"{np.nanmedian(known[:, poor]):.2g}), and the FRF gives neither a covariance nor averages: what is made of "
+        "it does not know its errors; average more, or give the averages and the coherence of each entry"
+    ]
+
+
+def _coherence(frf: Frf) -> Real | None:
+    """Give the coherence of each entry, (n_frequencies, n_responses, n_excitations): multiple, else ordinary."""
+    if frf.multiple_coherence is not None:
+        return np.broadcast_to(frf.multiple_coherence[:, :, None], frf.values.shape)
+    return frf.coherence
+
 
 RISING = 0.5
 """Share of the phase's weighted steps that may rise; measured structures have below 0.02, conjugates above 0.98."""
@@ -141,3 +208,155 @@ def _against(frf: Frf, point: DrivePoint, share: float, name: str) -> str:
         "the sign of one of the two channels, exchange force and response if their names are swapped, or correct the "
         "unit if it is another quantity"
     )
+
+
+DRIVEN = 1e-4
+"""A line is driven where the power of one of the inputs is above this share of that input's largest."""
+
+LEAST_SHARE = 0.5
+"""Share of the driven lines on which a fit needs independent inputs; below it the model guesses most of the band."""
+
+
+def driven_lines(spectra: CrossSpectra) -> NDArray[np.bool_]:
+    """Lines above 0 Hz on which the inputs have power at all, each input weighed by its own largest.
+
+    Returns
+    -------
+    (n_frequencies,), bool
+    """
+    power = np.real(np.einsum("kii->ki", spectra.input_spectra))
+    largest = power.max(axis=0)
+    share = np.max(power / np.where(largest > 0, largest, 1.0), axis=1)
+    return np.asarray((share > DRIVEN) & (spectra.frequencies > 0))
+
+
+def check_inputs(total: CrossSpectra, band: Band | None = None, least_share: float = 0.0) -> list[str]:
+    """Judge rank and condition of the stacked inputs on the lines that they drive.
+
+    Parameters
+    ----------
+    total
+        Spectra of all tests, summed.
+    band
+        Lines that the job uses, Hz; None: all.
+    least_share
+        Share of the driven lines on which the inputs must be independent. 0, for an FRF that is estimated line by line:
+        one line is enough, and the others are flagged as not valid. :data:`LEAST_SHARE` for a fit over the band.
+
+    Returns
+    -------
+    list of str
+        Doubts: bands in which the inputs are dependent or nearly so.
+
+    Raises
+    ------
+    InputError
+        An input without any power, no driven line in the band, or dependent inputs on more of them than the job bears.
+    """
+    f = total.frequencies
+    inside = np.ones(len(f), dtype=bool) if band is None else (f >= band[0]) & (f <= band[1])
+    _refuse_silent(total, inside)
+    driven = driven_lines(total) & inside
+    if not driven.any():
+        where = "" if band is None else f" between {band[0]:g} and {band[1]:g} Hz"
+        raise InputError(f"the inputs have no power on any line{where}; check the excitation channels")
+    lines = f[driven]
+    judged = input_independence(total, (float(lines[0]), float(lines[-1])))
+    good = judged.independent & driven
+    share = float(good.sum() / driven.sum())
+    if share == 0 or share < least_share:
+        raise InputError(_dependent(total, driven, share, driven & ~judged.independent))
+    return list(judged.warnings)
+
+
+def check_band_recordings(
+    recordings: Sequence[BandRecording], band: Band, names: Sequence[str], rates: Sequence[float]
+) -> list[str]:
+    """Judge the inputs and the sample rates of recordings that are fitted together.
+
+    Their spectra are those of :func:`estimation.spectra_for_judging`.
+
+    Parameters
+    ----------
+    recordings
+        Records of one set-up.
+    band : Hz
+        Lowest and highest frequency of the fit.
+    names, rates
+        Names of the recordings they were made from, and their sample rates (Hz) as the files state them.
+
+    Raises
+    ------
+    InputError
+        As :func:`check_inputs` and :func:`millfrf.gate.clocks.check_sample_rates`.
+    """
+    tests = spectra_for_judging(recordings)
+    doubts = check_sample_rates([gain_of(*each) for each in zip(tests, names, rates, strict=True)])
+    return doubts + check_inputs(sum_tests(tests), band, LEAST_SHARE)
+
+
+def _refuse_silent(total: CrossSpectra, inside: NDArray[np.bool_]) -> None:
+    power = np.real(np.einsum("kii->ki", total.input_spectra))[inside & (total.frequencies > 0)]
+    silent = [channel.name for channel, one in zip(total.excitations, power.T, strict=True) if not (one > 0).any()]
+    if silent and len(silent) < len(total.excitations):
+        raise InputError(
+            f"excitation {', '.join(silent)} has no power in any test: no FRF can be had for it; check its cable, or "
+            "name the others with --excitation"
+        )
+
+
+def _dependent(total: CrossSpectra, driven: NDArray[np.bool_], share: float, bad: NDArray[np.bool_]) -> str:
+    n_inputs, lines = len(total.excitations), total.frequencies[driven]
+    if share == 0:
+        where = f"every line they drive ({lines[0]:.4g} to {lines[-1]:.4g} Hz)"
+    else:
+        where = f"{100 * (1 - share):.0f} % of the lines they drive ({bands_text(total.frequencies, bad)})"
+    return (
+        f"the {n_inputs} inputs are dependent on {where} in {total.n_tests} test{'s' if total.n_tests != 1 else ''} of "
+        f"{total.n_segments} segments (an input direction has less than {RANK_TOLERANCE:g} of the power): give at "
+        f"least {n_inputs} tests with different immersions, porous material, or shorter segments"
+    )
+
+
+NOISY = 0.3
+"""Standard error of the whole matrix on a line, over its size, from which a line is told."""
+
+SHARE = 0.02
+"""Share of the lines that may be so without a word."""
+
+
+def check_local_frf(frf: Frf, n_tests: int) -> list[str]:
+    """Doubt the error bars of fits to a local-polynomial FRF, and lines on which it hardly saw the structure.
+
+    The transient of a record is smooth in frequency; so is a slow sweep's force. What cannot be told apart has large
+    error bars, which a fit takes into account and a reader of the curves should know of.
+
+    Parameters
+    ----------
+    frf
+        FRF with the covariance that :func:`estimation.local_polynomial` gives.
+    n_tests
+        Number of records behind it.
+    """
+    lines = 2 * local_half_width(n_tests, len(frf.excitations)) + 1
+    shared = (
+        f"errors of {lines} neighbouring lines are correlated (a window of local polynomials): a fit's error bars are "
+        f"too small by up to {np.sqrt(lines):.0f} times"
+    )
+    return [shared, *_noisy_lines(frf)]
+
+
+def _noisy_lines(frf: Frf) -> list[str]:
+    variance = frf.entry_variance()
+    if variance is None or not frf.valid.any():
+        return []
+    size = np.sqrt(np.sum(np.abs(frf.values) ** 2, axis=(1, 2)))
+    error = np.sqrt(np.sum(variance, axis=(1, 2)))
+    noisy = frf.valid & (error > NOISY * size)
+    if noisy.sum() <= SHARE * frf.valid.sum():
+        return []
+    return [
+        f"on {int(noisy.sum())} of {int(frf.valid.sum())} lines ({bands_text(frf.frequencies, noisy)}) the standard "
+        f"error is above {100 * NOISY:.0f} % of the FRF: the force is weak there, or too smooth in frequency for local "
+        "polynomials, as that of a slow sweep; compare with --estimator h1"
+    ]

@@ -1,4 +1,4 @@
-"""Hammer tests: recordings with taps in them, taps that can be used, and an FRF that they carry."""
+"""Checks of hammer tests."""
 
 import os
 import re
@@ -10,11 +10,10 @@ import numpy as np
 from acquisition import Stream
 from estimation import Decay, FoundTaps, Frf, MergedTaps, TapSettings, TapTest
 from millfrf.core import InputError
+from millfrf.core.progress import Progress, silent
 
-from ..progress import Progress, silent
 from .frfs import check_frf
-from .looking import doubts_of
-from .recordings import check_channels
+from .recordings import check_channels, doubts_of
 
 CUT_OFF = 0.02
 """Share of the answer at the segment's end above which it is said that it is cut off."""

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from estimation import Frf
 from millfrf.core import InputError
+from millfrf.core.provenance import read_provenance
 from modal_fit import ModalModel
 
-from ..provenance import read_provenance
 from .frfs import check_frf
 
 CHI_SQUARE = 2.0

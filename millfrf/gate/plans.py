@@ -6,8 +6,7 @@ from estimation import SweepDemand, SweepPlan
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess
 
-from .cutting_data import MOST_RADIANS
-from .spindle import MOST_RPM, check_depth
+from .cutting_data import MOST_RADIANS, MOST_RPM, check_depth
 
 SLOWEST_RPM = 1.0
 """Below it no spindle turns evenly."""

@@ -1,19 +1,155 @@
-"""Recordings that a job uses: signals that are alive, whole, of this world and each their own."""
+"""Checks of recordings: signals that are alive, complete, plausible and distinct."""
 
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from acquisition import Recording, Stream
-from estimation import choose_channels
+from estimation import choose_channels, find_taps
 from millfrf.core import InputError
+from millfrf.core.progress import Progress, silent
+from millfrf.core.provenance import sha256
 
-from ..progress import Progress, silent
 from .clocks import check_clock_of, clock_concerns
-from .several import check_several
 from .signals import ChannelLevel, Look, look, rate_concerns
-from .taps_in_segments import Segmentation, refuse_taps
+
+
+def check_several(paths: Sequence[str | os.PathLike[str]]) -> None:
+    """Refuse a recording that is given twice, under one name or as a copy: it would count as two tests.
+
+    Raises
+    ------
+    InputError
+        With both names.
+    """
+    by_size: dict[int, list[Path]] = {}
+    for path in (Path(path) for path in paths):
+        if path.is_file():
+            by_size.setdefault(path.stat().st_size, []).append(path)
+    for alike in (group for group in by_size.values() if len(group) > 1):
+        seen: dict[str, Path] = {}
+        for path in alike:
+            first = seen.setdefault(sha256(path), path)
+            if first is not path:
+                raise InputError(f"{path.name} is the same recording as {first.name}; give each test once")
+
+
+T = TypeVar("T")
+
+
+def doubts_of(check: Callable[[T, str], list[str]], given: T, name: str) -> list[str]:
+    """Collect the doubts of a check; a refusal counts as one more doubt.
+
+    Parameters
+    ----------
+    check
+        Check of the gate, a function of what is given and of the name of its file.
+    given, name
+        Object that is checked, and the name of its file.
+    """
+    try:
+        return check(given, name)
+    except InputError as error:
+        return [str(error)]
+
+
+IMPULSIVE = 12.0
+"""Peak over standard deviation above which a force is taken for taps of a hammer; a cut has less than 6."""
+
+LONGEST = 900.0
+"""Seconds beyond which a recording is no hammer test."""
+
+SUSPECT = 5.0
+"""Peak over standard deviation from which a force is looked at: one tap in a short record has little more."""
+
+STANDS_OUT = 12.0
+"""Peak over the force's middle magnitude from which pulses stand in quiet: a cut has below 5."""
+
+DUTY = 0.1
+"""Share of the time in contact, at most; teeth of a light cut have about as much."""
+
+MANY = 10.0
+"""Taps a segment from which they are a random force, as segments and windows are made for."""
+
+EARLY = 0.25
+"""Share of a segment within which a tap must lie if the segment is to hold its answer."""
+
+
+@dataclass(frozen=True)
+class Segmentation:
+    """Segments into which a job cuts a recording.
+
+    Parameters
+    ----------
+    seconds : s
+        Duration of a segment.
+    overlap
+        Share that a segment has in common with the next.
+    window
+        Name of the window.
+    """
+
+    seconds: float
+    overlap: float
+    window: str
+
+
+def refuse_taps(stream: Stream, levels: Sequence[ChannelLevel], cut: Segmentation) -> None:
+    """Refuse a recording of hammer taps whose force and answer the segments would weigh differently.
+
+    A window is large in its middle, wherever the tap is: it can make the answer many times larger than the force, with
+    a coherence of one. Segments without window and overlap hold where each begins just before a tap.
+
+    Raises
+    ------
+    InputError
+        With the number of taps and the command that is made for them.
+    """
+    if stream.duration > LONGEST:
+        return
+    for level in levels:
+        if level.channel.quantity != "force" or level.n_missing or level.peak < SUSPECT * level.deviation:
+            continue
+        force = np.concatenate([block[:, 0] for block in stream.blocks(channels=[level.channel.name])])
+        if not _tapped(force, stream.sample_rate, cut.seconds):
+            continue
+        times = np.array([tap.time for tap in find_taps(force, stream.sample_rate)])
+        if cut.window == "boxcar" and cut.overlap == 0 and _early(times, stream.duration, cut.seconds):
+            continue
+        raise InputError(
+            f"{stream.path.name}: the force on {level.channel.name} comes in {len(times)} "
+            f"tap{'s' if len(times) != 1 else ''} of a hammer; segments of {cut.seconds:g} s {_harm(cut)}: use "
+            "'millfrf tap', which cuts at the taps"
+        )
+
+
+def _harm(cut: Segmentation) -> str:
+    if cut.window == "boxcar":
+        return "begin anywhere between them, so that answers are cut off and counted without their tap"
+    return f"under a {cut.window} window weigh a tap and its answer differently: the FRF would be wrong many times over"
+
+
+def _tapped(force: NDArray[np.float64], sample_rate: float, seconds: float) -> bool:
+    """Say whether a force is a few pulses in quiet."""
+    size = np.abs(force - np.median(force))
+    if size.max() <= STANDS_OUT * 1.4826 * np.median(size):
+        return False
+    pushed = size > 0.2 * size.max()
+    pulses = int(np.sum(np.diff(pushed.astype(np.int8)) > 0)) + int(pushed[0])
+    a_segment = pulses * min(1.0, seconds * sample_rate / len(force))
+    return bool(pushed.mean() < DUTY and a_segment < MANY)
+
+
+def _early(times: NDArray[np.float64], duration: float, seconds: float) -> bool:
+    """Say whether each tap that lies in a whole segment lies at its beginning."""
+    whole = times[times < np.floor(duration / seconds) * seconds]
+    return bool(((whole % seconds) < EARLY * seconds).all())
+
 
 BELIEVED = {
     "force": 1e7,

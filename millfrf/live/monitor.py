@@ -11,19 +11,15 @@ from numpy.typing import NDArray
 
 from acquisition import Block, Channel, Events, StreamDescription
 from estimation import Frf
-from millfrf.core import InputError
+from millfrf.core import InputError, Real
 
-from .enough import BandProgress, band_progress
-from .session import SPEED_EVENTS, MilledSpeeds, SessionTests, SetUp, Standing
-from .spectra import GrownSpectra, LiveSpectra
-from .stacked_frf import StackedFrf, stack
-from .traces import TraceBuffer
+from .spectra import BandProgress, GrownSpectra, LiveSpectra, StackedFrf, TraceBuffer, band_progress, stack
+from .standing import SessionTests, Standing
+from .tests_of_session import SPEED_EVENTS, MilledSpeeds, SetUp
 
 _WAITING = 64
 _OVERLOAD = 0.999
 _FINISHING = 2.0  # s
-
-Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -39,7 +35,7 @@ class LiveSettings:
     segment : s
         Duration of a segment.
     relative_error, absolute_error
-        Wanted standard deviation of the FRF, see :func:`millfrf.live.enough.band_progress`.
+        Wanted standard deviation of the FRF, see :func:`millfrf.live.spectra.band_progress`.
     n_bands
         Number of bands for which progress is told.
     teeth

@@ -1,5 +1,1 @@
 """`millfrf new`: a commented file to begin with, filled in from what there is."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ..terminal import say
+from millfrf.core.terminal import say
 
 Out = Annotated[Path, typer.Option("--out", metavar="FILE.toml", help="File to write.")]
 
@@ -29,8 +29,7 @@ def new_cut(
     plan: Annotated[bool, typer.Option("--plan", help="Add the table of a plan of speed sweeps.")] = False,
 ) -> None:
     """Write a commented cutting file; what only you know is left out, and lobes name it as missing."""
-    from .making import cut_text
-    from .writing_new import write_new
+    from .templates import cut_text, write_new
 
     write_new(out, cut_text(teeth, diameter, plan=plan))
     say(f"wrote {out}; fill in what is marked FILL IN, then: millfrf lobes MODEL.json --cutting {out} ...")
@@ -44,8 +43,7 @@ def new_session(
     ] = 6,
 ) -> None:
     """Write a commented session file for `millfrf acquire`."""
-    from .making import session_text
-    from .writing_new import write_new
+    from .templates import session_text, write_new
 
     write_new(out, session_text(driver.value, channels))
     say(f"wrote {out}; fill in what is marked FILL IN, then: millfrf acquire {out} --check")
@@ -61,8 +59,7 @@ def new_campaign(
     ] = None,
 ) -> None:
     """Write a commented campaign file for `millfrf campaign`."""
-    from .making import campaign_text
-    from .writing_new import write_new
+    from .templates import campaign_text, write_new
 
     write_new(out, campaign_text(files, robot))
     say(f"wrote {out}; fill in what is marked FILL IN, then: millfrf campaign {out} --dry-run")
@@ -73,8 +70,9 @@ def new_schemas(
 ) -> None:
     """Write a JSON schema of each TOML file, for editors that complete and check keys."""
     from millfrf.core import writing_whole_folder
+    from millfrf.core.described_tables import json_schema
 
-    from ..toml_files import json_schema, toml_files
+    from .toml_files import toml_files
 
     with writing_whole_folder(out) as folder:
         for file in toml_files():

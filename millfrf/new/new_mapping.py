@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..terminal import say
+from millfrf.core.terminal import say
 
 
 def new_mapping(
@@ -13,8 +13,8 @@ def new_mapping(
     out: Annotated[Path, typer.Option("--out", metavar="MAP.toml", help="Mapping to write.")],
 ) -> None:
     """Write a commented mapping with the columns, units and sample rate that a file tells."""
-    from .making import mapping_for
-    from .writing_new import write_new
+    from .mapping_file import mapping_for
+    from .templates import write_new
 
     made = mapping_for(file)
     write_new(out, made.text)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ..terminal import say
+from millfrf.core.terminal import say
 
 Triple = tuple[float, float, float]
 
@@ -63,7 +63,7 @@ def new_robot(
     ] = None,
 ) -> None:
     """Write a robot file: joints, bodies with full inertias, tool, spindle; what is assumed is marked."""
-    from .making import Asked, write_new_robot
+    from .robot_file import Asked, write_new_robot
 
     asked = Asked(
         dh,

@@ -1,7 +1,9 @@
-"""Read the files of a report and find out which belongs to which."""
+"""Files of a report, and which of them belong together."""
 
+import gc
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -9,14 +11,12 @@ from typing import Any
 from acquisition import Recording
 from estimation import Frf, Geometry, read_frf, read_geometry
 from millfrf.core import InputError
+from millfrf.core.file_kinds import CHATTER, CUTTING, FRF, GEOMETRY, LOBES, MODEL, RECORDING, kind_of
+from millfrf.core.provenance import read_provenance, sha256
 from millfrf.cutting import MillingProcess
-from millfrf.stability import StabilityLobes, read_lobes
+from millfrf.gate import Given, check_belonging, read_checked_cutting
+from millfrf.stability import KeptCut, StabilityLobes, read_cuts, read_lobes
 from modal_fit import ModalModel, read_modal_model
-
-from ..chain import KeptCut, read_cuts
-from ..file_kinds import CHATTER, CUTTING, FRF, GEOMETRY, LOBES, MODEL, RECORDING, kind_of
-from ..gate import Given, check_belonging, read_checked_cutting
-from ..provenance import read_provenance, sha256
 
 
 @dataclass(frozen=True)
@@ -135,3 +135,18 @@ def _source(path: Path) -> SourceFile:
     if kind == CUTTING:
         stored = {"warnings": read_checked_cutting(path)[1]}
     return SourceFile(path, kind, sha256(path), stored)
+
+
+@contextmanager
+def collection_paused() -> Iterator[None]:
+    """Search for no unused objects inside the block.
+
+    A figure makes enough objects to set off several full searches, each through all objects of the libraries (0.2 s).
+    """
+    running = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if running:
+            gc.enable()

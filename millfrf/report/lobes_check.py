@@ -3,17 +3,14 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimation import Frf, to_receptance
-from millfrf.core import InputError
+from millfrf.core import InputError, Real
 from millfrf.cutting import MillingProcess
 from millfrf.stability import StabilityLobes, certified_lobes, zero_order
 from modal_fit import ModalModel
 
 from .collection import Collected, SourceFile
-
-Real = NDArray[np.float64]
 
 FEW = 9
 """Speeds at which it is found out what a file is of."""

@@ -7,37 +7,27 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from estimation import read_geometry
+from millfrf.core.file_kinds import GEOMETRY, MODEL
+from millfrf.core.progress import Progress, silent
+from millfrf.core.provenance import sha256, versions
+from millfrf.gate import check_frf, check_model, check_model_reciprocity, check_reciprocity, doubts_of, stored_doubts
 from modal_fit import ModalModel, read_modal_model
 
-from ..file_kinds import GEOMETRY, MODEL
-from ..gate import (
-    check_frf,
-    check_model,
-    check_model_reciprocity,
-    check_reciprocity,
-    doubts_of,
-    stored_doubts,
-)
-from ..progress import Progress, silent
-from ..provenance import sha256, versions
 from .collection import Collected, SourceFile, collect
-from .pages import FigureFiles, ResultsPage, write_results_page, write_results_pdf
+from .paper import write_results_pdf
+from .results_page import FigureFiles, ResultsPage, write_results_page
 from .section import Section
-from .sections import (
+from .sections.frfs import frf_section
+from .sections.measurement import (
     channel_section,
-    chatter_in_brief,
-    chatter_section,
-    comparison_section,
     file_section,
-    frf_section,
     hammer_section,
-    input_section,
-    mode_section,
     reciprocity_section,
     settings_section,
     setup_section,
-    stability_findings,
 )
+from .sections.results import comparison_section, input_section, mode_section
+from .sections.stability import chatter_in_brief, chatter_section, stability_findings
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import numpy as np
 from estimation import Frf
 from millfrf.core import TIP, InputError
 from millfrf.cutting import MillingProcess
+from millfrf.gate import check_band_of_lobes, limits_inside_band
 from millfrf.stability import (
     LimitBand,
     RecommendedCut,
@@ -22,7 +23,6 @@ from millfrf.stability import (
 from modal_fit import ModalModel, Residuals
 from replay_data import Settling, settle
 
-from ..gate import check_band_of_lobes, limits_inside_band
 from .lobes_check import CheckedLobes
 
 CONFIDENCE, DRIFT = 0.95, 0.02

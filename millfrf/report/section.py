@@ -5,9 +5,8 @@ from typing import Literal
 
 from matplotlib.figure import Figure
 
+from millfrf.core.terminal import Table
 from millfrf.figures import MovingShapes, SmallSvg, ZoomedPlot, as_data_uri
-
-from ..tables import Table
 
 
 @dataclass(frozen=True)

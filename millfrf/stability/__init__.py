@@ -4,7 +4,8 @@ from .certification import certified_lobes
 from .chatter.classify import classify_cut
 from .chatter.evidence import gather_evidence
 from .chatter.fitted_depth import ModelledCut
-from .chatter.verdict import ChatterVerdict, CutSpectrum, ForeignTone, cut_spectrum
+from .chatter.judged_cuts import JudgedCut, KeptCut, read_cuts, write_cuts
+from .chatter.verdict import ChatterVerdict, CutSpectrum, cut_spectrum
 from .floquet.multipliers import multipliers
 from .lobes_result import STATUSES, StabilityLobes, read_lobes, write_lobes
 from .milling_loop import delay_system, with_static_high_modes
@@ -22,7 +23,8 @@ __all__ = [
     "STATUSES",
     "ChatterVerdict",
     "CutSpectrum",
-    "ForeignTone",
+    "JudgedCut",
+    "KeptCut",
     "LimitBand",
     "LimitSensitivity",
     "ModeCouplingLimit",
@@ -48,10 +50,12 @@ __all__ = [
     "multi_frequency",
     "multipliers",
     "nyquist_limits",
+    "read_cuts",
     "read_lobes",
     "semi_discretisation",
     "with_residual_flexibility",
     "with_static_high_modes",
+    "write_cuts",
     "write_lobes",
     "zero_order",
 ]

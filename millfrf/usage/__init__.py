@@ -1,5 +1,24 @@
-"""What is typed: examples in every help, lists of numbers, and mistakes in our words."""
+"""Command lines as typed: examples, number lists, former names, messages of the parser."""
 
-import lazy_loader
+from .examples import EXAMPLES, commands_in, with_examples
+from .former_names import FORMER_NAMES, with_names_of_today
+from .framing import ANSWERING, FOLDERS, OWN_FOLDER, WRITING, framed, option_names
+from .number_lists import options_of_several, with_lists_apart
+from .parser_words import usage_in_words
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__all__ = [
+    "ANSWERING",
+    "EXAMPLES",
+    "FOLDERS",
+    "FORMER_NAMES",
+    "OWN_FOLDER",
+    "WRITING",
+    "commands_in",
+    "framed",
+    "option_names",
+    "options_of_several",
+    "usage_in_words",
+    "with_examples",
+    "with_lists_apart",
+    "with_names_of_today",
+]

@@ -10,8 +10,7 @@ import typer
 from typer.models import OptionInfo
 
 from millfrf.core import keeping_files, notices_to, refuse_replacing
-
-from ..terminal import aside, print_document, speaking
+from millfrf.core.terminal import aside, print_document, speaking
 
 WRITING = ("--out", "--picture", "--table", "--report", "--candidates", "--figures", "--pdf", "--pick")
 """Options that name a file or folder to write."""

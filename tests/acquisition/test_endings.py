@@ -12,8 +12,8 @@ import pytest
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from millfrf.__main__ import run
-from millfrf.chain.measuring.record_session import acquire, open_session
 from millfrf.core import MillfrfError
+from millfrf.steps.acquire import acquire, open_session
 
 RunWithDaqmx = Callable[..., subprocess.CompletedProcess[str]]
 SESSION = """

@@ -14,8 +14,8 @@ from acquisition import HOST_AXIS, Block, Channel, Events, Recording, StreamDesc
 from acquisition.errors import Disconnected
 from acquisition.sources.timing import Stamped, SteadyStamps
 from millfrf.__main__ import run
-from millfrf.chain.measuring.record_session import acquire, open_session
 from millfrf.core import InputError
+from millfrf.steps.acquire import acquire, open_session
 
 STREAM = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))
 REPLAY = '[device]\ndriver = "replay"\nfile = "whole.h5"\nspeed = 1.0\n'

@@ -139,7 +139,7 @@ class Rig:
 
 def main(drivers: Path, port: int) -> None:
     from millfrf.__main__ import run
-    from millfrf.chain import acquire, open_session
+    from millfrf.steps.acquire import acquire, open_session
 
     Path("s.toml").write_text(SESSION % port)
     Path("cell.dbc").write_text(DBC)

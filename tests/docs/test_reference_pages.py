@@ -11,8 +11,8 @@ import pytest
 import typer
 
 from millfrf.__main__ import app
-from millfrf.toml_files import TomlFile, toml_files
-from millfrf.toml_files.json_schemas import schemas_in
+from millfrf.core.described_tables import TomlFile, schemas_in
+from millfrf.new.toml_files import toml_files
 
 EXTENSIONS = Path(__file__).resolve().parents[2] / "docs" / "extensions"
 

@@ -9,7 +9,7 @@ import pytest
 
 from acquisition import Recording
 from estimation import read_frf
-from millfrf.new.making import mapping_for
+from millfrf.new.mapping_file import mapping_for
 from millfrf.stability import read_lobes
 from modal_fit import read_modal_model
 from tests.docs.page_runner import ROOT, run_page

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from millfrf.core import InputError, Result, Summary, listed, optional_library, same_values
+from millfrf.core import InputError, Result, Summary, listed, optional_library
+from millfrf.core.results import same_values
 
 
 @dataclass(frozen=True, eq=False, repr=False)

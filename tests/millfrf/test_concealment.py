@@ -7,9 +7,16 @@ from typing import Any
 import pytest
 
 from millfrf.core import InputError
-from millfrf.demonstration.concealment import ConcealOptions, run_concealed
-from millfrf.demonstration.concealment_result import concealment_table, direction_error, judgement
-from millfrf.demonstration.seal import PADDED, open_seal, seal
+from millfrf.steps.concealment import (
+    PADDED,
+    ConcealOptions,
+    concealment_table,
+    direction_error,
+    judgement,
+    open_seal,
+    run_concealed,
+    seal,
+)
 from replay_data import FOREIGN, ConcealedEffect
 
 CONTENT = {"name": "backlash", "direction": [0.6, 0.0, 0.8], "parameters": {"half_gap_m": 1e-5}}

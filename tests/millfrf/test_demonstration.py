@@ -13,7 +13,7 @@ import pytest
 
 import millfrf as mf
 from estimation import read_frf
-from millfrf.demonstration.whole_chain import (
+from millfrf.steps.demo import (
     FIT_BAND,
     SUBSPACE_BAND,
     DemoOptions,
@@ -22,7 +22,7 @@ from millfrf.demonstration.whole_chain import (
     nearest_modes,
     run_demo,
 )
-from millfrf.structure import diagnose_files
+from millfrf.steps.diagnose import diagnose_files
 from modal_fit import read_modal_model
 from replay_data import default_structure, table_one_model, tip_model
 

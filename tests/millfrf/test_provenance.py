@@ -3,8 +3,8 @@
 import tomllib
 from pathlib import Path
 
+from millfrf.core.provenance import origin, with_warnings
 from millfrf.mismatch import Settings
-from millfrf.provenance import origin, with_warnings
 
 
 def test_warnings_of_two_jobs_stand_in_one_table() -> None:

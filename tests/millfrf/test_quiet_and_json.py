@@ -12,7 +12,7 @@ import typer
 from estimation import write_frf
 from millfrf.__main__ import app, run
 from millfrf.core import writing_whole_file
-from millfrf.terminal import answer, note, plain, say, speaking, tell
+from millfrf.core.terminal import answer, note, plain, say, speaking, tell
 from millfrf.usage import ANSWERING, commands_in, framed
 from modal_fit import ModalModel, write_modal_model
 

@@ -8,8 +8,7 @@ import pytest
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
 from millfrf.__main__ import run
-from millfrf.tables import Table, show
-from millfrf.terminal import say
+from millfrf.core.terminal import Table, say, show
 
 ROOT = Path(__file__).resolve().parents[2]
 NAMES = ("acc x [g]", "[/]", "[red]x", "[link=http://a.example]y", ":bomb:", "z\x1b[2Jz")
@@ -76,7 +75,7 @@ def _replayed(recording: Path) -> str:
 def test_a_bar_shows_its_description_as_it_stands(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from millfrf import progress
+    from millfrf.core import progress
 
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("TERM", "xterm")
@@ -102,13 +101,13 @@ def test_nothing_else_in_the_program_prints_through_rich() -> None:
         for file in room.rglob("*.py")
         if re.search(r"^\s*(from|import) rich\b", file.read_text(encoding="utf-8"), re.MULTILINE)
     ]
-    assert users == ["millfrf/terminal/rich_output.py"]
+    assert users == ["millfrf/core/terminal.py"]
 
 
 def test_every_line_of_an_answer_passes_the_terminal() -> None:
     """`typer.echo` and `print` would carry a channel's control characters to the screen."""
     root = ROOT / "millfrf"
-    allowed = {"terminal/saying.py", "__main__.py", "hidden_packages.py"}
+    allowed = {"core/terminal.py", "__main__.py"}
     past = [
         f"{path.relative_to(root)}:{number}"
         for path in sorted(root.rglob("*.py"))
@@ -116,7 +115,7 @@ def test_every_line_of_an_answer_passes_the_terminal() -> None:
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
         if re.match(r"\s*(typer\.echo|print|click\.echo)\(", line)
     ]
-    assert not past, f"print with millfrf.terminal.say: {past}"
+    assert not past, f"print with millfrf.core.terminal.say: {past}"
 
 
 def test_a_warning_goes_to_standard_error_without_control_characters(capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from estimation import BandRecording
 from millfrf.mismatch import AcceptedCause, StructureDiagnosis
-from millfrf.structure.diagnosis_words import diagnosis_lines
+from millfrf.steps.diagnose import diagnosis_lines
 from modal_fit import ModalModel
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from millfrf import diagnose
 from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.steps.face_diagnose import diagnose
 from millfrf.usage import with_lists_apart
 
 Ask = Callable[..., tuple[int, str, str]]

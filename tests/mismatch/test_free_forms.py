@@ -43,7 +43,7 @@ from millfrf.mismatch.structure.freed_laws_proved import (
     freed_from_nothing,
 )
 from millfrf.mismatch.structure.held_out import held_out_improvement, recordings_of
-from millfrf.structure.diagnosis_words import diagnosis_lines
+from millfrf.steps.diagnose import diagnosis_lines
 from modal_fit import read_modal_model, write_modal_model
 
 LEVELS = (10.0, 20.0, 40.0)

@@ -17,7 +17,7 @@ from millfrf.mismatch.noise.noise_model import fit_noise
 from millfrf.mismatch.records.bands import compared_band, compared_lines
 from millfrf.mismatch.records.held_out_parts import with_measured_noise
 from millfrf.mismatch.records.reading import band_of
-from millfrf.structure.diagnosis_words import diagnosis_lines
+from millfrf.steps.diagnose import diagnosis_lines
 from modal_fit import read_modal_model
 
 

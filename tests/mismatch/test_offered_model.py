@@ -17,8 +17,8 @@ from millfrf.mismatch import (
     predict,
     write_diagnosis,
 )
-from millfrf.report.diagnoses.diagnosis_answers import how_sure
-from millfrf.structure.diagnosis_words import diagnosis_lines
+from millfrf.report.diagnoses.answers import how_sure
+from millfrf.steps.diagnose import diagnosis_lines
 
 LEVELS = (20.0, 40.0, 60.0)
 

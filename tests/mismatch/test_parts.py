@@ -1,7 +1,7 @@
 """The diagnosis' parts: derivatives, noise, time loop, library."""
 
 from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -100,10 +100,8 @@ def test_an_elastic_plastic_element_follows_its_loop(lines: WindowedSpectrum) ->
     assert force[62] == pytest.approx(10 - 10 * (3 - x[62]), abs=1e-9)
 
 
-def test_every_cause_is_a_short_file_with_its_source() -> None:
-    folder = Path(physics_folder.__file__).parent
-    for name, cause in physics_folder.library().items():
-        assert len((folder / f"{name}.py").read_text().splitlines()) < 150
+def test_every_cause_states_its_equation_and_source() -> None:
+    for cause in physics_folder.library().values():
         assert cause.equation
         assert cause.source
         assert all(other in physics_folder.library() or other == "modal_parameters" for other in cause.confusable_with)
@@ -134,9 +132,10 @@ PHYSICS = Toy()
 """
 
 
-def test_a_new_cause_is_one_file_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "toy_square_root.py").write_text(TOY)
-    monkeypatch.setattr(physics_folder, "__path__", [*physics_folder.__path__, str(tmp_path)])
+def test_a_new_cause_is_one_entry_of_the_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    defined: dict[str, Any] = {}
+    exec(TOY, defined)
+    monkeypatch.setattr(physics_folder, "CAUSES", (*physics_folder.CAUSES, defined["PHYSICS"]))
     toy = physics_folder.library()["toy_square_root"]
     assert isinstance(toy, physics_folder.JointPhysics)
 

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 from estimation import windowed_spectrum
-from millfrf.chain.fitting.fit import fit_recordings
-from millfrf.chain.fitting.fit_options import FitOptions
 from millfrf.mismatch import (
     Hypothesis,
     LabError,
@@ -24,6 +22,7 @@ from millfrf.mismatch import (
 from millfrf.mismatch.faults.clipping_repair import repair_faults
 from millfrf.mismatch.records.held_out_parts import with_measured_noise
 from millfrf.mismatch.records.reading import in_deflections
+from millfrf.steps.fit import FitOptions, fit_recordings
 
 pytestmark = pytest.mark.shared_data
 

@@ -12,11 +12,10 @@ from estimation import read_frf
 from millfrf.__main__ import BAD_INPUT, DONE, run
 from millfrf.core import apart
 from millfrf.cutting import MillingProcess
-from millfrf.robot.depth_maps.depth_map import depth_limits
-from millfrf.robot.depth_maps.posture_maps import depth_over_places, depth_over_redundancy
-from millfrf.robot.robot_lobes import at_the_tip
 from millfrf.robot_model import modal_model_at, read_planar_robot, read_spatial_robot, rigid_model, tool_down
 from millfrf.stability import certified_lobes, multipliers, read_lobes
+from millfrf.steps.robot.lobes import at_the_tip
+from millfrf.steps.robot.maps import depth_limits, depth_over_places, depth_over_redundancy
 from modal_fit import read_modal_model
 from replay_data import MillingCell
 

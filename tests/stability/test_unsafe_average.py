@@ -14,7 +14,7 @@ from drawn_cuts import RPM, TIP, growth
 
 from millfrf.__main__ import run
 from millfrf.cutting import MillingProcess, write_cutting_process
-from millfrf.report import collect
+from millfrf.report.collection import collect
 from millfrf.report.lobes_check import checked_lobes
 from millfrf.report.recommendation import recommendation
 from millfrf.report.sections.stability import stability_findings

@@ -1,19 +1,19 @@
-"""`write_summary`: the table of modes and the report of a campaign, from the results of its sets."""
+"""The table of modes of a campaign as CSV and Parquet, and its report."""
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from millfrf.core import InputError, Real, optional_library, warning_lines, writing_whole_file
+from millfrf.core.provenance import origin
+from millfrf.report.results_page import ResultsPage, write_results_page
+from millfrf.report.section import Section
 
-from millfrf.core import InputError, writing_whole_file
-
-from ...provenance import origin
-from ...report import ResultsPage, Section, write_results_page
-from .drift import Drifts, Labels, Outliers, Series, drifts_and_outliers, labels_of, series_of
+from .drift import Drifts
 from .identity import IdentifiedModes, identify_modes
-from .measured_set import NOT_STATED, MeasuredSet
+from .outliers import Outliers, drifts_and_outliers
 from .page import (
     all_failures,
     drift_section,
@@ -27,10 +27,90 @@ from .page import (
 )
 from .pictures import map_plane, tip_positions
 from .postures import FILE, PostureCoverage, contradiction_words, coverage_of, posture_section
-from .read_set import SetResults, read_set
-from .table import mode_rows, write_mode_tables
+from .regression import Labels, labels_of
+from .sets import NOT_STATED, Cell, MeasuredSet, SetResults, mode_rows, read_set
+from .trends import Series, series_of
 
-Real = NDArray[np.float64]
+PURPOSE, EXTRA = "the table of a campaign", "cluster"
+
+WHOLE_NUMBERS = ("mode_of_set", "mode")
+"""Columns of whole numbers, empty where a set has no mode or a mode could not be told."""
+
+WORDS = (
+    "set",
+    "pose",
+    "recorded_at",
+    "mode_doubt",
+    "depth_limit_status",
+    "verdict",
+    "recordings",
+    "doubts",
+    "failures",
+)
+"""Columns of text; labels are text where one of their values is, and every other column holds numbers."""
+
+
+def write_mode_tables(
+    folder: Path, rows: Sequence[Mapping[str, Cell]], provenance: Mapping[str, Any], warnings: Sequence[str]
+) -> None:
+    """Write both files into a folder.
+
+    Parameters
+    ----------
+    folder
+        Folder of the files; older ones are replaced.
+    rows
+        Rows with equal columns, see :func:`mode_rows`.
+    provenance
+        Origin of the table; the line ``# provenance:`` of the CSV, and ``millfrf.provenance`` in the Parquet's schema.
+    warnings
+        Doubts about the whole table; lines ``# warning:`` and ``millfrf.warnings``.
+
+    Raises
+    ------
+    InputError
+        pandas or pyarrow are not installed, or the folder cannot be written to.
+    """
+    pd = optional_library("pandas", PURPOSE, EXTRA)
+    arrow = optional_library("pyarrow", PURPOSE, EXTRA)
+    parquet = optional_library("pyarrow.parquet", PURPOSE, EXTRA)
+    frame = _typed(pd.DataFrame(list(rows), columns=list(rows[0]) if rows else ["set"]))
+    with (
+        writing_whole_file(folder / "modes.csv") as temporary,
+        temporary.open("w", encoding="utf-8", newline="") as file,
+    ):
+        file.writelines(warning_lines(warnings))
+        file.write(f"# provenance: {json.dumps(dict(provenance))}\n")
+        frame.to_csv(file, index=False, float_format="%.10g", lineterminator="\n")
+    table = arrow.Table.from_pandas(frame, preserve_index=False)
+    stated = {
+        "millfrf.format": "millfrf.modes 1",
+        "millfrf.provenance": json.dumps(dict(provenance)),
+        "millfrf.warnings": json.dumps(list(warnings)),
+    }
+    table = table.replace_schema_metadata({**(table.schema.metadata or {}), **stated})
+    with writing_whole_file(folder / "modes.parquet") as temporary:
+        parquet.write_table(table, temporary)
+
+
+def _typed(frame: Any) -> Any:
+    """Give each column one type: whole numbers, numbers, or text."""
+    for name in frame.columns:
+        values = [value for value in frame[name] if value is not None]
+        if name in WHOLE_NUMBERS:
+            frame[name] = frame[name].astype("Int64")
+        elif name in WORDS or any(isinstance(value, str) for value in values):
+            frame[name] = ["" if value is None else _as_text(value) for value in frame[name]]
+        else:
+            frame[name] = frame[name].astype("float64")
+    return frame
+
+
+def _as_text(value: Cell) -> str:
+    """A label as text, where one value of its column is; a missing one is empty."""
+    if isinstance(value, float):
+        return "" if value != value else f"{value:.10g}"
+    return str(value)
 
 
 @dataclass(frozen=True)

@@ -1,23 +1,202 @@
-"""`make_campaign`: a campaign as a laboratory would have it, without hardware."""
+"""Simulated campaigns with hidden effects, without hardware."""
 
-from dataclasses import dataclass
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from millfrf.core import InputError, process_pool, writing_whole_folder
+from estimation import Frf, FrfCovariance, write_frf
+from millfrf.core import HOUSING, TIP, InputError, process_pool, writing_whole_folder
+from millfrf.core.progress import Progress, silent
+from millfrf.cutting import write_cutting_process
 from millfrf.robot_model import named_posture, read_spatial_robot
+from modal_fit import ModalModel, write_modal_model
+from replay_data import select
 
-from ...progress import Progress, silent
-from .at_rest import write_idle_model, write_taps
-from .campaign_files import write_campaign_files
-from .concealed import write_concealed
-from .hidden import drawn_drift
-from .recordings import Laboratory, write_recording
-from .schedule import PlannedRecording, drawn_schedule, sessions_of
-from .true_robot import drawn_robot
-from .work_area import spread_postures
+from .recordings import CUTTER, Laboratory, drawn_drift, write_recording
+from .true_robot import (
+    LESS_LOSS_PER_KELVIN,
+    REFERENCE_TEMPERATURE,
+    SOFTER_PER_KELVIN,
+    Condition,
+    PlannedRecording,
+    drawn_robot,
+    drawn_schedule,
+    pose_name,
+    sessions_of,
+    spread_postures,
+)
+
+LINES = np.arange(5.0, 150.0 + 0.125, 0.25)
+"""Frequencies of the hammer FRFs, Hz: taps 4 s apart."""
+
+HAMMER_NOISE = 0.01
+"""Noise of a hammer FRF over the root mean square of its row, after averaging."""
+
+BAND = (8.0, 95.0)
+"""Band of the models at rest, Hz."""
+
+OFF = (0.002, 0.04, 0.02)
+"""Relative errors of the laboratory's own models: frequency, damping ratio, shape."""
+
+
+def write_taps(laboratory: Laboratory, pose: int, folder: Path, seed: int) -> None:
+    """Hammer FRFs ``<pose>_tip.h5`` and ``<pose>_housing.h5``, accelerance with its covariance."""
+    structure = laboratory.true.structure(laboratory.postures[pose], Condition(idle=True))
+    generator = np.random.default_rng([seed, pose, 1])
+    for place, responses in (("tip", TIP), ("housing", HOUSING)):
+        model = select(structure, responses, TIP)
+        write_frf(folder / f"{pose_name(pose)}_{place}.h5", _tapped(model, generator))
+
+
+def _tapped(model: ModalModel, generator: np.random.Generator) -> Frf:
+    omega = 2 * np.pi * LINES[:, None, None]
+    exact = -(omega**2) * model.receptance(LINES)
+    size = HAMMER_NOISE * np.sqrt(np.mean(np.abs(exact) ** 2, axis=(0, 2)))
+    noise = generator.standard_normal((2, *exact.shape)) * size[:, None] / np.sqrt(2)
+    n_lines, n_excitations = len(LINES), exact.shape[2]
+    covariance = FrfCovariance(
+        np.tile(np.diag(size**2).astype(complex), (n_lines, 1, 1)),
+        np.tile(np.eye(n_excitations, dtype=complex), (n_lines, 1, 1)),
+    )
+    return Frf(
+        LINES,
+        exact + noise[0] + 1j * noise[1],
+        model.responses,
+        model.excitations,
+        "accelerance",
+        "m/s^2/N",
+        np.ones(n_lines, dtype=bool),
+        covariance=covariance,
+        band=(float(LINES[0]), float(LINES[-1])),
+    )
+
+
+def write_idle_model(laboratory: Laboratory, pose: int, folder: Path, seed: int) -> None:
+    """Model of the robot at rest, ``<pose>.json``, at the housing, with the errors of a laboratory's own fit."""
+    structure = laboratory.true.structure(laboratory.postures[pose], Condition(idle=True))
+    generator = np.random.default_rng([seed, pose, 2])
+    own = select(structure, HOUSING, TIP)
+    low = own.natural_frequencies < BAND[1]
+    count = int(low.sum())
+    natural = 2 * np.pi * own.natural_frequencies[low] * (1 + OFF[0] * generator.standard_normal(count))
+    ratios = own.damping_ratios[low] * (1 + OFF[1] * generator.standard_normal(count))
+    shape = own.right[low] * (1 + OFF[2] * generator.standard_normal(own.right[low].shape))
+    poles = natural * (-ratios + 1j * np.sqrt(1 - ratios**2))
+    model = ModalModel(poles, shape, own.left[low], own.responses, own.excitations)
+    write_modal_model(folder / f"{pose_name(pose)}.json", replace(model, band=BAND))
+
+
+CUT = "cut.toml"
+
+CAMPAIGN = f"""# A simulated campaign: poses x immersions x sessions of a milling robot. What is hidden in it
+# stands in concealed.json.
+[campaign]
+title = "Simulated campaign on a {{robot}}"
+robot = "{{robot}}"
+
+[[recordings]]
+files = ["recordings/*.h5"]
+pattern = "(?P<pose>P\\\\d+)_(?P<immersion>[a-z]+)_(?P<session>\\\\d+)"
+
+[recordings.setup]
+posture_deg = "robot.posture_deg"
+temperature_c = "conditions.temperature_c"
+level = "conditions.level"
+
+# Recordings of one pose, session and level are stacked: three immersions make the forces independent.
+[sets]
+by = ["pose", "session", "level"]
+
+[fit]
+method = "subspace"
+band_hz = [{BAND[0]}, {BAND[1]}]
+
+[calibrate]
+tip = "taps/{{{{pose}}}}_tip.h5"
+sensor = "taps/{{{{pose}}}}_housing.h5"
+
+[lobes]
+cutting = "{CUT}"
+speeds_rpm = [1200, 2400, 5]
+max_depth_m = 0.02
+
+[diagnose]
+model = "idle/{{{{pose}}}}.json"
+by = ["pose"]
+
+[learn]
+
+[report]
+"""
+
+
+def write_campaign_files(folder: Path, robot: str) -> None:
+    """Write both files into the campaign's folder."""
+    (folder / "campaign.toml").write_text(CAMPAIGN.format(robot=robot), encoding="utf-8")
+    write_cutting_process(folder / CUT, CUTTER)
+
+
+FORMAT = "millfrf.concealed_campaign"
+
+
+def write_concealed(path: Path, laboratory: Laboratory, planned: Sequence[PlannedRecording], seed: int) -> None:
+    """Write what was hidden, which files are broken, and the true modes of every pose."""
+    true, drift = laboratory.true, laboratory.drift
+    constants = {
+        name: np.asarray(getattr(true, name)).tolist() for name in ("stiffening", "wave", "phase", "loss", "friction")
+    }
+    content: dict[str, Any] = {
+        "format": FORMAT,
+        "format_version": 1,
+        "seed": seed,
+        "robot": laboratory.robot,
+        "joints": [joint.frame for joint in true.driven_joints()],
+        "stiffness_at_light_load_nm_per_rad": [float(joint.stiffness[5]) for joint in true.driven_joints()],
+        **constants,
+        "drift": {
+            "pose": pose_name(drift.pose),
+            "joint": drift.joint,
+            "stiffness_factor_in_each_session": list(drift.factors),
+            "frequency_hz_in_each_session": [_softened(laboratory, factor) for factor in drift.factors],
+        },
+        "temperature": {
+            "reference_c": REFERENCE_TEMPERATURE,
+            "stiffness_lost_per_kelvin": SOFTER_PER_KELVIN,
+            "loss_lost_per_kelvin": LESS_LOSS_PER_KELVIN,
+        },
+        "level": "no property of the robot depends on the level",
+        "broken": [{"file": f"recordings/{one.name}.h5", "fault": one.fault} for one in planned if one.fault],
+        "poses": [_pose(laboratory, number) for number in range(len(laboratory.postures))],
+        "recordings": [asdict(one) for one in planned],
+    }
+    path.write_text(json.dumps(content, indent=1), encoding="utf-8")
+
+
+def _softened(laboratory: Laboratory, factor: float) -> list[float]:
+    """True frequencies of the drifting pose at the reference temperature, Hz."""
+    condition = Condition(joint_factors={laboratory.drift.joint: factor})
+    found = laboratory.true.structure(laboratory.postures[laboratory.drift.pose], condition).natural_frequencies
+    return [float(value) for value in found[found < BAND[1]]]
+
+
+def _pose(laboratory: Laboratory, number: int) -> dict[str, Any]:
+    """True modes at the tip below the band's end, at the reference temperature, without drift."""
+    q = laboratory.postures[number]
+    model = select(laboratory.true.structure(q, Condition()), TIP, TIP)
+    low = model.natural_frequencies < BAND[1]
+    return {
+        "pose": pose_name(number),
+        "posture_deg": np.degrees(q).round(3).tolist(),
+        "frequency_hz": model.natural_frequencies[low].tolist(),
+        "damping_ratio": model.damping_ratios[low].tolist(),
+        "mass_normalised_shape": model.right.real[low].tolist(),
+    }
+
 
 ROBOT = "kuka_kr90_r3100"
 WORKERS = 2

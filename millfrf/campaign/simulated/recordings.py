@@ -1,4 +1,4 @@
-"""One recording of the simulated campaign: cell, notes, file."""
+"""Recordings of a simulated campaign, with hidden effects and faults."""
 
 import math
 from collections.abc import Sequence
@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquisition import RecordingWriter
+from millfrf.core import Real
 from millfrf.cutting import MillingProcess
+from millfrf.robot_model import modes_at
 from replay_data import (
     SWEEP_IMMERSIONS,
     ConstantSpeed,
@@ -21,12 +22,83 @@ from replay_data import (
     setup_text,
 )
 
-from .faults import clipped_sensors, spoil
-from .hidden import HiddenDrift
-from .schedule import LEVEL_TEST, PlannedRecording, pose_name
-from .true_robot import TrueRobot
+from .true_robot import LEVEL_TEST, Condition, PlannedRecording, TrueRobot, energy_shares, pose_name
 
-Real = NDArray[np.float64]
+SOFTENING = 0.035
+"""Share of a joint's stiffness that is lost from the first session to the last."""
+
+LOW_MODES = 6
+"""Modes that the recordings show."""
+
+
+@dataclass(frozen=True)
+class HiddenDrift:
+    """A joint that softens where the robot stands in one pose: a worn place of its gear.
+
+    Parameters
+    ----------
+    pose
+        Number of the pose, from 0.
+    joint
+        Frame of the joint.
+    factors : (n_sessions,)
+        Factor on the joint's stiffness in each session.
+    """
+
+    pose: int
+    joint: str
+    factors: tuple[float, ...]
+
+    def condition(self, planned: PlannedRecording) -> Condition:
+        """The robot's state in a recording."""
+        softer = {self.joint: self.factors[planned.session - 1]} if planned.pose == self.pose else {}
+        return Condition(planned.temperature, softer)
+
+
+def drawn_drift(true: TrueRobot, postures: Real, sessions: int, generator: np.random.Generator) -> HiddenDrift:
+    """Draw the pose, and take the joint that holds most of the energy of one of its low modes."""
+    pose = int(generator.integers(len(postures)))
+    shares = energy_shares(true.robot, modes_at(true.robot, postures[pose]))[:LOW_MODES, :-1]
+    joint = true.driven_joints()[int(np.argmax(shares.max(axis=0)))].frame
+    lost = SOFTENING * np.arange(sessions) / (sessions - 1)
+    return HiddenDrift(pose, joint, tuple(float(value) for value in 1 - lost))
+
+
+KEPT = 0.55
+"""Share of a truncated file that is left."""
+
+SECTOR = 4096
+"""Bytes of a bad sector."""
+
+CLIPPED_AT = 0.5
+"""Full scale of the clipped force over its largest value."""
+
+CLIPPED = "fy"
+
+
+def clipped_sensors(cell: MillingCell) -> tuple[Sensor, ...]:
+    """The cell's sensors with a range of one force that its peaks pass."""
+    names = [sensor.name for sensor in cell.sensors]
+    peak = float(np.abs(cell.samples()[:, names.index(CLIPPED)]).max())
+    return tuple(
+        replace(sensor, full_scale=round(CLIPPED_AT * peak, 1)) if sensor.name == CLIPPED else sensor
+        for sensor in cell.sensors
+    )
+
+
+def spoil(path: Path, fault: str | None, cell: MillingCell) -> None:
+    """Spoil a recording of a cell that was written whole."""
+    if fault == "no HDF5 file":
+        names = ";".join(sensor.name for sensor in cell.sensors)
+        np.savetxt(path, cell.samples(), fmt="%.4f", delimiter=";", header=names, comments="")
+        return
+    content = path.read_bytes()
+    if fault == "truncated":
+        path.write_bytes(content[: int(KEPT * len(content))])
+    elif fault == "damaged block":
+        middle = len(content) // 2 // SECTOR * SECTOR
+        path.write_bytes(content[:middle] + bytes(SECTOR) + content[middle + SECTOR :])
+
 
 RPM = math.pi / 30
 

@@ -1,24 +1,29 @@
-"""`TrueRobot`: the robot that is milled with, of which the robot's file knows only a part."""
+"""The robot of a simulated campaign, its work area, and the schedule of recordings."""
 
+import datetime
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.stats import qmc
 
-from millfrf.core import HOUSING, TIP
+from millfrf.core import HOUSING, TIP, InputError, Real
 from millfrf.robot_model import (
+    Mechanism,
     SpatialRobot,
     StructureModes,
     gravity_torques,
     housing_node,
     modes_at,
     structure_at,
+    target_of,
+    tool_down,
+    tool_postures,
     with_tool_spring,
 )
 from modal_fit import ModalModel
-
-Real = NDArray[np.float64]
+from replay_data import SWEEP_IMMERSIONS
 
 ABOUT_AXIS = 5
 """Rotation about its own axis among a joint's six motions."""
@@ -42,7 +47,7 @@ TOOL_COMPLIANCE, TOOL_MASS = 3e-8, 1.0
 SENSOR = np.array([0.06, -0.04, 0.25])
 """Place of the accelerometers from the tip, m, in the base frame: they are glued to the spindle housing."""
 
-HIGHEST = 1000.0
+TRUE_ROBOT_HIGHEST = 1000.0
 """Modes up to here are simulated, Hz; the recordings hold what lies below half their sample rate."""
 
 SOFTER_PER_KELVIN, LESS_LOSS_PER_KELVIN = 1.0e-3, 8e-3
@@ -181,8 +186,200 @@ def _model(robot: SpatialRobot, modes: StructureModes, ratios: Real) -> ModalMod
     tip = modes.shapes[:, modes.structure.tip, :3]
     held = modes.shapes[:, housing_node(robot)]
     natural = np.sqrt(modes.squares)
-    kept = (natural < 2 * np.pi * HIGHEST) & (ratios < 1)
+    kept = (natural < 2 * np.pi * TRUE_ROBOT_HIGHEST) & (ratios < 1)
     damped = (natural * np.sqrt(1 - np.minimum(ratios, 0.99) ** 2))[kept]
     right = np.hstack([tip, held[:, :3] + np.cross(held[:, 3:], SENSOR)])[kept].astype(complex)
     poles = -(ratios * natural)[kept] + 1j * damped
     return ModalModel(poles, right, tip[kept] / (2j * damped[:, None]), (*TIP, *HOUSING), TIP)
+
+
+LOWEST = np.array([1.1, -0.8, 0.5, 110.0])
+WORK_AREA_HIGHEST = np.array([2.1, 0.8, 1.2, 250.0])
+"""Work area: place of the tool tip in the base frame, m, and turn about the tool, degrees; 180 leaves joint 6 at 0."""
+
+MARGIN = np.radians(5.0)
+"""Distance that is kept from the joints' limits, rad."""
+
+DIGITS = 3
+"""Decimals of the angles, degrees, as a robot's controller shows them."""
+
+
+def spread_postures(mechanism: Mechanism, ready: Real, count: int, generator: np.random.Generator) -> Real:
+    """Postures over the work area, each the branch nearest to ``ready``.
+
+    Places are a scrambled Halton sequence; those that the tool does not reach within the limits are left out.
+
+    Parameters
+    ----------
+    mechanism
+        Kinematics of the robot.
+    ready : (n_driven,), rad
+        Posture from which branches are chosen.
+    count
+        Number of postures.
+    generator
+        Random generator that scrambles the sequence.
+
+    Returns
+    -------
+    (count, n_driven), rad
+        Angles, whole thousandths of a degree.
+
+    Raises
+    ------
+    InputError
+        The robot reaches too few places of the area.
+    """
+    halton = qmc.Halton(len(LOWEST), rng=generator)
+    found: list[Real] = []
+    for _ in range(20 * count):
+        x, y, z, turn = LOWEST + (WORK_AREA_HIGHEST - LOWEST) * halton.random(1)[0]
+        target = target_of(tool_down([x, y, z], float(np.radians(turn))))
+        branches = [q for q in tool_postures(mechanism, target, ready) if _inside(mechanism, q)]
+        if branches:
+            nearest = min(branches, key=lambda q: float(np.abs(q - ready).max()))
+            found.append(np.radians(np.round(np.degrees(nearest), DIGITS)))
+        if len(found) == count:
+            return np.array(found)
+    raise InputError(f"the robot reaches {len(found)} of {count} places of the work area; ask for fewer poses")
+
+
+def _inside(mechanism: Mechanism, q: Real) -> bool:
+    frames = [mechanism.frames[index] for index in mechanism.moving]
+    return all(frame.lower + MARGIN < value < frame.upper - MARGIN for frame, value in zip(frames, q, strict=True))
+
+
+LEVEL_TEST = "porous"
+"""A slot in porous material at another level: its random forces are independent in one recording."""
+
+FULL_LEVEL, OTHER_LEVEL = 1.0, 0.5
+"""Depth of cut over that of the sweeps."""
+
+FAULTS = ("truncated", "no HDF5 file", "damaged block", "clipped", "wrong posture")
+"""What is wrong with the broken files: see :mod:`millfrf.campaign.simulated.recordings`."""
+
+FIRST_DAY = datetime.datetime(2026, 3, 2, 8, tzinfo=datetime.UTC)
+DAYS_BETWEEN, MINUTES_A_POSE, MINUTES_A_RECORDING = 7, 20, 4
+MEAN_TEMPERATURES, WARMER_BY_EVENING = (17.0, 26.0), 5.0
+"""Mean of a day, degrees Celsius, and how much a hall and a robot warm up in eight hours."""
+
+LEAST_POSES, LEAST_A_POSE = len(FAULTS) + 1, 6
+
+
+@dataclass(frozen=True)
+class PlannedRecording:
+    """One recording of the campaign.
+
+    Parameters
+    ----------
+    name
+        Name of the file, without its suffix.
+    pose
+        Number of the pose, from 0.
+    immersion
+        One of :data:`replay_data.SWEEP_IMMERSIONS`, or :data:`LEVEL_TEST`.
+    session
+        Number of the session, from 1.
+    level
+        Depth of cut over that of the sweeps.
+    temperature : degrees Celsius
+        Temperature at the time.
+    recorded_at
+        Time of the recording, ISO 8601, UTC.
+    seed
+        Seed of noise and pores.
+    fault
+        One of :data:`FAULTS`, or None.
+    """
+
+    name: str
+    pose: int
+    immersion: str
+    session: int
+    level: float
+    temperature: float
+    recorded_at: str
+    seed: int
+    fault: str | None
+
+
+def pose_name(number: int) -> str:
+    """Name of a pose, from its number, from 0.
+
+    Examples
+    --------
+    >>> pose_name(6)
+    'P07'
+    """
+    return f"P{number + 1:02d}"
+
+
+def sessions_of(recordings: int, poses: int) -> tuple[int, int]:
+    """How many sessions of three immersions, and recordings at another level, each pose has.
+
+    Raises
+    ------
+    InputError
+        Numbers that do not divide, or too few.
+
+    Examples
+    --------
+    >>> sessions_of(200, 20)
+    (3, 1)
+    """
+    if poses < LEAST_POSES:
+        raise InputError(f"{poses} poses are too few for {len(FAULTS)} broken files and a drift: give {LEAST_POSES}")
+    each, rest = divmod(recordings, poses)
+    if rest or each < LEAST_A_POSE:
+        raise InputError(
+            f"{recordings} recordings in {poses} poses: give a multiple of the poses, {LEAST_A_POSE} or more a pose, "
+            f"for example {10 * poses}"
+        )
+    return divmod(each, len(SWEEP_IMMERSIONS))
+
+
+def drawn_schedule(
+    recordings: int, poses: int, drifting: int, generator: np.random.Generator
+) -> list[PlannedRecording]:
+    """Draw days, orders and temperatures; put the faults into five poses other than the drifting one.
+
+    Parameters
+    ----------
+    recordings, poses
+        Numbers of recordings and poses.
+    drifting
+        Number of the pose with the drift, which keeps whole files.
+    generator
+        Random generator that draws it all.
+    """
+    sessions, others = sessions_of(recordings, poses)
+    spoilt = generator.choice([p for p in range(poses) if p != drifting], len(FAULTS), replace=False).tolist()
+    places = {
+        (pose, int(generator.integers(1, sessions + 1)), str(generator.choice(list(SWEEP_IMMERSIONS)))): fault
+        for pose, fault in zip(spoilt, FAULTS, strict=True)
+    }
+    planned: list[PlannedRecording] = []
+    for session in range(1, sessions + 1):
+        mean = generator.uniform(*MEAN_TEMPERATURES)
+        tests = list(product(SWEEP_IMMERSIONS, [FULL_LEVEL]))
+        if session == sessions:
+            tests += [(LEVEL_TEST, OTHER_LEVEL)] * others
+        for turn, pose in enumerate(generator.permutation(poses).tolist()):
+            for number, (immersion, level) in enumerate(tests):
+                minutes = MINUTES_A_POSE * turn + MINUTES_A_RECORDING * number
+                when = FIRST_DAY + datetime.timedelta(days=DAYS_BETWEEN * (session - 1), minutes=minutes)
+                again = f"_{number - len(SWEEP_IMMERSIONS) + 1}" if number > len(SWEEP_IMMERSIONS) else ""
+                planned.append(
+                    PlannedRecording(
+                        f"{pose_name(pose)}_{immersion}_{session}{again}",
+                        pose,
+                        immersion,
+                        session,
+                        level,
+                        round(mean + WARMER_BY_EVENING * minutes / 480, 1),
+                        when.isoformat(timespec="seconds"),
+                        int(generator.integers(1 << 31)),
+                        places.get((pose, session, immersion)),
+                    )
+                )
+    return planned

@@ -29,15 +29,7 @@ from .measuring_chain import (
     GAIN_ERROR,
     UNMEASURED_EXCITATION,
 )
-from .protocol import (
-    ChainPhysics,
-    FaultPhysics,
-    JointPhysics,
-    Parameter,
-    Physics,
-    answer_name,
-    axes_of,
-)
+from .protocol import ChainPhysics, FaultPhysics, JointPhysics, Parameter, Physics, answer_name, axes_of
 from .structural import GYROSCOPIC_COUPLING, MISSING_MODE, MODAL_PARAMETERS, NON_PROPORTIONAL_DAMPING
 
 SHORT = {"N": "n", "N m": "nm", "V": "v", "m/s^2": "m_per_s2", "m": "m", "rad": "rad"}

@@ -1,19 +1,21 @@
-"""The sections on the measurement: files, set-up, channels, settings."""
+"""Sections on the measurement: files, set-up, channels, taps, reciprocity."""
 
 import tomllib
 from collections.abc import Mapping
 from typing import Any
 
 from acquisition import Recording
-from millfrf.figures import time_figure
+from estimation import reciprocity_pairs
+from millfrf.core.progress import Progress
+from millfrf.core.terminal import Table
+from millfrf.figures import reciprocity_figure, time_figure
+from millfrf.gate import level_table, look, shown_pairs
+from millfrf.steps.tap import tap_concerns
+from millfrf.steps.test_spectra import LOCAL
 
-from ...chain import LOCAL
-from ...gate import level_table, look
-from ...progress import Progress
-from ...tables import Table
-from ...taps import tap_concerns
 from ..collection import Collected, SourceFile
 from ..section import Picture, Section, picture_of
+from ..tables import pair_table, vector_table
 
 MOST_OVERVIEWS = 4
 
@@ -135,3 +137,67 @@ def _settings(made: Mapping[str, Any]) -> tuple[str, ...]:
         names = [source["file"] for source in made["sources"]]
         return (f"imported from {names[0]}" + (f" and {len(names) - 1} more" if len(names) > 1 else ""), *[""] * 5)
     return ("",) * 6
+
+
+MOST = 60
+"""Taps left out that are listed."""
+
+
+def hammer_section(collected: Collected) -> Section:
+    """Taps used and left out, file by file, and why, of each FRF that ``millfrf tap`` made."""
+    tables = []
+    for file, _ in collected.frfs:
+        if file.provenance.get("step") == "tap":
+            taps = file.provenance["taps"]
+            tables.append(_counts(file.path.name, taps))
+            if any(tap["left_out"] for tap in taps):
+                tables.append(_left_out(file.path.name, taps))
+    return Section("Hammer tests", tables=tuple(tables))
+
+
+def _counts(name: str, taps: list[dict[str, Any]]) -> Table:
+    rows = []
+    for recording, point in dict.fromkeys((tap["file"], tap["hit"]) for tap in taps):
+        of_it = [tap for tap in taps if (tap["file"], tap["hit"]) == (recording, point)]
+        used = [tap for tap in of_it if not tap["left_out"]]
+        peaks = [abs(tap["peak_n"]) for tap in used]
+        span = f"{min(peaks):.4g} to {max(peaks):.4g}" if peaks else ""
+        rows.append((recording, point, str(len(of_it)), str(len(used)), span))
+    return Table(f"{name}: taps", ("recording", "hit at", "found", "used", "peaks used (N)"), tuple(rows))
+
+
+def _left_out(name: str, taps: list[dict[str, Any]]) -> Table:
+    rows = [
+        (tap["file"], f"{tap['time_s']:.3f}", f"{abs(tap['peak_n']):.4g}", tap["left_out"])
+        for tap in taps
+        if tap["left_out"]
+    ]
+    note = f" (the first {MOST} of {len(rows)})" if len(rows) > MOST else ""
+    return Table(f"{name}: taps left out{note}", ("recording", "time (s)", "peak (N)", "why"), tuple(rows[:MOST]))
+
+
+MOST_DRAWN = 6
+"""Pairs that are drawn."""
+
+
+def reciprocity_section(collected: Collected) -> Section:
+    """``H_pq`` against ``H_qp`` of each FRF, and left against right vectors of each model; both need shared points."""
+    tables, pictures = [], []
+    for file, frf in collected.frfs:
+        found = collected.model_of(file, frf)
+        stored = None if found is None else found[0].provenance.get("band_hz")
+        band = (float(stored[0]), float(stored[1])) if stored else None
+        table = pair_table(frf, file.path.name, band)
+        if table is None:
+            continue
+        tables.append(table)
+        pairs = shown_pairs(reciprocity_pairs(frf, band), MOST_DRAWN)
+        caption = (
+            f"{file.path.name}: FRFs that were measured both ways, response at p with force at q and the reverse, and "
+            "their difference over their root mean square. A structure at rest is reciprocal; a robot that moves need "
+            "not be."
+        )
+        pictures.append(picture_of(reciprocity_figure(pairs, frf.unit), caption, "Reciprocity of FRFs"))
+    vectors = [vector_table(model, file.path.name) for file, model in collected.models]
+    tables += [table for table in vectors if table is not None]
+    return Section("Reciprocity", tables=tuple(tables), pictures=tuple(pictures))

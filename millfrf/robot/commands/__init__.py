@@ -5,9 +5,9 @@ from collections.abc import Callable
 import typer
 
 from ...usage import framed
-from ..diagnosis import diagnose
 from .compensate import compensate
 from .deviation import deviation
+from .diagnose import diagnose
 from .frf import frf
 from .identify import identify
 from .learn import learn

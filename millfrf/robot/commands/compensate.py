@@ -22,8 +22,7 @@ def compensate(
     ] = None,
 ) -> None:
     """Move a tool path against the deflection that its forces, the robot's weight and a payload will cause."""
-    from ..asked_loads import loads_of
-    from ..postures import Asked
-    from ..results import write_compensation
+    from millfrf.steps.robot.common import write_compensation
+    from millfrf.steps.robot.postures import Asked, loads_of
 
     write_compensation(robot, path, Asked(pose, joints), out, loads_of(payload, payload_at, weight), picture)

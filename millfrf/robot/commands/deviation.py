@@ -53,9 +53,8 @@ def deviation(
     from math import pi
 
     from millfrf.robot_model import LoadUncertainty
-
-    from ..asked_loads import loads_of
-    from ..loads import Accuracy, DrillingArea, RunningOut, show_deviation
+    from millfrf.steps.robot.deviation import Accuracy, DrillingArea, RunningOut, show_deviation
+    from millfrf.steps.robot.postures import loads_of
 
     area = DrillingArea(1e-3 * drill, 1e-3 * feed_rev, x, y, z, links)
     known = LoadUncertainty(1e-2 * force_error, 1e-2 * stiffness_error)

@@ -33,11 +33,11 @@ def frf(
     table: Numbers = None,
 ) -> None:
     """Receptance at the tool tip in a posture, as an FRF file or as the modal model behind it."""
-    from ..postures import Asked
+    from millfrf.steps.robot.postures import Asked
 
     asked = Asked(pose, joints, at, feed, turn, redundancy)
     if learned is not None:
-        from ..learned import write_learned_receptance
+        from millfrf.steps.robot.learned import write_learned_receptance
 
         if sensor is not None or links or picture is not None or table is not None:
             raise InputError(
@@ -46,6 +46,6 @@ def frf(
             )
         write_learned_receptance(robot, learned, asked, out, band, lines)
         return
-    from ..results import write_receptance
+    from millfrf.steps.robot.common import write_receptance
 
     write_receptance(robot, asked, out, band, lines, sensor, links, (picture, table))

@@ -28,6 +28,6 @@ def identify(
 
     A row is a posture, the change of force on the tool and the change of place that it caused, in the base frame.
     """
-    from ..identifying import write_identified
+    from millfrf.steps.robot.identify import write_identified
 
     write_identified(robot, deflections, out, 1e-6 * error, links, prior)

@@ -34,7 +34,7 @@ def learn(
     z: Annotated[float, typer.Option("--z", metavar="M", help="Height of the tool's tip there, m.")] = 0.8,
 ) -> None:
     """Learn how measured modes differ from the robot's model over postures; `frf` takes it as --learned."""
-    from ..learned import LearningFrom, WorkArea, learn_from_files
+    from millfrf.steps.robot.learn import LearningFrom, WorkArea, learn_from_files
 
     if (x is None) != (y is None) or (x is not None and next_postures is None):
         raise InputError("an area of --next needs both --x LO HI N and --y LO HI N, and --next N")

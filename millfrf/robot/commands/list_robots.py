@@ -4,7 +4,7 @@ from typing import Annotated
 
 import typer
 
-from ...terminal import say, tell
+from millfrf.core.terminal import say, tell
 
 
 def list_robots(

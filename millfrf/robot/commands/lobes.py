@@ -39,12 +39,12 @@ def lobes(
     learned: Learned = None,
 ) -> None:
     """Stability lobes in a posture (--speeds), or the depth limit over a redundancy angle (--turns and --speed)."""
-    from ..postures import Asked
-    from ..robot_lobes import write_lobes_in_posture, write_map_over_redundancy
+    from millfrf.steps.robot.lobes import write_lobes_in_posture, write_map_over_redundancy
+    from millfrf.steps.robot.postures import Asked
 
     asked = Asked(pose, joints, at, feed, turn, redundancy)
     if learned is not None:
-        from ..learned import write_learned_lobes
+        from millfrf.steps.robot.learned import write_learned_lobes
 
         if angles is not None or links:
             raise InputError("--learned gives lobes in one posture: leave --turns and --links out")

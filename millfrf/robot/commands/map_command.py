@@ -25,6 +25,6 @@ def map_command(
     max_depth: Annotated[float, typer.Option("--max-depth", metavar="M", help="Largest depth looked at, m.")] = 0.02,
 ) -> None:
     """Lowest natural frequency of a vertical tool over an area, and with --cutting the depth limit."""
-    from ..depth_maps import Area, write_workspace_map
+    from millfrf.steps.robot.maps import Area, write_workspace_map
 
     write_workspace_map(robot, picture, Area(x, y, z, feed), cutting, speed, max_depth, out)

@@ -23,7 +23,7 @@ def modes(
     ] = None,
 ) -> None:
     """Natural frequencies and damping in a posture, and a picture of the robot and its mode shapes."""
-    from ..postures import Asked
-    from ..results import show_modes
+    from millfrf.steps.robot.common import show_modes
+    from millfrf.steps.robot.postures import Asked
 
     show_modes(robot, Asked(pose, joints, at, feed, turn, redundancy), count, picture, links)

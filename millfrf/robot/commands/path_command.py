@@ -61,9 +61,8 @@ def path_command(
     weight: Weight = "all",
 ) -> None:
     """Postures along a tool path by its redundancy: largest depth, least deviation or both; the compensated path."""
-    from ..along_path import AskedPath, write_optimised_path
-    from ..asked_loads import loads_of
-    from ..postures import Asked
+    from millfrf.steps.robot.path import AskedPath, write_optimised_path
+    from millfrf.steps.robot.postures import Asked, loads_of
 
     asked = AskedPath(
         optimise,

@@ -5,7 +5,8 @@ from typing import Annotated
 
 import typer
 
-from ...terminal import say
+from millfrf.core.terminal import say
+
 from .options import At, Feed, Joints, Pose, Redundancy, Robot, Turn
 
 
@@ -25,9 +26,8 @@ def show(
 ) -> None:
     """A page with the robot, its joints, its posture and its mode shapes: one file, no network."""
     from millfrf.core import free_name
-
-    from ..postures import Asked
-    from ..shown import show_robot
+    from millfrf.steps.robot.postures import Asked
+    from millfrf.steps.robot.robot_page import show_robot
 
     for line in show_robot(
         robot, Asked(pose, joints, at, feed, turn, redundancy), out or free_name(Path("robot.html")), browser

@@ -29,9 +29,8 @@ def stiffness(
     table: Numbers = None,
 ) -> None:
     """Compliance at the tool tip, softest and stiffest directions, deflection under a force, weight and payload."""
-    from ..asked_loads import loads_of
-    from ..loads import show_stiffness
-    from ..postures import Asked
+    from millfrf.steps.robot.postures import Asked, loads_of
+    from millfrf.steps.robot.stiffness import show_stiffness
 
     asked = Asked(pose, joints, at, feed, turn, redundancy)
     show_stiffness(robot, asked, tip_force, loads_of(payload, payload_at), links, out, (picture, table))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ...terminal import say
+from millfrf.core.terminal import say
 
 
 def update(
@@ -39,7 +39,7 @@ def update(
     Joint stiffnesses and dampings, links, payload and tool mass, compliance of tool, tip and base are free together.
     The file is written only if the updated robot predicts postures better that were left out of its update.
     """
-    from ..updating import Asking, update_robot_file
+    from millfrf.steps.robot.update import Asking, update_robot_file
 
     asking = Asking(tuple(pose or ()), feed, band, sensor, stream)
     for line in update_robot_file(robot, files, out, report, asking):

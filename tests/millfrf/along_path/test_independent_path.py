@@ -8,7 +8,6 @@ import pytest
 from scipy.linalg import expm
 
 from millfrf.cutting import MillingProcess
-from millfrf.robot.along_path import Loading, PathCut, Request, Wanted, optimised, values_of
 from millfrf.robot_model import (
     Payload,
     Redundancy,
@@ -28,6 +27,10 @@ from millfrf.robot_model import (
 )
 from millfrf.robot_model.finite_elements.structure import coordinate_basis, mass_matrix, stiffness_matrix
 from millfrf.stability import certified_lobes
+from millfrf.steps.robot.path_optimum import optimised
+from millfrf.steps.robot.path_search import Wanted
+from millfrf.steps.robot.path_state import Loading
+from millfrf.steps.robot.path_values import PathCut, Request, values_of
 from modal_fit import ModalModel
 
 CASE = read_spatial_robot("kuka_kr90_angled")

@@ -8,10 +8,10 @@ import pytest
 from milling_of_a_path import CUT
 
 from millfrf.__main__ import run
-from millfrf.provenance import read_provenance
-from millfrf.robot.settled_modes import settled_modes
+from millfrf.core.provenance import read_provenance
 from millfrf.robot_model import modal_model_at, named_posture, read_robot
 from millfrf.stability import certified_lobes
+from millfrf.steps.robot.common import settled_modes
 
 
 @pytest.fixture(autouse=True)

@@ -9,7 +9,8 @@ from collections.abc import Callable
 import numpy as np
 from simulated_series import Simulated
 
-from millfrf.campaign.results.drift import Drifts, drifts_and_outliers, find_drifts
+from millfrf.campaign.results.drift import Drifts, find_drifts
+from millfrf.campaign.results.outliers import drifts_and_outliers
 
 SCATTER = float(np.hypot(1e-3, 5e-4))
 BOTH = ("session", "temperature_c")

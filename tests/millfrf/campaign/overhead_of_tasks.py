@@ -6,9 +6,10 @@ from pathlib import Path
 
 import psutil
 
-from millfrf.campaign.graph import Task
-from millfrf.campaign.running import Ended, Order, State, dask_executor, program_digest, run_tasks
-from millfrf.campaign.running.store import store_outcome
+from millfrf.campaign.on_dask import dask_executor
+from millfrf.campaign.running import Ended, Order, State, run_tasks
+from millfrf.campaign.store import program_digest, store_outcome
+from millfrf.campaign.tasks import Task
 
 IDENTITY, KEY = "check:nothing", "0" * 64
 EVERY = 200

@@ -5,7 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from millfrf.campaign.results.drift import Labels, Series
+from millfrf.campaign.results.regression import Labels
+from millfrf.campaign.results.trends import Series
 
 Real = NDArray[np.float64]
 

@@ -10,14 +10,13 @@ import pytest
 
 from acquisition import Recording
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from millfrf.campaign import SimulatedCampaign, make_campaign
-from millfrf.campaign.simulated import Condition, laboratory_of
+from millfrf.campaign.simulated.make import SimulatedCampaign, laboratory_of, make_campaign
 from millfrf.campaign.simulated.recordings import write_recording
-from millfrf.campaign.simulated.schedule import FAULTS
-from millfrf.campaign.simulated.work_area import HIGHEST, LOWEST
-from millfrf.chain import SUBSPACE, FitOptions, fit_recordings
+from millfrf.campaign.simulated.true_robot import FAULTS, LOWEST, Condition
+from millfrf.campaign.simulated.true_robot import WORK_AREA_HIGHEST as HIGHEST
 from millfrf.core import InputError
 from millfrf.gate import check_recordings
+from millfrf.steps.fit import SUBSPACE, FitOptions, fit_recordings
 
 POSES, RECORDINGS = 6, 36
 

@@ -10,7 +10,7 @@ import pytest
 from overhead_of_tasks import overhead_of
 from unmeasured_postures import trial
 
-from millfrf.campaign import SimulatedCampaign, make_campaign
+from millfrf.campaign.simulated.make import SimulatedCampaign, make_campaign
 
 
 @pytest.mark.slow

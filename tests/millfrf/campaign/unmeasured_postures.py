@@ -17,13 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimation import read_frf
-from millfrf.campaign.simulated import Condition, Laboratory, SimulatedCampaign, laboratory_of, make_campaign
-from millfrf.campaign.simulated.schedule import PlannedRecording, pose_name
-from millfrf.campaign.simulated.work_area import spread_postures
-from millfrf.chain import SUBSPACE, FitOptions, calibrate_model, fit_recordings
+from millfrf.campaign.simulated.make import SimulatedCampaign, laboratory_of, make_campaign
+from millfrf.campaign.simulated.recordings import Laboratory
+from millfrf.campaign.simulated.true_robot import Condition, PlannedRecording, pose_name, spread_postures
 from millfrf.core import InputError, MillfrfError
 from millfrf.cutting import MillingProcess, read_cutting_process
-from millfrf.robot.learned.depth_band import depth_band
 from millfrf.robot_model import (
     LearnedPostures,
     learn_postures,
@@ -34,6 +32,9 @@ from millfrf.robot_model import (
 )
 from millfrf.robot_model.posture_process.measured_modes import MeasuredModes, mode_pairs
 from millfrf.stability import lowest_limits
+from millfrf.steps.calibrate import calibrate_model
+from millfrf.steps.fit import SUBSPACE, FitOptions, fit_recordings
+from millfrf.steps.robot.learned import depth_band
 from modal_fit import ModalModel, read_modal_model, write_modal_model
 from replay_data import tip_model
 

@@ -10,9 +10,8 @@ import pytest
 
 from acquisition import record
 from millfrf.__main__ import run
-from millfrf.chain.cuts.chatter_file import read_cuts
 from millfrf.cutting import MillingProcess
-from millfrf.stability import cut_spectrum, gather_evidence
+from millfrf.stability import cut_spectrum, gather_evidence, read_cuts
 from modal_fit import write_modal_model
 from replay_data import MillingCell, dynamometer, table_one_model, tip_accelerometers
 

@@ -9,8 +9,9 @@ from scipy import signal
 from acquisition import Channel, RecordingWriter, StreamDescription
 from estimation import read_frf
 from millfrf.__main__ import run
-from millfrf.chain import EstimateOptions, estimate_recordings
 from millfrf.core import InputError
+from millfrf.steps.estimate import estimate_recordings
+from millfrf.steps.test_spectra import EstimateOptions
 from modal_fit import ModalModel
 
 RATE = 200.0

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from acquisition import Channel, RecordingWriter, StreamDescription
-from millfrf.chain.fitting.fit import fit_recordings
-from millfrf.chain.fitting.fit_options import FitOptions
 from millfrf.core import InputError
+from millfrf.steps.fit import FitOptions, fit_recordings
 from modal_fit import ModalModel
 
 RATE, SAMPLES = 1024.0, 16384

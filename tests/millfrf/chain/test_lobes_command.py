@@ -8,9 +8,9 @@ import pytest
 
 from estimation import write_frf
 from millfrf.__main__ import DONE, run
-from millfrf.chain.cuts.lobes import lobes_summary, mode_coupling_line
 from millfrf.cutting import MillingProcess, write_cutting_process
 from millfrf.stability import StabilityLobes, certified_lobes, read_lobes
+from millfrf.steps.lobes import lobes_summary, mode_coupling_line
 from modal_fit import write_modal_model
 from replay_data import table_one_model
 

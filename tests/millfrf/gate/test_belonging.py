@@ -1,6 +1,6 @@
 """Files of one report: tied to each other by their sources, step by step, or said to belong to something else."""
 
-from millfrf.gate.belonging import Given, check_belonging
+from millfrf.gate import Given, check_belonging
 
 
 def given(name: str, kind: str, *sources: str) -> Given:

@@ -9,7 +9,7 @@ import pytest
 from estimation import Frf, write_frf
 from millfrf.__main__ import BAD_INPUT, DONE, run
 from millfrf.core import Band
-from millfrf.provenance import read_provenance
+from millfrf.core.provenance import read_provenance
 from modal_fit import ModalModel, write_modal_model
 from replay_data import default_structure
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from millfrf.__main__ import DONE, run
-from millfrf.chain import compute_lobes, speed_axis
 from millfrf.core import Band
 from millfrf.cutting import write_cutting_process
 from millfrf.gate import limits_inside_band
 from millfrf.stability import read_lobes
+from millfrf.steps.lobes import compute_lobes, speed_axis
 from modal_fit import ModalModel, write_modal_model
 from replay_data import ACETAL_CUTTER, default_structure, tip_model
 

@@ -10,9 +10,10 @@ import pytest
 
 from acquisition import convert
 from estimation import Frf
-from millfrf.chain import EstimateOptions, estimate_recordings
 from millfrf.core import InputError
 from millfrf.gate import check_frf, check_model, check_recordings
+from millfrf.steps.estimate import estimate_recordings
+from millfrf.steps.test_spectra import EstimateOptions
 from modal_fit import read_modal_model
 
 MAPPING = Path(__file__).resolve().parents[3] / "examples" / "fsm_mapping.toml"

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.core.provenance import read_provenance
 from millfrf.gate import check_recordings
-from millfrf.provenance import read_provenance
 
 Samples = np.ndarray
 CHANNELS = {"fx": 0, "fy": 1, "fz": 2, "ax": 3, "ay": 4, "az": 5}

@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import resample_poly
 
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from millfrf.provenance import read_provenance
+from millfrf.core.provenance import read_provenance
 
 BAND = ["--band", "13", "25"]
 

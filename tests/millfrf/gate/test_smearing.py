@@ -8,7 +8,7 @@ import pytest
 
 from estimation import Frf, FrfCovariance, SpectralSettings, read_frf, write_frf
 from estimation.spectra.cross_spectra import spectral_width
-from millfrf.chain import FitOptions, fit_model
+from millfrf.steps.fit import FitOptions, fit_model
 
 FREQUENCY, DAMPING = 11.3, 0.045
 

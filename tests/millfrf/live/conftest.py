@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from acquisition import Channel, StreamDescription
-from millfrf.live import LiveMonitor, LiveSettings
+from millfrf.live.monitor import LiveMonitor, LiveSettings
 
 pytest.importorskip("bokeh")
 RATE = 4096.0

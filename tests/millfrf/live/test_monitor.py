@@ -7,9 +7,9 @@ import pytest
 
 from acquisition import Block, Channel, Events
 from estimation import SpectralAccumulator, h1, settings_for
-from millfrf.live import LiveControl, LiveMonitor
-from millfrf.live.enough import band_progress
-from millfrf.live.traces import TraceBuffer
+from millfrf.live.control import LiveControl
+from millfrf.live.monitor import LiveMonitor
+from millfrf.live.spectra import TraceBuffer, band_progress
 
 RATE = 4096.0
 CHANNELS = (

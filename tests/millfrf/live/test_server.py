@@ -11,7 +11,9 @@ from urllib.parse import urlsplit
 import pytest
 
 from millfrf.core import InputError
-from millfrf.live import LiveControl, LiveMonitor, LiveServer
+from millfrf.live.control import LiveControl
+from millfrf.live.monitor import LiveMonitor
+from millfrf.live.server import LiveServer
 
 
 def _status(url: str) -> int:
@@ -104,7 +106,9 @@ def test_no_log_holds_the_token(monitor: LiveMonitor, caplog: pytest.LogCaptureF
 IN_A_NETWORK = """
 import fcntl, http.client, socket, struct, urllib.error, urllib.request
 from acquisition import Channel, StreamDescription
-from millfrf.live import LiveControl, LiveMonitor, LiveServer, LiveSettings
+from millfrf.live.control import LiveControl
+from millfrf.live.monitor import LiveMonitor, LiveSettings
+from millfrf.live.server import LiveServer
 
 def address(text):
     return struct.pack("HH4s8x", socket.AF_INET, 0, socket.inet_aton(text))

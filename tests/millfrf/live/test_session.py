@@ -13,13 +13,13 @@ from acquisition import Block, Channel, Recording
 from acquisition.drivers.replay import ReplaySource
 from estimation import CrossSpectra, SpectralAccumulator, settings_for, to_receptance
 from millfrf.__main__ import run
-from millfrf.chain import open_session, plan_from_file
-from millfrf.chain.measuring.live_session import live_settings, session_tests
-from millfrf.live import LiveMonitor, SessionPlan
-from millfrf.live.drawings import all_drawings, first_choice
-from millfrf.live.enough import BandProgress
-from millfrf.live.monitor import Snapshot
-from millfrf.live.session import MilledSpeeds, SessionTest, force_power, standing_of
+from millfrf.live.frequency_drawings import all_drawings, first_choice
+from millfrf.live.monitor import LiveMonitor, Snapshot
+from millfrf.live.spectra import BandProgress
+from millfrf.live.standing import standing_of
+from millfrf.live.tests_of_session import MilledSpeeds, SessionPlan, SessionTest, force_power
+from millfrf.steps.acquire import live_settings, open_session, session_tests
+from millfrf.steps.plan import plan_from_file
 from replay_data import default_structure
 
 SESSION = """

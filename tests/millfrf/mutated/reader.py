@@ -74,11 +74,9 @@ def wrong(code: int, said: str, gigabytes: float) -> str:
 
 def main() -> None:
     """Deal the mutations to the kinds."""
-    import acquisition  # noqa: F401  # with EAGER_IMPORT, everything is loaded once
-    import millfrf.chain
-    import millfrf.face
-    import millfrf.report
-    import millfrf.robot  # noqa: F401
+    import millfrf.__main__
+    import millfrf.report.page
+    import millfrf.steps.robot.common  # noqa: F401  # what every kind needs is loaded once
 
     kinds, mutations = _load("kinds"), _load("mutations")
     folder, work, first, last = Path(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])

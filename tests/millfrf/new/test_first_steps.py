@@ -9,9 +9,9 @@ from scipy.io import savemat
 
 from acquisition import Recording
 from millfrf.__main__ import run
-from millfrf.inspection import inspect_file
-from millfrf.new.making import mapping_for
+from millfrf.new.mapping_file import mapping_for
 from millfrf.stability import StabilityLobes, write_lobes
+from millfrf.steps.inspect import inspect_file
 
 ROWS = [f"{k / 500:.3f},{a:.5f},{b:.5f}" for k, (a, b) in enumerate(np.random.default_rng(1).standard_normal((400, 2)))]
 

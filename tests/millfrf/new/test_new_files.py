@@ -10,9 +10,10 @@ from scipy.io import savemat
 from acquisition import Recording
 from millfrf.__main__ import run
 from millfrf.core import InputError
+from millfrf.core.described_tables import described_tables
 from millfrf.cutting import read_cutting_process
-from millfrf.new.making import mapping_for
-from millfrf.toml_files import described_tables, toml_files
+from millfrf.new.mapping_file import mapping_for
+from millfrf.new.toml_files import toml_files
 
 SAMPLES = np.random.default_rng(3).standard_normal((400, 3))
 

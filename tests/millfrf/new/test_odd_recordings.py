@@ -13,7 +13,7 @@ from scipy.io import savemat
 from acquisition import Recording, open_arrays
 from millfrf.__main__ import run
 from millfrf.core import FileFormatError, InputError
-from millfrf.new.making import mapping_for
+from millfrf.new.mapping_file import mapping_for
 
 N = 40
 DATA = np.random.default_rng(8).standard_normal((N, 3))

@@ -11,7 +11,7 @@ from scipy.io import savemat
 
 from acquisition import Recording, open_arrays
 from millfrf.__main__ import run
-from millfrf.new.making import mapping_for
+from millfrf.new.mapping_file import mapping_for
 
 DATA = np.random.default_rng(5).standard_normal((60, 4))
 NAMES, UNITS = ["Kraft_X", "Kraft_Y", "Acc_TCP_x", "Acc_TCP_y"], ["kN", "kN", "g", "g"]

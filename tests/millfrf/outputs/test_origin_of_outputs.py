@@ -14,7 +14,7 @@ from scipy.io import loadmat
 from writing_commands import COMMANDS, Writing
 
 from millfrf.__main__ import run
-from millfrf.provenance import read_provenance
+from millfrf.core.provenance import read_provenance
 
 WITHOUT = {
     "convert uff": "UFF has no place for it",

@@ -59,13 +59,10 @@ def attend(child: int, trial: dict) -> int:
 
 def main() -> None:
     """Serve trials until standard input ends."""
-    import acquisition  # noqa: F401  # what every copy needs, loaded once
     import millfrf.__main__
-    import millfrf.chain
-    import millfrf.face
-    import millfrf.report
-    import millfrf.robot
-    import millfrf.structure  # noqa: F401
+    import millfrf.report.page
+    import millfrf.steps.diagnose
+    import millfrf.steps.robot.common  # noqa: F401  # what every copy needs is loaded once
 
     for line in sys.stdin:
         trial = json.loads(line)

@@ -16,16 +16,8 @@ import pytest
 from estimation import write_frf
 from millfrf.__main__ import run
 from millfrf.core import InputError, MillfrfError
-from millfrf.picking import (
-    PickSession,
-    check_pick,
-    chosen_at_first,
-    drawn_page,
-    fitted_answer,
-    pick_poles,
-    write_picked,
-)
-from millfrf.picking.session import Pole, as_poles
+from millfrf.live.picking import PickSession, Pole, as_poles, chosen_at_first, drawn_page, fitted_answer
+from millfrf.live.picking_server import check_pick, pick_poles, write_picked
 from modal_fit import ModalModel, fit_polyreference, read_modal_model, read_picked_poles
 
 BAND = (5.0, 60.0)

@@ -13,8 +13,7 @@ from acquisition import Channel, RecordingWriter, StreamDescription
 from millfrf.__main__ import run
 from millfrf.mismatch import library
 from millfrf.mismatch.physics.protocol import answer_name
-from millfrf.report.diagnoses.diagnosis_answers import where
-from millfrf.report.diagnoses.next_tests import next_test
+from millfrf.report.diagnoses.answers import next_test, where
 from modal_fit import ModalModel, write_modal_model
 
 RATE, SECONDS, DELAY = 128.0, 40.0, 0.005

@@ -11,18 +11,10 @@ import numpy as np
 import pytest
 
 from millfrf.core import InputError
+from millfrf.core.terminal import Table
 from millfrf.figures import GalleryEntry, SmallSvg, gallery_page, house_style, new_figure, save_figure
-from millfrf.report import (
-    FigureFiles,
-    Fold,
-    Picture,
-    ResultsPage,
-    Section,
-    page_text,
-    picture_of,
-    write_results_page,
-)
-from millfrf.tables import Table
+from millfrf.report.results_page import FigureFiles, ResultsPage, page_text, write_results_page
+from millfrf.report.section import Fold, Picture, Section, picture_of
 
 FREQUENCIES = np.linspace(1.0, 50.0, 200)
 

@@ -4,7 +4,7 @@ from math import pi
 
 import numpy as np
 
-from millfrf.report.pages.table_columns import of_numbers
+from millfrf.report.results_page import of_numbers
 from millfrf.report.sections.stability import advice_table, lobes_table
 from millfrf.stability import StabilityLobes
 

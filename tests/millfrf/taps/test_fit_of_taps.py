@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from simulated_taps import Bench, Hits, plate, write_taps
 
-from millfrf.taps import TapOptions, tap_recordings
+from millfrf.steps.tap import tap_recordings
+from millfrf.steps.tap_points import TapOptions
 from modal_fit import fit_polyreference
 
 PLACES = ("P1:+Z", "P2:+Z")

@@ -13,8 +13,9 @@ from simulated_taps import Bench, Hits, Structure, at_resonances, plate, write_t
 from acquisition import Recording, RecordingWriter, StreamDescription
 from estimation import Frf, read_frf, write_frf
 from millfrf.__main__ import BAD_INPUT, DONE, run
-from millfrf.chain import EstimateOptions, estimate_recordings
 from millfrf.core import InputError
+from millfrf.steps.estimate import estimate_recordings
+from millfrf.steps.test_spectra import EstimateOptions
 
 TIMES = (0.6, 2.1, 3.6)
 QUICK = Bench(rate=2560.0, seconds=5.2, noise=1e-4)

@@ -7,9 +7,8 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from millfrf.toml_files import TomlFile, described_tables, json_schema, toml_files
-from millfrf.toml_files.docstring_keys import keys_of
-from millfrf.toml_files.json_schemas import schemas_in
+from millfrf.core.described_tables import TomlFile, described_tables, json_schema, keys_of, schemas_in
+from millfrf.new.toml_files import toml_files
 
 ROOT = Path(__file__).resolve().parents[3]
 FILES = {file.name: file for file in toml_files()}

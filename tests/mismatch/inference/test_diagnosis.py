@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from estimation import BandRecording
-from millfrf.core import same_values
+from millfrf.core.results import same_values
 from millfrf.mismatch import AcceptedCause, Candidate, Diagnosis, Settings, StructureDiagnosis
 from millfrf.mismatch.inference.diagnosis import VERDICTS, Findings, HeldOutError, Improvement, Remainder, verdict_of
 from millfrf.mismatch.inference.paired_tests import signed_ranks

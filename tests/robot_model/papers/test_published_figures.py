@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from millfrf.cutting import MillingProcess
-from millfrf.robot.depth_maps.posture_maps import depth_over_redundancy
 from millfrf.robot_model import (
     exact_receptance,
     in_posture,
@@ -19,6 +18,7 @@ from millfrf.robot_model import (
     turned_place,
 )
 from millfrf.stability import multipliers
+from millfrf.steps.robot.maps import depth_over_redundancy
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "robot_paper_figures.py"
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from millfrf.__main__ import DONE, run
-from millfrf.robot.compensation_figure import compensation_figure
 from millfrf.robot_model import CompensatedPath, ToolPath
+from millfrf.steps.robot.pictures import compensation_figure
 
 ROBOT = "staubli_rx160"
 CUT = """[cutting]

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from millfrf.__main__ import run
-from millfrf.campaign import RunOptions, Task, run_campaign
-from millfrf.campaign.graph import in_order
-from millfrf.campaign.running import worker_checks
+from millfrf.campaign import on_dask as worker_checks
+from millfrf.campaign.campaign_run import RunOptions, run_campaign
+from millfrf.campaign.tasks import Task, in_order
 from millfrf.core import InputError
 
 
@@ -86,7 +86,7 @@ def test_two_sets_of_one_name_are_refused(campaign: Path) -> None:
 
 
 def test_no_scheduler_answers(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from millfrf.campaign.running import on_dask
+    from millfrf.campaign import on_dask
 
     monkeypatch.setattr(on_dask, "CONNECT_SECONDS", 1.0)
     with pytest.raises(InputError, match=r"no scheduler answers at tcp://127.0.0.1:9 within 1 s; check the address"):
@@ -153,7 +153,7 @@ def test_a_worker_as_this_process_is_accepted(tmp_path: Path) -> None:
 
 
 def test_a_second_run_at_the_same_time_is_refused(campaign: Path) -> None:
-    from millfrf.campaign.whole_run.one_run import only_run
+    from millfrf.campaign.run_folder import only_run
 
     with only_run(campaign.parent / "out"), pytest.raises(InputError, match="another run works in"):
         run_campaign(campaign, RunOptions(campaign.parent / "out", workers=0))

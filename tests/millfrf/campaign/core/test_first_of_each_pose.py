@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from millfrf.campaign.jobs.robot_jobs import _first_of_each_pose
+from millfrf.campaign.jobs import _first_of_each_pose
 
 
 def test_of_each_posture_the_first_sets_are_taken_in_their_order() -> None:

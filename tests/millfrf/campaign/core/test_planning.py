@@ -7,14 +7,15 @@ from typing import Any
 import pytest
 
 from millfrf.__main__ import run
-from millfrf.campaign.configuration import EstimateTable, FileLook, FoundRecording, Labels, without_copies
-from millfrf.campaign.configuration.labels import joined_labels, labels_of_setup, read_label_table
-from millfrf.campaign.graph import Task, in_order, keys_of
-from millfrf.campaign.graph.recording_sets import RecordingSet, grouped
-from millfrf.campaign.graph.spectra_tasks import estimate_tasks
-from millfrf.campaign.running import DONE, REFUSED, Ended, ProgressLines, left_to_run, measured_rates, note_time
-from millfrf.campaign.whole_run.dry_run import longest_chain
-from millfrf.campaign.whole_run.one_run import PROGRAM, only_run
+from millfrf.campaign.campaign_tables import EstimateTable
+from millfrf.campaign.labels import Labels, joined_labels, labels_of_setup, read_label_table
+from millfrf.campaign.opened import longest_chain
+from millfrf.campaign.planning import estimate_tasks
+from millfrf.campaign.progress import ProgressLines, measured_rates, note_time
+from millfrf.campaign.recordings import FileLook, FoundRecording, without_copies
+from millfrf.campaign.run_folder import PROGRAM, only_run
+from millfrf.campaign.running import DONE, REFUSED, Ended, left_to_run
+from millfrf.campaign.tasks import RecordingSet, Task, grouped, in_order, keys_of
 from millfrf.core import InputError
 
 

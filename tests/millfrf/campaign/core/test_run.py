@@ -11,8 +11,9 @@ import pytest
 
 from estimation import read_frf
 from millfrf.__main__ import run
-from millfrf.campaign import RunOptions, RunSummary, run_campaign
-from millfrf.campaign.jobs import JOB_OF, Work
+from millfrf.campaign.campaign_run import RunOptions, RunSummary, run_campaign
+from millfrf.campaign.jobs import JOB_OF
+from millfrf.campaign.work import Work
 
 
 def serial(campaign: Path, **options: bool) -> RunSummary:
@@ -20,7 +21,7 @@ def serial(campaign: Path, **options: bool) -> RunSummary:
 
 
 def result(found: RunSummary, identity: str) -> Path:
-    from millfrf.campaign.running import folder_of
+    from millfrf.campaign.store import folder_of
 
     key = found.opened.keys[identity]
     assert key is not None

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from millfrf.campaign.configuration import FoundRecording, Labels, without_wrong_postures
-from millfrf.campaign.configuration.file_look import FileLook
-from millfrf.campaign.graph.recording_sets import grouped
+from millfrf.campaign.labels import Labels
+from millfrf.campaign.recordings import FileLook, FoundRecording, without_wrong_postures
+from millfrf.campaign.tasks import grouped
 
 RIGHT, NEAR, WRONG = (10.0, -20.0), (10.02, -20.03), (35.0, 5.0)
 

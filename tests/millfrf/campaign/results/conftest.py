@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from millfrf.campaign.results import MeasuredSet
+from millfrf.campaign.results.sets import MeasuredSet
 from millfrf.core import TIP
 from millfrf.stability import StabilityLobes, write_lobes
 from modal_fit import ModalModel, ModeErrors, write_modal_model

@@ -7,7 +7,10 @@ from scipy.stats import norm
 from scipy.stats import t as student
 from simulated_series import Simulated
 
-from millfrf.campaign.results.drift import Drifts, Labels, Series, drifts_and_outliers, find_drifts, pool, trends_over
+from millfrf.campaign.results.drift import Drifts, find_drifts
+from millfrf.campaign.results.outliers import drifts_and_outliers
+from millfrf.campaign.results.regression import Labels
+from millfrf.campaign.results.trends import Series, pool, trends_over
 
 Real = NDArray[np.float64]
 

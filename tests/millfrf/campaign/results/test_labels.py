@@ -2,8 +2,8 @@
 
 import pytest
 
-from millfrf.campaign.results import MeasuredSet
-from millfrf.campaign.results.drift import TIME, labels_of
+from millfrf.campaign.results.regression import TIME, labels_of
+from millfrf.campaign.results.sets import MeasuredSet
 
 
 def _set(pose: str, recorded_at: float | None, **labels: str | float) -> MeasuredSet:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from simulated_series import Simulated
 
-from millfrf.campaign.results.drift import PooledTrend, find_drifts
-from millfrf.campaign.results.drift.judged import OWN_ALARMS, drifts_apart
+from millfrf.campaign.results.drift import OWN_ALARMS, drifts_apart, find_drifts
+from millfrf.campaign.results.trends import PooledTrend
 
 MEAN = PooledTrend(1, 15.0, "frequency", "session", 11, -0.3, 0.15, 0.0, 3.0, 0.1)
 

@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from millfrf.campaign import write_summary
+from millfrf.campaign.results.summary import write_summary
 from millfrf.robot_model import read_spatial_robot
 
 EXAMPLE = Path(__file__).resolve().parents[4] / "examples" / "campaign_results.py"

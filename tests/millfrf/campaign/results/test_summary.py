@@ -7,8 +7,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from millfrf.campaign.results import MeasuredSet, write_summary
-from millfrf.provenance import read_provenance, sha256
+from millfrf.campaign.results.sets import MeasuredSet
+from millfrf.campaign.results.summary import write_summary
+from millfrf.core.provenance import read_provenance, sha256
 
 ERRORS = np.array([[0.01, 0.001], [0.02, 0.001], [0.03, 0.001]])
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from independent_cut import Mill, simulated
 
-from millfrf.cut.diagnosis_words import summary
 from millfrf.cutting import MillingProcess
 from millfrf.mismatch import CutDiagnosis, diagnose_cut
 from millfrf.mismatch.cut.recordings import CutRecording, chatter_of, cut_recording
 from millfrf.mismatch.cut.spindle_law import SpindleLaw
+from millfrf.steps.cut_diagnose import summary
 
 CUT = MillingProcess(2, 12.7e-3, math.pi / 2, 119e6, 0.17, 0.33, math.pi / 2, math.pi, 0.15e-3)
 HELIX = math.radians(30)

@@ -21,12 +21,12 @@ from millfrf.mismatch import (
 )
 from millfrf.mismatch.robot.held_out import chance
 from millfrf.mismatch.robot.receptance import posed
-from millfrf.robot.diagnosis.diagnosis_words import describe, summary
 from millfrf.robot_model import SpatialRobot, cell_structure_at, read_spatial_robot, with_payload, with_tool_spring
 from millfrf.robot_model.finite_elements.statics import with_gravity
 from millfrf.robot_model.model_updating.changes import with_lighter_end
 from millfrf.robot_model.spatial.spatial_modes import frf_at
 from millfrf.robot_model.spatial.spatial_robot import LumpedBody
+from millfrf.steps.robot.diagnose import describe, summary
 
 Real = NDArray[np.float64]
 

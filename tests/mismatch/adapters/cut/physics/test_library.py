@@ -1,7 +1,7 @@
 """A cause is one file of the folder."""
 
 import math
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,9 +35,10 @@ PHYSICS = Toy()
 """
 
 
-def test_a_new_cause_is_one_file_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (tmp_path / "toy_drag.py").write_text(TOY)
-    monkeypatch.setattr(physics_folder, "__path__", [*physics_folder.__path__, str(tmp_path)])
+def test_a_new_cause_is_one_entry_of_the_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    defined: dict[str, Any] = {}
+    exec(TOY, defined)
+    monkeypatch.setattr(physics_folder, "CAUSES", (*physics_folder.CAUSES, defined["PHYSICS"]))
     toy = physics_folder.library()["toy_drag"]
     recording = CutRecording("r", 20000.0, np.zeros((20000, 3)), (0, 1, 2), None, LAW, 0.1)
     view = view_of(recording, CUTTER, LAW, 1)

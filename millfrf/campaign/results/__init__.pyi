@@ -1,4 +1,0 @@
-from .measured_set import MeasuredSet
-from .summary import write_summary
-
-__all__ = ["MeasuredSet", "write_summary"]

@@ -1,5 +1,0 @@
-"""The steps of the main job, as the commands and the demonstration both call them."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

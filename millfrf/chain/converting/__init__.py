@@ -1,5 +1,0 @@
-"""Between this project's files and those of other programs."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,5 +1,0 @@
-"""From an FRF or recordings to a modal model at the tool tip."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

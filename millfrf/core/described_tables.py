@@ -1,0 +1,281 @@
+"""TOML tables described by their classes: keys with type, unit, range and default, as text and as JSON schema."""
+
+import inspect
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, get_args, get_origin
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+
+@dataclass(frozen=True)
+class TomlFile:
+    """One kind of TOML file.
+
+    Parameters
+    ----------
+    name
+        Short name of the kind, such as ``cut``.
+    title
+        What such a file says, a few words.
+    schema
+        Model class that checks the file, or the one table of it that counts.
+    table
+        Name of that table, such as ``cutting``; empty: the whole file.
+    read_by
+        Commands that read it.
+    """
+
+    name: str
+    title: str
+    schema: type[BaseModel]
+    table: str
+    read_by: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class KeyText:
+    """Unit and description of a key."""
+
+    unit: str
+    text: str
+
+
+def keys_of(schema: type[BaseModel]) -> dict[str, KeyText]:
+    """Unit and description by key, from the section ``Parameters`` of a table's docstring and of those it extends.
+
+    Examples
+    --------
+    >>> class Row(BaseModel):
+    ...     '''A row.
+    ...
+    ...     Parameters
+    ...     ----------
+    ...     depth_m, width_m : m
+    ...         Size of the cut.
+    ...     '''
+    ...     depth_m: float
+    ...     width_m: float
+    >>> keys_of(Row)["width_m"]
+    KeyText(unit='m', text='Size of the cut.')
+    """
+    found: dict[str, KeyText] = {}
+    for base in reversed(schema.__mro__):
+        if issubclass(base, BaseModel) and base is not BaseModel:
+            found |= _of_text(inspect.cleandoc(base.__doc__ or ""))
+    return found
+
+
+def summary_of(schema: type[BaseModel]) -> str:
+    """First paragraph of a table's docstring, in one line."""
+    return " ".join(inspect.cleandoc(schema.__doc__ or "").split("\n\n")[0].split())
+
+
+def _of_text(text: str) -> dict[str, KeyText]:
+    lines = text.splitlines()
+    if "Parameters" not in lines:
+        return {}
+    found: dict[str, KeyText] = {}
+    names: list[str] = []
+    begin = lines.index("Parameters") + 2
+    for line, after in zip(lines[begin:], [*lines[begin + 1 :], ""], strict=True):
+        if after and set(after) == {"-"}:
+            break
+        if line and not line.startswith(" "):
+            listed, _, unit = line.partition(" : ")
+            names = [name.strip() for name in listed.split(",")]
+            found |= {name: KeyText(unit, "") for name in names}
+        elif line.strip():
+            found |= {name: KeyText(found[name].unit, f"{found[name].text} {line.strip()}".strip()) for name in names}
+    return found
+
+
+def json_schema(file: TomlFile) -> dict[str, Any]:
+    """JSON schema (draft 2020-12) of a kind of TOML file; other tables beside the checked one are allowed.
+
+    Parameters
+    ----------
+    file
+        Kind of file, one of :func:`toml_files`.
+    """
+    found = file.schema.model_json_schema()
+    classes = {one.__name__: one for one in schemas_in(file.schema)}
+    _describe(found, file.schema)
+    for name, definition in found.get("$defs", {}).items():
+        _describe(definition, classes[name])
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": f"{file.name}: {file.title}"}
+    if not file.table:
+        return {**found, **head}
+    definitions = found.pop("$defs", {})
+    inner = {"type": "object", "properties": {file.table: found}, "required": [file.table]}
+    return {**head, **inner, **({"$defs": definitions} if definitions else {})}
+
+
+def schemas_in(schema: type[BaseModel]) -> Iterator[type[BaseModel]]:
+    """A model class and all that it holds, each once."""
+    waiting, seen = [schema], set()
+    while waiting:
+        one = waiting.pop()
+        if one in seen:
+            continue
+        seen.add(one)
+        yield one
+        for field in one.model_fields.values():
+            waiting.extend(held_by(field.annotation))
+
+
+def held_by(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Model classes inside an annotation: of a list, a choice, a dictionary."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for inner in get_args(annotation):
+        yield from held_by(inner)
+
+
+def _describe(definition: dict[str, Any], schema: type[BaseModel]) -> None:
+    """Replace titles made from names of classes by what the docstring says."""
+    texts = keys_of(schema)
+    definition.pop("title", None)
+    definition["description"] = summary_of(schema)
+    properties: Mapping[str, dict[str, Any]] = definition.get("properties", {})
+    for name, entry in properties.items():
+        entry.pop("title", None)
+        text = texts[name]
+        entry["description"] = f"{text.text} [{text.unit}]" if text.unit else text.text
+
+
+_PLAIN = {"string": "text", "integer": "whole number", "number": "number", "boolean": "true or false"}
+_BOUNDS = (
+    ("exclusiveMinimum", "above {}"),
+    ("minimum", "{} or more"),
+    ("exclusiveMaximum", "below {}"),
+    ("maximum", "{} or less"),
+)
+
+
+def type_in_words(schema: Mapping[str, Any]) -> str:
+    """What a key takes, in a few words.
+
+    Examples
+    --------
+    >>> type_in_words({"type": "array", "prefixItems": [{"type": "number"}] * 2})
+    'list of 2 numbers'
+    >>> type_in_words({"anyOf": [{"type": "number", "exclusiveMinimum": 0}, {"type": "null"}]})
+    'number above 0'
+    """
+    ways = schema.get("anyOf") or schema.get("oneOf")
+    if ways:
+        words = [type_in_words(one) for one in ways if one.get("type") != "null"]
+        return " or ".join(dict.fromkeys(words))
+    if "const" in schema:
+        return f"`{schema['const']}`"
+    if "enum" in schema:
+        return " or ".join(f"`{value}`" for value in schema["enum"] if value != "")
+    if "$ref" in schema:
+        return "table"
+    if schema.get("type") == "object":
+        held = schema.get("additionalProperties")
+        return "tables by name" if isinstance(held, dict) and "$ref" in held else "free table"
+    if schema.get("type") == "array":
+        return _list(schema)
+    bounds = [words.format(f"{schema[key]:g}") for key, words in _BOUNDS if key in schema]
+    return " ".join([_PLAIN.get(str(schema.get("type")), "value"), " and ".join(bounds)]).strip()
+
+
+def _list(schema: Mapping[str, Any]) -> str:
+    entries = schema.get("prefixItems")
+    if entries:
+        return f"list of {len(entries)} {_plural(type_in_words(entries[0]))}"
+    inner = schema.get("items", {})
+    most, least = schema.get("maxItems"), schema.get("minItems")
+    count = f"{most} " if most is not None and most == least else ""
+    return f"list of {count}{_plural(type_in_words(inner))}"
+
+
+def _plural(words: str) -> str:
+    first, _, rest = words.partition(" ")
+    if words.startswith("whole number"):
+        return words.replace("whole number", "whole numbers", 1)
+    if words == "free table":
+        return "free tables"
+    if first in ("number", "table", "value", "list"):
+        return f"{first}s {rest}".strip()
+    return "texts" if words == "text" else words
+
+
+@dataclass(frozen=True)
+class DescribedKey:
+    """One key of a table.
+
+    Parameters
+    ----------
+    name, unit, text
+        Its name, its unit (empty: none) and what it means.
+    kind
+        What it takes, such as ``number above 0``.
+    default
+        What holds where it is left out; ``None``: it must be given; empty: nothing.
+    """
+
+    name: str
+    unit: str
+    text: str
+    kind: str
+    default: str | None
+
+
+@dataclass(frozen=True)
+class DescribedTable:
+    """One table of a TOML file: its heading as it stands in the file, what it is, its keys."""
+
+    heading: str
+    text: str
+    keys: tuple[DescribedKey, ...]
+
+
+def described_tables(file: TomlFile) -> tuple[DescribedTable, ...]:
+    """All tables of a kind of TOML file, each with every key, the whole file's own keys first.
+
+    Examples
+    --------
+    >>> from millfrf.new.toml_files import toml_files
+    >>> cut = next(file for file in toml_files() if file.name == "cut")
+    >>> described_tables(cut)[0].heading, described_tables(cut)[0].keys[1].name
+    ('[cutting]', 'diameter_m')
+    """
+    heading = f"[{file.table}]" if file.table else ""
+    return tuple(_tables(file.schema, heading, file.table))
+
+
+def _tables(schema: type[BaseModel], heading: str, path: str) -> Iterator[DescribedTable]:
+    texts, properties = keys_of(schema), schema.model_json_schema().get("properties", {})
+    keys = tuple(
+        _key(name, field, texts[name].unit, texts[name].text, properties[name])
+        for name, field in schema.model_fields.items()
+    )
+    yield DescribedTable(heading, summary_of(schema), keys)
+    for name, field in schema.model_fields.items():
+        own = f"{name}.NAME" if get_origin(field.annotation) is dict else name
+        inner = f"{path}.{own}" if path else own
+        for held in dict.fromkeys(held_by(field.annotation)):
+            yield from _tables(held, _heading(field, inner), inner)
+
+
+def _heading(field: FieldInfo, path: str) -> str:
+    return f"[[{path}]]" if get_origin(field.annotation) in (tuple, list) else f"[{path}]"
+
+
+def _key(name: str, field: FieldInfo, unit: str, text: str, schema: Mapping[str, Any]) -> DescribedKey:
+    if field.is_required():
+        return DescribedKey(name, unit, text, type_in_words(schema), None)
+    value = field.get_default(call_default_factory=True, validated_data={})
+    empty = value is None or value in ("", (), [], {}) or isinstance(value, BaseModel)
+    shown = "" if empty else str(value).lower() if isinstance(value, bool) else _shown(value)
+    return DescribedKey(name, unit, text, type_in_words(schema), shown)
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(_shown(one) for one in value)}]"
+    return f"{value:g}" if isinstance(value, float) else repr(value)[1:-1] if isinstance(value, str) else str(value)

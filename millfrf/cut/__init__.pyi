@@ -1,5 +1,0 @@
-from .commands import cut_app
-
-__all__ = [
-    "cut_app",
-]

@@ -1,0 +1,248 @@
+"""Poles picked in the browser: the page, served to this computer, and the file of the choice."""
+
+import asyncio
+import json
+import os
+import webbrowser
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from estimation import read_frf
+from millfrf.core import InputError, MillfrfError, writing_whole_file
+from millfrf.core.file_kinds import FRF, kind_of
+from millfrf.core.progress import Progress
+from millfrf.core.provenance import sources, versions
+from millfrf.core.terminal import say
+from millfrf.options import check_output
+from millfrf.steps.fit import FitOptions, fit_model
+
+from .handlers import Guarded, Missing
+from .picking import PickSession, Pole, checked_choice, drawn_page, fitted_answer
+from .server import LOOPBACK, CountedServer, Guard, Limits, hosts_of
+
+
+def write_picked(
+    path: str | os.PathLike[str], chosen: Sequence[Pole], frf: str | os.PathLike[str], band: tuple[float, float]
+) -> None:
+    """Write chosen poles as TOML, with the FRF and the band in comments.
+
+    Parameters
+    ----------
+    path
+        File to write, ``.toml``.
+    chosen
+        Frequency (Hz) and damping ratio of each pole.
+    frf
+        FRF that they were picked of.
+    band : Hz
+        Lowest and highest frequency of the fit.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+    """
+    [source] = sources([frf])
+    lines = [
+        f"# Poles picked in the browser from {_comment(str(source['file']))}, {band[0]:g} to {band[1]:g} Hz.",
+        f"# SHA-256 of that file: {source['sha256']}; millfrf {versions()['millfrf']}.",
+        f"# Repeat: millfrf fit {_comment(str(source['file']))} --band {band[0]:g} {band[1]:g} --poles THIS_FILE",
+        'format = "millfrf.poles"',
+        "format_version = 1",
+    ]
+    for frequency, damping in sorted(chosen):
+        lines += ["", "[[poles]]", f"frequency_hz = {frequency!r}", f"damping_ratio = {damping!r}"]
+    with writing_whole_file(path) as temporary:
+        Path(temporary).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _comment(text: str) -> str:
+    """A name without what would end a comment's line."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+
+_FOLDER = Path(__file__).parent
+_KINDS = {".js": "text/javascript", ".css": "text/css", ".json": "application/json"}
+
+
+def pick_poles(
+    session: PickSession, say: Callable[[str], None], show: Callable[[str], object] | None = None
+) -> list[Pole]:
+    """Serve the page until a choice is saved, and give the choice.
+
+    The server listens on this computer only, under a path that holds a token; it answers requests with its own name
+    (``Host``) and from its own page (``Origin``), as the live page does.
+
+    Parameters
+    ----------
+    session
+        FRF and automatic fit.
+    say
+        Takes a line with the page's address.
+    show
+        Opens the address in a browser; None: the one of this computer.
+
+    Returns
+    -------
+    list of (float, float)
+        Frequency (Hz) and damping ratio of each chosen pole.
+
+    Raises
+    ------
+    MillfrfError
+        The page was left without a choice.
+    """
+    chosen = asyncio.run(_served(session, say, show or webbrowser.open))
+    if chosen is None:
+        raise MillfrfError("no poles were saved on the page: nothing is written")
+    return chosen
+
+
+async def _served(session: PickSession, say: Callable[[str], None], show: Callable[[str], object]) -> list[Pole] | None:
+    from tornado.netutil import bind_sockets
+    from tornado.web import Application
+
+    [socket] = bind_sockets(0, LOOPBACK)
+    port = socket.getsockname()[1]
+    guard = Guard(hosts_of(LOOPBACK, port, True))
+    ended: asyncio.Future[list[Pole] | None] = asyncio.get_running_loop().create_future()
+    application = Application(
+        [
+            (r"/(?P<token>[^/]*)/(?P<name>fit|save|leave)", _handler("Answer")),
+            (r"/(?P<token>[^/]*)/(?P<name>[^/]*)", _handler("File")),
+        ],
+        default_handler_class=Missing,
+        log_function=lambda _: None,  # a request's path holds the token
+        guard=guard,
+        content=_content(session),
+        session=session,
+        ended=ended,
+    )
+    server = CountedServer.with_limits(application, Limits())
+    server.add_sockets([socket])
+    url = f"http://{LOOPBACK}:{port}/{guard.token}/"
+    say(f"pick poles at {url}")
+    show(url)
+    try:
+        return await ended
+    finally:
+        await asyncio.sleep(0.2)  # the answer to the last request is on its way
+        server.stop()
+        await server.close_all_connections()
+
+
+def _content(session: PickSession) -> dict[str, tuple[bytes, str]]:
+    from millfrf.figures import browser_library
+
+    own = {name: (_FOLDER / name).read_bytes() for name in ("picking.js", "picking.css")}
+    made = {"page.json": drawn_page(session).encode(), "bokeh.min.js": browser_library().encode()}
+    files = {name: (body, _KINDS[Path(name).suffix]) for name, body in (own | made).items()}
+    return files | {"": ((_FOLDER / "picking.html").read_bytes(), "text/html; charset=utf-8")}
+
+
+def _handler(kind: str) -> Any:
+    """Handlers of tornado, made when a page is served: the command line starts without it."""
+    from tornado.web import HTTPError
+
+    class File(Guarded):
+        """A file of the page."""
+
+        def get(self, token: str, name: str) -> None:
+            del token
+            if name not in self.application.settings["content"]:
+                raise HTTPError(404)
+            body, of_kind = self.application.settings["content"][name]
+            self.set_header("Content-Type", of_kind)
+            self.write(body)
+
+    class Answer(Guarded):
+        """An answer to the page: a choice is fitted, or saved, or the page is left."""
+
+        def prepare(self) -> None:
+            super().prepare()
+            if not self._guard.origin_is_ours(self.request.headers.get_list("Origin")):
+                raise HTTPError(403)
+
+        async def post(self, token: str, name: str) -> None:
+            del token
+            settings = self.application.settings
+            try:
+                asked = json.loads(self.request.body or b"{}")
+            except (ValueError, RecursionError) as error:
+                raise HTTPError(400) from error
+            if name == "fit":
+                loop = asyncio.get_running_loop()
+                self.write(await loop.run_in_executor(None, fitted_answer, settings["session"], asked))
+                return
+            self.write(_ended(settings["session"], settings["ended"], asked if name == "save" else None))
+
+    return {"File": File, "Answer": Answer}[kind]
+
+
+def _ended(session: PickSession, ended: "asyncio.Future[list[Pole] | None]", asked: object) -> dict[str, str]:
+    """End with a choice that can be fitted, or without one; what the page is told."""
+    chosen: list[Pole] | None = None
+    if asked is not None:
+        answer = fitted_answer(session, asked)
+        if "error" in answer:
+            return {"error": str(answer["error"])}
+        try:
+            chosen = checked_choice(asked, 10**9)[0]
+        except InputError as error:
+            return {"error": str(error)}
+    if not ended.done():
+        ended.set_result(chosen)
+    return {"done": "saved" if chosen else "left"}
+
+
+def check_pick(pick: Path, out: Path, poles: Path | None, candidates: Path | None, files: Sequence[Path]) -> None:
+    """Refuse a choice that cannot be made or written, before anything is computed.
+
+    Raises
+    ------
+    InputError
+        Poles that are named already, candidates for another picker, recordings, or a name that cannot be written.
+    """
+    if poles is not None:
+        raise InputError("--pick chooses the poles that --poles would name; give one of the two")
+    if candidates is not None:
+        raise InputError("--candidates is for another picker; leave it out beside --pick")
+    if kind_of(files[0]) != FRF:
+        raise InputError("--pick shows the poles of an FRF; estimate one from these recordings first")
+    check_output(pick, (".toml",), [out, *files])
+
+
+def pick_in_browser(pick: Path, frf: Path, options: FitOptions, progress: Progress) -> Path:
+    """Fit, show the page until a choice is saved, and write the choice.
+
+    Parameters
+    ----------
+    pick
+        File of the choice, ``.toml``.
+    frf
+        File of the FRF.
+    options
+        Band, and where it is given highest order and number of modes of the automatic fit.
+    progress
+        Shows progress of the automatic fit.
+
+    Returns
+    -------
+    Path
+        The file of the choice, for ``--poles``.
+
+    Raises
+    ------
+    InputError
+        An FRF or a band that cannot be fitted.
+    MillfrfError
+        The page was left without a choice.
+    """
+    measured = read_frf(frf)
+    automatic = fit_model(measured, replace(options, poles=None, refine=False), progress, frf.name)
+    chosen = pick_poles(PickSession(frf.name, measured, automatic, options.max_order), say)
+    write_picked(pick, chosen, frf, options.band)
+    say(f"wrote {pick}: {len(chosen)} poles; --poles {pick} repeats the fit")
+    return pick

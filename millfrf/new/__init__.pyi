@@ -1,5 +1,0 @@
-from .new_commands import new_app
-
-__all__ = [
-    "new_app",
-]

@@ -1,0 +1,241 @@
+"""Report pages of the diagnoses of cuts and robots."""
+
+import os
+
+import numpy as np
+
+from millfrf.core.terminal import Table
+from millfrf.figures import cut_orders_figure, cut_turn_figure, house_style, robot_evidence_figure, robot_spectra_figure
+from millfrf.mismatch import (
+    COEFFICIENT_NAMES,
+    ROBOT,
+    Candidate,
+    CutDiagnosis,
+    RobotDiagnosis,
+    number_of,
+    standard_error_of,
+)
+
+from ..results_page import FigureFiles, ResultsPage, write_results_page
+from ..section import Section, picture_of
+from .answers import made_when
+from .robot_words import UNITS, refusal, told_number, what_is_asked
+
+
+def write_cut_report(
+    path: str | os.PathLike[str],
+    found: CutDiagnosis,
+    cut_name: str,
+    summary: list[str],
+    figures: FigureFiles | None = None,
+) -> None:
+    """Write one HTML page, figures inside, that needs no other file and no network.
+
+    Parameters
+    ----------
+    path
+        File of the page.
+    found
+        Diagnosis of the cut.
+    cut_name
+        Name of the cut, for the title.
+    summary
+        Verdict, a sentence on it, and a line for each finding.
+    figures
+        Folder and format in which each figure is written as a file too; None: no files.
+    """
+    names = ", ".join(spectra.recording.name for spectra in found.details.cut.spectra)
+    page = ResultsPage(
+        "Diagnosis of computed against measured cutting forces",
+        f"{cut_name} against {names}",
+        made_when(),
+        (f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",),
+        tuple(_warnings_of_cut(found)),
+        (("What was found", tuple(summary[2:])),),
+    )
+    sections = [
+        _around_the_turn(found),
+        _by_order(found),
+        _coefficients(found),
+        _candidates_of_cut(found),
+    ]
+    write_results_page(path, page, sections, figures)
+
+
+def _warnings_of_cut(found: CutDiagnosis) -> list[str]:
+    cut, proof = found.details.cut, found.details.settings.proof
+    warnings = [
+        f"Coefficients are taken to be off by {100 * cut.belief.error:g} %, each spectral line of a right computed "
+        f"force by {100 * cut.force_error:g} %; what is smaller is not named.",
+        f"A cause is told if it lowers the error of the force on blocks held out with p < {proof.significance:g}. Its "
+        "± is one standard error: the fit's own, the spread between halves of the blocks and between bands of "
+        "frequency, and the largest shift with another cause free.",
+    ]
+    warnings += found.doubts
+    if any(one.stage.startswith("not weighed") for one in found.candidates):
+        warnings.append("Not every cause could be weighed; see the table of candidates.")
+    return warnings
+
+
+def _around_the_turn(found: CutDiagnosis) -> Section:
+    with house_style():
+        figure = cut_turn_figure(found)
+    name = found.details.cut.spectra[0].recording.name
+    caption = (
+        f"Force on the tool around the turn of the spindle in {name}, mean of all turns, without its constant part, in "
+        "the band that is compared (its upper end makes the ripple). Below: measured less computed."
+    )
+    return Section("Around the turn", (), (), (picture_of(figure, caption, "Measured and computed force"),))
+
+
+def _by_order(found: CutDiagnosis) -> Section:
+    with house_style():
+        figure = cut_orders_figure(found)
+    caption = "Amplitude of the force and of what is left of it; teeth of equal chips give multiples of their number."
+    better = found.improvement
+    columns: tuple[str, ...] = ("as computed", "coefficients refitted", "noise")
+    numbers: tuple[float, ...] = (better.before, better.refitted, better.noise_floor)
+    if found.details.final.freed:
+        columns, numbers = (*columns[:2], "with causes", "noise"), (*numbers[:2], better.after, better.noise_floor)
+    row = tuple(f"{100 * number:.3g}" for number in numbers)
+    table = Table("Error on blocks of time that were not fitted (% of the force)", columns, (row,))
+    return Section("By spindle order", (), (table,), (picture_of(figure, caption, "Error by spindle order"),))
+
+
+def _coefficients(found: CutDiagnosis) -> Section:
+    belief, fitted = found.details.cut.belief, found.details.final
+    stated, _ = belief.told(np.zeros(6), np.zeros(6))
+    values, errors = belief.told(fitted.hypothesis.deviations, np.sqrt(np.diag(fitted.covariance)[:6]))
+    rows = tuple(
+        (name, f"{stated[name]:.4g}", f"{values[name]:.4g} ± {errors[name]:.2g}", f"{deviation:+.2f}")
+        for name, deviation in zip(COEFFICIENT_NAMES, fitted.hypothesis.deviations, strict=True)
+    )
+    columns = ("coefficient", "stated", "refitted", "off by (lab's errors)")
+    return Section("Coefficients", (), (Table("Force coefficients, refitted with the causes", columns, rows),))
+
+
+def _candidates_of_cut(found: CutDiagnosis) -> Section:
+    rows = tuple((one.name, one.stage, f"{one.evidence:.1f}") for one in found.candidates)
+    table = Table(
+        "Evidence of each cause, beside those accepted before it", ("cause", "how far it was taken", "evidence"), rows
+    )
+    return Section("What was weighed", (), (table,))
+
+
+def write_robot_report(
+    path: str | os.PathLike[str],
+    found: RobotDiagnosis,
+    robot_name: str,
+    summary: list[str],
+    *,
+    dated: bool = True,
+    figures: FigureFiles | None = None,
+) -> None:
+    """Write one HTML page, figures inside, that needs no other file and no network.
+
+    Parameters
+    ----------
+    path
+        The page; an older one is replaced.
+    found
+        Diagnosis of the robot.
+    robot_name
+        Name of the robot, for the title.
+    summary
+        Verdict, a sentence on it, and a line for each cause and held-out recording.
+    dated
+        Whether the page tells when it was written; without, equal input gives equal bytes.
+    figures
+        Folder and format in which each figure is written as a file too; None: no files.
+    """
+    names = ", ".join(one.name for one in found.details.robot.recordings)
+    page = ResultsPage(
+        "Diagnosis of a robot model against recordings",
+        f"{robot_name} against {names}",
+        made_when(dated=dated),
+        (f"{summary[0].removeprefix('verdict: ').capitalize()}: {summary[1]}.",),
+        (*found.doubts, *_warnings_of_robot(found)),
+        (("What was found", tuple(summary[2:]) or ("Nothing to change.",)),),
+    )
+    write_results_page(path, page, [_spectra(found), _candidates_of_robot(found), _postures(found)], figures)
+
+
+def _warnings_of_robot(found: RobotDiagnosis) -> list[str]:
+    error = found.details.robot.error
+    warnings = [
+        f"A right model is taken to be off by {100 * error.frequency:g} % in frequency, {100 * error.damping:g} % in "
+        f"damping and {100 * error.shape:g} % of a shape's size in each posture; what is smaller is not named."
+    ]
+    if len(found.details.robot.recordings) == 1:
+        warnings.append("One posture loads the joints in one way: causes are told apart better from several.")
+    warnings.append(what_is_asked())
+    if found.after.share > ROBOT.verdict.noise_like:
+        warnings.append(
+            f"What is left is {found.after.share:.2g} times what a right model's modes are off (passes up to "
+            f"{ROBOT.verdict.noise_like:g}): some of the physics is missing."
+        )
+    return warnings
+
+
+def _spectra(found: RobotDiagnosis) -> Section:
+    with house_style():
+        figure = robot_spectra_figure(found)
+    caption = (
+        "Root of response power over force power, all channels of a recording together, as receptance. The modes of "
+        "the robot are drawn without the small deviations that a right model is allowed."
+    )
+    columns: tuple[str, ...] = ("recording", "as modelled", "modes fitted freely")
+    rows: list[tuple[str, ...]] = [
+        (one.name, f"{100 * one.before:.3g}", f"{100 * one.floor:.3g}") for one in found.held_out
+    ]
+    if found.physics:
+        columns = (*columns[:2], "with the change", columns[2])
+        pairs = zip(rows, found.held_out, strict=True)
+        rows = [(*row[:2], f"{100 * one.after:.3g}", row[2]) for row, one in pairs]
+    table = Table("Error of recordings that were left out of the fit (% of the response)", columns, tuple(rows))
+    return Section("On the recordings", (), (table,), (picture_of(figure, caption, "Spectra before and after"),))
+
+
+def _candidates_of_robot(found: RobotDiagnosis) -> Section:
+    with house_style():
+        figure = robot_evidence_figure(found)
+    rows = tuple((one.name, *_number(one), f"{one.evidence:.1f}", refusal(one) or "-") for one in found.candidates)
+    columns = ("change", "number", "unit", "evidence", "recordings left out")
+    table = Table("Every change alone with its number, error of the fit alone", columns, rows)
+    caption = "Gain in score of each single change (twice a log Bayes factor); blue: accepted, or as good."
+    tables = (_errors(found), table) if found.physics else (table,)
+    return Section("What was weighed", (), tables, (picture_of(figure, caption, "Evidence of the candidates"),))
+
+
+def _errors(found: RobotDiagnosis) -> Table:
+    """Explain the sources of the errors of the numbers told."""
+    rows = []
+    for one in found.physics:
+        number, unit = told_number(one)
+        factor = UNITS.get(one.location["unit"], ("", 1.0))[1]
+        parts = (f"{factor * part:.2g}" for part in one.error_parts[one.name].values())
+        rows.append((one.name, number, unit or "times", *parts))
+    columns = ("change", "number", "unit", "fit", "between recordings", "another change free")
+    return Table("What was found, and the parts of its error", columns, tuple(rows))
+
+
+def _number(cause: Candidate) -> tuple[str, str]:
+    size = {"m/N": 0.0}.get(cause.location["unit"], 0.5)
+    if not standard_error_of(cause) < 3 * abs(number_of(cause)) + size:
+        return "not told by the data", ""
+    number, unit = told_number(cause)
+    return number, unit or "times"
+
+
+def _postures(found: RobotDiagnosis) -> Section:
+    rows = tuple(
+        (
+            one.name,
+            ", ".join(f"{angle:.1f}" for angle in np.degrees(one.q)),
+            f"{one.spectrum.frequencies[0]:.3g} to {one.spectrum.frequencies[-1]:.3g}",
+            ", ".join(one.responses),
+        )
+        for one in found.details.robot.recordings
+    )
+    table = Table("Recordings and their postures", ("recording", "joints (deg)", "band (Hz)", "responses"), rows)
+    return Section("What was compared", (), (table,))

@@ -1,0 +1,389 @@
+"""Report page of a structural diagnosis: tables, figures, effect on the lobes."""
+
+import os
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from millfrf.core import InputError
+from millfrf.core.terminal import Table
+from millfrf.cutting import MillingProcess
+from millfrf.figures import (
+    behaviour_figure,
+    channel_map_figure,
+    growth_figure,
+    law_figure,
+    lobes_figure,
+    spectra_figure,
+    time_map_figure,
+)
+from millfrf.mismatch import (
+    Candidate,
+    Hypothesis,
+    StructureDiagnosis,
+    equivalent_receptance,
+    free_form_laws,
+    held_out_spectra,
+    in_processes,
+    joint_in_words,
+    recording_errors,
+    rig_of,
+    significant_cells,
+)
+from millfrf.stability import StabilityLobes, zero_order
+from modal_fit import ModalModel
+
+from ..collection import collection_paused
+from ..results_page import FigureFiles, ResultsPage, write_results_page
+from ..section import Picture, Section, picture_of
+from .answers import answers, made_when, number, offered_in_words, place, verdict_sentence, warnings, words
+
+MOST_CANDIDATES = 15
+
+LEVELS_APART = 1.05
+"""Strongest over weakest level from which growth is drawn: nearer ones lie on one spot."""
+
+
+def location_section(diagnosis: StructureDiagnosis) -> Section:
+    """Maps of the residual."""
+    view = diagnosis.details.view
+    assert view is not None
+    located = diagnosis.located
+    level = 100 * located["family_wise_level"]
+    mask = significant_cells(located, view.before.ratio.shape)
+    maps = _picture(
+        channel_map_figure(view, mask),
+        "Residual power over noise power by frequency and channel, a column a recording. Dots: more than noise "
+        f"leaves, at {level:.0f} % for all {located['tests']} cells of all maps together (F tests, Holm).",
+        "Residual by frequency and channel",
+    )
+    times = _picture(
+        time_map_figure(view), "The same over time and frequency, all channels together.", "Residual by time"
+    )
+    return Section("Where the residual sits", (), (), (maps, times))
+
+
+def growth_section(diagnosis: StructureDiagnosis) -> Section:
+    """How the residual grows with the level."""
+    growth = diagnosis.located["growth"]
+    reason = _no_growth(growth, len(diagnosis.details.recordings))
+    if reason:
+        return Section("Growth with the level", (reason,))
+    caption = (
+        "Residual with the power of the noise taken off, relative to the response averaged over all recordings, "
+        "against force; bars are two standard errors. Thin lines: slopes of typical omissions."
+    )
+    return Section(
+        "Growth with the level", (), (), (_picture(growth_figure(growth), caption, "Growth of the residual"),)
+    )
+
+
+def _no_growth(growth: Mapping[str, Any], recordings: int) -> str:
+    """Why there is no figure of the growth; empty where there is one."""
+    if recordings < 2:
+        return "Not drawn: there is a single recording, and how the residual grows needs two levels."
+    if "residual" not in growth:
+        return f"Not drawn: {growth.get('note', 'nothing was located')}."
+    found = [growth[key] for key in ("residual", "effect") if key in growth]
+    if not any((one or 0.0) > 0 for part in found for one in part["amplitude"]):
+        return (
+            "Not drawn: in the bands that stand out, the residual of whole recordings is no larger than their noise "
+            "at any level."
+        )
+    levels, unit = found[0].get("drive_rms") or found[0]["force_rms_n"], found[0].get("drive_unit", "N")
+    if max(levels) < LEVELS_APART * min(levels):
+        return (
+            f"Not drawn: all recordings have nearly one level, {min(levels):.3g} to {max(levels):.3g} {unit}; record "
+            "at half and at twice of it to see how the residual grows."
+        )
+    return ""
+
+
+def law_section(diagnosis: StructureDiagnosis) -> Section:
+    """The measured force of the joint."""
+    title = "The measured force of the joint"
+    laws = free_form_laws(diagnosis)
+    sentences = tuple(
+        "The force that the linear model lacks along the found direction, from the recordings alone and with no law "
+        f"assumed; {words(found.name)} gives {100 * found.explained:.1f} % of its power."
+        for found in laws
+    )
+    caption = (
+        "Force that the joint takes beyond the linear model, in bins over all recordings, with bands of two standard "
+        "errors; (a) against deflection, rising and falling; (b) against velocity. Lines: the accepted law, driven by "
+        "the same motion and averaged alike."
+    )
+    if diagnosis.details.textbook is not None:
+        caption += (
+            " Dotted: the library's law, with the linear spring and damper that bring it nearest, as they cannot be "
+            "told from the structure's own."
+        )
+    pictures = tuple(_picture(law_figure(found), caption, f"Force of the joint: {words(found.name)}") for found in laws)
+    return Section(title, sentences, (), pictures)
+
+
+def held_out_section(diagnosis: StructureDiagnosis) -> Section:
+    """Errors and spectra on the recording that was held out."""
+    unit = rig_of(diagnosis.details.final.hypothesis.model).force_unit
+    rows = tuple(
+        (
+            f"{one.recording}{' (held out)' if one.held_out else ''}",
+            f"{one.force:.4g}",
+            *(f"{100 * error:.3g}" for error in (one.nominal, one.refitted, one.final, one.noise)),
+            f"{one.final / one.noise:.3g}",
+        )
+        for one in recording_errors(diagnosis)
+    )
+    columns = (
+        "recording",
+        f"{'force' if unit == 'N' else 'drive'}, rms ({unit})",
+        "nominal (%)",
+        "refitted (%)",
+        "final (%)",
+        "noise (%)",
+        "final over noise",
+    )
+    without = "Error as a share of the response, all channels together"
+    if diagnosis.details.tested:
+        without += f"; fitted without {diagnosis.improvement.where}"
+    table = Table(without, columns, rows)
+    spectra = held_out_spectra(diagnosis)
+    caption = (
+        f"{spectra.recording}: measured and predicted response, and what each model leaves of it, fitted to the other "
+        "recordings only. Grey: noise, with what the noise of the forces becomes in the structure."
+    )
+    picture = _picture(spectra_figure(spectra), caption, "Spectra of the held-out recording")
+    return Section("On data that was not fitted", (), (table,), (picture,))
+
+
+def number_section(diagnosis: StructureDiagnosis) -> Section:
+    """Parameters of each accepted cause with standard errors."""
+    rows = []
+    for cause in diagnosis.physics:
+        for name, value in cause.parameters.items():
+            shown = number(value, cause.standard_errors.get(name))
+            rows.append((words(cause.name), name, shown, place(diagnosis, cause)))
+    columns = ("cause", "parameter", "value ± standard error", "place")
+    return Section(
+        "Numbers", (), (Table("Parameters of the accepted causes (SI units)", columns, tuple(rows)),) if rows else ()
+    )
+
+
+def candidate_section(diagnosis: StructureDiagnosis) -> Section:
+    """Make the section on all causes that were weighed."""
+    accepted = {cause.name: cause.evidence for cause in diagnosis.physics}
+    rows, seen = [], set()
+    for one in sorted(diagnosis.candidates, key=lambda one: (one.stage != "fitted", -one.evidence)):
+        key = (one.name, one.stage, str(one.location) if "channel" in one.location else "")
+        if key in seen or not np.isfinite(one.evidence):
+            continue
+        seen.add(key)
+        told = one.name in accepted and one.stage == "fitted"
+        evidence = accepted[one.name] if told else one.evidence
+        rows.append((words(one.name), one.stage, f"{evidence:.0f}", _short_place(one), "accepted" if told else ""))
+    sentence = (
+        "Screened: gain in misfit to first order, before a fit. Fitted: gain in evidence after all numbers were fitted "
+        "anew and the joint simulated freely; the larger, the better. Of each cause the best round is shown; of an "
+        "accepted one the evidence it was accepted with. Impossible: fitted, but with numbers that nothing real has."
+    )
+    table = Table(
+        "Causes that were weighed", ("cause", "stage", "evidence", "place", ""), tuple(rows[:MOST_CANDIDATES])
+    )
+    spared = tuple(f"{one[:1].upper()}{one[1:]}." for one in diagnosis.content.get("not_asked_for", ()))
+    return Section("What was weighed", (sentence, *spared), (table,) if rows else ())
+
+
+def _short_place(one: Candidate) -> str:
+    if "direction" in one.location:
+        return "(" + ", ".join(f"{value:.2f}" for value in one.location["direction"]) + ")"
+    if "participation" in one.location:
+        return joint_in_words(one.location)
+    return str(one.location.get("impossible", one.location.get("channel", "")))
+
+
+def _picture(figure: Figure, caption: str, alternative: str) -> Picture:
+    return picture_of(figure, caption, alternative)
+
+
+def if_possible(make: Callable[[], Section], title: str) -> Section:
+    """A section, or the reason why it is missing: one figure must not cost a report."""
+    try:
+        return make()
+    except (InputError, np.linalg.LinAlgError) as error:
+        return Section(title, (f"Not shown: {error}",))
+
+
+TITLE = "What the modes do with the level"
+
+
+def behaviour_section(diagnosis: StructureDiagnosis) -> Section:
+    """Each mode by level in words, and frequencies and damping ratios drawn over the level."""
+    found = diagnosis.details.behaviour
+    if found is None:
+        return Section(TITLE, ())
+    sentences = [found.sentence]
+    sentences += [f"{one.sentence[:1].upper()}{one.sentence[1:]}." for one in found.modes]
+    sentences += [f"{one[:1].upper()}{one[1:]}." for one in found.distortion]
+    told = tuple(dict.fromkeys(sentences))
+    if not found.modes or len(found.modes[0].levels) < 2:
+        return Section(TITLE, told)
+    caption = (
+        "Each recording refitted alone by a linear model, no law assumed. Bars are two standard errors and count what "
+        "a linear model cannot follow. (a) Natural frequency from that at the lowest level; (b) damping ratio."
+    )
+    picture = picture_of(behaviour_figure(found), caption, "Natural frequency and damping by level")
+    return Section(TITLE, told, (), (picture,))
+
+
+ASSUMED = MillingProcess(
+    teeth=2,
+    diameter=0.010,
+    edge_angle=np.pi / 2,
+    ktc=800e6,
+    krc=0.3,
+    kac=0.2,
+    start_angle=0.0,
+    exit_angle=np.pi,
+    feed_per_tooth=1e-4,
+)
+"""A slot in aluminium, where no cut is named."""
+
+SPEEDS, DEEPEST = 240, 0.2
+
+LINES_PER_WIDTH = 24
+"""Frequencies within a resonance's half-power width: depths are then within 0.2 % of those of a finer grid."""
+
+FEWEST_LINES, MOST_LINES = 600, 4000
+
+
+def diagnosis_lobes_section(diagnosis: StructureDiagnosis, process: MillingProcess | None) -> Section:
+    """Compare depth limits of the nominal and the improved structure, the latter at the weakest and strongest level.
+
+    Parameters
+    ----------
+    diagnosis
+        Diagnosis in which something was found.
+    process
+        Milling process of the cut; None: a slot that is assumed.
+
+    Raises
+    ------
+    InputError
+        A model without the axes that a cut needs.
+    """
+    title = "What it does to the lobes"
+    if diagnosis.verdict != "explained":
+        return Section(title)
+    unit = diagnosis.details.final.hypothesis.model.unit
+    if unit != "m/N":
+        said = f"Lobes need a model in m/N; this one is in {unit}."
+        return Section(title, (said,) if process is not None else ())
+    cut = process or ASSUMED
+    curves = _curves(diagnosis, cut)
+    names = list(curves)
+    lowest = {name: float(np.nanmin(lobes.depth_limits)) for name, lobes in curves.items()}
+    rows = tuple((name, f"{1e3 * depth:.3g}", f"{depth / lowest[names[0]]:.2f}") for name, depth in lowest.items())
+    told = "the cut given" if process else "a slot, 2 teeth, K_tc 800 MPa, as no cut was given (--cutting CUT.toml)"
+    sentence = (
+        f"For {told}: zero-order limits, which compare structures and cannot see period doubling: cut by those of "
+        "`millfrf lobes` with the improved model. Joints count as the spring and damper that come closest to their law "
+        "at the motion of the recording named; faults of the measuring chain are no part of the structure."
+    )
+    columns = ("structure", "depth stable at every speed (mm)", "over nominal")
+    table = Table("Depth that is stable at every speed drawn", columns, rows)
+    caption = "(a) Largest stable axial depth over spindle speed; (b) chatter frequency at the limit."
+    picture = picture_of(lobes_figure(curves), caption, "Stability lobes before and after")
+    return Section(title, (sentence, *offered_in_words(diagnosis)), (table,), (picture,))
+
+
+def _frequencies(model: ModalModel) -> NDArray[np.float64]:
+    """Frequencies from a third of the lowest mode to three times the highest, as dense as the sharpest one needs."""
+    natural, sharpest = model.natural_frequencies, max(float(model.damping_ratios.min()), 1e-6)
+    span = np.log(9 * natural.max() / natural.min())
+    lines = int(np.clip(LINES_PER_WIDTH * span / (2 * sharpest), FEWEST_LINES, MOST_LINES))
+    return np.geomspace(natural.min() / 3, 3 * natural.max(), lines)
+
+
+def _curves(diagnosis: StructureDiagnosis, cut: MillingProcess) -> dict[str, StabilityLobes]:
+    final, lines = diagnosis.details.final.hypothesis, diagnosis.details.recordings
+    nominal = final.nominal
+    natural = nominal.model.natural_frequencies
+    frequencies = _frequencies(nominal.model)
+    tooth = 2 * np.pi / cut.teeth
+    speeds = np.geomspace(natural.min() * tooth / 2, 3 * natural.max() * tooth, SPEEDS)
+
+    def limits(hypothesis: Hypothesis, place: int) -> StabilityLobes:
+        return zero_order(equivalent_receptance(hypothesis, lines[place], frequencies), cut, speeds, DEEPEST)
+
+    curves = {"nominal": limits(nominal, 0)}
+    if any(cause.axis is not None for cause in final.causes) and len(lines) > 1:
+        for place in (0, len(lines) - 1):
+            curves[f"improved, as in {lines[place].recording.name}"] = limits(final, place)
+    else:
+        curves["improved"] = limits(final, 0)
+    if any(not np.isfinite(lobes.depth_limits).any() for lobes in curves.values()):
+        raise InputError(f"no limit below {1e3 * DEEPEST:g} mm; the structure is too stiff for the cut")
+    return curves
+
+
+def write_diagnosis_report(
+    path: str | os.PathLike[str],
+    diagnosis: StructureDiagnosis,
+    model_name: str = "",
+    process: MillingProcess | None = None,
+    *,
+    dated: bool = True,
+    figures: FigureFiles | None = None,
+) -> None:
+    """Write one HTML page, figures inside, that needs no other file and no network.
+
+    Parameters
+    ----------
+    path
+        File of the page.
+    diagnosis
+        Diagnosis of a structure, with its fits and maps.
+    model_name
+        Name of the nominal model, for the title.
+    process
+        Milling process for the lobes; None: one that is assumed.
+    dated
+        Whether the page tells when it was written; without, equal input gives equal bytes.
+    figures
+        Folder and format in which each figure is written as a file too; None: no files.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+    """
+    with collection_paused():
+        sections = (number_section(diagnosis), *_drawn_sections(diagnosis, process), candidate_section(diagnosis))
+        names = ", ".join(one.recording.name for one in diagnosis.details.recordings)
+        page = ResultsPage(
+            "Diagnosis of a model against recordings",
+            f"{model_name or 'Nominal model'} against {names}",
+            made_when(dated=dated),
+            (verdict_sentence(diagnosis),),
+            tuple(warnings(diagnosis)),
+            answers(diagnosis),
+        )
+        write_results_page(path, page, sections, figures)
+
+
+def _drawn_sections(diagnosis: StructureDiagnosis, process: MillingProcess | None) -> list[Section]:
+    """Sections with figures, drawn side by side, the longest first."""
+    makers: list[Callable[[], Section]] = [
+        lambda: if_possible(lambda: held_out_section(diagnosis), "On data that was not fitted"),
+        partial(location_section, diagnosis),
+        lambda: if_possible(lambda: diagnosis_lobes_section(diagnosis, process), "What it does to the lobes"),
+        lambda: if_possible(lambda: law_section(diagnosis), "The measured force of the joint"),
+        partial(growth_section, diagnosis),
+        partial(behaviour_section, diagnosis),
+    ]
+    held_out, location, lobes, law, growth, behaviour = in_processes(makers)
+    return [behaviour, law, held_out, lobes, location, growth]

@@ -1,5 +1,0 @@
-"""What is told of an optimised path: a table, a picture, sentences."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,5 +1,0 @@
-"""`millfrf robot diagnose`: the command, its run, and its words."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,5 +1,0 @@
-"""Robots under load on the command line: stiffness, payload, and deviation of drilled holes."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

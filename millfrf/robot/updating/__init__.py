@@ -1,5 +1,0 @@
-"""`millfrf robot update`: files in, an updated robot file and words out."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

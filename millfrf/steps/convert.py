@@ -1,0 +1,207 @@
+"""Step ``convert``: files of other programs into recordings, FRFs, models and geometries, and back."""
+
+import datetime
+import json
+import os
+import tomllib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from acquisition import convert as convert_recording
+from estimation import (
+    ImportedFrf,
+    import_frf,
+    import_geometry,
+    is_frf_mapping,
+    load_frf_mapping,
+    looks_like_frf,
+    read_frf,
+    write_frf,
+    write_frf_uff,
+    write_geometry,
+)
+from millfrf.core import InputError, writing_whole_file
+from millfrf.core.provenance import add_comment, add_to_json, made, origin, sources, versions
+from millfrf.gate import check_frf, doubts_of_rate
+from modal_fit import ModalModel, import_modes_uff, read_modal_model, write_modal_model, write_modes_uff
+
+UFF_SUFFIXES = (".uff", ".unv")
+
+Files = Sequence[str | os.PathLike[str]]
+
+
+@dataclass(frozen=True)
+class Told:
+    """Remarks of a conversion: what it inferred, and doubts, which are stored with the result."""
+
+    inferred: tuple[str, ...] = ()
+    doubts: tuple[str, ...] = ()
+
+
+def is_uff_conversion(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> bool:
+    """Say whether one side is a UFF file, or a geometry is to be written."""
+    suffixes = [Path(path).suffix.lower() for path in (source, target)]
+    return suffixes[1] == ".toml" or any(suffix in UFF_SUFFIXES for suffix in suffixes)
+
+
+def convert_uff(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> Told:
+    """A geometry where the target is ``.toml``, a modal model where either side is ``.json``, else an FRF.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be used, or an FRF that :mod:`millfrf.gate` refuses; nothing is written.
+    """
+    suffixes = [Path(path).suffix.lower() for path in (source, target)]
+    if suffixes[1] == ".toml":
+        return convert_geometry(source, target)
+    if ".json" in suffixes:
+        return _convert_modes(source, target)
+    found = import_frf([source]) if suffixes[0] in UFF_SUFFIXES else ImportedFrf(read_frf(source))
+    return write_imported(target, found, [source])
+
+
+def _convert_modes(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> Told:
+    if Path(target).suffix.lower() in UFF_SUFFIXES:
+        model = read_modal_model(source)
+        write_modes_uff(target, model)
+        return Told((), _left_out(model, Path(source).name))
+    model, doubts = import_modes_uff(Path(source))
+    with writing_whole_file(target) as temporary:
+        write_modal_model(temporary, model)
+        add_to_json(temporary, made_of([source], Told((), doubts)))
+    return Told((), doubts)
+
+
+def convert_geometry(source: str | os.PathLike[str], target: str | os.PathLike[str]) -> Told:
+    """Nodes, local axes and lines of a UFF, CSV or TOML file as TOML.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be used; nothing is written.
+    """
+    geometry, doubts = import_geometry(source)
+    with writing_whole_file(target) as temporary:
+        write_geometry(temporary, geometry)
+        add_comment(temporary, origin("convert", [source]))
+    return Told((), doubts)
+
+
+def write_imported(target: str | os.PathLike[str], found: ImportedFrf, files: Files) -> Told:
+    """Ask the gate about an FRF from another program, and write it by suffix, with its sources and doubts.
+
+    Parameters
+    ----------
+    target
+        File to write: ``.h5``, ``.uff`` or ``.unv``.
+    found
+        FRF that was read, with what was inferred.
+    files
+        Files from which it was read.
+
+    Raises
+    ------
+    InputError
+        The gate refuses it, or it cannot be written.
+    """
+    name = Path(files[0]).name if len(files) == 1 else f"{len(files)} files"
+    told = Told(found.inferred, (*found.doubts, *check_frf(found.frf, name)))
+    if Path(target).suffix.lower() in UFF_SUFFIXES:
+        write_frf_uff(target, found.frf)
+    else:
+        write_frf(target, found.frf, title=f"from {name}", provenance=json.dumps(made_of(files, told)))
+    return told
+
+
+def made_of(files: Files, told: Told) -> dict[str, Any]:
+    """Provenance of something that was converted."""
+    said = {"inferred": list(told.inferred), "warnings": list(told.doubts)}
+    return {"step": "convert", "sources": sources(files), **said, "versions": versions()}
+
+
+def _left_out(model: ModalModel, name: str) -> tuple[str, ...]:
+    """List the parts of a model for which a UFF file of modes has no place."""
+    lost = [
+        what
+        for what, there in (
+            ("residuals", model.residuals is not None),
+            ("error bars", model.covariance is not None),
+            ("the delay", bool(model.delay)),
+            ("terms of a diagnosis", bool(model.physics)),
+        )
+        if there
+    ]
+    return (f"{name}: UFF has no place for {', '.join(lost)}",) if lost else ()
+
+
+FRF_SUFFIXES = (".h5", ".hdf5", *UFF_SUFFIXES)
+
+
+def convert_files(
+    sources: Sequence[Path],
+    target: Path,
+    mapping: Path | None,
+    progress: Callable[[int], None] | None = None,
+    span: tuple[float, float] | None = None,
+) -> tuple[list[Path], Told]:
+    """Convert one file, or several that make one FRF matrix.
+
+    Parameters
+    ----------
+    sources
+        Files to read.
+    target
+        File to write.
+    mapping
+        TOML with ``channels`` (a recording) or ``[frf]`` (FRFs); None: the files say it themselves.
+    progress
+        Called with the number of samples written so far, for recordings.
+    span : s
+        First and last time of a recording to keep, counted from its first sample; None: all of it.
+
+    Returns
+    -------
+    list of Path, Told
+        The files written, and what was inferred or may be doubted.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be used together or at all; nothing is written.
+    """
+    if span is not None and (is_frf_conversion(sources, mapping) or is_uff_conversion(sources[0], target)):
+        raise InputError("--span cuts a part out of a recording; leave it out for other files")
+    if is_frf_conversion(sources, mapping):
+        found = import_frf(sources, None if mapping is None else load_frf_mapping(mapping))
+        return [target], write_imported(target, found, sources)
+    if len(sources) > 1:
+        raise InputError(
+            f"{len(sources)} files to read: only FRFs are merged; convert the others one by one, or give a mapping "
+            "with [frf] and [[entries]]"
+        )
+    if mapping is None and is_uff_conversion(sources[0], target):
+        return [target], convert_uff(sources[0], target)
+    now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+    origin = made("convert", [sources[0], *([] if mapping is None else [mapping])], {"span_s": span, "at": now})
+    written = convert_recording(sources[0], target, mapping, progress=progress, span=span, provenance=origin)
+    doubts = tuple(doubt for path in written for doubt in doubts_of_rate(path))
+    return written, Told((), doubts)
+
+
+def is_frf_conversion(sources: Sequence[Path], mapping: Path | None) -> bool:
+    """Say whether FRFs of other programs are read: the mapping says so, or without one the files leave no doubt."""
+    if mapping is not None:
+        return _is_about_frfs(mapping)
+    if len(sources) > 1:
+        return all(path.suffix.lower() in UFF_SUFFIXES for path in sources) or any(map(looks_like_frf, sources))
+    return looks_like_frf(sources[0])
+
+
+def _is_about_frfs(mapping: Path) -> bool:
+    try:
+        return is_frf_mapping(tomllib.loads(mapping.read_text(encoding="utf-8")))
+    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError):  # whoever reads it next says so in one line
+        return False

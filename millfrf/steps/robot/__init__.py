@@ -1,0 +1,1 @@
+"""Steps on robot models: postures, receptance, lobes, loads, paths, updates."""

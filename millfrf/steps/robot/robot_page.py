@@ -1,0 +1,233 @@
+"""Step ``robot show``: a robot in a posture on one page."""
+
+import webbrowser
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from millfrf.core import InputError, Real, writing_whole_file
+from millfrf.core.provenance import versions
+from millfrf.core.terminal import Table
+from millfrf.figures import COLOURS, MovingShapes, house_style, new_figure
+from millfrf.options import check_output
+from millfrf.report.results_page import ResultsPage, page_text
+from millfrf.report.section import Section, picture_of
+from millfrf.robot_model import (
+    PostureResult,
+    SpatialCase,
+    StructureModes,
+    close_loops,
+    in_posture,
+    modes_at,
+    read_robot,
+    shown_values,
+    structure_at,
+)
+
+from .postures import Asked, posture_of, spatial
+
+_SHOWN = 0.25
+"""Largest displacement drawn, m."""
+
+_REST = "0.78"
+"""Grey of the robot at rest."""
+
+
+def skeleton(modes: StructureModes) -> list[tuple[int, int]]:
+    """Pairs of nodes that a line joins: beams and rigid links."""
+    return [*(beam.nodes for beam in modes.structure.beams), *modes.structure.rigid]
+
+
+def exaggeration(modes: StructureModes, mode: int) -> float:
+    """Factor that makes the largest displacement of a mode 0.25 m."""
+    return float(_SHOWN / max(np.linalg.norm(modes.shapes[mode, :, :3], axis=1).max(), 1e-300))
+
+
+def robot_figure(modes: StructureModes, n_modes: int = 4) -> Figure:
+    """The robot at rest in grey and its lowest mode shapes in colour, largest displacement 0.25 m.
+
+    Above from the front left, below from above: what swings sideways shows in one of them.
+    """
+    with house_style():
+        figure = new_figure(105.0, layout=None)
+        shown = min(n_modes, len(modes.squares))
+        for mode in range(shown):
+            moved = modes.structure.positions + exaggeration(modes, mode) * modes.shapes[mode, :, :3]
+            left, width = 0.04 + mode * 0.95 / shown, 0.95 / shown
+            upper = figure.add_axes((left, 0.42, width, 0.55), projection="3d")
+            _lines(upper, modes, modes.structure.positions, _REST, 3.0)
+            _lines(upper, modes, moved, COLOURS[1], 1.3)
+            _equal_axes(upper, modes.structure.positions)
+            title = f"mode {mode + 1}, {modes.frequencies[mode]:.1f} Hz"
+            figure.text(left + 0.5 * width, 0.98, title, ha="center", va="top")
+            lower = figure.add_axes((left + 0.03, 0.11, width - 0.05, 0.30))
+            _from_above(lower, modes, moved)
+            if mode == 0:
+                lower.set_ylabel("y (m)")
+    return figure
+
+
+def _from_above(axes: Axes, modes: StructureModes, moved: Real) -> None:
+    """The same from above, x to the right."""
+    for positions, colour, width in ((modes.structure.positions, _REST, 3.0), (moved, COLOURS[1], 1.3)):
+        for first, second in skeleton(modes):
+            axes.plot(*positions[[first, second]][:, :2].T, color=colour, linewidth=width, marker="o", markersize=2)
+    rest = modes.structure.positions
+    middle = (rest.max(axis=0) + rest.min(axis=0)) / 2
+    half = max(float(np.ptp(rest[:, :2], axis=0).max()) / 2 + 1.2 * _SHOWN, 0.4)
+    axes.set_xlim(middle[0] - half, middle[0] + half)
+    axes.set_ylim(middle[1] - half, middle[1] + half)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x (m)")
+
+
+def _lines(axes: Axes, modes: StructureModes, positions: Real, colour: str, width: float) -> None:
+    for first, second in skeleton(modes):
+        axes.plot(*positions[[first, second]].T, color=colour, linewidth=width, marker="o", markersize=2)
+
+
+def _equal_axes(axes: Axes, positions: Real) -> None:
+    middle = (positions.max(axis=0) + positions.min(axis=0)) / 2
+    half = np.ptp(positions, axis=0).max() / 2 + _SHOWN
+    for name, centre in zip(("x", "y", "z"), middle, strict=True):
+        getattr(axes, f"set_{name}lim")(centre - half, centre + half)
+        getattr(axes, f"{name}axis").set_ticklabels([])
+        getattr(axes, f"set_{name}label")(name, labelpad=-12)
+    axes.set_box_aspect((1, 1, 1), zoom=1.1)  # type: ignore[arg-type, call-arg]
+    axes.view_init(elev=18, azim=-50)  # type: ignore[attr-defined]
+
+
+_MOST = 12
+"""Modes on the page."""
+
+_AXIS = 0.09
+"""Half the length of the line that shows the axis of a joint, m."""
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A table below the picture: heading, names of the columns, rows of text."""
+
+    heading: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def mode_page(
+    name: str,
+    modes: StructureModes,
+    facts: Sequence[Fact] = (),
+    warnings: Sequence[str] = (),
+) -> str:
+    """HTML of an interactive picture: drag or arrow keys turn it, a list chooses the mode, a slider the exaggeration.
+
+    Without modes the robot stands still. Joints are drawn as short lines along their axes.
+    """
+    moving = _moving(modes)
+    frequencies = ", ".join(f"{frequency:.2f}" for frequency in modes.frequencies[:4])
+    verdict = (
+        f"The lowest natural frequencies are {frequencies} Hz." if frequencies else "Without masses it has no modes."
+    )
+    told = tuple(
+        f"{row[0].capitalize()}: {row[1]}." for fact in facts for row in fact.rows if row[0].startswith("softest")
+    )
+    page = ResultsPage(
+        "Robot in a posture", name, f"Made by millfrf {versions()['millfrf']}", (verdict, *told), tuple(warnings)
+    )
+    caption = "Grey: at rest; orange: tool tip; black lines: axes of the joints. Displacements are exaggerated."
+    words = f"{name} with its mode shapes" if len(moving.labels) else f"{name} at rest"
+    picture = picture_of(robot_figure(modes), caption, words, moving=moving)
+    tables = [Section(fact.heading, tables=(Table(fact.heading, fact.columns, fact.rows),)) for fact in facts]
+    rows = tuple((str(k + 1), f"{frequency:.3f}") for k, frequency in enumerate(modes.frequencies[:_MOST]))
+    listed = Section("Natural frequencies", tables=(Table("Modes", ("mode", "frequency (Hz)"), rows),) if rows else ())
+    shown = Section("Mode shapes" if len(moving.labels) else "Robot", pictures=(picture,))
+    return page_text(page, [shown, listed, *tables])
+
+
+def _moving(modes: StructureModes) -> MovingShapes:
+    """Shapes with largest displacement 1, and the axes of the joints."""
+    count = min(_MOST, len(modes.squares))
+    shapes = modes.shapes[:count, :, :3]
+    largest = np.linalg.norm(shapes, axis=2).max(axis=1, initial=0.0)
+    axes = tuple(
+        (
+            (spring.place - _AXIS * spring.axes[:, 2]).round(5).tolist(),
+            (spring.place + _AXIS * spring.axes[:, 2]).round(5).tolist(),
+        )
+        for spring in modes.structure.springs
+    )
+    return MovingShapes(
+        modes.structure.positions,
+        tuple(skeleton(modes)),
+        (shapes / np.maximum(largest, 1e-300)[:, None, None]).astype(complex),
+        tuple(f"{k + 1}: {frequency:.2f} Hz" for k, frequency in enumerate(modes.frequencies[:count])),
+        np.ones(len(modes.structure.positions), dtype=bool),
+        axes,
+        modes.structure.tip,
+    )
+
+
+def show_robot(robot: str, asked: Asked, out: Path, browser: bool = False) -> list[str]:
+    """Write the page; lines that say what is on it.
+
+    Raises
+    ------
+    InputError
+        A planar robot, or a posture that is not there.
+    """
+    check_output(out, (".html",))
+    case = spatial(read_robot(robot))
+    driven, axes = posture_of(case, asked)
+    q = close_loops(case.robot.mechanism, driven)
+    result = in_posture(case, driven, axes)
+    structure = structure_at(case.robot, q)
+    empty = StructureModes(structure, np.zeros(0), np.zeros((0, len(structure.positions), 6)))
+    modes = modes_at(case.robot, q) if len(result.frequencies) else empty
+    facts = (_joint_facts(case, q), _posture_facts(case, driven, q, result))
+    with writing_whole_file(out) as unfinished:
+        unfinished.write_text(mode_page(case.name, modes, facts, result.warnings), encoding="utf-8")
+    if browser and not webbrowser.open(out.resolve().as_uri()):
+        raise InputError(f"no browser was found; open {out} in one")
+    return [*(f"warning: {warning}" for warning in result.warnings), f"wrote {out}: open it in a browser"]
+
+
+def _joint_facts(case: SpatialCase, q: Real) -> Fact:
+    """One row a moving joint: value, limits, stiffness along its own motion."""
+    mechanism, rows = case.robot.mechanism, []
+    for index, value in zip(mechanism.moving, q, strict=True):
+        frame = mechanism.frames[index]
+        sliding = frame.motion == "prismatic"
+        scale, unit = (1.0, "m") if sliding else (180 / np.pi, "deg")
+        limits = "none"
+        if np.isfinite([frame.lower, frame.upper]).all():
+            limits = f"{scale * frame.lower:.4g} to {scale * frame.upper:.4g} {unit}"
+        own = [joint.stiffness[2 if sliding else 5] for joint in case.robot.joints if joint.frame == frame.name]
+        stiffness = "rigid"
+        if own and np.isfinite(sum(own)):
+            stiffness = f"{sum(own):.3g} {'N/m' if sliding else 'N m/rad'}"
+        rows.append((frame.name, frame.motion, f"{scale * value:.4g} {unit}", limits, stiffness))
+    return Fact("Joints", ("joint", "motion", "value", "limits", "stiffness along its motion"), tuple(rows))
+
+
+def _posture_facts(case: SpatialCase, driven: Real, q: Real, result: PostureResult) -> Fact:
+    """Place of the tip, moving mass, softest direction."""
+    structure = structure_at(case.robot, q)
+    place = ", ".join(f"{value:.4f}" for value in structure.positions[case.robot.tip])
+    values, directions = np.linalg.eigh(result.compliance[:3, :3])
+    along = ", ".join(f"{value:+.2f}" for value in directions[:, -1])
+    links = sum(
+        beam.section.mass * float(np.linalg.norm(np.diff(structure.positions[list(beam.nodes)], axis=0)))
+        for beam in structure.beams
+    )
+    mass = sum(body.mass for body in case.robot.bodies) + links
+    rows = [
+        ("posture", shown_values(case.robot.mechanism, driven)),
+        ("tool tip", f"{place} m"),
+        ("mass of bodies and links", f"{mass:.4g} kg" if mass else "not known"),
+        ("softest direction of the tip", f"{1e-6 / values[-1]:.3g} N/µm along ({along})"),
+    ]
+    return Fact("Posture", ("what", "value"), tuple(rows))

@@ -1,0 +1,138 @@
+"""The simulated device of a session: the cell, milled in the session's immersion while the spindle sweeps."""
+
+import math
+import os
+from typing import Any
+
+import numpy as np
+
+from acquisition import AroundSource, Block, EventAxis, Events, Paced, Session, SimulatedDevice, Source
+from millfrf.cutting import MillingProcess, process_from_table
+from replay_data import (
+    ACETAL_CUTTER,
+    ConstantSpeed,
+    MillingCell,
+    RepeatedSweep,
+    SpeedProfile,
+    cutting_table,
+    default_structure,
+    milling_sensors,
+)
+
+from .plan import plan_from_file
+
+RPM = math.pi / 30
+SPEED_EVENTS = "spindle_speed_rpm"
+_ENGAGEMENT = ("start_angle_deg", "exit_angle_deg", "immersion", "radial_depth_m")
+
+
+def simulated_device(session: Session, path: str | os.PathLike[str]) -> Source:
+    """Set the simulated cell up as a session describes it, in real time or faster.
+
+    Cutter and coefficients are those of ``[cutting]``, and where it is silent those of the demonstration; the immersion
+    is that of ``[cut]`` or ``[cutting]``, the depth that of ``[cut]`` or ``[plan]``.
+
+    Parameters
+    ----------
+    session
+        Session whose device is simulated.
+    path
+        The file it was read from.
+
+    Raises
+    ------
+    InputError
+        A cutter, an immersion or a speed that cannot be milled with.
+    """
+    from .demo import SWEEP_DEPTH
+
+    device = session.device
+    assert isinstance(device, SimulatedDevice)
+    profile = _profile(session, device, path)
+    process = _process(session, path)
+    passing = process.teeth * profile.fastest / (2 * math.pi)
+    finest = max(8192.0, 10 * passing)
+    cell = MillingCell(
+        default_structure(),
+        process,
+        _number(session.cut, "depth_m") or _number(session.plan, "depth_m") or SWEEP_DEPTH,
+        profile,
+        session.duration_s or 3600.0,
+        sample_rate=device.sample_rate_hz,
+        sensors=milling_sensors(device.noise, device.noise),
+        seed=device.seed,
+        block_length=max(64, round(0.1 * device.sample_rate_hz)),
+        oversampling=max(2, math.ceil(finest / device.sample_rate_hz)),
+    )
+    return Paced(WithSpindleSpeed(cell, profile, device.sample_rate_hz), device.speed)
+
+
+def _profile(session: Session, device: SimulatedDevice, path: str | os.PathLike[str]) -> SpeedProfile:
+    """A steady speed where one is given; else the sweep that is given, that is planned, or of the demonstration."""
+    from .demo import SWEEP_RPM, SWEEP_SECONDS
+
+    if device.spindle_speed_rpm is not None:
+        return ConstantSpeed(device.spindle_speed_rpm * RPM)
+    speeds, seconds = tuple(speed * RPM for speed in SWEEP_RPM), session.duration_s or SWEEP_SECONDS
+    if session.plan:
+        plan = plan_from_file(path)[0]
+        speeds, seconds = plan.spindle_speeds, plan.duration
+    if device.sweep_rpm is not None:
+        speeds = tuple(speed * RPM for speed in device.sweep_rpm)
+    return RepeatedSweep(speeds[0], speeds[1], device.sweep_s or seconds)
+
+
+def _process(session: Session, path: str | os.PathLike[str]) -> MillingProcess:
+    """The session's cutter in its immersion; what the session does not say is the demonstration's."""
+    told = {**session.cutting, **{key: session.cut[key] for key in _ENGAGEMENT if key in session.cut}}
+    default: dict[str, Any] = cutting_table(ACETAL_CUTTER)
+    if any(key in told for key in _ENGAGEMENT):
+        default = {key: value for key, value in default.items() if key not in _ENGAGEMENT}
+    return process_from_table(default | told, os.fspath(path))
+
+
+def _number(table: dict[str, Any], key: str) -> float:
+    value = table.get(key, 0)
+    return float(value) if isinstance(value, int | float) else 0.0
+
+
+class WithSpindleSpeed(AroundSource):
+    """A simulated cell that also tells its spindle speed at the end of every block, as a drive on a bus would.
+
+    Parameters
+    ----------
+    cell
+        Simulated cell that is milled.
+    profile
+        Its spindle speed over time.
+    sample_rate : Hz
+        Its sample rate.
+    """
+
+    def __init__(self, cell: Source, profile: SpeedProfile, sample_rate: float) -> None:
+        super().__init__(cell)
+        self._profile, self._rate = profile, sample_rate
+        self._told: Events | None = None
+        self.event_series = {SPEED_EVENTS: EventAxis()}
+
+    def open(self) -> None:
+        """Start the cell from rest."""
+        self._told = None
+        self._source.open()
+
+    def read(self) -> Block | Events | None:
+        """The next block, and after it the speed at its end."""
+        if self._told is not None:
+            told, self._told = self._told, None
+            return told
+        block = self._source.read()
+        if isinstance(block, Block):
+            end = (block.first_sample + len(block.samples)) / self._rate
+            around = self._profile.angle(np.array([end - 1e-3, end]))
+            speed = float(np.diff(around)[0]) / 1e-3 / RPM
+            self._told = Events(SPEED_EVENTS, np.array([end]), np.array([speed]))
+        return block
+
+    def close(self) -> None:
+        """Let go of the cell."""
+        self._source.close()
