@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from millfrf.core import InputError, Real
 
@@ -81,5 +81,5 @@ def shaft_angle(samples: Real, sample_rate: float, pulses_per_revolution: int = 
         raise InputError(f"the tachometer channel has {len(times)} pulses; at least two are needed, check the sensor")
     first, last = int(np.ceil(times[0] * sample_rate)), int(np.floor(times[-1] * sample_rate))
     at_pulses = 2 * np.pi / pulses_per_revolution * np.arange(len(times))
-    angle = PchipInterpolator(times, at_pulses)(np.arange(first, last + 1) / sample_rate)
+    angle = scipy.interpolate.PchipInterpolator(times, at_pulses)(np.arange(first, last + 1) / sample_rate)
     return ShaftAngle(first, np.asarray(angle, dtype=float), times)

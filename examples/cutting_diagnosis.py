@@ -14,7 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquisition import record
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.cutting import MillingProcess, write_cutting_process
 from millfrf.figures import cut_orders_figure, cut_turn_figure, house_style, save_figure
 from millfrf.mismatch import diagnose_cut, read_cut_recording

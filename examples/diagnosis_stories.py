@@ -9,9 +9,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+from millfrf.demonstration.concealment import ConcealOptions, run_concealed
 from millfrf.figures import law_figure, spectra_figure
 from millfrf.mismatch import diagnose, free_form_laws, held_out_spectra, read_recordings
-from millfrf.steps.concealment import ConcealOptions, run_concealed
 from modal_fit import read_modal_model
 
 PICTURES = Path(__file__).resolve().parents[1] / "docs" / "pictures"

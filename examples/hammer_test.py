@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from acquisition import Recording, record
 from estimation import exponential_window, force_window
 from millfrf.core import TIP
-from millfrf.steps.tap import TapResult, tap_recordings
-from millfrf.steps.tap_points import TapOptions
+from millfrf.steps.tap import TapResult, tap
 from replay_data import HammerCell, default_structure, dynamometer, select, tip_accelerometers
 
 RATE, SECONDS = 2048.0, 1.0
@@ -76,7 +75,7 @@ def compare() -> Compared:
     """Tap the simulated robot, and evaluate its FRF where it was measured."""
     with tempfile.TemporaryDirectory() as folder:
         paths = recordings(Path(folder))
-        result = tap_recordings(paths, TapOptions(band=SHOWN))
+        result = tap(*paths, band=SHOWN)
         with Recording(paths[0]) as recording:
             samples = recording.stream().read()
     frf = result.merged.frf

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from acquisition import record
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.cutting import MillingProcess
 from millfrf.robot_model import SpatialRobot, cell_structure_at, read_spatial_robot, with_joint_factor, with_payload
 from replay_data import LinearSweep, MillingCell

@@ -27,12 +27,12 @@ from millfrf.robot_model import (
     tool_down,
     turned_place,
 )
+from millfrf.steps.robot.along_path.optimum import PathOptimum, optimised
+from millfrf.steps.robot.along_path.results import draw_path
+from millfrf.steps.robot.along_path.search import Wanted
+from millfrf.steps.robot.along_path.state import Loading
+from millfrf.steps.robot.along_path.values import PathCut
 from millfrf.steps.robot.maps import certified_over_places, first_postures
-from millfrf.steps.robot.path_optimum import PathOptimum, optimised
-from millfrf.steps.robot.path_results import draw_path
-from millfrf.steps.robot.path_search import Wanted
-from millfrf.steps.robot.path_state import Loading
-from millfrf.steps.robot.path_values import PathCut
 
 CUT = MillingProcess(2, 0.012, pi / 2, 600e6, 0.3, 0.1, pi / 2, pi, 1e-4)
 """Aluminium, half immersion down: assumed, Table 4 of the paper is missing."""

@@ -4,12 +4,10 @@
 ``import millfrf`` and ``millfrf --version`` take milliseconds.
 """
 
-import ast
-from functools import cache
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+
+from .lazy_front import lazy_front
 
 PACKAGES = ("acquisition", "estimation", "modal_fit", "replay_data")
 """Packages that are installed beside this one."""
@@ -27,25 +25,4 @@ def _refuse_hidden_packages() -> None:
 
 _refuse_hidden_packages()
 
-
-@cache
-def _homes() -> dict[str, tuple[str, int]]:
-    """For each public name its module and the level of a relative import, as the stub states them."""
-    stub = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
-    lines = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
-    return {alias.name: (str(node.module), node.level) for node in lines for alias in node.names}
-
-
-def __getattr__(name: str) -> Any:
-    if name == "__all__":
-        return sorted(_homes())
-    if name not in _homes():
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module, level = _homes()[name]
-    value = getattr(import_module("." * level + module, __name__), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(_homes())
+__getattr__, __dir__ = lazy_front(__name__, __file__)

@@ -6,15 +6,22 @@ from millfrf.mismatch import Diagnosis, Settings
 from millfrf.stability import StabilityLobes
 from modal_fit import ModalFit, ModalModel, SubspaceFit, TipCalibration
 
-from .steps.face_diagnose import diagnose
-from .steps.face_estimate import estimate, tap
-from .steps.face_fit import calibrate, fit
-from .steps.face_lobes import lobes
-from .steps.face_predict import predict
+from .steps.acquire import acquire
+from .steps.calibrate import calibrate
+from .steps.chatter import chatter
+from .steps.convert import convert
+from .steps.cut_diagnose import cut_diagnose
+from .steps.diagnose import diagnose
+from .steps.estimate import Estimate, estimate
+from .steps.fit import fit
+from .steps.inspect import inspect
+from .steps.lobes import lobes
 from .steps.opening import open
-from .steps.predict import Predicted
-from .steps.tap import TapResult
-from .steps.test_spectra import Estimate
+from .steps.plan import plan
+from .steps.predict import Predicted, predict
+from .steps.recover import recover
+from .steps.report import report
+from .steps.tap import TapResult, tap
 from .version import __version__
 
 PACKAGES: tuple[str, ...]
@@ -42,12 +49,20 @@ __all__ = [
     "TapResult",
     "TipCalibration",
     "__version__",
+    "acquire",
     "calibrate",
+    "chatter",
+    "convert",
+    "cut_diagnose",
     "diagnose",
     "estimate",
     "fit",
+    "inspect",
     "lobes",
     "open",
+    "plan",
     "predict",
+    "recover",
+    "report",
     "tap",
 ]

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
-from scipy.special import erfc
 
 from estimation import FRF_ORDERS, LinearApproximation, SteadyPeriods, derivative_orders, linear_approximation
 from millfrf.core import Complex, InputError, MillfrfError, Real
@@ -91,7 +90,7 @@ def fit_level(linear: LinearApproximation, band: tuple[float, float], frequencie
     def rest(unknowns: Real) -> Real:
         return _rest(unknowns, s, measured, weight, order)[0]
 
-    found = least_squares(rest, start, x_scale=np.concatenate([damping, np.full(n, 0.3)]), max_nfev=60)
+    found = scipy.optimize.least_squares(rest, start, x_scale=np.concatenate([damping, np.full(n, 0.3)]), max_nfev=60)
     fitted = np.exp(found.x)
     if not found.success or fitted[:n].min() < 0.8 * band[0] or fitted[:n].max() > 1.2 * band[1]:
         raise MillfrfError(
@@ -337,4 +336,4 @@ def _percent(share: float) -> str:
 
 
 def _two_sided(sigmas: float) -> float:
-    return float(erfc(abs(sigmas) / np.sqrt(2)))
+    return float(scipy.special.erfc(abs(sigmas) / np.sqrt(2)))

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 from estimation import Frf
 from millfrf.core import Band, InputError
@@ -116,7 +116,7 @@ class ComplexModeIndicator:
         found = []
         for curve in range(self.singular_values.shape[1]):
             size = self._logarithm(curve)
-            lines, seen = find_peaks(size, prominence=np.log(least_prominence))
+            lines, seen = scipy.signal.find_peaks(size, prominence=np.log(least_prominence))
             for line, prominence in zip(lines, seen["prominences"], strict=True):
                 if self._crossing(int(line), curve):
                     continue
@@ -199,7 +199,7 @@ class MultivariateModeIndicator:
 
     def dips(self, deepest: float = 0.3) -> NDArray[np.float64]:
         """Frequencies (Hz) of the minima of the first curve that are below ``deepest``."""
-        lines, _ = find_peaks(-self.values[:, 0], height=-deepest, prominence=0.1)
+        lines, _ = scipy.signal.find_peaks(-self.values[:, 0], height=-deepest, prominence=0.1)
         return np.asarray(self.frequencies[lines])
 
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from estimation import Frf
 from millfrf.core import Complex, InputError, MillfrfError, Result, Summary
@@ -58,7 +58,7 @@ def transfer_delay(poles: Complex, spectra: RecordSpectra, band: tuple[float, fl
     best = int(np.argmin([misfit(delay) for delay in delays]))
     step = delays[1]
     around = (delays[best] - step, delays[best] + step)
-    found = minimize_scalar(misfit, bounds=around, method="bounded", options={"xatol": 1e-5 * step})
+    found = scipy.optimize.minimize_scalar(misfit, bounds=around, method="bounded", options={"xatol": 1e-5 * step})
     return float(max(found.x, 0.0))
 
 

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull, QhullError
 
 from estimation import shared_points
 from millfrf.core import Complex, InputError, Real
@@ -39,6 +38,8 @@ def mode_complexity(vectors: NDArray[np.complex128]) -> NDArray[np.float64]:
 
 
 def _share(vector: NDArray[np.complex128]) -> float:
+    from scipy.spatial import ConvexHull, QhullError  # loads slowly, and few need it
+
     largest = float(np.abs(vector).max(initial=0.0))
     if largest == 0.0:
         return 0.0
@@ -69,6 +70,7 @@ def modal_assurance(first: Complex, second: Complex) -> NDArray[np.float64]:
     >>> modal_assurance(np.array([[1, 1j]]), np.array([[2j, -2], [1, 0]])).round(3).tolist()
     [[1.0, 0.5]]
     """
+
     product = np.abs(first.conj() @ second.T) ** 2
     sizes = np.outer(np.sum(np.abs(first) ** 2, axis=1), np.sum(np.abs(second) ** 2, axis=1))
     return np.asarray(np.divide(product, sizes, out=np.zeros(sizes.shape), where=sizes > 0))

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.optimize import linear_sum_assignment
 
 from estimation import Frf
 from millfrf.core import Complex
@@ -100,7 +99,7 @@ def _normal_matrices(
     mixed = sums[:, 1 : 1 + n_responses * n_excitations][difference]
     # rows: numerator power r; columns: denominator power s
     mixed = mixed.reshape(count, count, n_responses, n_excitations).transpose(0, 2, 1, 3)
-    reduced = solve_triangular(factor, mixed.reshape(count, -1), lower=True).reshape(
+    reduced = scipy.linalg.solve_triangular(factor, mixed.reshape(count, -1), lower=True).reshape(
         count, n_responses, count, n_excitations
     )
     square = sums[:, 1 + n_responses * n_excitations :][difference]
@@ -140,10 +139,10 @@ def _poles_of_order(full: Complex, order: int, n_excitations: int, band: tuple[f
 def _solve_hermitian(matrix: Complex, right_side: Complex) -> Complex:
     """Cholesky where the matrix is regular in double precision, else the least-norm solution."""
     try:
-        factor, lower = cho_factor(matrix, lower=True, check_finite=False)
+        factor, lower = scipy.linalg.cho_factor(matrix, lower=True, check_finite=False)
         diagonal = np.abs(np.diag(factor))
         if diagonal.min() > _REGULAR * diagonal.max():
-            return np.asarray(cho_solve((factor, lower), right_side, check_finite=False))
+            return np.asarray(scipy.linalg.cho_solve((factor, lower), right_side, check_finite=False))
     except np.linalg.LinAlgError:
         pass
     return np.asarray(np.linalg.lstsq(matrix, right_side, rcond=1e-14)[0])
@@ -305,7 +304,7 @@ def _tracks(poles: Complex, orders: NDArray[np.int64]) -> NDArray[np.int64]:
         mine = np.flatnonzero(orders == order)
         centres = np.array([np.median(np.real(m[-_MEMORY:])) + 1j * np.median(np.imag(m[-_MEMORY:])) for m in members])
         distance = np.abs(logarithm[mine][:, None] - centres.reshape(1, -1))
-        rows, columns = linear_sum_assignment(np.minimum(distance, 2 * _REACH))
+        rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(distance, 2 * _REACH))
         found = {int(row): int(column) for row, column in zip(rows, columns, strict=True)}
         for row, index in enumerate(mine):
             column = found.get(row)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from acquisition import Block, StreamDescription
 from millfrf.core import TIP, InputError
+from millfrf.core.compilation import CUTTING, SIMULATION, compile_kernels
 from millfrf.cutting import MillingProcess, refuse_varied, tooth_offsets
 from modal_fit import ModalModel
 
@@ -49,6 +50,7 @@ class SampledCell:
     ) -> None:
         _require_sampling(duration, sample_rate, seed, oversampling, block_length)
         require_simulable(structure)
+        compile_kernels(*CUTTING, *SIMULATION)
         self.structure = structure
         self.sensors = tuple(sensors)
         self.sample_rate = float(sample_rate)

@@ -6,9 +6,8 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import bilinear, lfilter
-from scipy.spatial.transform import Rotation
 
 from acquisition import Block, StreamDescription
 from millfrf.core import Real
@@ -201,13 +200,17 @@ def through_chain(effect: ConcealedEffect, signals: Real, rate: float) -> Real:
             shown[:, column] = np.interp(late, np.arange(len(signals)), signals[:, column], left=0.0)
     elif effect.name == "ac_coupling":
         corner = 2 * np.pi * values["corner_hz"]
-        shown[:, 3:] = lfilter(*bilinear([1.0, 0.0], [1.0, corner], rate), signals[:, 3:], axis=0)
+        shown[:, 3:] = scipy.signal.lfilter(
+            *scipy.signal.bilinear([1.0, 0.0], [1.0, corner], rate), signals[:, 3:], axis=0
+        )
     elif effect.name == "dynamometer_dynamics":
         natural, zeta = 2 * np.pi * values["frequency_hz"], values["damping_ratio"]
-        resonance = bilinear([natural**2], [1.0, 2 * zeta * natural, natural**2], rate)
-        shown[:, :3] = lfilter(*resonance, signals[:, :3], axis=0)
+        resonance = scipy.signal.bilinear([natural**2], [1.0, 2 * zeta * natural, natural**2], rate)
+        shown[:, :3] = scipy.signal.lfilter(*resonance, signals[:, :3], axis=0)
     elif effect.name == "axis_misalignment":
-        shown[:, :3] = Rotation.from_rotvec(values["rotation_deg"], degrees=True).apply(signals[:, :3])
+        shown[:, :3] = scipy.spatial.transform.Rotation.from_rotvec(values["rotation_deg"], degrees=True).apply(
+            signals[:, :3]
+        )
     elif effect.name == "gain_error":
         shown[:, CHANNELS.index(values["channel"])] *= values["gain"]
     return shown

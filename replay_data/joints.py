@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from millfrf.core import TIP
-from millfrf.core.compilation import compiled
+from millfrf.core.compilation import SIMULATION, compile_kernels, compiled
 from modal_fit import ModalModel
 
 from .modal_integrator import require_simulable
@@ -131,6 +131,7 @@ def tip_motion(
         A structure that cannot be simulated.
     """
     require_simulable(structure)
+    compile_kernels(*SIMULATION)
     tip = select(structure, TIP, TIP)
     z = tip.poles * step
     growth = np.exp(z)
@@ -156,7 +157,12 @@ def tip_motion(
     return displacement, velocity, np.asarray(acceleration)
 
 
-@compiled
+@compiled(
+    "(float64[:,::1], "
+    "Tuple((complex128[::1],complex128[::1,:],complex128[::1,:],complex128[::1,:],complex128[::1,:])), "
+    "float64, int64, Tuple((float64[::1],float64[::1],float64[:,::1])), complex128[:,::1], "
+    "float64[:,::1])",
+)
 def _march(
     force: NDArray[np.float64],
     dynamics: tuple[

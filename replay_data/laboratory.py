@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import firwin, lfilter, upfirdn
 
 from acquisition import Channel
 from millfrf.core import HOUSING, SI_UNITS, TIP, DegreeOfFreedom, InputError
@@ -237,7 +237,7 @@ class Decimator:
             return np.empty((0, held.shape[1]))
         used = held[: 2 * self.lookahead + (ready - 1) * self._factor + 1]
         first = 2 * self.lookahead // self._factor
-        filtered = upfirdn(self._taps, used, down=self._factor, axis=0)
+        filtered = scipy.signal.upfirdn(self._taps, used, down=self._factor, axis=0)
         self._held = held[ready * self._factor :].copy()
         return np.asarray(filtered[first : first + ready])
 
@@ -247,7 +247,7 @@ def anti_alias_filter(factor: int) -> NDArray[np.float64]:
     if factor == 1:
         return np.ones(1)
     length = 2 * HALF_WIDTH * factor + 1
-    return np.asarray(firwin(length, _PASSED_SHARE / factor, window=("kaiser", _KAISER_BETA)))
+    return np.asarray(scipy.signal.firwin(length, _PASSED_SHARE / factor, window=("kaiser", _KAISER_BETA)))
 
 
 class SignalChain:
@@ -314,7 +314,7 @@ class _HighPass:
             return samples
         output = samples.copy()
         for index, (columns, numerator, denominator) in enumerate(self._groups):
-            output[:, columns], self._state[index] = lfilter(
+            output[:, columns], self._state[index] = scipy.signal.lfilter(
                 numerator, denominator, samples[:, columns], axis=0, zi=self._state[index]
             )
         return output

@@ -2,13 +2,13 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from millfrf.core import TIP, InputError, Real
-from millfrf.core.compilation import compiled
+from millfrf.core.compilation import CUTTING, SIMULATION, compile_kernels, compiled
 from millfrf.cutting import (
     MillingProcess,
     engaged_share,
@@ -85,7 +85,14 @@ def empty_memory(n_modes: int, teeth: int, instants_of_delay: int) -> Memory:
     )
 
 
-@compiled
+def _example() -> tuple[Any, ...]:
+    """Arguments of :func:`mill`, for its compilation ahead of a simulation."""
+    line, table = np.zeros(1), np.zeros((1, 1))
+    cut = Cut(*(0.0,) * 7, (0.0,) * 3, (0.0,) * 3, 0.0, 0.0, 1, np.uint64(0))
+    return line, 1.0, Dynamics(table, table), cut, line, empty_memory(1, 1, 1), table, table
+
+
+@compiled(example=_example)
 def mill(
     angles: NDArray[np.float64],
     step: float,
@@ -334,6 +341,7 @@ def settle(structure: ModalModel, process: MillingProcess, depth: float, spindle
     passing = 2 * math.pi / (process.teeth * spindle_speed)
     highest = float(np.abs(structure.poles).max()) / (2 * math.pi)
     steps = max(STEPS[0], math.ceil(STEPS[1] * highest * passing))
+    compile_kernels(*CUTTING, *SIMULATION)
     dynamics = discretise(replace(structure, residuals=None), passing / steps)
     if structure.residuals is not None:
         dynamics = dynamics._replace(immediate=dynamics.immediate + structure.residuals.upper)

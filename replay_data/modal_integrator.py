@@ -69,7 +69,10 @@ def require_simulable(structure: ModalModel) -> None:
         )
 
 
-@compiled
+@compiled(
+    "(float64[:,::1], float64[:,::1], float64[::1], float64[::1], float64[:,::1])",
+    "(float64[:,:], float64[:,::1], float64[:], float64[::1], float64[:,::1])",
+)
 def respond(
     force: NDArray[np.float64],
     modes: NDArray[np.float64],

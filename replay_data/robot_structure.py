@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from millfrf.core import HOUSING, TIP, InputError
 from modal_fit import ModalModel
@@ -183,7 +183,9 @@ def posture_robot(generator: np.random.Generator) -> ModalModel:
     """
     natural = 2 * np.pi * np.array([generator.uniform(*span) for span in FREQUENCIES])
     zeta = generator.uniform(*DAMPING, len(natural))
-    triad = Rotation.random(random_state=generator).as_matrix() + SKEW * generator.uniform(-1, 1, (3, 3))
+    triad = scipy.spatial.transform.Rotation.random(random_state=generator).as_matrix() + SKEW * generator.uniform(
+        -1, 1, (3, 3)
+    )
     shapes = triad / np.linalg.norm(triad, axis=1, keepdims=True)
     return real_modes(natural, zeta, shapes / np.sqrt(generator.uniform(*MASS, (3, 1))))
 

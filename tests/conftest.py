@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from millfrf.core.compilation import KERNELS, compile_kernels
+
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
@@ -18,3 +20,9 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"measured data of other laboratories are not at {folder}; set MILLFRF_SHARED to the folder above")
     return folder
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Compile all kernels before the first test, so that no two workers compile the same one."""
+    if not hasattr(config, "workerinput"):
+        compile_kernels(*KERNELS)

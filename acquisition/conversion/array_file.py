@@ -10,8 +10,8 @@ from typing import Any
 
 import h5py
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.io import loadmat
 
 from millfrf.core import FileFormatError, InputError, require_memory
 
@@ -318,7 +318,7 @@ def _mat(path: Path) -> dict[str, Any]:
         return {name: _reversed_axes(value) for name, value in _hdf5(path).items()}
     if not is_plain_mat(path):
         return read_guarded(path, "mat")
-    return {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+    return {name: value for name, value in scipy.io.loadmat(path).items() if not name.startswith("__")}
 
 
 def _hdf5(path: Path) -> dict[str, Any]:

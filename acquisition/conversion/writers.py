@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.io import savemat
 
 from millfrf.core import FileFormatError, InputError, require_memory
 
@@ -265,7 +265,7 @@ def _write_mat(content: Content, path: Path, progress: Progress) -> None:
             "write .h5, which MATLAB reads with h5read, or a part with --span",
         )
     with path.open("wb") as handle:
-        savemat(handle, to_fields(content), oned_as="column")
+        scipy.io.savemat(handle, to_fields(content), oned_as="column")
     progress(_total(content))
 
 

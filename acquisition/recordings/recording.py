@@ -1,7 +1,8 @@
 """`Recording`: a recording file opened for reading; samples are read in blocks, never as a whole."""
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -265,3 +266,51 @@ class Recording:
             parts[0].columns,
             tuple(row for part in parts for row in part.rows),
         )
+
+
+RecordingFile = str | os.PathLike[str] | Recording
+"""A recording by the name of its file, or open already."""
+
+
+@contextmanager
+def opened(recording: RecordingFile) -> Iterator["Recording"]:
+    """Open a recording file for a block; a recording that is open already is used as it is, and stays open.
+
+    Parameters
+    ----------
+    recording
+        Name of a file, or an open recording.
+    """
+    if isinstance(recording, Recording):
+        yield recording
+    else:
+        with Recording(path_of(recording)) as found:
+            yield found
+
+
+@contextmanager
+def all_opened(recordings: Iterable[RecordingFile]) -> Iterator[list["Recording"]]:
+    """Open several recordings for a block, see :func:`opened`.
+
+    Parameters
+    ----------
+    recordings
+        Names of files, or open recordings.
+    """
+    with ExitStack() as stack:
+        yield [stack.enter_context(opened(recording)) for recording in recordings]
+
+
+def path_of(recording: "RecordingFile | Stream") -> Path:
+    """Path of the file of a recording.
+
+    Raises
+    ------
+    InputError
+        Something that is neither a name nor a recording.
+    """
+    if isinstance(recording, Recording | Stream):
+        return recording.path
+    if isinstance(recording, str | os.PathLike):
+        return Path(recording)
+    raise InputError(f"a {type(recording).__name__} is no recording; give a recording or the name of its file")

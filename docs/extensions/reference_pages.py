@@ -8,9 +8,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from command_pages import command_page, commands
+from command_pages import command_page, slug
 from file_pages import file_page
 
+from millfrf.commands import STEPS
 from millfrf.new.toml_files import toml_files
 
 ROOMS = (
@@ -18,13 +19,13 @@ ROOMS = (
     "acquisition",
     "estimation",
     "modal_fit",
-    "cutting",
-    "stability",
-    "robot_model",
-    "mismatch",
+    "millfrf.cutting",
+    "millfrf.stability",
+    "millfrf.robot_model",
+    "millfrf.mismatch",
     "replay_data",
-    "figures",
-    "foundation",
+    "millfrf.figures",
+    "millfrf.core",
 )
 """Import packages in the order in which a reader meets them."""
 
@@ -41,8 +42,8 @@ def _write_pages(app: Any, config: Any) -> None:
     for part in ("commands", "files", "python"):
         shutil.rmtree(folder / part, ignore_errors=True)
         (folder / part).mkdir(parents=True)
-    for command in commands():
-        _write(folder / "commands" / f"{command.slug}.md", command_page(command))
+    for words in STEPS:
+        _write(folder / "commands" / f"{slug(words)}.md", command_page(words))
     for file in toml_files():
         _write(folder / "files" / f"{file.name}.md", file_page(file))
     for room in ROOMS:

@@ -1,6 +1,5 @@
 """`BandRecording`: forces and responses of one recording, reduced to the channels and the band that are needed."""
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -10,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Channel, Recording, Stream, aligned_blocks, rows_left_out
+from acquisition import Channel, RecordingFile, Stream, aligned_blocks, opened, rows_left_out
 from millfrf.core import InputError, Real
 
 from .channel_matching import (
@@ -213,7 +212,7 @@ MOST_LOOKED_AT = 2_000_000
 
 
 def read_band_recording(
-    path: str | os.PathLike[str],
+    path: RecordingFile,
     excitations: Sequence[str],
     responses: Sequence[str],
     needed: float,
@@ -247,7 +246,7 @@ def read_band_recording(
         A channel is missing, or would excite and respond at once; values are not finite, or the recording is shorter
         than the filter.
     """
-    with Recording(path) as recording:
+    with opened(path) as recording:
         source = recording.stream(stream)
         forces = matched_channels(source, excitations, exciting)
         motions = matched_channels(source, responses, responding)
@@ -257,9 +256,7 @@ def read_band_recording(
     return before_force_high_pass(found)
 
 
-def require_room_at_rate(
-    path: str | os.PathLike[str], n_channels: int, needed: float, *, stream: str | None = None
-) -> None:
+def require_room_at_rate(path: RecordingFile, n_channels: int, needed: float, *, stream: str | None = None) -> None:
     """Refuse a recording that :func:`read_band_recording` has no memory for, before a sample is read.
 
     Parameters
@@ -278,7 +275,7 @@ def require_room_at_rate(
     InputError
         It is too long; the line says how long it may be.
     """
-    with Recording(path) as recording:
+    with opened(path) as recording:
         source = recording.stream(stream)
         require_room(source, n_channels, BYTES_A_VALUE, float(needed_ratio(source.sample_rate, needed)))
 

@@ -5,8 +5,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, prev_fast_len, rfft
 
 from millfrf.core import Complex, Real
 
@@ -100,9 +100,11 @@ class WindowedSpectrum:
         """
         force, fading = self.recording.force, _rising(self.recording)
         after = force[-2 : -2 - fading : -1] * _rise(fading)[::-1, None]
-        padded = next_fast_len(self.padded + fading, real=True)
+        padded = scipy.fft.next_fast_len(self.padded + fading, real=True)
         padded += padded % 2
-        return replace(self, padded=padded, force_lines=np.asarray(rfft(np.vstack([force, after]), n=padded, axis=0)))
+        return replace(
+            self, padded=padded, force_lines=np.asarray(scipy.fft.rfft(np.vstack([force, after]), n=padded, axis=0))
+        )
 
     def between(self, first: float, last: float) -> "WindowedSpectrum":
         """The same recording compared in a part of its samples alone; it is still predicted from its beginning.
@@ -114,7 +116,9 @@ class WindowedSpectrum:
         """
         n, rate = len(self.window), self.recording.rate
         begin = int(first * n)
-        window = _window(prev_fast_len(int(last * n) - begin, real=True), self.recording.at_rest and begin == 0)
+        window = _window(
+            scipy.fft.prev_fast_len(int(last * n) - begin, real=True), self.recording.at_rest and begin == 0
+        )
         axis = np.arange(len(window) // 2 + 1) * rate / len(window)
         slack = rate / n
         band = np.flatnonzero((axis >= self.frequencies[0] - slack) & (axis <= self.frequencies[-1] + slack))
@@ -128,11 +132,11 @@ class WindowedSpectrum:
     def cut(self, signal: NDArray[np.floating]) -> Complex:
         """Windowed lines (n_lines, n) of signals (n_samples or more, n) that begin with the recording."""
         kept = signal[self.start : self.start + len(self.window)]
-        return np.asarray(rfft(kept * self.window[:, None].astype(kept.dtype), axis=0)[self.band])
+        return np.asarray(scipy.fft.rfft(kept * self.window[:, None].astype(kept.dtype), axis=0)[self.band])
 
     def signal(self, spectrum: Complex) -> Real:
         """Time signals (n_samples, n) of padded spectra (padded // 2 + 1, n)."""
-        return np.asarray(irfft(spectrum, n=self.padded, axis=0)[: len(self.recording.force)])
+        return np.asarray(scipy.fft.irfft(spectrum, n=self.padded, axis=0)[: len(self.recording.force)])
 
     @cached_property
     def padded_kinematic(self) -> Complex:
@@ -165,10 +169,10 @@ def windowed_spectrum(recording: BandRecording, band: tuple[float, float], decay
     """
     n = len(recording.force)
     run_in = 0 if recording.at_rest else int(min(7.0 / decay * recording.rate, 0.2 * n))
-    padded = next_fast_len(n + int(min(7.0 / decay * recording.rate, 0.2 * n)), real=True)
+    padded = scipy.fft.next_fast_len(n + int(min(7.0 / decay * recording.rate, 0.2 * n)), real=True)
     padded += padded % 2
     rising = _rising(recording)
-    kept = prev_fast_len(n - run_in - rising // 2, real=True)
+    kept = scipy.fft.prev_fast_len(n - run_in - rising // 2, real=True)
     window = _window(kept, recording.at_rest)
     axis = np.arange(kept // 2 + 1) * recording.rate / kept
     lines = np.flatnonzero((axis >= max(band[0], 3 * recording.rate / kept)) & (axis <= band[1]))
@@ -210,4 +214,4 @@ def padded_force(spectrum: WindowedSpectrum) -> Complex:
     if not spectrum.recording.at_rest:
         ramp[:rising] = rise
     ramp[len(ramp) - rising :] = rise[::-1]
-    return np.asarray(rfft(spectrum.recording.force * ramp[:, None], n=spectrum.padded, axis=0))
+    return np.asarray(scipy.fft.rfft(spectrum.recording.force * ramp[:, None], n=spectrum.padded, axis=0))

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d, median_filter
-from scipy.stats import chi2
 
 from millfrf.core import Real
 
@@ -97,7 +96,7 @@ def _decay(answers: LateAnswers, settings: TapSettings) -> Decay:
         return Decay(0.0, 0.0, "", 0.0)
     last = np.sqrt(answers.last)
     # of the whole segment's lines, every second is one of a half's; a resonance may lie between
-    whole = np.sqrt(maximum_filter1d(answers.whole, 3, axis=0)[::2][: len(last)])
+    whole = np.sqrt(scipy.ndimage.maximum_filter1d(answers.whole, 3, axis=0)[::2][: len(last)])
     lost = np.log(np.divide(answers.middle, answers.last, out=np.ones_like(whole), where=rings & (answers.middle > 0)))
     damping = np.clip(2 * lost, _LEAST_DAMPING, None)  # sigma T
     tail = 4 / damping * np.exp(-damping / 4)
@@ -141,5 +140,7 @@ def _stands_out(power: Real, n_taps: int) -> NDArray[np.bool_]:
     """Say where a power exceeds that of the lines around by more than noise does on one line of a million."""
     if not n_taps:
         return np.zeros(power.shape, dtype=bool)
-    around = median_filter(power, size=(min(_AROUND, len(power)), 1), mode="nearest")
-    return np.asarray(power > max(_MORE, chi2.isf(_FALSE, 2 * n_taps) / chi2.median(2 * n_taps)) * around)
+    around = scipy.ndimage.median_filter(power, size=(min(_AROUND, len(power)), 1), mode="nearest")
+    return np.asarray(
+        power > max(_MORE, scipy.stats.chi2.isf(_FALSE, 2 * n_taps) / scipy.stats.chi2.median(2 * n_taps)) * around
+    )

@@ -4,10 +4,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal.windows import hann
 
-from acquisition import Recording, Stream
+from acquisition import Stream, opened
 from millfrf.core import InputError, Real
 
 from .taps import FoundTaps, JudgedTap, limited
@@ -192,7 +192,7 @@ def segments_of(found: FoundTaps, settings: TapSettings, before: int = 0) -> Ite
     int, (before + length, n_excitations + n_responses)
     """
     names = found.test.names
-    with Recording(found.test.path) as recording:
+    with opened(found.test.path) as recording:
         stream = recording.stream(found.test.stream)
         for number, one in enumerate(found.taps):
             if not one.reason:
@@ -208,7 +208,7 @@ def screened(found: FoundTaps, settings: TapSettings) -> FoundTaps:
     names, n_forces = found.test.names, len(found.test.excitations)
     scales = [channel.full_scale for channel in (*found.test.excitations, *found.test.responses)]
     judged = list(found.taps)
-    with Recording(found.test.path) as recording:
+    with opened(found.test.path) as recording:
         stream = recording.stream(found.test.stream)
         for number, one in enumerate(found.taps):
             if one.reason:
@@ -267,7 +267,7 @@ def _level(stream: Stream, found: FoundTaps, number: int, settings: TapSettings)
         earlier = found.taps[number - 1]
         first = max(first, min(earlier.place + rise(earlier, settings.sample_rate) * 2, last - settings.before))
     samples = stream.read(max(0, first), max(last, 1), found.test.names)
-    weight = hann(len(samples) + 2)[1:-1]
+    weight = scipy.signal.windows.hann(len(samples) + 2)[1:-1]
     return (first + last - 1) / 2, np.asarray(weight @ samples / weight.sum())
 
 

@@ -4,8 +4,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal.windows import hann
 
 from acquisition import Channel
 from millfrf.core import Band, Complex, InputError, Real
@@ -232,7 +232,7 @@ class _Sums:
     def __init__(self, settings: TapSettings, n_responses: int) -> None:
         self._settings, self._half = settings, settings.length // 2
         n_lines = self._half // 2 + 1
-        self._window = hann(self._half, sym=False)[:, None]
+        self._window = scipy.signal.windows.hann(self._half, sym=False)[:, None]
         self._cut = np.ones(settings.length)
         if settings.force_samples is not None:
             duration = settings.force_samples / settings.sample_rate

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from acquisition import Channel, Recording
+from acquisition import Channel, opened
 from millfrf.core import InputError, Real
 
 from ..band_recordings.resampling import require_room
@@ -258,7 +258,7 @@ def require_room_for_taps(test: TapTest) -> None:
     InputError
         It is too long; the line says how long it may be.
     """
-    with Recording(test.path) as recording:
+    with opened(test.path) as recording:
         require_room(recording.stream(test.stream), len(test.excitations), _BYTES_A_VALUE)
 
 
@@ -271,7 +271,7 @@ def found_taps(test: TapTest) -> FoundTaps:
         A channel that is not there, or a force that is constant.
     """
     require_room_for_taps(test)
-    with Recording(test.path) as recording:
+    with opened(test.path) as recording:
         stream = recording.stream(test.stream)
         force = stream.read(channels=[channel.name for channel in test.excitations])
         rate, start = stream.sample_rate, stream.start_time

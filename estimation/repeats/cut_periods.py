@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import rfft
 
 from acquisition import Channel
 from millfrf.core import Complex, InputError, Real
@@ -173,7 +173,7 @@ def _realisations(recording: BandRecording, found: RepeatedForce) -> list[Realis
         if n_periods < 2:
             continue
         periods = between_samples(joint, start, found.period, n_periods)
-        spectra = rfft(periods - periods.mean(axis=(0, 1)), axis=1) / np.sqrt(periods.shape[1])
+        spectra = scipy.fft.rfft(periods - periods.mean(axis=(0, 1)), axis=1) / np.sqrt(periods.shape[1])
         out = _transient(spectra[:, 1:, :m], spectra[:, 1:, m:])
         name = recording.name if len(found.stretches) == 1 else f"{recording.name}, realisation {number + 1}"
         result.append(Realisation(name, spectra[out:, :, :m], spectra[out:, :, m:], out))

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter1d
 
 from millfrf.core import Complex, InputError, Real
 
@@ -40,7 +40,7 @@ def excited_lines(periods: SteadyPeriods) -> NDArray[np.bool_]:
     for one in periods.realisations:
         own = np.abs(one.forces.mean(axis=0)) ** 2
         power = np.maximum(power, (own / np.maximum(own.max(axis=0), 1e-300)).max(axis=1))
-    near = maximum_filter1d(power, 2 * NEIGHBOURS + 1, mode="nearest")
+    near = scipy.ndimage.maximum_filter1d(power, 2 * NEIGHBOURS + 1, mode="nearest")
     return np.asarray((power > FAR_BELOW) & (power > BELOW * near))
 
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import rfft
+import scipy
 
 from millfrf.core import Complex, InputError, Real
 
@@ -183,7 +183,11 @@ def noise_in_silence(
     n = round(seconds * first.rate)
     window = np.hanning(n + 1)[:-1, None]
     window = window / np.sqrt(np.sum(window**2))
-    spectra = [rfft((cut - cut.mean(axis=0)) * window, axis=0) for one in recordings for cut in _silent_blocks(one, n)]
+    spectra = [
+        scipy.fft.rfft((cut - cut.mean(axis=0)) * window, axis=0)
+        for one in recordings
+        for cut in _silent_blocks(one, n)
+    ]
     if len(spectra) < FEWEST:
         return None
     frequencies = np.arange(n // 2 + 1) * first.rate / n
@@ -275,7 +279,7 @@ def _levels(recordings: Sequence[BandRecording], band: tuple[float, float]) -> R
     powers = []
     for one in recordings:
         joint = np.concatenate([one.force, one.response], axis=1)
-        spectrum = rfft(joint - joint.mean(axis=0), axis=0) / np.sqrt(len(joint))
+        spectrum = scipy.fft.rfft(joint - joint.mean(axis=0), axis=0) / np.sqrt(len(joint))
         axis = np.arange(len(spectrum)) * one.rate / len(joint)
         powers.append(np.mean(np.abs(spectrum[(axis >= band[0]) & (axis <= band[1])]) ** 2, axis=0))
     return np.asarray(np.sqrt(np.maximum(np.mean(powers, axis=0), 1e-300)))

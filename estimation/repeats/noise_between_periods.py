@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.fft import rfft
+import scipy
 
 from millfrf.core import Complex, InputError, Real
 
@@ -116,7 +116,7 @@ def noise_of_repeats(recordings: Sequence[BandRecording], band: tuple[float, flo
     n, first = min(len(one.force) for one in recordings), recordings[0]
     kept = np.arange(1, int(first.usable_band * n / first.rate) + 1)
     forces, responses = (
-        np.array([rfft(x[:n] - x[:n].mean(axis=0), axis=0)[kept] / np.sqrt(n) for x in each])
+        np.array([scipy.fft.rfft(x[:n] - x[:n].mean(axis=0), axis=0)[kept] / np.sqrt(n) for x in each])
         for each in ([one.force for one in recordings], [one.response for one in recordings])
     )
     one = Realisation(first.name, forces, responses, 0)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
+import scipy
 
 from millfrf.core import InputError, Real
 
@@ -122,8 +122,8 @@ def find_repeats(force: Real, least: int | None = None, most: int | None = None)
 def _likeness(force: Real, least: int, most: int) -> Real:
     """Correlation of forces with themselves at the lags from ``least`` to ``most``."""
     centred = force - force.mean(axis=0)
-    n = next_fast_len(2 * len(centred), real=True)
-    own = np.sum(irfft(np.abs(rfft(centred, n=n, axis=0)) ** 2, n=n, axis=0), axis=1)[: most + 1]
+    n = scipy.fft.next_fast_len(2 * len(centred), real=True)
+    own = np.sum(scipy.fft.irfft(np.abs(scipy.fft.rfft(centred, n=n, axis=0)) ** 2, n=n, axis=0), axis=1)[: most + 1]
     energy = np.concatenate([[0.0], np.cumsum(np.sum(centred**2, axis=1))])
     lags = np.arange(least, most + 1)
     overlap = np.sqrt(energy[len(centred) - lags] * (energy[-1] - energy[lags]))
@@ -203,8 +203,8 @@ def _width(period: float) -> int:
 def _refined(first: Real, later: Real, lag: int, m: int) -> tuple[float, float]:
     """Period and its standard error (samples) from the phase of two stretches ``lag``, about m periods, apart."""
     window = np.hanning(len(first))[:, None]
-    n = next_fast_len(len(first) + len(first) % 2, real=True)
-    a, b = (rfft((x - x.mean(axis=0)) * window, n=n + n % 2, axis=0) for x in (first, later))
+    n = scipy.fft.next_fast_len(len(first) + len(first) % 2, real=True)
+    a, b = (scipy.fft.rfft((x - x.mean(axis=0)) * window, n=n + n % 2, axis=0) for x in (first, later))
     cross = np.sum(np.conj(a) * b, axis=1)
     w = np.pi * np.arange(len(cross)) / (len(cross) - 1)
     size = np.abs(cross)
@@ -244,7 +244,7 @@ def _advanced(signals: Real, samples: float) -> Real:
     """Signals (n_samples, n) a fraction of a sample later in time; zeros stand beyond its edges."""
     if abs(samples) < 1e-9:
         return signals
-    n = next_fast_len(len(signals) + 64, real=True)  # zeros stand between the last sample and the first
+    n = scipy.fft.next_fast_len(len(signals) + 64, real=True)  # zeros stand between the last sample and the first
     w = 2 * np.pi * np.fft.rfftfreq(n)
-    moved = irfft(rfft(signals, n=n, axis=0) * np.exp(1j * w * samples)[:, None], n=n, axis=0)
+    moved = scipy.fft.irfft(scipy.fft.rfft(signals, n=n, axis=0) * np.exp(1j * w * samples)[:, None], n=n, axis=0)
     return np.asarray(moved[: len(signals)])

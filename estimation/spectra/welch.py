@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
 
 from acquisition import Channel, Recording, Stream
 from millfrf.core import InputError
@@ -237,7 +237,7 @@ def _transformed(segments: NDArray[np.float64]) -> NDArray[np.complex128]:
     scipy's own threads are not asked (``workers``): they end before each fork of the process, and where that meets
     their beginning, the fork waits for ever.
     """
-    return np.asarray(fft.rfft(segments, axis=1, overwrite_x=True))
+    return np.asarray(scipy.fft.rfft(segments, axis=1, overwrite_x=True))
 
 
 def _detrended(segments: NDArray[np.float64], kind: str) -> NDArray[np.float64]:

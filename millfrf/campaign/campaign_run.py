@@ -6,10 +6,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+from annotated_types import Ge
 
 from millfrf.core import DiskFull, InputError
-from millfrf.core.progress import Progress, silent
-from millfrf.core.terminal import Table
+from millfrf.core.steps import File, Reads, Typed, Writes, step
+from millfrf.core.terminal import Table, manner, say, show, tell, warn
+from millfrf.steps.answers import tables_answer
 
 from .on_dask import dask_executor
 from .opened import OpenedCampaign, graph_table, open_campaign, time_lines
@@ -31,6 +35,81 @@ from .run_folder import (
 )
 from .running import Ended, Executor, InThisProcess, State, left_to_run, run_tasks
 from .store import forget, read_outcome
+
+
+@step
+def campaign(
+    campaign: Annotated[File, Reads("CAMPAIGN.toml")],
+    /,
+    *,
+    scheduler: Annotated[str, Typed("ADDRESS")] | None = None,
+    workers: Annotated[int, Ge(0)] | None = None,
+    dry_run: bool = False,
+    out: Annotated[File | None, Writes("DIR")] = None,
+    retry: bool = False,
+) -> "RunSummary | None":
+    """Estimate, fit, calibrate, lobes, diagnose, learn and report over hundreds of recordings, on any number of cores.
+
+    Results are kept by the content of their inputs: a second run computes only what is new or was left. What fails is
+    listed with its reason and hides nothing else; exit code 1 says that tasks are left which the next run tries again.
+
+    Parameters
+    ----------
+    campaign
+        Campaign file: recordings, and the jobs to do.
+    scheduler
+        Dask scheduler; without it this machine does the work.
+    workers
+        Worker processes of this machine; 0 is none, without Dask.
+    dry_run
+        Show the graph and its time; compute nothing.
+    out
+        Folder of results; without it CAMPAIGN_results in the folder of the file.
+    retry
+        Try again what was refused.
+
+    Returns
+    -------
+    RunSummary or None
+        What became of the run; None for a dry run.
+
+    Raises
+    ------
+    InputError
+        A file, an option or a cluster that cannot be used.
+    MillfrfError
+        The scheduler is gone.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf campaign campaign.toml --workers 2 --out results
+    """
+    path = Path(campaign)
+    folder = path.with_name(f"{path.stem}_results") if out is None else Path(out)
+    options = RunOptions(folder, scheduler, workers, retry)
+    if dry_run:
+        table, lines = dry_run_lines(path, options)
+        tell(lambda: {"tasks": tables_answer([table]), "lines": lines})
+        show(table)
+        for line in lines:
+            say(line)
+        return None
+    found = run_campaign(path, options)
+    tell(lambda: {"tasks_run": found.ran, "tasks_settled": found.state.settled, "failures": found.failures})
+    for line in found.failures:
+        say(f"failed: {line}")
+    warn(found.doubts)
+    for line in found.lines():
+        say(line)
+    if found.state.failed or found.state.full:
+        manner().exit_code = TASKS_LEFT
+    return found
+
+
+TASKS_LEFT = 1
+"""Exit code where tasks are left that the next run tries again."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +176,7 @@ class RunSummary:
         return lines
 
 
-def dry_run_lines(path: Path, options: RunOptions, progress: Progress = silent) -> tuple[Table, list[str]]:
+def dry_run_lines(path: Path, options: RunOptions) -> tuple[Table, list[str]]:
     """The graph as a table, and lines on the time that it takes; nothing is computed or written.
 
     Raises
@@ -105,7 +184,7 @@ def dry_run_lines(path: Path, options: RunOptions, progress: Progress = silent) 
     InputError
         As :func:`open_campaign`.
     """
-    opened = open_campaign(path, options.out.resolve(), progress, hashing=False)
+    opened = open_campaign(path, options.out.resolve(), hashing=False)
     settled = _settled(opened)
     rates = measured_rates(opened.out)
     workers = max(1, cores() if options.workers is None else options.workers)
@@ -115,7 +194,7 @@ def dry_run_lines(path: Path, options: RunOptions, progress: Progress = silent) 
     return graph_table(opened, settled, rates), lines
 
 
-def run_campaign(path: Path, options: RunOptions, progress: Progress = silent) -> RunSummary:
+def run_campaign(path: Path, options: RunOptions) -> RunSummary:
     """Run all tasks of a campaign whose results are not in the store, and write the report.
 
     Raises
@@ -128,7 +207,7 @@ def run_campaign(path: Path, options: RunOptions, progress: Progress = silent) -
     _check(options)
     out = options.out.resolve()
     with only_run(out):
-        opened = open_campaign(path, out, progress, hashing=True)
+        opened = open_campaign(path, out, hashing=True)
         keep(out, opened.kept)
         state = State(settled=_settled(opened))
         if options.retry:

@@ -1,28 +1,24 @@
 """The tables of CAMPAIGN.toml, checked by pydantic; `millfrf new schemas` and the reference read their docstrings."""
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
-from pydantic import AliasChoices, BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from millfrf.core.step_tables import StepTable, table_of
+from millfrf.steps.calibrate import calibrate
+from millfrf.steps.diagnose import diagnose
+from millfrf.steps.estimate import estimate
+from millfrf.steps.fit import fit
+from millfrf.steps.lobes import lobes
+from millfrf.steps.robot.diagnose import diagnose_robot
+from millfrf.steps.robot.learn import learn_postures
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Share = Annotated[float, Field(gt=0, lt=1)]
 Text = Annotated[str, Field(min_length=1)]
-FrequencyBand = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], Positive]
-Place = tuple[Finite, Finite, Finite]
 
 
 class _Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
-
-
-class _Banded(_Table):
-    @model_validator(mode="after")
-    def _band_is_not_empty(self) -> "_Banded":
-        band = getattr(self, "band_hz", None)
-        if band is not None and not band[0] < band[1]:
-            raise ValueError(f"band_hz [{band[0]:g}, {band[1]:g}] is empty; give [LOW, HIGH]")
-        return self
 
 
 class CampaignTable(_Table):
@@ -81,191 +77,73 @@ class SetsTable(_Table):
     by: list[Text] = Field(default_factory=list)
 
 
-class EstimateTable(_Banded):
-    """Options of ``millfrf estimate``; and how long the parts are into which a long recording is split.
+class _Parts(StepTable):
+    """Options of a table that only a campaign has.
 
     Parameters
     ----------
-    segment_s : s
-        Duration of a segment; ``segment`` is the same.
-    overlap
-        Share of a segment that the next one shares, 0 to below 1.
-    window
-        Window of the segments: ``hann``, ``hamming`` or ``boxcar``.
-    stack
-        Way of stacking recordings: ``sum`` or ``side-by-side``.
-    excitation
-        Names of channels that excite; empty: forces and voltages.
-    response
-        Names of channels that respond; empty: motions.
-    band_hz : Hz
-        Lowest and highest frequency to keep; without it all lines, which take much room. ``band`` is the same.
-    stream
-        Sample clock; needed where a recording has several.
-    estimator
-        Estimator: ``h1``, ``h2``, ``hv``, ``instrumental-variable`` or ``local-polynomial``.
-    exclude
-        Whether segments with overload, clipping or dropped samples are left out; recordings then stay whole.
-    instrument
-        Channels that drive the forces, for ``instrumental-variable``.
     part_s : s
         A recording that is longer is split into parts of about this duration, each a task of its own.
     """
 
-    segment_s: Positive = Field(8.0, validation_alias=AliasChoices("segment_s", "segment"))
-    overlap: Annotated[float, Field(ge=0, lt=1)] = 0.5
-    window: Literal["hann", "hamming", "boxcar"] = "hann"
-    stack: str = "sum"
-    excitation: list[Text] = Field(default_factory=list)
-    response: list[Text] = Field(default_factory=list)
-    band_hz: FrequencyBand | None = Field(None, validation_alias=AliasChoices("band_hz", "band"))
-    stream: Text | None = None
-    estimator: str = "h1"
-    exclude: bool = False
-    instrument: list[Text] = Field(default_factory=list)
     part_s: Positive = 900.0
 
 
-class FitTable(_Banded):
-    """Options of ``millfrf fit``.
+class _Groups(StepTable):
+    """Options of a table that only a campaign has.
 
     Parameters
     ----------
-    band_hz : Hz
-        Lowest and highest frequency of the fit; ``band`` is the same.
-    method
-        Method: ``polyreference`` of FRFs or ``subspace`` of recordings; without it by whether there is ``[estimate]``.
-    max_order
-        Highest model order; without it by the data, or the method's own.
-    modes
-        Number of modes to keep; without it as many as are found.
-    excitation
-        Names of channels of recordings that excite; empty: chosen by quantity.
-    response
-        Names of channels of recordings that respond; empty: chosen by quantity.
-    stream
-        Sample clock; needed where a recording has several.
-    """
-
-    band_hz: FrequencyBand = Field(validation_alias=AliasChoices("band_hz", "band"))
-    method: Literal["polyreference", "subspace"] | None = None
-    max_order: Annotated[int, Field(ge=1)] | None = None
-    modes: Annotated[int, Field(ge=1)] | None = None
-    excitation: list[Text] = Field(default_factory=list)
-    response: list[Text] = Field(default_factory=list)
-    stream: Text | None = None
-
-
-class CalibrateTable(_Table):
-    """Hammer FRFs by which a model is carried to the tool tip; names of files may hold labels in braces.
-
-    Parameters
-    ----------
-    tip
-        FRF file: tapped at the tip, motion there; such as ``taps/{pose}_tip.h5``.
-    sensor
-        FRF file: tapped at the tip, motion at the sensor.
-    """
-
-    tip: Text
-    sensor: Text
-
-
-class LobesTable(_Table):
-    """Options of ``millfrf lobes``.
-
-    Parameters
-    ----------
-    cutting
-        Cutting file; its name may hold labels in braces.
-    speeds_rpm : rpm
-        Lowest spindle speed, highest, and how many, a whole number.
-    max_depth_m : m
-        Largest depth that is looked at.
-    method
-        Solver by its name, or ``certified``.
-    """
-
-    cutting: Text
-    speeds_rpm: tuple[Positive, Positive, Annotated[int, Field(ge=1)]]
-    max_depth_m: Positive
-    method: str = "certified"
-
-
-class DiagnoseTable(_Banded):
-    """Options of ``millfrf diagnose``.
-
-    Parameters
-    ----------
-    model
-        Nominal model; its name may hold labels in braces, such as ``idle/{pose}.json``.
     by
         Labels of recordings that are diagnosed together; without it those of the sets; empty: all together.
-    band_hz : Hz
-        Band that is compared; without it that of the model. ``band`` is the same.
-    lab_error
-        What a lab's own fit is off, as shares: frequency, damping, shapes.
-    cutting
-        Cutting file whose lobes the report shows; its name may hold labels in braces.
-    stream
-        Sample clock; needed where a recording has several.
     """
 
-    model: Text
     by: list[Text] | None = None
-    band_hz: FrequencyBand | None = Field(None, validation_alias=AliasChoices("band_hz", "band"))
-    lab_error: tuple[Share, Share, Share] = (0.01, 0.12, 0.03)
-    cutting: Text | None = None
-    stream: Text | None = None
 
 
-class RobotDiagnoseTable(_Banded):
-    """Options of ``millfrf robot diagnose``.
+class _SetsPerPose(StepTable):
+    """Options of a table that only a campaign has.
 
     Parameters
     ----------
-    by
-        Labels of recordings that are diagnosed together; empty: all together.
-    feed_deg : deg
-        Direction of the channels' X axes from the base's x, Z up; without it the base's axes.
-    band_hz : Hz
-        Band that is compared; without it about the first modes. ``band`` is the same.
-    sensor_m : m
-        Place of the housing sensor from the tip, in the channels' axes.
-    payload_at_m : m
-        Place of a payload from the tip, in the tool's frame; without it any place.
-    rigid_links
-        Whether the model with rigid links is questioned.
-    model_error
-        What a right model is still off, as shares: frequency, damping, shapes.
-    stream
-        Sample clock; needed where a recording has several.
-    """
-
-    by: list[Text] = Field(default_factory=list)
-    feed_deg: Finite | None = None
-    band_hz: FrequencyBand | None = Field(None, validation_alias=AliasChoices("band_hz", "band"))
-    sensor_m: Place | None = None
-    payload_at_m: Place | None = None
-    rigid_links: bool = False
-    model_error: tuple[Share, Share, Share] = (0.01, 0.15, 0.05)
-    stream: Text | None = None
-
-
-class LearnTable(_Table):
-    """Options of ``millfrf robot learn``.
-
-    Parameters
-    ----------
-    feed_deg : deg
-        Direction of the models' X axes from the base's x; without it the base's axes.
     sets_per_pose
         Number of sets of each posture that are learned from, the first ones: time rises with the third power of it, and
         repeats say little of other postures.
     """
 
-    feed_deg: Finite | None = None
     sets_per_pose: Annotated[int, Field(ge=1)] = 1
+
+
+if TYPE_CHECKING:  # the tables are made from the steps, which describe their options
+    EstimateTable = _Parts
+    FitTable = StepTable
+    CalibrateTable = StepTable
+    LobesTable = StepTable
+    DiagnoseTable = _Groups
+    RobotDiagnoseTable = _Groups
+    LearnTable = _SetsPerPose
+else:
+    EstimateTable = table_of(estimate, "EstimateTable", base=_Parts, without=("recordings",))
+    FitTable = table_of(fit, "FitTable", without=("sources", "poles", "refine"), needed=("band",))
+    CalibrateTable = table_of(calibrate, "CalibrateTable", without=("model",))
+    LobesTable = table_of(lobes, "LobesTable", without=("dynamics",), needed=("speeds", "max_depth"))
+    DiagnoseTable = table_of(
+        diagnose, "DiagnoseTable", base=_Groups, without=("recordings", "simulated", "figure_format")
+    )
+    RobotDiagnoseTable = table_of(
+        diagnose_robot,
+        "RobotDiagnoseTable",
+        base=_Groups,
+        without=("robot", "recordings", "poses", "figure_format"),
+        former={"channels_turned": "feed_deg", "sensor_at": "sensor_m"},
+    )
+    LearnTable = table_of(
+        learn_postures,
+        "LearnTable",
+        base=_SetsPerPose,
+        without=("robot", "models", "poses", "next", "x", "y", "z"),
+        former={"channels_turned": "feed_deg"},
+    )
 
 
 class ReportTable(_Table):
@@ -315,7 +193,7 @@ class CampaignFile(_Table):
 
     @model_validator(mode="after")
     def _what_jobs_need(self) -> "CampaignFile":
-        if self.fit is not None and self.fit.method == "polyreference" and self.estimate is None:
+        if self.fit is not None and self.fit.options["method"] == "polyreference" and self.estimate is None:
             raise ValueError('[fit] method = "polyreference" fits FRFs; add [estimate], or use method = "subspace"')
         for job in ("calibrate", "lobes", "learn"):
             if getattr(self, job) is not None and self.fit is None:

@@ -1,26 +1,28 @@
 """Jobs of a campaign: each does what a command does, and writes into a folder."""
 
-import warnings
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from millfrf.core import InputError, MillfrfWarning
-from millfrf.core.provenance import of_lobes
+from estimation import check_equal_rates
+from millfrf.core import InputError
+from millfrf.core.provenance import origin
+from millfrf.core.terminal import silently
 from millfrf.gate import join_judged, read_checked_cutting
-from millfrf.mismatch import LabError, Settings
-from millfrf.stability import write_lobes
-from millfrf.steps.calibrate import write_calibration
-from millfrf.steps.diagnose import diagnose_files
-from millfrf.steps.estimate import estimate_of_spectra, estimate_recordings, write_estimate
-from millfrf.steps.face_fit import calibrate as calibrate_to_tip
-from millfrf.steps.face_fit import fit as fit_model
-from millfrf.steps.face_lobes import lobes as lobes_of
-from millfrf.steps.fit import POLYREFERENCE, FitOptions, write_fit
-from millfrf.steps.robot.diagnose import Asking, diagnose_robot_files
-from millfrf.steps.robot.learn import LearningFrom, learn_from_files
-from millfrf.steps.test_spectra import LOCAL, EstimateOptions, check_equal_rates
+from millfrf.robot_model import read_robot
+from millfrf.steps.calibrate import calibrate as calibrate_to_tip
+from millfrf.steps.diagnose import diagnose as diagnose_model
+from millfrf.steps.diagnose import write_diagnosis_folder
+from millfrf.steps.estimate import LOCAL, EstimateOptions, estimate_of_spectra, write_estimate
+from millfrf.steps.estimate import estimate as estimate_frf
+from millfrf.steps.fit import POLYREFERENCE
+from millfrf.steps.fit import fit as fit_model
+from millfrf.steps.lobes import lobes as lobes_of
+from millfrf.steps.robot.diagnose import diagnose_robot, write_robot_diagnosis
+from millfrf.steps.robot.learn import learn_postures
+from millfrf.steps.robot.postures import spatial
 
 from .results.sets import MeasuredSet
 from .results.summary import write_summary
@@ -53,8 +55,8 @@ def estimate(work: Work, folder: Path) -> list[str]:
     options = EstimateOptions(**as_options(work.settings["options"]))
     if options.estimator == LOCAL:
         paths, lines = sound_files(work)
-        found = estimate_recordings(paths, options)
-        write_estimate(folder / FRF, found, paths)
+        with silently():
+            found = estimate_frf(*paths, out=folder / FRF, **asdict(options))
         return [*lines, *found.warnings]
     checks, lines = sound_checks(work)
     tests = [one for one in work.needs if one.kind != "check"]
@@ -70,7 +72,7 @@ def estimate(work: Work, folder: Path) -> list[str]:
     doubts = [*lines, *lines_on_refused(tests), *doubts]
     made = estimate_of_spectra([found for found, _ in left], gains, doubts, options)
     stated = [{"file": one.file, "sha256": beside["sha256"]} for one, beside in judged]
-    write_estimate(folder / FRF, made, [one.file for one, _ in judged], stated)
+    write_estimate(folder / FRF, made, stated)
     return list(made.warnings)
 
 
@@ -94,21 +96,11 @@ def fit(work: Work, folder: Path) -> list[str]:
     MillfrfError
         No stable pole was found.
     """
-    options = FitOptions(**as_options(work.settings["options"]))
-    paths, lines = ([work.need("estimate").folder / FRF], []) if options.method == POLYREFERENCE else sound_files(work)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MillfrfWarning)  # the result holds them
-        found = fit_model(
-            *paths,
-            band=options.band,
-            method=options.method,
-            max_order=options.max_order,
-            modes=options.n_modes,
-            excitations=options.excitations,
-            responses=options.responses,
-            stream=options.stream,
-        )
-    write_fit(folder / MODEL, found, paths, options)
+    options = as_options(work.settings["options"])
+    of_frf = options["method"] == POLYREFERENCE
+    paths, lines = ([work.need("estimate").folder / FRF], []) if of_frf else sound_files(work)
+    with silently():
+        found = fit_model(*paths, out=folder / MODEL, **options)
     return [*lines, *found.warnings]
 
 
@@ -122,11 +114,8 @@ def calibrate(work: Work, folder: Path) -> list[str]:
     """
     tip, sensor = work.files
     model = work.need("fit").folder / MODEL
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MillfrfWarning)
-        found = calibrate_to_tip(model, tip, sensor)
-    write_calibration(folder / MODEL, found, [model, tip, sensor])
-    return list(found.warnings)
+    with silently():
+        return list(calibrate_to_tip(model, tip=tip, sensor=sensor, out=folder / MODEL).warnings)
 
 
 DIAGNOSIS = "diagnosis.json"
@@ -143,19 +132,13 @@ def diagnose(work: Work, folder: Path) -> list[str]:
     with_cut = bool(work.settings["cutting"])
     recordings, lines = sound_files(work, 2 if with_cut else 1)
     process, doubts = read_checked_cutting(work.files[1]) if with_cut else (None, [])
-    settings = Settings(LabError(*work.settings["lab_error"]))
-    band = work.settings["band_hz"]
-    made = diagnose_files(
-        work.files[0],
-        recordings,
-        folder,
-        settings,
-        stream=work.settings["stream"],
-        band=None if band is None else (band[0], band[1]),
-        process=process,
-        dated=False,
-    )
-    return [*lines, *doubts, *made.diagnosis.doubts]
+    options = as_options(work.settings["options"])
+    model = work.files[0]
+    with silently():
+        made = diagnose_model(model, *recordings, **options)
+    origin_of = origin("diagnose", [model, *recordings], options)
+    write_diagnosis_folder(folder, made, model.name, origin_of, process, dated=False)
+    return [*lines, *doubts, *made.doubts]
 
 
 LOBES = "lobes.csv"
@@ -171,13 +154,8 @@ def lobes(work: Work, folder: Path) -> list[str]:
     """
     (cutting,) = work.files
     model = work.need(work.needs[0].kind).folder / MODEL
-    low, high, count = work.settings["speeds_rpm"]
-    speeds, depth, method = (low, high, count), work.settings["max_depth_m"], work.settings["method"]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", MillfrfWarning)
-        found = lobes_of(model, cutting, speeds=speeds, max_depth=depth, method=method)
-    asked = {"speeds_rpm": speeds, "max_depth_m": depth, "method": method}
-    write_lobes(folder / LOBES, found, provenance=of_lobes([model, cutting], asked))
+    with silently():
+        found = lobes_of(model, cutting=cutting, out=folder / LOBES, **as_options(work.settings["options"]))
     return list(found.warnings)
 
 
@@ -195,18 +173,13 @@ def robot_diagnose(work: Work, folder: Path) -> list[str]:
     asked, given = work.settings, len(work.files) - len(work.settings["poses"])
     poses = {path.stem: pose for path, pose in zip(work.files[given:], asked["poses"], strict=True)}
     recordings, lines = sound_files(work, given)
-    asking = Asking(
-        tuple(poses[path.stem] for path in recordings),
-        asked["feed_deg"],
-        _tuple(asked["band_hz"]),
-        _tuple(asked["sensor_m"]),
-        _tuple(asked["payload_at_m"]),
-        asked["rigid_links"],
-        LabError(*asked["model_error"]),
-        asked["stream"],
-    )
-    told = diagnose_robot_files(_robot(work), recordings, folder, asking, dated=False)
-    return [*lines, *(line.removeprefix("warning: ") for line in told if line.startswith("warning: "))]
+    options, robot = as_options(asked["options"]), _robot(work)
+    options["poses"] = [poses[path.stem] for path in recordings]
+    with silently():
+        found = diagnose_robot(robot, *recordings, **options)
+    origin_of = origin("robot diagnose", [robot, *recordings], options)
+    write_robot_diagnosis(folder, found, spatial(read_robot(robot)).name, origin_of, dated=False)
+    return [*lines, *found.doubts]
 
 
 def learn(work: Work, folder: Path) -> list[str]:
@@ -224,7 +197,10 @@ def learn(work: Work, folder: Path) -> list[str]:
         raise InputError("no set has a modal model")
     taken = _first_of_each_pose(left, asked["sets_per_pose"])
     models, names, poses = zip(*taken, strict=True)
-    learn_from_files(_robot(work), models, LearningFrom(poses, asked["feed_deg"]), folder / LEARNED, names)
+    with silently():
+        learn_postures(
+            _robot(work), *models, poses=poses, names=names, out=folder / LEARNED, **as_options(asked["options"])
+        )
     beside = [f"{len(left) - len(taken)} further sets of the same poses: see sets_per_pose"] * (len(left) > len(taken))
     return [*(f"left out {name}: {one.reason}" for one, name, _ in named if not one.done), *beside]
 
@@ -244,10 +220,6 @@ def _robot(work: Work) -> str:
     """Name of a robot that ships, or the path of its file."""
     named = work.settings["robot"]
     return str(work.files[0]) if named is None else str(named)
-
-
-def _tuple(value: Any) -> Any:
-    return None if value is None else tuple(value)
 
 
 FILE_OF = {"model": MODEL, "lobes": LOBES, "diagnosis": DIAGNOSIS}

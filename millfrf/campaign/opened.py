@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 
 from millfrf.core import InputError, checked_toml
-from millfrf.core.progress import Progress
 from millfrf.core.terminal import Table
 from millfrf.robot_model import SpatialCase, read_robot
-from millfrf.steps.robot.learn import driven_of
+from millfrf.steps.robot.postures import driven_of
 
 from .campaign_tables import CampaignFile
 from .planning import plan_campaign
@@ -144,7 +143,7 @@ class OpenedCampaign:
         return {place_below(Path(path), self.base): look for path, look in self.looks.items()}
 
 
-def open_campaign(path: Path, out: Path, progress: Progress, *, hashing: bool) -> OpenedCampaign:
+def open_campaign(path: Path, out: Path, *, hashing: bool) -> OpenedCampaign:
     """Read, find, plan and key.
 
     Parameters
@@ -153,8 +152,6 @@ def open_campaign(path: Path, out: Path, progress: Progress, *, hashing: bool) -
         The campaign's file.
     out
         Folder of results.
-    progress
-        Shows progress, such as ``millfrf.progress.bar``.
     hashing
         Whether content that is not known yet is hashed; else keys that hang on it are left open.
 
@@ -166,10 +163,10 @@ def open_campaign(path: Path, out: Path, progress: Progress, *, hashing: bool) -
     file = checked_toml(path, CampaignFile, "campaign")
     base = path.parent.resolve()
     kept = read_kept(out)
-    found = find_recordings(file, base, out, kept, progress)
+    found = find_recordings(file, base, out, kept)
     looks = {place_below(one.path, base): one.look for one in found}
     if hashing:
-        looks = hash_all(looks, base, progress)
+        looks = hash_all(looks, base)
     digests = {one.name: looks[place_below(one.path, base)].digest for one in found}
     recordings = tuple(without_wrong_postures(without_copies(found, digests)))
     robot = _robot(file, base)

@@ -8,9 +8,9 @@ from typing import Any
 
 from estimation import count_segments, settings_for
 from millfrf.core import InputError
-from millfrf.steps.fit import POLYREFERENCE, SUBSPACE, FitOptions
-from millfrf.steps.lobes import LOBE_METHODS
-from millfrf.steps.test_spectra import LOCAL, EstimateOptions, check_options
+from millfrf.core.steps import completed
+from millfrf.steps.estimate import LOCAL, EstimateOptions, estimate
+from millfrf.steps.fit import POLYREFERENCE, SUBSPACE
 
 from .campaign_tables import CampaignFile, EstimateTable
 from .labels import filled_in, labels_in
@@ -23,19 +23,7 @@ FAN_IN = 8
 
 def options_of(table: EstimateTable) -> EstimateOptions:
     """The options of ``millfrf estimate`` that the table states."""
-    return EstimateOptions(
-        table.segment_s,
-        table.overlap,
-        table.window,
-        table.stack,
-        tuple(table.excitation),
-        tuple(table.response),
-        table.band_hz,
-        table.stream,
-        table.estimator,
-        table.exclude,
-        tuple(table.instrument),
-    )
+    return EstimateOptions(**completed(estimate, table.options))
 
 
 def estimate_tasks(one: RecordingSet, table: EstimateTable) -> Iterator[Task]:
@@ -78,11 +66,12 @@ def parts_of(recording: FoundRecording, table: EstimateTable) -> list[tuple[int,
     Recordings from which segments may be left out stay whole, since a part might have none left.
     """
     streams = {name: (n_samples, rate) for name, n_samples, rate in recording.look.streams}
-    name = table.stream if table.stream is not None else next(iter(streams), "")
+    options = options_of(table)
+    name = options.stream if options.stream is not None else next(iter(streams), "")
     n_samples, rate = streams.get(name, (0, 1.0))
-    if table.exclude or n_samples <= table.part_s * rate:
+    if options.exclude or n_samples <= table.part_s * rate:
         return [(0, 0)]
-    settings = settings_for(rate, table.segment_s, overlap=table.overlap, window=table.window)
+    settings = settings_for(rate, options.segment, overlap=options.overlap, window=options.window)
     count = count_segments(n_samples, settings)
     parts = max(1, min(count, round(n_samples / (table.part_s * rate))))
     edges = [count * number // parts for number in range(parts + 1)]
@@ -177,13 +166,11 @@ def _check_asked(planner: _Planner) -> None:
     """Refuse options and names of files before anything is planned."""
     file = planner.file
     if file.estimate is not None:
-        check_options(options_of(file.estimate))
-    if file.lobes is not None and file.lobes.method not in LOBE_METHODS:
-        raise InputError(f"[lobes] method {file.lobes.method!r} is unknown; use one of {', '.join(LOBE_METHODS)}")
+        options_of(file.estimate).check()
     named = [
-        *([] if file.calibrate is None else [file.calibrate.tip, file.calibrate.sensor]),
-        *([] if file.lobes is None else [file.lobes.cutting]),
-        *([] if file.diagnose is None else [file.diagnose.model, file.diagnose.cutting]),
+        *([] if file.calibrate is None else [file.calibrate.options[name] for name in ("tip", "sensor")]),
+        *([] if file.lobes is None else [file.lobes.options["cutting"]]),
+        *([] if file.diagnose is None else [file.diagnose.options[name] for name in ("model", "cutting")]),
     ]
     for template in named:
         if template is not None and not labels_in(template) and not (planner.base / template).is_file():
@@ -198,14 +185,12 @@ def _lacking(one: FoundRecording, by: Sequence[str]) -> str:
 def _checked_as(file: CampaignFile) -> dict[str, Any]:
     """Channels and segments for which each recording is judged by itself."""
     if file.estimate is not None:
-        return {"options": asdict(options_of(file.estimate)), "segments": file.estimate.estimator != LOCAL}
+        options = options_of(file.estimate)
+        return {"options": asdict(options), "segments": options.estimator != LOCAL}
     table = file.fit or file.diagnose or file.robot_diagnose
-    names = {
-        "stream": None if table is None else table.stream,
-        "excitations": [] if file.fit is None else list(file.fit.excitation),
-        "responses": [] if file.fit is None else list(file.fit.response),
-    }
-    return {"options": names, "segments": False}
+    stated = {} if table is None else table.options
+    chosen: dict[str, Any] = {name: stated[name] for name in ("stream", "excitations", "responses") if name in stated}
+    return {"options": completed(estimate, chosen), "segments": False}
 
 
 def _of_set(planner: _Planner, one: RecordingSet) -> Iterator[tuple[Task, str]]:
@@ -219,15 +204,16 @@ def _of_set(planner: _Planner, one: RecordingSet) -> Iterator[tuple[Task, str]]:
     model = _fit(planner, one)
     yield model, "" if file.calibrate else "model"
     if file.calibrate is not None:
-        taps = tuple(_or_template(planner, name, one) for name in (file.calibrate.tip, file.calibrate.sensor))
+        taps = tuple(
+            _or_template(planner, name, one)
+            for name in (file.calibrate.options["tip"], file.calibrate.options["sensor"])
+        )
         model = Task("calibrate", one.name, taps, (model.identity,))
         yield model, "model"
     if file.lobes is not None:
-        asked = file.lobes.model_dump(mode="json", exclude={"cutting"})
-        yield (
-            Task("lobes", one.name, (_or_template(planner, file.lobes.cutting, one),), (model.identity,), asked),
-            "lobes",
-        )
+        asked = dict(file.lobes.options)
+        cutting = _or_template(planner, asked.pop("cutting"), one)
+        yield Task("lobes", one.name, (cutting,), (model.identity,), {"options": asked}), "lobes"
 
 
 def _or_template(planner: _Planner, template: str, one: RecordingSet) -> str:
@@ -241,17 +227,8 @@ def _or_template(planner: _Planner, template: str, one: RecordingSet) -> str:
 def _fit(planner: _Planner, one: RecordingSet) -> Task:
     table = planner.file.fit
     assert table is not None
-    method = table.method or (SUBSPACE if planner.file.estimate is None else POLYREFERENCE)
-    options = FitOptions(
-        table.band_hz,
-        method,
-        table.max_order,
-        table.modes,
-        tuple(table.excitation),
-        tuple(table.response),
-        table.stream,
-    )
-    settings = {"options": asdict(options)}
+    method = table.options["method"] or (SUBSPACE if planner.file.estimate is None else POLYREFERENCE)
+    settings = {"options": {**table.options, "method": method}}
     if method == POLYREFERENCE:
         return Task("fit", one.name, (), (f"estimate:{one.name}",), settings)
     files, checks = _files_and_checks(one.recordings)
@@ -276,15 +253,10 @@ def _diagnoses(
     groups = grouped(recordings, by)[0] if by or table.by is None else [all_together(recordings, ALL)]
     for group in groups:
         files, checks = _files_and_checks(group.recordings)
-        inputs = [_or_template(planner, table.model, group)]
-        if table.cutting is not None:
-            inputs.append(_or_template(planner, table.cutting, group))
-        settings = {
-            "band_hz": table.band_hz,
-            "lab_error": table.lab_error,
-            "stream": table.stream,
-            "cutting": table.cutting is not None,
-        }
+        options = dict(table.options)
+        model, cutting = options.pop("model"), options.pop("cutting")
+        inputs = [_or_template(planner, name, group) for name in (model, cutting) if name is not None]
+        settings = {"options": options, "cutting": cutting is not None}
         task = Task("diagnose", group.name, (*inputs, *files), checks, settings)
         yield task
         members = {one.name for one in group.recordings}
@@ -306,7 +278,7 @@ def _robot_diagnoses(planner: _Planner, recordings: Sequence[FoundRecording], le
     for group in grouped(posed, table.by)[0] if table.by else [all_together(posed, ALL)] if posed else []:
         files, checks = _files_and_checks(group.recordings)
         settings = {
-            **table.model_dump(mode="json", exclude={"by"}),
+            "options": table.options,
             "robot": _robot_name(planner),
             "poses": [planner.pose_of(one) for one in group.recordings],
         }
@@ -326,7 +298,7 @@ def _learning(
         if one not in posed
     ]
     settings = {
-        "feed_deg": table.feed_deg,
+        "options": table.options,
         "sets_per_pose": table.sets_per_pose,
         "robot": _robot_name(planner),
         "names": [one.name for one in posed],

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from millfrf.core.terminal import printable, progress_bar
+from millfrf.core.progress import progress_bar
+from millfrf.core.terminal import printable
 
 from .running import DONE, REFUSED, Ended
 from .tasks import Task

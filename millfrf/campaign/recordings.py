@@ -12,7 +12,7 @@ from typing import Any
 
 from acquisition import Recording
 from millfrf.core import InputError, writing_whole_file
-from millfrf.core.progress import Progress, silent
+from millfrf.core.progress import progress
 from millfrf.core.provenance import sha256
 
 from .campaign_tables import CampaignFile, RecordingsTable
@@ -53,9 +53,7 @@ class FileLook:
     fault: str = ""
 
 
-def look_at_recordings(
-    paths: Sequence[Path], kept: dict[str, FileLook], base: Path, progress: Progress = silent
-) -> dict[str, FileLook]:
+def look_at_recordings(paths: Sequence[Path], kept: dict[str, FileLook], base: Path) -> dict[str, FileLook]:
     """Look into each recording whose size or time of change is not what it was; hashes are left as they are.
 
     Parameters
@@ -66,8 +64,6 @@ def look_at_recordings(
         What was seen before, by the file's place below ``base``.
     base
         Folder of the campaign.
-    progress
-        Shows progress, such as ``millfrf.progress.bar``.
     """
     found = {}
     with progress("looking at recordings", len(paths)) as update:
@@ -81,7 +77,7 @@ def look_at_recordings(
     return found
 
 
-def hash_all(looks: dict[str, FileLook], base: Path, progress: Progress = silent) -> dict[str, FileLook]:
+def hash_all(looks: dict[str, FileLook], base: Path) -> dict[str, FileLook]:
     """Hash the content of each file whose hash is not known, several at a time."""
     wanted = [name for name, look in looks.items() if not look.digest]
     found = dict(looks)
@@ -166,9 +162,7 @@ class FoundRecording:
     fault: str = ""
 
 
-def find_recordings(
-    file: CampaignFile, base: Path, out: Path, kept: dict[str, FileLook], progress: Progress = silent
-) -> list[FoundRecording]:
+def find_recordings(file: CampaignFile, base: Path, out: Path, kept: dict[str, FileLook]) -> list[FoundRecording]:
     """Find, open and label all recordings, in the order of their names.
 
     Parameters
@@ -181,8 +175,6 @@ def find_recordings(
         Folder of results; no recording may lie in it.
     kept
         What earlier runs have seen.
-    progress
-        Shows progress, such as ``millfrf.progress.bar``.
 
     Raises
     ------
@@ -191,7 +183,7 @@ def find_recordings(
     """
     named = [(path, table, row) for table in file.recordings for path, row in _files(table, base)]
     _refuse_clashes([path for path, _, _ in named], base, out)
-    looks = look_at_recordings([path for path, _, _ in named], kept, base, progress)
+    looks = look_at_recordings([path for path, _, _ in named], kept, base)
     found = [
         _labelled(path, looks[place_below(path, base)], table, row)
         for path, table, row in sorted(named, key=lambda one: one[0].stem)

@@ -9,6 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from millfrf import PACKAGES
 from millfrf.core import writing_whole_folder
 from millfrf.core.provenance import versions
 
@@ -88,7 +89,6 @@ OPTIONAL = ("pandas", "pyarrow")
 """Libraries that some jobs refuse to do without: a refusal for their sake is forgotten when they are installed."""
 
 _SUFFIXES = {".py", ".toml", ".j2", ".css", ".js", ".html"}
-from millfrf import PACKAGES
 
 _ROOT = Path(__file__).resolve().parents[2]
 

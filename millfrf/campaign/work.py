@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from acquisition import Channel, Recording
-from estimation import CrossSpectra, SpectralSettings, join_parts, sum_tests
+from acquisition import Channel, opened
+from estimation import CrossSpectra, SpectralSettings, join_parts, spectra_of_test, sum_tests
 from millfrf.core import InputError
 from millfrf.gate import Gain, JudgedRecording, Segmentation, judge_recording
-from millfrf.steps.test_spectra import EstimateOptions, gain_of_test, spectra_of_test, with_instruments
+from millfrf.steps.estimate import EstimateOptions, gain_of_test
 
 
 @dataclass(frozen=True)
@@ -105,17 +105,17 @@ def check(work: Work, folder: Path) -> list[str]:
         raise InputError(work.settings["fault"])
     (path,) = work.files
     options = EstimateOptions(**as_options(work.settings["options"]))
-    taken = with_instruments(path, options)
-    segments = Segmentation(taken.segment, taken.overlap, taken.window) if work.settings["segments"] else None
-    judged = judge_recording(
-        path,
-        stream=taken.stream,
-        excitations=taken.excitations,
-        responses=taken.responses,
-        excluding=taken.exclude,
-        segments=segments,
-    )
-    with Recording(path) as recording:
+    with opened(path) as recording:
+        taken = options.settings(recording)
+        segments = Segmentation(taken.segment, taken.overlap, taken.window) if work.settings["segments"] else None
+        judged = judge_recording(
+            recording,
+            stream=taken.stream,
+            excitations=taken.excitations,
+            responses=taken.responses,
+            excluding=taken.exclude,
+            segments=segments,
+        )
         rate = recording.stream(taken.stream).sample_rate
     content = {**asdict(judged), "sample_rate": rate, "sha256": work.digests[0]}
     (folder / JUDGED).write_text(json.dumps(content, indent=1), encoding="utf-8")
@@ -210,7 +210,8 @@ def spectra(work: Work, folder: Path) -> list[str]:
     (path,) = work.files
     options = EstimateOptions(**as_options(work.settings["options"]))
     part = work.settings["segments"]
-    found = spectra_of_test(path, with_instruments(path, options), segments=None if part is None else tuple(part))
+    with opened(path) as recording:
+        found = spectra_of_test(recording, options.settings(recording), None if part is None else tuple(part))
     write_spectra(folder, found, [gain_of_test(found, path.name, options)] if part is None else [])
     return []
 

@@ -1,44 +1,156 @@
-"""Compilation of inner loops with numba: cached on disk, without the interpreter lock."""
+"""Compilation of inner loops (kernels) with numba: cached for each user, and compiled in one go at the first use.
 
-from collections.abc import Callable
+Machine code is kept in the user's cache folder, in a folder of its own for each state of the kernels' sources, so that
+stale code is never loaded. Where no such folder can be written, each run compiles anew in memory.
+"""
+
+import hashlib
+import os
+import sys
+from collections.abc import Callable, Iterator
 from functools import cache
-from typing import TypeVar, cast
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any, TypeVar, overload
 
-from numba import njit
-from numba.core import event
+import numba
+from numba.core import sigutils
+from numba.core.dispatcher import Dispatcher
 
-from .runtime import notice
+from .progress import progress
+from .terminal import aside
 
 Function = TypeVar("Function", bound=Callable[..., object])
+Example = Callable[[], tuple[Any, ...]]
+
+CUTTING = ("millfrf.cutting.tooth",)
+SIMULATION = ("replay_data.joints", "replay_data.modal_integrator", "replay_data.milling_loop")
+STABILITY = (
+    "millfrf.stability.floquet.depth_series",
+    "millfrf.stability.roots.characteristic",
+    "millfrf.stability.roots.critical_lines",
+    "millfrf.stability.roots.winding_numbers",
+)
+DIAGNOSIS = (
+    "millfrf.mismatch.residual.structured_residual",
+    "millfrf.mismatch.noise.loops",
+    "millfrf.mismatch.joints.time_loops",
+    "millfrf.mismatch.joints.tangent_loop",
+    "millfrf.mismatch.joints.modal_filters",
+    "millfrf.mismatch.models.modal_loops",
+    "millfrf.mismatch.models.modal_lines",
+)
+KERNELS = (*CUTTING, *SIMULATION, *STABILITY, *DIAGNOSIS)
+"""Modules with compiled functions, by the work that needs them."""
 
 
-def compiled(function: Function) -> Function:
-    """Compile ``function`` with numba at its first call; division by zero gives infinity, as in NumPy.
+@overload
+def compiled(function: Function, /) -> Function: ...
+@overload
+def compiled(*signatures: str, example: Example | None = None) -> Callable[[Function], Function]: ...
+def compiled(*signatures: Any, example: Example | None = None) -> Any:
+    """Compile a function with numba; division by zero gives infinity, as in NumPy.
 
-    The machine code is kept beside the source (or in the user's cache folder where that cannot be written), so that
-    only the first run on a machine pays for it. That run tells why it waits (:func:`millfrf.core.runtime.notice`).
+    A function that Python calls states the types of its arguments, for :func:`compile_kernels`; one that only other
+    compiled functions call needs none. Other types are compiled when they come.
+
+    Parameters
+    ----------
+    signatures
+        Types of the arguments as numba writes them, such as ``"(float64, float64[::1])"``; or the function itself,
+        where no types are stated.
+    example
+        A function that gives arguments of the right types, for types that numba has no text for (named tuples).
+
+    Examples
+    --------
+    ::
+
+        @compiled("(float64, float64)")
+        def ratio(a, b):
+            return a / b  # infinity where b is zero
     """
-    _tell_of_compilations()
-    return cast(Function, njit(cache=True, nogil=True, error_model="numpy")(function))
+    if signatures and callable(signatures[0]):
+        return _dispatcher(signatures[0], (), None)
+    return lambda function: _dispatcher(function, signatures, example)
 
 
-class _Compilations(event.Listener):  # type: ignore[misc]
-    """Tells of the first compilation; code that is read from the cache is none."""
+def _dispatcher(function: Callable[..., object], signatures: tuple[str, ...], example: Example | None) -> Any:
+    stored = cache_folder() is not None
+    made = numba.njit(cache=stored, nogil=True, error_model="numpy")(function)
+    made.stated_signatures = signatures
+    made.example = example
+    return made
 
-    def on_start(self, event: event.Event) -> None:
-        del event
-        _say_once()
 
-    def on_end(self, event: event.Event) -> None:
-        del event
+def compile_kernels(*modules: str) -> None:
+    """Compile the kernels of some modules, once on a computer, before a clock starts or a process is forked.
+
+    Parameters
+    ----------
+    modules
+        Names of modules, such as those of :data:`STABILITY`.
+    """
+    folder = cache_folder()
+    new = [module for module in modules if folder is None or not (folder / module).exists()]
+    kernels = [kernel for module in new for kernel in _kernels_of(import_module(module))]
+    if not kernels:
+        return
+    aside("compiling inner loops, once on this computer: up to a minute" if folder else "compiling inner loops")
+    with progress("compiling", len(kernels)) as update:
+        for number, kernel in enumerate(kernels, 1):
+            for signature in kernel.stated_signatures:
+                arguments, _ = sigutils.normalize_signature(signature)  # the cache's key is these types, not the text
+                kernel.compile(arguments)
+            if kernel.example:
+                kernel.compile(tuple(numba.typeof(value) for value in kernel.example()))
+            update(number)
+    if folder:
+        for module in new:
+            (folder / module).touch()
+
+
+def _kernels_of(module: ModuleType) -> Iterator[Any]:
+    """Compiled functions that a module defines."""
+    for value in vars(module).values():
+        if isinstance(value, Dispatcher) and value.py_func.__module__ == module.__name__:
+            yield value
 
 
 @cache
-def _tell_of_compilations() -> None:
-    """Listen to numba, from the first function on."""
-    event.register("numba:compile", _Compilations())
+def cache_folder() -> Path | None:
+    """Folder of the machine code of these sources, made if need be; None where nothing can be written."""
+    root = _user_cache()
+    if root is None:
+        return None
+    folder = root / "millfrf" / f"kernels-{_digest()}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    if not os.access(folder, os.W_OK):
+        return None
+    numba.config.CACHE_DIR = str(folder)
+    return folder
 
 
-@cache
-def _say_once() -> None:
-    notice("compiling inner loops, once on this computer: up to a minute")
+def _user_cache() -> Path | None:
+    """The user's folder for caches, by the conventions of the system; None where the user has no home."""
+    stated = os.environ.get("XDG_CACHE_HOME") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else None)
+    if stated:
+        return Path(stated)
+    try:
+        home = Path.home()
+    except RuntimeError:
+        return None
+    return home / ("Library/Caches" if sys.platform == "darwin" else ".cache")
+
+
+def _digest() -> str:
+    """Digest of the kernels' sources, of Python and of numba."""
+    root = Path(__file__).resolve().parents[2]
+    content = hashlib.sha256(f"{sys.version} {numba.__version__}".encode())
+    for module in KERNELS:
+        content.update((root / f"{module.replace('.', '/')}.py").read_bytes())
+    return content.hexdigest()[:16]

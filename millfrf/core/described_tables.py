@@ -1,12 +1,13 @@
 """TOML tables described by their classes: keys with type, unit, range and default, as text and as JSON schema."""
 
-import inspect
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, get_args, get_origin
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
+
+from .docstrings import ParameterText, paragraphs_in, parameters_in
 
 
 @dataclass(frozen=True)
@@ -34,61 +35,24 @@ class TomlFile:
     read_by: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class KeyText:
-    """Unit and description of a key."""
+def keys_of(schema: type[BaseModel]) -> dict[str, ParameterText]:
+    """Unit and description by key, from the docstrings of a table and of those that it extends.
 
-    unit: str
-    text: str
-
-
-def keys_of(schema: type[BaseModel]) -> dict[str, KeyText]:
-    """Unit and description by key, from the section ``Parameters`` of a table's docstring and of those it extends.
-
-    Examples
-    --------
-    >>> class Row(BaseModel):
-    ...     '''A row.
-    ...
-    ...     Parameters
-    ...     ----------
-    ...     depth_m, width_m : m
-    ...         Size of the cut.
-    ...     '''
-    ...     depth_m: float
-    ...     width_m: float
-    >>> keys_of(Row)["width_m"]
-    KeyText(unit='m', text='Size of the cut.')
+    Parameters
+    ----------
+    schema
+        Model class of the table.
     """
-    found: dict[str, KeyText] = {}
+    found: dict[str, ParameterText] = {}
     for base in reversed(schema.__mro__):
         if issubclass(base, BaseModel) and base is not BaseModel:
-            found |= _of_text(inspect.cleandoc(base.__doc__ or ""))
+            found |= parameters_in(base.__doc__ or "")
     return found
 
 
 def summary_of(schema: type[BaseModel]) -> str:
     """First paragraph of a table's docstring, in one line."""
-    return " ".join(inspect.cleandoc(schema.__doc__ or "").split("\n\n")[0].split())
-
-
-def _of_text(text: str) -> dict[str, KeyText]:
-    lines = text.splitlines()
-    if "Parameters" not in lines:
-        return {}
-    found: dict[str, KeyText] = {}
-    names: list[str] = []
-    begin = lines.index("Parameters") + 2
-    for line, after in zip(lines[begin:], [*lines[begin + 1 :], ""], strict=True):
-        if after and set(after) == {"-"}:
-            break
-        if line and not line.startswith(" "):
-            listed, _, unit = line.partition(" : ")
-            names = [name.strip() for name in listed.split(",")]
-            found |= {name: KeyText(unit, "") for name in names}
-        elif line.strip():
-            found |= {name: KeyText(found[name].unit, f"{found[name].text} {line.strip()}".strip()) for name in names}
-    return found
+    return paragraphs_in(schema.__doc__ or "")[0]
 
 
 def json_schema(file: TomlFile) -> dict[str, Any]:

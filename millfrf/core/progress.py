@@ -1,11 +1,11 @@
-"""Progress bars on standard error for work that takes over two seconds; none where nobody watches."""
+"""Progress bars on standard error for work that takes over a second, while a command runs on a terminal."""
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from typing import Protocol
+from contextlib import contextmanager
+from typing import Any
 
-from .terminal import printable, progress_bar
+from .terminal import manner, printable
 
 QUIET_FOR = 1.0
 """A bar appears only after this many seconds."""
@@ -13,28 +13,26 @@ QUIET_FOR = 1.0
 Update = Callable[[int], None]
 
 
-class Progress(Protocol):
-    """Callable that opens a bar: ``with progress("estimating", total) as update: update(done)``."""
-
-    def __call__(self, description: str, total: int | None = None) -> AbstractContextManager[Update]:
-        """Open a bar for one job; with total None it only shows that work goes on."""
-
-
 @contextmanager
-def silent(description: str, total: int | None = None) -> Iterator[Update]:
-    """Show no bar: for libraries and tests."""
-    del description, total
-    yield _ignore
+def progress(description: str, total: int | None = None) -> Iterator[Update]:
+    """Show a bar that appears after a second and vanishes when the work is done.
 
+    Nothing is shown outside of a command, by a quiet command, and where standard error is no terminal.
 
-def _ignore(done: int) -> None:
-    del done
+    Parameters
+    ----------
+    description
+        What is being done.
+    total
+        Amount of work; None: the bar only shows that work goes on.
 
-
-@contextmanager
-def bar(description: str, total: int | None = None) -> Iterator[Update]:
-    """Show a bar that appears after a second and vanishes when the job is done."""
-    shown_bar = progress_bar()
+    Yields
+    ------
+    callable
+        Takes the amount of work that is done.
+    """
+    now = manner()
+    shown_bar = None if now.silent or now.quiet else progress_bar()
     if shown_bar is None:
         yield _ignore
         return
@@ -55,3 +53,21 @@ def bar(description: str, total: int | None = None) -> Iterator[Update]:
     finally:
         if shown:
             shown_bar.stop()
+
+
+def _ignore(done: int) -> None:
+    del done
+
+
+def progress_bar() -> Any:
+    """Make rich's progress bar on standard error, descriptions as they stand; None where nobody watches."""
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        return None
+    described = TextColumn("{task.description:<28}", markup=False)
+    return Progress(
+        described, BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), console=console, transient=True
+    )

@@ -4,7 +4,7 @@ import ctypes
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 
@@ -33,14 +33,20 @@ def end_with(parent: int) -> None:
         os._exit(1)
 
 
-def process_pool(workers: int) -> ProcessPoolExecutor:
+def process_pool(workers: int, kernels: Sequence[str] = ()) -> ProcessPoolExecutor:
     """A pool of processes that end with this one.
 
     Parameters
     ----------
     workers
         Number of processes at most.
+    kernels
+        Modules whose kernels the processes need; they are compiled first.
     """
+    if kernels:
+        from .compilation import compile_kernels  # numba takes longer to load than all else of this module
+
+        compile_kernels(*kernels)
     return ProcessPoolExecutor(workers, initializer=end_with, initargs=(os.getpid(),))
 
 

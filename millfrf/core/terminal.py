@@ -1,10 +1,16 @@
-"""Output of commands: in words, quietly, or as one JSON document; text of files is shown as it stands."""
+"""Output of commands: in words, quietly, or as one JSON document.
+
+Steps say what they do through this module. Outside of a command nothing is printed: a function called from Python
+returns its result, and its warnings are warnings of Python. Text of files and users is shown as it stands: it can
+neither move the cursor nor be read as markup.
+"""
 
 import json
 import math
 import sys
 import unicodedata
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field, fields, is_dataclass
@@ -12,29 +18,211 @@ from enum import Enum
 from pathlib import Path, PurePath
 from typing import Any
 
-import typer
+from .errors import MillfrfWarning
 
-_REPLACED = "\N{REPLACEMENT CHARACTER}"
+FORMAT = "millfrf.answer"
+
+
+@dataclass
+class Manner:
+    """How the running command prints, and what it has answered so far.
+
+    Parameters
+    ----------
+    silent
+        Whether nothing is printed: no command is running.
+    quiet
+        Whether progress and notes are left out.
+    as_json
+        Whether one JSON document is the only thing on standard output.
+    answers
+        Fields of the document.
+    warnings
+        Warnings so far.
+    exit_code
+        Exit code of the command, unless an error ends it.
+    """
+
+    silent: bool = False
+    quiet: bool = False
+    as_json: bool = False
+    answers: dict[str, Any] = field(default_factory=dict)
+    warnings: list[str] = field(default_factory=list)
+    exit_code: int = 0
+
+
+_manner: ContextVar[Manner | None] = ContextVar("manner", default=None)
+
+
+def manner() -> Manner:
+    """How the running command prints; outside of a command, silently."""
+    return _manner.get() or Manner(silent=True)
+
+
+@contextmanager
+def speaking(*, quiet: bool = False, as_json: bool = False) -> Iterator[Manner]:
+    """Print from within a block, as a command does.
+
+    Parameters
+    ----------
+    quiet
+        Whether progress and notes are left out.
+    as_json
+        Whether one JSON document is the only thing on standard output.
+    """
+    chosen = Manner(quiet=quiet, as_json=as_json)
+    token = _manner.set(chosen)
+    try:
+        yield chosen
+    finally:
+        _manner.reset(token)
+
+
+@contextmanager
+def silently() -> Iterator[None]:
+    """Print nothing from within a block: a step that calls other steps prints an answer of its own."""
+    token = _manner.set(Manner(silent=True))
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", MillfrfWarning)  # they stand in the files that the steps write
+            yield
+    finally:
+        _manner.reset(token)
 
 
 def printable(text: str) -> str:
-    """Text without what moves a terminal's cursor or paints it; tab and line feed stay.
+    """Text without control characters, which move or paint a terminal's cursor; tab and line feed stay.
 
     Examples
     --------
     >>> printable("ax \\x1b[31m[g]")
     'ax �[31m[g]'
     """
-    return "".join(_REPLACED if unicodedata.category(c) == "Cc" and c not in "\t\n" else c for c in text)
+    replacement = "\N{REPLACEMENT CHARACTER}"
+    return "".join(replacement if unicodedata.category(c) == "Cc" and c not in "\t\n" else c for c in text)
+
+
+def say(text: str = "") -> None:
+    """Print a line of the answer on standard output; of a command that answers in JSON, on standard error."""
+    now = manner()
+    if not now.silent:
+        print(printable(text), file=sys.stderr if now.as_json else sys.stdout)
+
+
+def say_written(paths: Iterable[object], text: str = "") -> None:
+    """Tell which files were written; a quiet command prints only what is said of them.
+
+    Parameters
+    ----------
+    paths
+        Names of the files.
+    text
+        Short description of their content.
+
+    Examples
+    --------
+    >>> with speaking():
+    ...     say_written(["frf.h5"], "receptance, 800 lines")
+    wrote frf.h5: receptance, 800 lines
+    """
+    listed = " and ".join(map(str, paths))
+    if manner().quiet:
+        if text:
+            say(f"{listed}: {text}")
+    else:
+        say(f"wrote {listed}" + (f": {text}" if text else ""))
+
+
+def note(text: str) -> None:
+    """Print what is going on; a quiet command does not."""
+    if not manner().quiet:
+        say(text)
+
+
+def aside(text: str) -> None:
+    """Print a note on standard error; a quiet command does not.
+
+    Parameters
+    ----------
+    text
+        One sentence without a full stop.
+    """
+    now = manner()
+    if not (now.quiet or now.silent):
+        print(f"note: {printable(text)}", file=sys.stderr)
+
+
+STACK_LEVEL = 4
+"""Frames from ``warnings.warn`` to the line that called a step: `warn`, the step, its wrapper, the caller."""
+
+
+def warn(doubts: Iterable[str], stack_level: int = STACK_LEVEL) -> None:
+    """Warn of each doubt once: a command prints lines on standard error, a function warns as Python does.
+
+    Parameters
+    ----------
+    doubts
+        Sentences.
+    stack_level
+        Frames up to the line that is named by Python's warning.
+    """
+    now = manner()
+    for doubt in dict.fromkeys(doubts):
+        if now.silent:
+            warnings.warn(doubt, MillfrfWarning, stacklevel=stack_level)
+        else:
+            now.warnings.append(printable(doubt))
+            print(f"warning: {printable(doubt)}", file=sys.stderr)
+
+
+def say_concern(text: str) -> None:
+    """Print a warning on standard output, where warnings are what was asked for."""
+    manner().warnings.append(printable(text))
+    say(f"warning: {text}")
+
+
+def tell(make: Callable[[], Mapping[str, Any]]) -> None:
+    """Add fields to the JSON document of a command; without ``--json`` they are not computed.
+
+    Parameters
+    ----------
+    make
+        Gives the fields: plain values, arrays or paths, with the unit at the end of each key (``frequency_hz``).
+    """
+    if manner().as_json:
+        manner().answers.update(make())
+
+
+def print_document(command: str, chosen: Manner, written: Sequence[Path]) -> None:
+    """Print the one JSON document of a command: format, command, its fields, warnings, files written; no NaN.
+
+    Parameters
+    ----------
+    command
+        Words of the command.
+    chosen
+        Answers and warnings of the command.
+    written
+        Files that the command wrote.
+    """
+    content = {
+        "format": FORMAT,
+        "format_version": 1,
+        "command": command,
+        **chosen.answers,
+        "warnings": chosen.warnings,
+        "written": [str(path) for path in written],
+    }
+    print(json.dumps(plain(content), indent=1, ensure_ascii=False, allow_nan=False))
 
 
 def plain(value: Any) -> Any:
-    """Lists, dictionaries, texts, numbers and null; what is not finite is null, a complex number ``[re, im]``.
+    """A result as values of JSON: what is not finite is null, a complex number ``[re, im]``.
 
     Parameters
     ----------
     value
-        A result: scalar, array, path, dataclass, or collections of them.
+        Scalar, array, path, dataclass, or collections of them.
 
     Examples
     --------
@@ -52,212 +240,11 @@ def plain(value: Any) -> Any:
     if isinstance(value, complex):
         return [plain(value.real), plain(value.imag)]
     if isinstance(value, Mapping):
-        return {str(key): plain(one) for key, one in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if is_dataclass(value) and not isinstance(value, type):
-        return {one.name: plain(getattr(value, one.name)) for one in fields(value)}
-    listed = getattr(value, "tolist", None)  # arrays and scalars of NumPy, which is not loaded for `--help`
-    return plain(listed()) if callable(listed) else [plain(one) for one in value]
-
-
-FORMAT = "millfrf.answer"
-
-
-@dataclass
-class Manner:
-    """How the command at hand speaks, and what it has said for a script.
-
-    Parameters
-    ----------
-    quiet
-        Whether progress and notes are left out.
-    as_json
-        Whether one JSON document is the only thing on standard output.
-    answers
-        Fields of the document.
-    warnings
-        Warnings so far.
-    """
-
-    quiet: bool = False
-    as_json: bool = False
-    answers: dict[str, Any] = field(default_factory=dict)
-    warnings: list[str] = field(default_factory=list)
-
-
-_manner: ContextVar[Manner | None] = ContextVar("manner", default=None)
-
-
-def manner() -> Manner:
-    """How the command at hand speaks; outside a command, in words."""
-    return _manner.get() or Manner()
-
-
-@contextmanager
-def speaking(*, quiet: bool = False, as_json: bool = False) -> Iterator[Manner]:
-    """Let a block speak in a manner.
-
-    Parameters
-    ----------
-    quiet
-        Whether progress and notes are left out.
-    as_json
-        Whether one JSON document is the only thing on standard output.
-    """
-    chosen = Manner(quiet, as_json)
-    token = _manner.set(chosen)
-    try:
-        yield chosen
-    finally:
-        _manner.reset(token)
-
-
-def tell(make: Callable[[], Mapping[str, Any]]) -> None:
-    """Add fields to the document of a command that was asked for JSON; otherwise nothing is made.
-
-    Parameters
-    ----------
-    make
-        Gives the fields: plain values, arrays or paths, with the unit at the end of each key (``frequency_hz``).
-    """
-    chosen = _manner.get()
-    if chosen is not None and chosen.as_json:
-        chosen.answers.update(make())
-
-
-def document(command: str, chosen: Manner, written: list[Path]) -> str:
-    """The document as text: format, command, its fields, warnings, files written; no NaN.
-
-    Parameters
-    ----------
-    command
-        Words of the command.
-    chosen
-        What was said.
-    written
-        Files that the command wrote.
-    """
-    content = {
-        "format": FORMAT,
-        "format_version": 1,
-        "command": command,
-        **chosen.answers,
-        "warnings": chosen.warnings,
-        "written": [str(path) for path in written],
-    }
-    return json.dumps(plain(content), indent=1, ensure_ascii=False, allow_nan=False)
-
-
-def as_it_stands(text: str) -> Any:
-    """Text for rich that shows every character as it stands: brackets are brackets, no markup."""
-    from rich.text import Text
-
-    return Text(printable(text))
-
-
-def print_table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table to the terminal, every cell as it stands.
-
-    Parameters
-    ----------
-    title, columns
-        Title of the table and its headings; the first column is aligned to the left, the others to the right.
-    rows
-        Cells of each row.
-    """
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    drawn = Table(title=as_it_stands(title), box=box.SIMPLE_HEAD, title_justify="left")
-    for number, heading in enumerate(columns):
-        drawn.add_column(as_it_stands(heading), justify="left" if number == 0 else "right")
-    for row in rows:
-        drawn.add_row(*map(as_it_stands, row))
-    stream = sys.stderr if manner().as_json else sys.stdout
-    Console(file=stream, width=None if stream.isatty() else 120, emoji=False).print(drawn)
-
-
-def progress_bar() -> Any:
-    """Make rich's progress bar on standard error, its descriptions as they stand; None where nobody watches."""
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    if not console.is_terminal or manner().quiet:
-        return None
-    described = TextColumn("{task.description:<28}", markup=False)
-    return Progress(
-        described, BarColumn(), TaskProgressColumn(), TimeRemainingColumn(), console=console, transient=True
-    )
-
-
-_WARNING, _NOTE, _WROTE = "warning: ", "note: ", "wrote "
-
-
-def say(text: str = "") -> None:
-    """Print text on standard output, and a line that begins with `warning: ` on standard error.
-
-    Control characters are replaced, because the text may hold names of files and channels. A quiet command leaves out
-    lines that begin with `note: ` and, of lines that tell what it wrote, all but what follows the colon. A command
-    that answers in JSON prints all lines on standard error.
-
-    Examples
-    --------
-    >>> say("wrote a\\x1b[2Jb.h5")
-    wrote a�[2Jb.h5
-    """
-    now = manner()
-    if text.startswith(_WARNING):
-        now.warnings.append(printable(text.removeprefix(_WARNING)))
-    elif now.quiet:
-        if text.startswith(_NOTE) or (text.startswith(_WROTE) and ": " not in text):
-            return
-        text = text.removeprefix(_WROTE)
-    typer.echo(printable(text), err=now.as_json or text.startswith(_WARNING))
-
-
-def answer(text: str) -> None:
-    """Print text on standard output, a warning too: where warnings are what was asked for.
-
-    Examples
-    --------
-    >>> answer("warning: ax is dead")
-    warning: ax is dead
-    """
-    now = manner()
-    if text.startswith(_WARNING):
-        now.warnings.append(printable(text.removeprefix(_WARNING)))
-    typer.echo(printable(text), err=now.as_json)
-
-
-def aside(text: str) -> None:
-    """Tell on standard error why one waits; a quiet command does not.
-
-    Parameters
-    ----------
-    text
-        What is to be known, as one sentence without a full stop.
-    """
-    if not manner().quiet:
-        typer.echo(printable(f"{_NOTE}{text}"), err=True)
-
-
-def note(text: str) -> None:
-    """Tell what is going on; a quiet command does not.
-
-    Examples
-    --------
-    >>> note("milling three sweeps ...")
-    milling three sweeps ...
-    """
-    now = manner()
-    if not now.quiet:
-        typer.echo(printable(text), err=now.as_json)
-
-
-def print_document(command: str, chosen: Manner, written: list[Path]) -> None:
-    """Print the one JSON document of a command, see `document`."""
-    typer.echo(document(command, chosen, written))
+        return {item.name: plain(getattr(value, item.name)) for item in fields(value)}
+    listed = getattr(value, "tolist", None)
+    return plain(listed()) if callable(listed) else [plain(item) for item in value]
 
 
 @dataclass(frozen=True)
@@ -280,5 +267,18 @@ class Table:
 
 
 def show(table: Table) -> None:
-    """Print a table to the terminal."""
-    print_table(table.title, table.columns, table.rows)
+    """Print a table, every cell as it stands: the first column to the left, the others to the right."""
+    if manner().silent:
+        return
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table as RichTable
+    from rich.text import Text
+
+    drawn = RichTable(title=Text(printable(table.title)), box=box.SIMPLE_HEAD, title_justify="left")
+    for number, heading in enumerate(table.columns):
+        drawn.add_column(Text(printable(heading)), justify="left" if number == 0 else "right")
+    for row in table.rows:
+        drawn.add_row(*(Text(printable(cell)) for cell in row))
+    stream = sys.stderr if manner().as_json else sys.stdout
+    Console(file=stream, width=None if stream.isatty() else 120, emoji=False).print(drawn)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from millfrf.core import InputError, Real
 
 from .process import MillingProcess, refuse_varied
-from .tooth_force import tooth_force
+from .tooth import tooth_force
 
 
 def chip_direction(process: MillingProcess, angles: NDArray[np.float64]) -> NDArray[np.float64]:

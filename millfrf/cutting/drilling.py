@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import pi, radians
 
 import numpy as np
-from scipy.optimize import root
+import scipy
 
 from millfrf.core import InputError, Real
 
@@ -326,7 +326,9 @@ def settled_drill(
         return resultant_force(drill, feed, tangential, axial, min(size, drill.diameter / 2), direction=angle)
 
     unit = max(runout, 1e-9)
-    found = root(lambda x: x - (at_rest + compliance * force_at(unit * x).force) / unit, at_rest / unit, tol=1e-12)
+    found = scipy.optimize.root(
+        lambda x: x - (at_rest + compliance * force_at(unit * x).force) / unit, at_rest / unit, tol=1e-12
+    )
     place = unit * np.asarray(found.x)
     left = place - at_rest - compliance * force_at(place).force
     if not np.abs(left).max() <= 1e-6 * unit or np.hypot(*place) > drill.diameter / 4:

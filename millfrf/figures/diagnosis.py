@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import scipy
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
-from scipy.fft import irfft
 
 from millfrf.core import Complex, Real
 from millfrf.mismatch import Behaviour, BinnedForce, CutDiagnosis, CutFit, Diagnosis, FreeFormLaw, ModeTrend
@@ -178,7 +178,7 @@ def _around(found: CutDiagnosis, shown: Complex) -> Real:
     lines, law = found.details.cut.spectra[0], shown_fit(found).hypothesis.laws[0]
     spectrum = np.zeros((lines.blocks, lines.size // 2 + 1, shown.shape[2]), dtype=complex)
     spectrum[:, lines.band] = shown
-    signals = irfft(spectrum, n=lines.size, axis=1) * np.sqrt(lines.size * 0.9375)
+    signals = scipy.fft.irfft(spectrum, n=lines.size, axis=1) * np.sqrt(lines.size * 0.9375)
     times = (lines.first + np.arange(lines.size * lines.blocks)) / lines.recording.rate
     angles = law.angles(times).reshape(lines.blocks, lines.size)
     kept = slice(lines.size // 8, -(lines.size // 8))

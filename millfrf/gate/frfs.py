@@ -1,22 +1,30 @@
 """Checks of FRFs and of the inputs that they are estimated from."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+from estimation import Frf
+from millfrf.core import InputError
+
+if TYPE_CHECKING:
+    pass
+
+
 from numpy.typing import NDArray
 
 from estimation import (
     RANK_TOLERANCE,
     BandRecording,
     CrossSpectra,
-    Frf,
     bands_text,
     input_independence,
     local_half_width,
     spectra_for_judging,
     sum_tests,
 )
-from millfrf.core import Band, InputError, Real, shared_band
+from millfrf.core import Band, Real, shared_band
 
 from .clocks import check_sample_rates, gain_of
 from .passivity import POWERS, DrivePoint, check_reciprocity, drive_points, returned_power, rising_phase, size_doubts
@@ -360,3 +368,19 @@ def _noisy_lines(frf: Frf) -> list[str]:
         f"error is above {100 * NOISY:.0f} % of the FRF: the force is weak there, or too smooth in frequency for local "
         "polynomials, as that of a slow sweep; compare with --estimator h1"
     ]
+
+
+def check_window_damping(frf: Frf, name: str = "the FRF") -> None:
+    """Refuse an FRF that carries an exponential window where its values are used as they stand.
+
+    Raises
+    ------
+    InputError
+        With the damping that the window added.
+    """
+    tau = frf.exponential_time_constant
+    if tau is not None:
+        raise InputError(
+            f"{name} was windowed by exp(-t / {tau:.4g} s): its values show each mode with {1 / (2 * np.pi * tau):.3g} "
+            "Hz of damping (half its half-power bandwidth) too much; fit it, which takes that off, and use the model"
+        )

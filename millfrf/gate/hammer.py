@@ -1,16 +1,23 @@
 """Checks of hammer tests."""
 
 import os
-import re
-from collections import Counter
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from acquisition import Stream
-from estimation import Decay, FoundTaps, Frf, MergedTaps, TapSettings, TapTest
+from estimation import Decay, FoundTaps, Frf, MergedTaps, TapSettings, TapTest, find_taps
 from millfrf.core import InputError
-from millfrf.core.progress import Progress, silent
+
+from .recordings import IMPULSIVE, LONGEST
+from .signals import ChannelLevel
+
+if TYPE_CHECKING:
+    pass
+
+import re
+from collections import Counter
 
 from .frfs import check_frf
 from .recordings import check_channels, doubts_of
@@ -34,9 +41,7 @@ NARROW = 0.5
 """Share of the widest band of a point hit, below which that of another point is said to be narrow."""
 
 
-def check_tap_recordings(
-    paths: Sequence[str | os.PathLike[str]], tests: Sequence[TapTest], progress: Progress = silent
-) -> list[str]:
+def check_tap_recordings(paths: Sequence[str | os.PathLike[str]], tests: Sequence[TapTest]) -> list[str]:
     """Judge the channels that hammer tests take from their recordings, as :func:`check_recordings` does.
 
     Samples that are clipped, missing or repeated are not told: taps that hold them are left out, each with its reason.
@@ -49,7 +54,7 @@ def check_tap_recordings(
     def chosen(source: Stream) -> tuple[list[str], list[str]]:
         return names[str(source.path)]
 
-    return check_channels(paths, chosen, tests[0].stream, True, progress)
+    return check_channels(paths, chosen, tests[0].stream, True)
 
 
 def check_taps_found(found: Sequence[FoundTaps]) -> None:
@@ -203,17 +208,22 @@ def _of_coherence(frf: Frf) -> list[str]:
     ]
 
 
-def check_window_damping(frf: Frf, name: str = "the FRF") -> None:
-    """Refuse an FRF that carries an exponential window where its values are used as they stand.
-
-    Raises
-    ------
-    InputError
-        With the damping that the window added.
-    """
-    tau = frf.exponential_time_constant
-    if tau is not None:
-        raise InputError(
-            f"{name} was windowed by exp(-t / {tau:.4g} s): its values show each mode with {1 / (2 * np.pi * tau):.3g} "
-            "Hz of damping (half its half-power bandwidth) too much; fit it, which takes that off, and use the model"
-        )
+def tap_concerns(stream: Stream, levels: Sequence[ChannelLevel]) -> list[str]:
+    """One sentence for each force channel with double hits."""
+    found = []
+    for level in levels:
+        if level.channel.quantity != "force" or stream.duration > LONGEST or level.n_missing:
+            continue
+        if level.deviation == 0 or level.peak < IMPULSIVE * level.deviation:
+            continue
+        force = np.concatenate([block[:, 0] for block in stream.blocks(channels=[level.channel.name])])
+        taps = find_taps(force, stream.sample_rate)
+        double = [tap for tap in taps if tap.second_hit is not None]
+        if double:
+            times = ", ".join(f"{stream.start_time + tap.time:.3f} s" for tap in double[:5])
+            found.append(
+                f"{level.channel.name}: {len(double)} of {len(taps)} taps hit twice (at {times}; the first after "
+                f"{1e3 * (double[0].second_hit or 0):.1f} ms with {100 * double[0].second_share:.0f} %); "
+                "'millfrf tap' leaves them out"
+            )
+    return found

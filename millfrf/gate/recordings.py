@@ -1,6 +1,5 @@
 """Checks of recordings: signals that are alive, complete, plausible and distinct."""
 
-import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,17 +8,16 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Recording, Stream
+from acquisition import RecordingFile, Stream, opened, path_of
 from estimation import choose_channels, find_taps
 from millfrf.core import InputError
-from millfrf.core.progress import Progress, silent
 from millfrf.core.provenance import sha256
 
 from .clocks import check_clock_of, clock_concerns
 from .signals import ChannelLevel, Look, look, rate_concerns
 
 
-def check_several(paths: Sequence[str | os.PathLike[str]]) -> None:
+def check_several(paths: Sequence[RecordingFile]) -> None:
     """Refuse a recording that is given twice, under one name or as a copy: it would count as two tests.
 
     Raises
@@ -28,7 +26,7 @@ def check_several(paths: Sequence[str | os.PathLike[str]]) -> None:
         With both names.
     """
     by_size: dict[int, list[Path]] = {}
-    for path in (Path(path) for path in paths):
+    for path in (path_of(path) for path in paths):
         if path.is_file():
             by_size.setdefault(path.stat().st_size, []).append(path)
     for alike in (group for group in by_size.values() if len(group) > 1):
@@ -192,14 +190,13 @@ class JudgedRecording:
 
 
 def check_recordings(
-    paths: Sequence[str | os.PathLike[str]],
+    paths: Sequence[RecordingFile],
     *,
     stream: str | None = None,
     excitations: Sequence[str] = (),
     responses: Sequence[str] = (),
     excluding: bool = False,
     segments: Segmentation | None = None,
-    progress: Progress = silent,
     remedy: str = NAME_OTHERS,
 ) -> list[str]:
     """Judge the channels that a job takes from its recordings, file by file.
@@ -216,8 +213,6 @@ def check_recordings(
         The job leaves out segments with missing, clipped or repeated samples: they are neither refused nor doubted.
     segments
         Segments over which the job averages; None: it does not.
-    progress
-        Shows progress while samples are read.
     remedy
         What to do about a channel that is dead or copies another, besides checking its cable.
 
@@ -244,7 +239,6 @@ def check_recordings(
             responses=responses,
             excluding=excluding,
             segments=segments,
-            progress=progress,
             remedy=remedy,
         )
         for path in paths
@@ -253,14 +247,13 @@ def check_recordings(
 
 
 def judge_recording(
-    path: str | os.PathLike[str],
+    path: RecordingFile,
     *,
     stream: str | None = None,
     excitations: Sequence[str] = (),
     responses: Sequence[str] = (),
     excluding: bool = False,
     segments: Segmentation | None = None,
-    progress: Progress = silent,
     remedy: str = NAME_OTHERS,
 ) -> JudgedRecording:
     """Judge one recording of a job by itself, as :func:`check_recordings` does.
@@ -275,7 +268,7 @@ def judge_recording(
         exciting, responding = choose_channels(source, excitations or None, responses or None)
         return [channel.name for channel in exciting], [channel.name for channel in responding]
 
-    return _judged(path, chosen, stream, excluding, progress, segments, remedy)
+    return _judged(path, chosen, stream, excluding, segments, remedy)
 
 
 def join_judged(judged: Sequence[JudgedRecording], remedy: str = NAME_OTHERS) -> list[str]:
@@ -295,11 +288,10 @@ def join_judged(judged: Sequence[JudgedRecording], remedy: str = NAME_OTHERS) ->
 
 
 def check_channels(
-    paths: Sequence[str | os.PathLike[str]],
+    paths: Sequence[RecordingFile],
     chosen: Callable[[Stream], tuple[Sequence[str], Sequence[str]]],
     stream: str | None = None,
     excluding: bool = False,
-    progress: Progress = silent,
     segments: Segmentation | None = None,
     remedy: str = NAME_OTHERS,
 ) -> list[str]:
@@ -311,24 +303,23 @@ def check_channels(
         As :func:`check_recordings`.
     """
     check_several(paths)
-    judged = [_judged(path, chosen, stream, excluding, progress, segments, remedy) for path in paths]
+    judged = [_judged(path, chosen, stream, excluding, segments, remedy) for path in paths]
     return join_judged(judged, remedy)
 
 
 def _judged(
-    path: str | os.PathLike[str],
+    path: RecordingFile,
     chosen: Callable[[Stream], tuple[Sequence[str], Sequence[str]]],
     stream: str | None,
     excluding: bool,
-    progress: Progress,
     segments: Segmentation | None,
     remedy: str,
 ) -> JudgedRecording:
-    with Recording(path) as recording:
+    with opened(path) as recording:
         source = recording.stream(stream)
         exciting, responding = chosen(source)
         gaps = check_clock_of(recording, source.name)
-        seen = _look(source, [*exciting, *responding], progress)
+        seen = _look(source, [*exciting, *responding])
         idle = [level.channel.name for level in seen.levels[: len(exciting)] if level.n_samples and not level.peak]
         found = _check_stream(source, seen, set(idle), excluding, remedy)
         found += gaps
@@ -338,25 +329,25 @@ def _judged(
             how = f" ({recording.ending})" if recording.ending else ""
             found.append(f"the recording was not closed in order{how}: its end may be missing")
     alive = tuple(name for name in exciting if name not in idle)
-    return JudgedRecording(Path(path).name, tuple(found), tuple(idle), alive)
+    return JudgedRecording(path_of(path).name, tuple(found), tuple(idle), alive)
 
 
-def doubts_of_rate(path: str | os.PathLike[str]) -> list[str]:
+def doubts_of_rate(path: RecordingFile) -> list[str]:
     """Judge the sample rates of a recording that was just made; a file of another kind is not judged."""
-    if Path(path).suffix.lower() not in (".h5", ".hdf5"):
+    if path_of(path).suffix.lower() not in (".h5", ".hdf5"):
         return []
-    with Recording(path) as recording:
+    with opened(path) as recording:
         return [
-            f"{Path(path).name}: {text}"
+            f"{path_of(path).name}: {text}"
             for name, one in recording.streams.items()
             for text in (*rate_concerns(one.sample_rate), *clock_concerns(recording, name))
         ]
 
 
-def _look(stream: Stream, names: Sequence[str], progress: Progress) -> Look:
+def _look(stream: Stream, names: Sequence[str]) -> Look:
     if stream.n_samples == 0:
         raise InputError(f"{stream.path.name}: stream {stream.name} holds no sample; record again")
-    return look(stream, names, progress)
+    return look(stream, names)
 
 
 def _check_stream(stream: Stream, seen: Look, idle: set[str], excluding: bool, remedy: str) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import Channel, Stream
-from millfrf.core.progress import Progress, silent
+from millfrf.core.progress import progress
 from millfrf.core.terminal import Table
 
 from .signal_faults import Copies, Extreme, RepeatedRows
@@ -199,7 +199,7 @@ def rate_concerns(sample_rate: float) -> list[str]:
     ]
 
 
-def look(stream: Stream, names: Sequence[str] | None = None, progress: Progress = silent) -> Look:
+def look(stream: Stream, names: Sequence[str] | None = None) -> Look:
     """Read a stream once and judge its channels.
 
     Parameters
@@ -208,8 +208,6 @@ def look(stream: Stream, names: Sequence[str] | None = None, progress: Progress 
         Stream of an open recording.
     names
         Names of the channels to look at; None: all.
-    progress
-        Shows progress while samples are read.
     """
     known = {channel.name: channel for channel in stream.channels}
     chosen = tuple(known) if names is None else tuple(names)

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Stream
+from acquisition import RecordingFile, Stream
 from estimation import Frf, family_of, names_at, quantities_of_unit, refuse_shared, to_receptance
 from millfrf.core import InputError, shared_band
-from millfrf.core.progress import Progress, silent
 from modal_fit import ModalModel
 
 from .frfs import check_frf
@@ -162,9 +161,8 @@ def check_scales(names: Sequence[str], measured: NDArray[np.float64], predicted:
 def check_model_and_recordings(
     model_path: str | os.PathLike[str],
     model: ModalModel,
-    recordings: Sequence[str | os.PathLike[str]],
+    recordings: Sequence[RecordingFile],
     stream: str | None = None,
-    progress: Progress = silent,
 ) -> list[str]:
     """Judge a model, what its file says of its fit, and the channels of recordings at its degrees of freedom.
 
@@ -178,8 +176,6 @@ def check_model_and_recordings(
         Files it is compared with.
     stream
         Sample clock; None: the only one.
-    progress
-        Shows progress while samples are read.
 
     Returns
     -------
@@ -206,7 +202,7 @@ def check_model_and_recordings(
         refuse_shared(exciting, responding, source.path.name)
         return exciting, responding
 
-    return [*doubts, *check_channels(recordings, chosen, stream, progress=progress, remedy=RECORD_AGAIN)]
+    return [*doubts, *check_channels(recordings, chosen, stream, remedy=RECORD_AGAIN)]
 
 
 @dataclass(frozen=True)
@@ -218,7 +214,7 @@ class Given:
     name
         Name of the file without its folder.
     kind
-        Kind of the file, as ``millfrf.file_kinds`` names it.
+        Kind of the file, as :class:`FileKind` names it.
     sha256
         SHA-256 hash of its bytes.
     provenance

@@ -18,8 +18,8 @@ from millfrf.core import counted
 
 from .control import LiveControl
 from .drawings import Choice, Drawing, as_json
+from .guard import Guard, Limits
 from .monitor import LiveMonitor, Snapshot
-from .server import Guard, Limits
 from .standing import COLUMNS
 
 

@@ -5,22 +5,18 @@ import json
 import os
 import webbrowser
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from estimation import read_frf
+from estimation import Frf
 from millfrf.core import InputError, MillfrfError, writing_whole_file
-from millfrf.core.file_kinds import FRF, kind_of
-from millfrf.core.progress import Progress
 from millfrf.core.provenance import sources, versions
 from millfrf.core.terminal import say
-from millfrf.options import check_output
-from millfrf.steps.fit import FitOptions, fit_model
+from modal_fit import ModalFit
 
+from .guard import LOOPBACK, CountedServer, Guard, Limits, hosts_of
 from .handlers import Guarded, Missing
 from .picking import PickSession, Pole, checked_choice, drawn_page, fitted_answer
-from .server import LOOPBACK, CountedServer, Guard, Limits, hosts_of
 
 
 def write_picked(
@@ -197,52 +193,36 @@ def _ended(session: PickSession, ended: "asyncio.Future[list[Pole] | None]", ask
     return {"done": "saved" if chosen else "left"}
 
 
-def check_pick(pick: Path, out: Path, poles: Path | None, candidates: Path | None, files: Sequence[Path]) -> None:
-    """Refuse a choice that cannot be made or written, before anything is computed.
-
-    Raises
-    ------
-    InputError
-        Poles that are named already, candidates for another picker, recordings, or a name that cannot be written.
-    """
-    if poles is not None:
-        raise InputError("--pick chooses the poles that --poles would name; give one of the two")
-    if candidates is not None:
-        raise InputError("--candidates is for another picker; leave it out beside --pick")
-    if kind_of(files[0]) != FRF:
-        raise InputError("--pick shows the poles of an FRF; estimate one from these recordings first")
-    check_output(pick, (".toml",), [out, *files])
-
-
-def pick_in_browser(pick: Path, frf: Path, options: FitOptions, progress: Progress) -> Path:
-    """Fit, show the page until a choice is saved, and write the choice.
+def pick_in_browser(
+    pick: str | os.PathLike[str], path: Path, frf: Frf, automatic: ModalFit, max_order: int | None = None
+) -> Path:
+    """Show an automatic fit on a page until a choice of poles is saved, and write the choice.
 
     Parameters
     ----------
     pick
         File of the choice, ``.toml``.
-    frf
+    path
         File of the FRF.
-    options
-        Band, and where it is given highest order and number of modes of the automatic fit.
-    progress
-        Shows progress of the automatic fit.
+    frf
+        The FRF.
+    automatic
+        Its automatic fit, from which poles are picked.
+    max_order
+        Highest model order, as it was asked for.
 
     Returns
     -------
     Path
-        The file of the choice, for ``--poles``.
+        The file of the choice.
 
     Raises
     ------
-    InputError
-        An FRF or a band that cannot be fitted.
     MillfrfError
         The page was left without a choice.
     """
-    measured = read_frf(frf)
-    automatic = fit_model(measured, replace(options, poles=None, refine=False), progress, frf.name)
-    chosen = pick_poles(PickSession(frf.name, measured, automatic, options.max_order), say)
-    write_picked(pick, chosen, frf, options.band)
+    session = PickSession(path.name, frf, automatic, max_order)
+    chosen = pick_poles(session, say)
+    write_picked(pick, chosen, path, automatic.band)
     say(f"wrote {pick}: {len(chosen)} poles; --poles {pick} repeats the fit")
-    return pick
+    return Path(pick)

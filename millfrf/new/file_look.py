@@ -1,4 +1,4 @@
-"""Layout of CSV files, and the texts of a file beside its samples."""
+"""Layout of CSV files, and texts that a file holds besides its samples."""
 
 import csv
 import re
@@ -46,7 +46,7 @@ class _Writing:
 
 
 def seen_csv_options(path: Path) -> dict[str, Any]:
-    """Options of ``[csv]`` with which a file is a table of numbers; those that need not be said are left out.
+    """Options of ``[csv]`` with which a file is read as a table of numbers; defaults are left out.
 
     Numbers are read from the last row upwards. The line above them may hold units, the one above that headings; what
     stands before is a preamble, whose lines are counted as ``skip_lines``.
@@ -73,16 +73,16 @@ def seen_csv_options(path: Path) -> dict[str, Any]:
     best = max(ways, key=lambda way: (-way.first, way.width, way.decimal == "."))
     head = _head(lines, kept, best)
     skipped = head if kept.index(head) > 0 else 0
-    found: dict[str, Any] = {}
+    options: dict[str, Any] = {}
     held = max(";\t", key=lines[head].count)
     usual = held if held in lines[head] or best.decimal == "," else ","
     if usual != best.delimiter and best.width > 1:
-        found["delimiter"] = best.delimiter
+        options["delimiter"] = best.delimiter
     if best.decimal != ".":
-        found["decimal"] = best.decimal
+        options["decimal"] = best.decimal
     if skipped:
-        found["skip_lines"] = skipped
-    return found if encoding == _ENCODINGS[0] else {**found, "encoding": encoding}
+        options["skip_lines"] = skipped
+    return options if encoding == _ENCODINGS[0] else {**options, "encoding": encoding}
 
 
 def _text(path: Path) -> tuple[str, str]:
@@ -182,14 +182,14 @@ class ColumnTexts:
     Parameters
     ----------
     names, units
-        One text a column; empty where the file states none, or more than one list might be meant.
-    said
-        Where they come from, for the reader; empty: nowhere.
+        One text for each column; empty where the file states none, or more than one list might be meant.
+    source
+        Sentence on the fields that they come from; empty: none.
     """
 
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
-    said: str = ""
+    source: str = ""
 
 
 def column_texts(fields: Mapping[str, Any], array: str, count: int) -> ColumnTexts:
@@ -212,11 +212,11 @@ def column_texts(fields: Mapping[str, Any], array: str, count: int) -> ColumnTex
     units = {name: texts for name, texts in lists.items() if _are_units(name, texts)}
     rest = {name: texts for name, texts in lists.items() if name not in units and len(set(texts)) == count}
     unit, name = _only(units, _UNITS), _only(rest, _NAMES)
-    told = [f"{what} from {key}" for what, key in (("names", name), ("units", unit)) if key]
+    sources = [f"{what} from {key}" for what, key in (("names", name), ("units", unit)) if key]
     return ColumnTexts(
         rest.get(name, ()),
         units.get(unit, ()),
-        f"Columns of {array} have {' and '.join(told)}: check them." if told else "",
+        f"Columns of {array} have {' and '.join(sources)}: check them." if sources else "",
     )
 
 
@@ -225,12 +225,12 @@ def texts_of(value: Any) -> tuple[str, ...]:
     if isinstance(value, str):
         return (value.strip(),)
     if isinstance(value, np.ndarray) and value.dtype.kind == "U":
-        return tuple(str(one).strip() for one in value.reshape(-1))
+        return tuple(str(text).strip() for text in value.reshape(-1))
     return ()
 
 
 def notes(fields: Mapping[str, Any]) -> Iterator[str]:
-    """Short texts and few numbers that a file holds, one line each: ``Hdr.machine: ABB IRB6660``."""
+    """Short texts and few numbers that a file holds, each on a line: ``Hdr.machine: ABB IRB6660``."""
     lines = [f"  {name}: {shown}" for name, value in fields.items() if (shown := _shown(value))]
     yield from lines[:_MOST_NOTES]
     if len(lines) > _MOST_NOTES:
@@ -239,8 +239,8 @@ def notes(fields: Mapping[str, Any]) -> Iterator[str]:
 
 def dates(fields: Mapping[str, Any]) -> str:
     """Texts of a file whose name says that they are a date or time, as ``Hdr.date = 2026-03-11``."""
-    told = [f"{name} = {_shown(value)}" for name, value in fields.items() if _DATES.search(name.rpartition(".")[2])]
-    return ", ".join(one for one in told if any(sign.isdigit() for sign in one.partition(" = ")[2]))
+    texts = [f"{name} = {_shown(value)}" for name, value in fields.items() if _DATES.search(name.rpartition(".")[2])]
+    return ", ".join(text for text in texts if any(sign.isdigit() for sign in text.partition(" = ")[2]))
 
 
 def _shown(value: Any) -> str:
@@ -253,7 +253,7 @@ def _shown(value: Any) -> str:
     if not isinstance(value, np.ndarray | np.generic | int | float) or not 0 < np.size(value) <= _FEW:
         return ""
     array = np.asarray(value)
-    return ", ".join(f"{one:.10g}" for one in array.reshape(-1)) if array.dtype.kind in "iuf" else ""
+    return ", ".join(f"{number:.10g}" for number in array.reshape(-1)) if array.dtype.kind in "iuf" else ""
 
 
 def _nearest(lists: dict[str, tuple[str, ...]], array: str) -> dict[str, tuple[str, ...]]:
@@ -268,7 +268,7 @@ def _are_units(name: str, texts: tuple[str, ...]) -> bool:
 
 
 def _only(lists: Mapping[str, tuple[str, ...]], wanted: re.Pattern[str]) -> str:
-    """Name of the only list, or of the only one whose name says what it is; empty: none, or it cannot be told."""
+    """Name of the only list, or of the only list whose name states what it holds; empty: none, or not unique."""
     called = [name for name in lists if wanted.search(name.rpartition(".")[2])]
-    found = called or list(lists)
-    return found[0] if len(found) == 1 else ""
+    names = called or list(lists)
+    return names[0] if len(names) == 1 else ""

@@ -1,4 +1,4 @@
-"""Guesses of channels and clocks from the headings and units of a file; what they leave open is asked."""
+"""Guesses of channels and clocks from the headings and units of a file, and questions where they do not suffice."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -60,19 +60,21 @@ def split_heading(heading: str) -> tuple[str, str]:
     >>> split_heading("Fx [kN]"), split_heading("Fx / kN"), split_heading("ax")
     (('Fx', 'kN'), ('Fx', 'kN'), ('ax', ''))
     """
-    found = _UNIT.match(heading.strip())
-    if found:
-        return found["name"].strip(), found["unit"].strip()
+    match = _UNIT.match(heading.strip())
+    if match:
+        return match["name"].strip(), match["unit"].strip()
     name, slash, unit = heading.partition("/")
-    if slash and (unit.strip() in ("s", "ms", "us", "µs") or any(_is_unit(one, unit.strip()) for one in _TRIED)):
+    if slash and (
+        unit.strip() in ("s", "ms", "us", "µs") or any(_is_unit(quantity, unit.strip()) for quantity in _TRIED)
+    ):
         return name.strip(), unit.strip()
     return heading.strip(), ""
 
 
 def guessed_channel(heading: str, unit: str = "", *, whole: bool = False) -> dict[str, Any]:
-    """Keys of a mapping's channel that heading and unit tell, and a question for each that they leave open.
+    """Keys of a mapping's channel that follow from heading and unit, and a question for each other key.
 
-    A unit tells the quantity; without one the name does, and the unit is asked. Where name and unit contradict each
+    A unit gives the quantity; without a unit the name does, and the unit is asked. Where name and unit contradict each
     other both are asked.
 
     Parameters
@@ -94,17 +96,17 @@ def guessed_channel(heading: str, unit: str = "", *, whole: bool = False) -> dic
     name, bracketed = split_heading(heading)
     unit = unit or bracketed
     quantity, asked = _quantity(name, unit)
-    found: dict[str, Any] = {"name": name or heading.strip() or "channel"}
-    found["quantity"] = quantity or Question(asked or "what does it measure")
+    keys: dict[str, Any] = {"name": name or heading.strip() or "channel"}
+    keys["quantity"] = quantity or Question(asked or "what does it measure")
     if unit and not asked:
-        found["unit"] = unit
+        keys["unit"] = unit
     else:
-        found["unit"] = Question((asked or "in which unit are its values") + (_COUNTS if whole else ""))
-    return found | _place(name, quantity)
+        keys["unit"] = Question((asked or "in which unit are its values") + (_COUNTS if whole else ""))
+    return keys | _place(name, quantity)
 
 
 def _quantity(name: str, unit: str) -> tuple[str, str]:
-    """Quantity, empty where it is open; and what is asked of quantity and unit, empty where they agree."""
+    """Quantity, empty where it is open; and the question on quantity and unit, empty where they agree."""
     named = _of_name(name)
     if not unit:
         return named, ""
@@ -122,7 +124,7 @@ def _quantity(name: str, unit: str) -> tuple[str, str]:
 
 
 def _place(name: str, quantity: str) -> dict[str, Any]:
-    """Node and direction that the name tells; a direction whose sign is in doubt is asked."""
+    """Node and direction that follow from the name; a direction whose sign is in doubt is asked."""
     words = [word.lower() for word in re.split(r"[^A-Za-z]+", name) if word]
     axes = {axis for word in words if (axis := _axis(word))}
     places = {_PLACES[word] for word in words if word in _PLACES}
@@ -196,15 +198,15 @@ class TimeColumn:
 
 
 def is_time(name: str, values: Any) -> bool:
-    """Whether a column is one of times: by its name, and for a name such as ``t1`` by values that rise evenly."""
+    """Whether a column holds times: by its name, and for a name such as ``t1`` by values that rise evenly."""
     plain = name.rpartition(".")[2].strip().lower()
     if plain in ("time", "times", "zeit", "timestamp"):
         return True
     return _TIME.fullmatch(plain) is not None and _even_step(np.asarray(values).reshape(-1)) > 0
 
 
-def guessed_clock(times: Sequence[TimeColumn], fields: Mapping[str, Any], beside: str = "") -> dict[str, Any]:
-    """The key that tells the sample rate: ``time`` with its unit, or ``sample_rate``; or a question.
+def guessed_clock(times: Sequence[TimeColumn], fields: Mapping[str, Any], hint: str = "") -> dict[str, Any]:
+    """The key that gives the sample rate: ``time`` with its unit, or ``sample_rate``; or a question.
 
     Parameters
     ----------
@@ -212,29 +214,29 @@ def guessed_clock(times: Sequence[TimeColumn], fields: Mapping[str, Any], beside
         Columns and arrays of times.
     fields
         All that the file holds, by name; a single number of the right name is a rate.
-    beside
-        What else may help whoever answers the question.
+    hint
+        Further hint for whoever answers the question.
     """
     rates = {name: float(np.ravel(values)[0]) for name, values in fields.items() if _is_rate(name, values)}
     if len(times) > 1:
-        names = " or ".join(one.name for one in times)
+        names = " or ".join(time.name for time in times)
         return {"time": Question(f"which is the time of the samples, {names}")}
     if len(rates) > 1:
         return {"sample_rate": Question(f"which is the rate of the samples in Hz, {' or '.join(rates)}")}
     if times:
-        found = _of_time(times[0])
+        keys = _of_time(times[0])
         rate = next(iter(rates.values()), None)
-        if rate is not None and "time_unit" in found:
-            measured = 1 / (_even_step(times[0].values) * _SECONDS[found["time_unit"]])
+        if rate is not None and "time_unit" in keys:
+            measured = 1 / (_even_step(times[0].values) * _SECONDS[keys["time_unit"]])
             if abs(measured / rate - 1) > _AGREED:
                 asked = f"{times[0].name} says {measured:.6g} Hz, {next(iter(rates))} {rate:g}: which is it"
                 return {"sample_rate": Question(asked)}
-        return found
+        return keys
     for name, rate in rates.items():
         if LEAST_RATE <= rate <= LARGEST_RATE:
             return {"sample_rate": name}
         return {"sample_rate": Question(f"the file says {name} = {rate:g}: how many samples a second are that")}
-    return {"sample_rate": Question(f"how many samples a second{_candidates(fields) or beside}")}
+    return {"sample_rate": Question(f"how many samples a second{_candidates(fields) or hint}")}
 
 
 def _of_time(time: TimeColumn) -> dict[str, Any]:
@@ -253,8 +255,8 @@ def _of_time(time: TimeColumn) -> dict[str, Any]:
 
 
 def _unit_of_name(name: str) -> str:
-    found = re.search(r"[\s_](s|ms|us)$", name.strip().lower())
-    return found[1] if found else ""
+    match = re.search(r"[\s_](s|ms|us)$", name.strip().lower())
+    return match[1] if match else ""
 
 
 def _is_rate(name: str, values: Any) -> bool:

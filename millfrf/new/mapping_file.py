@@ -1,11 +1,11 @@
-"""`mapping_for`: a commented mapping for a file of another program, with what the file tells filled in."""
+"""Step ``new mapping``: a commented mapping for a file of another program."""
 
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import tomlkit
@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from acquisition import ArrayFile, CsvOptions, open_arrays
 from millfrf.core import InputError
 from millfrf.core.described_tables import described_tables
+from millfrf.core.steps import File, Reads, Writes, step
+from millfrf.core.terminal import say, say_written
 
 from .file_look import column_texts, dates, notes, seen_csv_options, texts_of
 from .guesses import Question, TimeColumn, even_step, guessed_channel, guessed_clock, is_time, split_heading
-from .templates import FILL_IN, Row, template
+from .templates import FILL_IN, Row, template, write_new
 from .toml_files import toml_files
 
 _MOST_COLUMNS = 64
@@ -27,25 +29,60 @@ _LONGER = 4
 
 @dataclass(frozen=True)
 class NewMapping:
-    """Text of a mapping, the number of its channels, and the number of places that are left to fill in."""
+    """Text of a mapping, the number of its channels, and the number of places to fill in."""
 
     text: str
     n_channels: int
     n_open: int
 
 
-def mapping_for(path: Path) -> NewMapping:
-    """Read a file and write the mapping that `millfrf convert` needs for it.
+@step
+def new_mapping(
+    file: Annotated[File, Reads("FILE")],
+    /,
+    *,
+    out: Annotated[File | None, Writes(suffixes=(".toml",), needed=True)] = None,
+) -> NewMapping:
+    """Write a commented mapping with the columns, units and sample rate that a file tells.
 
     Columns and arrays become channels; a time column, a sample rate and units are recognised by name; quantities and
-    places are guesses from names and marked as such. What nothing tells, or two things tell differently, is left out
-    and asked.
+    places are guesses from names and marked as such. What the file does not tell, or contradicts, is asked.
+
+    Parameters
+    ----------
+    file
+        Recording of another program: .mat .csv .npz ...
+    out
+        Mapping to write, for `millfrf convert`.
+
+    Returns
+    -------
+    NewMapping
+        Text of the mapping, and the numbers of its channels and of its open places.
 
     Raises
     ------
     InputError
         A file that cannot be read, or one without samples.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf new mapping cut1.mat --out channels.toml
     """
+    mapping = _mapping_for(Path(file))
+    if out is not None:
+        write_new(Path(out), mapping.text)
+    say_written([out], f"{mapping.n_channels} channels; quantities and places are guessed from names, check them")
+    if mapping.n_open:
+        say(f"{mapping.n_open} places are open, each marked FILL IN; millfrf convert names what is missing")
+    say(f"then: millfrf convert {file} recording.h5 --map {out}")
+    return mapping
+
+
+def _mapping_for(path: Path) -> NewMapping:
+    """Mapping that ``millfrf convert`` needs for a file."""
     kind = next(file for file in toml_files() if file.name == "mapping")
     written = seen_csv_options(path) if path.suffix.lower() in (".csv", ".txt") else {}
     opened = open_arrays(path, **CsvOptions(**written).model_dump())
@@ -64,7 +101,7 @@ def mapping_for(path: Path) -> NewMapping:
         f"Quantities, nodes and directions are guessed from names: check each. Places marked {FILL_IN} are open.",
         f"The file holds {_listed(opened)}.",
         *_left_out(opened, columns),
-        *_said_of_columns(opened, columns),
+        *_column_sources(opened, columns),
         *_noted(opened),
     ]
     title = "\n".join(lines)
@@ -74,7 +111,7 @@ def mapping_for(path: Path) -> NewMapping:
 
 @dataclass(frozen=True)
 class _Column:
-    """A column of samples: where it is found, what is written above it, and its values."""
+    """A column of samples: its place in the file, heading, unit and values."""
 
     place: dict[str, Any]
     heading: str
@@ -98,10 +135,10 @@ def _columns(opened: ArrayFile) -> Iterator[_Column]:
         if table.shape[1] == 1 and not opened.headings:
             yield _Column(array, re.split(r"[./]", name)[-1], opened.array_units.get(name, ""), table[:, 0])
             continue
-        told = column_texts(opened.fields, name, table.shape[1])
-        units = opened.units or tuple(one.strip("[]()") for one in told.units)
+        texts = column_texts(opened.fields, name, table.shape[1])
+        units = opened.units or tuple(unit.strip("[]()") for unit in texts.units)
         for number in range(table.shape[1]):
-            heading = (opened.headings or told.names or _numbered(name, table.shape[1]))[number]
+            heading = (opened.headings or texts.names or _numbered(name, table.shape[1]))[number]
             unit = units[number] if units else ""
             once = bool(opened.headings) and bool(heading) and opened.headings.count(heading) == 1
             place = {**array, "column": heading if once else number + 1}
@@ -121,17 +158,17 @@ def _numbered(name: str, count: int) -> list[str]:
     return [f"{short}_{'xyz'[number]}" if count == 3 else f"{short} {number + 1}" for number in range(count)]
 
 
-def _said_of_columns(opened: ArrayFile, columns: Sequence[_Column]) -> list[str]:
+def _column_sources(opened: ArrayFile, columns: Sequence[_Column]) -> list[str]:
     """A line for each array whose columns get names or units from other fields of the file."""
-    counts = Counter(str(one.place["array"]) for one in columns if "array" in one.place)
-    said = [] if opened.headings else [column_texts(opened.fields, name, counts[name]).said for name in counts]
-    return [line for line in said if line]
+    counts = Counter(str(column.place["array"]) for column in columns if "array" in column.place)
+    sources = [] if opened.headings else [column_texts(opened.fields, name, counts[name]).source for name in counts]
+    return [line for line in sources if line]
 
 
 def _noted(opened: ArrayFile) -> list[str]:
-    """What the file says beside its samples, for whoever fills the mapping in."""
-    said = [] if opened.headings else list(notes(opened.fields))
-    return ["It says beside them:", *said] * bool(said)
+    """Texts and numbers that the file holds besides its samples, for whoever fills the mapping in."""
+    lines = [] if opened.headings else list(notes(opened.fields))
+    return ["It says beside them:", *lines] * bool(lines)
 
 
 def _channel(column: _Column) -> dict[str, Any]:
@@ -141,13 +178,13 @@ def _channel(column: _Column) -> dict[str, Any]:
 
 def _named_once(channels: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The channels, with a number behind names that several have."""
-    counts = Counter(one["name"] for one in channels)
+    counts = Counter(channel["name"] for channel in channels)
     seen: Counter[str] = Counter()
-    for one in channels:
-        name = one["name"]
+    for channel in channels:
+        name = channel["name"]
         seen[name] += 1
         if counts[name] > 1:
-            one["name"] = f"{name} {seen[name]}"
+            channel["name"] = f"{name} {seen[name]}"
     return channels
 
 
@@ -157,22 +194,26 @@ def _clock(opened: ArrayFile, columns: Sequence[_Column]) -> dict[str, Any]:
         return {}
     times = [
         TimeColumn(
-            str(one.place.get("column", one.place.get("array", "")) if opened.headings else _array(one, opened)),
-            one.unit or split_heading(one.heading)[1],
-            one.values.astype(float),
+            str(
+                column.place.get("column", column.place.get("array", "")) if opened.headings else _array(column, opened)
+            ),
+            column.unit or split_heading(column.heading)[1],
+            column.values.astype(float),
         )
-        for one in columns
-        if is_time(split_heading(one.heading)[0], one.values)
+        for column in columns
+        if is_time(split_heading(column.heading)[0], column.values)
     ]
-    rising = [(one.heading, step) for one in columns if (step := even_step(one.values)) > 0]
-    beside = f"; {rising[0][0]} rises evenly by {rising[0][1]:.6g}" if rising and not times else ""
-    return guessed_clock(times, opened.fields, beside)
+    rising = [(column.heading, step) for column in columns if (step := even_step(column.values)) > 0]
+    hint = f"; {rising[0][0]} rises evenly by {rising[0][1]:.6g}" if rising and not times else ""
+    return guessed_clock(times, opened.fields, hint)
 
 
 def _asked_time(opened: ArrayFile) -> Question:
-    """The time of recording is never guessed; what the file says of a date stands beside it."""
-    said = dates(opened.fields)
-    return Question(f"when was it recorded?{f' The file says {said}.' if said else ''} Left out: not known", open=False)
+    """The time of recording is never guessed; dates in the file are shown with the question."""
+    stated = dates(opened.fields)
+    return Question(
+        f"when was it recorded?{f' The file says {stated}.' if stated else ''} Left out: not known", open=False
+    )
 
 
 def _array(column: _Column, opened: ArrayFile) -> str:
@@ -181,7 +222,7 @@ def _array(column: _Column, opened: ArrayFile) -> str:
 
 def _axes(opened: ArrayFile) -> dict[str, list[Row]]:
     """Tables that say of arrays whose rows are channels that they are, and ask where the shape does not tell it."""
-    found: dict[str, list[Row]] = {}
+    tables: dict[str, list[Row]] = {}
     for name, values in opened.fields.items():
         if opened.headings or _length(values) != _longest(opened) or not _has_axes(values):
             continue
@@ -189,10 +230,10 @@ def _axes(opened: ArrayFile) -> dict[str, list[Row]]:
         heading = f"[arrays.{tomlkit.key(name).as_string()}]"
         if _in_doubt(values):
             asked = f'{rows} x {columns}: ["sample", "channel"], or ["channel", "sample"] where each row is a channel'
-            found[heading] = [{"axes": Question(asked, "[]")}]
+            tables[heading] = [{"axes": Question(asked, "[]")}]
         else:
-            found[heading] = [{"axes": ["channel", "sample"]}]
-    return found
+            tables[heading] = [{"axes": ["channel", "sample"]}]
+    return tables
 
 
 def _has_axes(values: Any) -> bool:
@@ -211,7 +252,7 @@ def _in_doubt(values: NDArray[Any]) -> bool:
 
 def _left_out(opened: ArrayFile, columns: Sequence[_Column]) -> list[str]:
     """One line on arrays of numbers that are no channels: of another length, or of more than two axes."""
-    taken = {one.place.get("array", next(iter(opened.fields))) for one in columns}
+    taken = {column.place.get("array", next(iter(opened.fields))) for column in columns}
     other = [
         f"{name} {'x'.join(map(str, np.shape(values)))}"
         for name, values in opened.fields.items()

@@ -1,26 +1,210 @@
-"""Commented TOML templates."""
+"""Steps ``new cut``, ``new session``, ``new campaign``, ``new schemas``: commented TOML files, and their schemas."""
 
+import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import tomlkit
+from annotated_types import Ge, Gt, Le
 
-from millfrf.core import writing_whole_file
-from millfrf.core.described_tables import DescribedKey, DescribedTable, TomlFile, described_tables
+from millfrf.core import InputError, writing_whole_file, writing_whole_folder
+from millfrf.core.described_tables import DescribedKey, DescribedTable, TomlFile, described_tables, json_schema
+from millfrf.core.steps import File, Typed, Writes, step
+from millfrf.core.terminal import say, say_written
 
 from .guesses import Question
 from .toml_files import toml_files
+
+NewFile = Annotated[File | None, Writes(suffixes=(".toml",), needed=True)]
+Row = Mapping[str, Any]
 
 FILL_IN = "FILL IN"
 """Mark of a key that must be given and that nothing tells; the command that reads the file names it as missing."""
 
 _WIDTH = 110
 
-Row = Mapping[str, Any]
+
+@step
+def new_cut(
+    *,
+    out: NewFile = None,
+    teeth: Annotated[int | None, Typed("N"), Ge(1)] = None,
+    diameter: Annotated[float | None, Typed("M"), Gt(0)] = None,
+    plan: bool = False,
+) -> str:
+    """Write a commented cutting file; what only you know is left out, and lobes name it as missing.
+
+    Parameters
+    ----------
+    out
+        Cutting file to write.
+    teeth
+        Number of cutting edges.
+    diameter : m
+        Diameter of the cutter.
+    plan
+        Add the table of a plan of speed sweeps.
+
+    Returns
+    -------
+    str
+        Text of the file.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf new cut --teeth 2 --diameter 0.0127 --out cut.toml
+    """
+    given = {"teeth": teeth, "diameter_m": diameter}
+    rows: dict[str, Sequence[Row]] = {
+        "[cutting]": [{key: value for key, value in given.items() if value is not None} | _engagement(diameter)],
+        "[plan]": [{}],
+    }
+    title = (
+        f"A cut: cutter, engagement, force coefficients. Marked {FILL_IN}: what must be given.\n"
+        "The engagement is start_angle_deg and exit_angle_deg, or immersion (with radial_depth_m)."
+    )
+    tables = [*described_tables(_kind("cut")), *(described_tables(_kind("plan")) if plan else ())]
+    return _written(out, template(title, tables, rows), "millfrf lobes MODEL.json --cutting {} ...")
+
+
+@step
+def new_session(
+    *,
+    out: NewFile = None,
+    driver: Literal["ni", "replay", "simulated"] = "ni",
+    channels: Annotated[int, Typed("N"), Ge(1), Le(256)] = 6,
+) -> str:
+    """Write a commented session file for `millfrf acquire`.
+
+    Parameters
+    ----------
+    out
+        Session file to write.
+    driver
+        Device that samples.
+    channels
+        Number of inputs to describe.
+
+    Returns
+    -------
+    str
+        Text of the file.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf new session --driver ni --channels 6 --out session.toml
+    """
+    tables = [
+        table for table in described_tables(_kind("session")) if table.heading != "[device]" or _drives(table, driver)
+    ]
+    rows: dict[str, Sequence[Row]] = {"": [{}], "[device]": [{"driver": driver}]}
+    if driver == "ni":
+        rows["[[channels]]"] = [{} for _ in range(channels)]
+    title = (
+        f"A session for: millfrf acquire THIS.toml --out REC.h5. Marked {FILL_IN}: what must be given.\n"
+        "Tables that stand as comments are not used; take the # away where the rig has such a device."
+    )
+    return _written(out, template(title, tables, rows), "millfrf acquire {} --check")
+
+
+@step
+def new_campaign(
+    *recordings: Annotated[str, Typed("REC")],
+    out: NewFile = None,
+    robot: Annotated[str, Typed("ROBOT")] | None = None,
+) -> str:
+    """Write a commented campaign file for `millfrf campaign`.
+
+    Parameters
+    ----------
+    recordings
+        Names of recordings; quoted, with wildcards: 'recordings/*.h5'.
+    out
+        Campaign file to write.
+    robot
+        Robot whose postures were measured.
+
+    Returns
+    -------
+    str
+        Text of the file.
+
+    Raises
+    ------
+    InputError
+        No recording.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf new campaign 'recordings/*.h5' --robot kuka_kr90_r3100 --out campaign.toml
+    """
+    if not recordings:
+        raise InputError("no recording given; name recordings, or quote a name with wildcards: 'recordings/*.h5'")
+    rows: dict[str, Sequence[Row]] = {
+        "[campaign]": [{} if robot is None else {"robot": robot}],
+        "[[recordings]]": [{"files": list(recordings)}],
+        "[sets]": [{}],
+        "[fit]": [{}],
+        "[report]": [{}],
+    }
+    title = (
+        f"A campaign for: millfrf campaign THIS.toml --dry-run. Marked {FILL_IN}: what must be given.\n"
+        "A job is done if its table is there: take the # away from [estimate], [calibrate], [lobes], [diagnose] ..."
+    )
+    return _written(out, template(title, described_tables(_kind("campaign")), rows), "millfrf campaign {} --dry-run")
+
+
+@step
+def new_schemas(*, out: Annotated[File | None, Writes("DIR", needed=True)] = None) -> dict[str, dict[str, Any]]:
+    """Write a JSON schema of each TOML file, for editors that complete and check keys.
+
+    Parameters
+    ----------
+    out
+        Folder for the schemas.
+
+    Returns
+    -------
+    dict of dict
+        Schemas by the kind of file.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf new schemas --out schemas
+    """
+    schemas = {file.name: json_schema(file) for file in toml_files()}
+    if out is not None:
+        with writing_whole_folder(out) as folder:
+            for name, schema in schemas.items():
+                (folder / f"{name}.schema.json").write_text(json.dumps(schema, indent=2) + "\n", encoding="utf-8")
+    say(f"wrote {len(schemas)} schemas into {out}; first line of a TOML file: #:schema PATH.schema.json")
+    return schemas
+
+
+def _written(out: File | None, text: str, then: str) -> str:
+    """Write a template, print which command reads it, and return it."""
+    if out is not None:
+        write_new(Path(out), text)
+    say_written([out], f"fill in what is marked {FILL_IN}, then: {then.format(out)}")
+    return text
+
+
+def write_new(out: Path, text: str) -> None:
+    """Write a template whole."""
+    with writing_whole_file(out) as temporary:
+        temporary.write_text(text, encoding="utf-8")
 
 
 def template(title: str, tables: Sequence[DescribedTable], rows: Mapping[str, Sequence[Row]]) -> str:
@@ -115,23 +299,6 @@ def _wrapped(text: str, mark: str = "# ") -> Iterator[str]:
     yield f"{mark}{line}"
 
 
-def cut_text(teeth: int | None, diameter: float | None, *, plan: bool) -> str:
-    """Text of a cutting file; ``diameter`` in m. With ``plan`` it has the table of a plan, too."""
-    given: dict[str, Any] = {}
-    if teeth is not None:
-        given["teeth"] = teeth
-    if diameter is not None:
-        given["diameter_m"] = diameter
-    given |= _engagement(diameter)
-    tables = [*described_tables(_kind("cut")), *(described_tables(_kind("plan")) if plan else ())]
-    rows: dict[str, Sequence[Row]] = {"[cutting]": [given], "[plan]": [{}]}
-    title = (
-        f"A cut: cutter, engagement, force coefficients. Marked {FILL_IN}: what must be given.\n"
-        "The engagement is start_angle_deg and exit_angle_deg, or immersion (with radial_depth_m)."
-    )
-    return template(title, tables, rows)
-
-
 def _engagement(diameter: float | None) -> dict[str, Question]:
     """What is asked of the engagement; ``diameter`` in m."""
     half = "diameter_m / 2" if diameter is None else f"{diameter / 2:g}"
@@ -142,45 +309,9 @@ def _engagement(diameter: float | None) -> dict[str, Question]:
     }
 
 
-def session_text(driver: str, n_channels: int) -> str:
-    """Text of a session file for a device: ``ni``, ``replay`` or ``simulated``."""
-    kind = _kind("session")
-    tables = [table for table in described_tables(kind) if table.heading != "[device]" or _drives(table, driver)]
-    rows: dict[str, Sequence[Row]] = {"": [{}], "[device]": [{"driver": driver}]}
-    if driver == "ni":
-        rows["[[channels]]"] = [{} for _ in range(n_channels)]
-    title = (
-        f"A session for: millfrf acquire THIS.toml --out REC.h5. Marked {FILL_IN}: what must be given.\n"
-        "Tables that stand as comments are not used; take the # away where the rig has such a device."
-    )
-    return template(title, tables, rows)
-
-
-def campaign_text(files: Sequence[str], robot: str | None) -> str:
-    """Text of a campaign file for recordings by name, and a robot where its postures matter."""
-    rows: dict[str, Sequence[Row]] = {
-        "[campaign]": [{} if robot is None else {"robot": robot}],
-        "[[recordings]]": [{"files": list(files)}],
-        "[sets]": [{}],
-        "[fit]": [{}],
-        "[report]": [{}],
-    }
-    title = (
-        f"A campaign for: millfrf campaign THIS.toml --dry-run. Marked {FILL_IN}: what must be given.\n"
-        "A job is done if its table is there: take the # away from [estimate], [calibrate], [lobes], [diagnose] ..."
-    )
-    return template(title, described_tables(_kind("campaign")), rows)
-
-
 def _kind(name: str) -> TomlFile:
     return next(file for file in toml_files() if file.name == name)
 
 
 def _drives(table: DescribedTable, driver: str) -> bool:
     return any(key.name == "driver" and key.kind == f"`{driver}`" for key in table.keys)
-
-
-def write_new(out: Path, text: str) -> None:
-    """Write a template whole."""
-    with writing_whole_file(out) as temporary:
-        temporary.write_text(text, encoding="utf-8")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from scipy.linalg import eigh
+import scipy
 
 from millfrf.core import TIP, InputError, Real
 from modal_fit import ModalModel
@@ -169,4 +169,4 @@ def _planar(case: PlanarCase, driven: Real, links: bool) -> PostureResult:
 
 
 def _undamped(mass: Real, stiffness: Real) -> Real:
-    return np.asarray(np.sqrt(eigh(stiffness, mass, eigvals_only=True)) / (2 * np.pi))
+    return np.asarray(np.sqrt(scipy.linalg.eigh(stiffness, mass, eigvals_only=True)) / (2 * np.pi))

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import expm
+import scipy
 
 from estimation import Frf
 from millfrf.core import TIP, Complex, InputError, Real
@@ -92,7 +92,7 @@ def _bending(
     system[:, 2, 0] = -frequency
     system[:, 3, 2] = -1
     system[:, 3, 1] = -frequency * rotary / (mass * length**2)
-    stiffness = _from_transfer(expm(system / 2**halvings))
+    stiffness = _from_transfer(scipy.linalg.expm(system / 2**halvings))
     for _ in range(halvings):
         stiffness = _doubled(stiffness)
     scale = np.array([1 / length, 1.0, 1 / length, 1.0])

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import null_space
+import scipy
 
 from millfrf.core import InputError, Real
 
@@ -100,7 +100,7 @@ class NaturalChain:
             mass[block, block] += weight / 6 * np.kron(np.array([[2.0, 1.0], [1.0, 2.0]]), np.eye(2))
         whole = np.zeros((3 * n, 3 * n))
         whole[: 2 * n, : 2 * n] = mass[2:, 2:]
-        kernel = null_space(self.jacobian(coordinates))
+        kernel = scipy.linalg.null_space(self.jacobian(coordinates))
         velocities = kernel @ np.linalg.inv(kernel[2 * n :])
         return velocities.T @ whole @ velocities, np.diag(np.asarray(self.robot.stiffness, dtype=float))
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
+import scipy
 
 from millfrf.core import InputError, Real
 from modal_fit import ModalModel
@@ -106,7 +106,7 @@ class FlexibleChain:
 
     def frequencies(self) -> Real:
         """Natural frequencies, Hz, (n,)."""
-        return np.asarray(np.sqrt(eigh(self.stiffness, self.mass, eigvals_only=True)) / (2 * np.pi))
+        return np.asarray(np.sqrt(scipy.linalg.eigh(self.stiffness, self.mass, eigvals_only=True)) / (2 * np.pi))
 
     def compliance(self) -> Real:
         """Over reach, height and rotation of the tip, (3, 3)."""
@@ -122,7 +122,7 @@ class FlexibleChain:
 
         ``zeta_r = sum_l zeta_l U_lr / U_r`` (Ungar & Kerwin 1962), so that a mode of one joint has that link's ratio.
         """
-        _, shapes = eigh(self.stiffness, self.mass)
+        _, shapes = scipy.linalg.eigh(self.stiffness, self.mass)
         energy = np.einsum("nr,lnm,mr->lr", shapes, self.links, shapes, optimize=True)
         ratios = self.ratios @ energy / energy.sum(axis=0)
         damping = modal_damping_matrix(self.mass, self.stiffness, ratios)

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from millfrf.core import Complex, InputError, Real
+from millfrf.core.compilation import STABILITY, compile_kernels
 from millfrf.cutting import MillingProcess, directional_matrix
 from modal_fit import ModalModel, Residuals
 
@@ -94,6 +95,7 @@ def delay_system(model: ModalModel, process: MillingProcess, *, node: str | None
     array([[  -2., -100.],
            [ 100.,   -2.]])
     """
+    compile_kernels(*STABILITY)
     directions = tool_directions(model, node)
     if not len(model.poles):
         raise InputError("the modal model has no mode; fit at least one")

@@ -5,7 +5,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtri
+import scipy
 
 from estimation import Frf
 from millfrf.core import InputError, Real
@@ -218,7 +218,7 @@ def _allowed(lobes: StabilityLobes, errors: Real, confidence: float, drift: floa
 def _lower(lobes: StabilityLobes, errors: Real, confidence: float, max_depth: float) -> Real:
     """Depth that holds at each speed with the confidence; 0 where nothing is known."""
     limits, spread = usable_limits(lobes, errors, max_depth)
-    return np.asarray(np.maximum(np.nan_to_num(limits - ndtri(confidence) * spread, nan=0.0), 0.0))
+    return np.asarray(np.maximum(np.nan_to_num(limits - scipy.special.ndtri(confidence) * spread, nan=0.0), 0.0))
 
 
 def _around(speed: float, drift: float) -> Real:

@@ -8,9 +8,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from annotated_types import Ge, Le
 
 from acquisition import (
     DEVICES,
@@ -30,18 +31,119 @@ from acquisition import (
     session_from_text,
     session_text,
 )
-from millfrf.core import DiskFull, MillfrfError
+from millfrf.core import DiskFull, InputError, MillfrfError
+from millfrf.core.progress import progress
 from millfrf.core.provenance import made
+from millfrf.core.steps import File, Reads, Typed, Writes, step
+from millfrf.core.terminal import note, say, say_written, show, warn
+from millfrf.gate import doubts_of_rate
 from millfrf.live.control import MARKS, LiveControl
+from millfrf.live.guard import LOOPBACK
 from millfrf.live.monitor import LiveMonitor, LiveSettings
-from millfrf.live.server import LOOPBACK, LiveServer
+from millfrf.live.server import LiveServer
 from millfrf.live.standing import SessionTests
 from millfrf.live.tests_of_session import SessionPlan, session_plan
 
 from .plan import plan_from_file
+from .signal_check import Preflight, listen, preflight
 from .simulated_device import simulated_device
 
 Watcher = Callable[[Block | Events], None]
+
+
+@step
+def acquire(
+    session: Annotated[File, Reads("SESSION.toml")],
+    /,
+    *,
+    out: Annotated[File | None, Writes("REC.h5", suffixes=(".h5", ".hdf5"))] = None,
+    check: bool = False,
+    seconds: Annotated[float, Ge(0.1)] = 3.0,
+    live: bool = False,
+    live_address: Annotated[str, Typed("IP")] = LOOPBACK,
+    live_port: Annotated[int, Ge(0), Le(65535)] = 0,
+    at_once: bool = False,
+) -> "Tally | Preflight | None":
+    """Record from the devices of a session until its duration is over, Stop is pressed or Ctrl-C.
+
+    Parameters
+    ----------
+    session
+        Session file: what is wired where, and for how long.
+    out
+        Recording to write.
+    check
+        Listen, judge every channel and record nothing; tap to check signs.
+    seconds : s
+        How long --check listens.
+    live
+        Show the signals on a page; its Start button begins the recording.
+    live_address
+        Network address of the page; other than 127.0.0.1, other computers see it.
+    live_port
+        Port of the page; 0 is any free port.
+    at_once
+        With --live: record without waiting for Start.
+
+    Returns
+    -------
+    Tally, Preflight or None
+        Count of samples and events; with ``check`` the judgement of every channel; None where the recording was
+        stopped before it was started.
+
+    Raises
+    ------
+    InputError
+        The session has a mistake, or neither ``out`` nor ``check`` is given.
+    DeviceError
+        A device cannot be set up, or fails; the file is closed and holds what came before.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf acquire session.toml --out rec1.h5 --live
+    """
+    if (out is None) == (not check):
+        raise InputError("give either --out REC.h5 to record or --check to look at the signals first")
+    opened = open_session(session)
+    for stream in opened.source.streams:
+        say(f"stream {stream.name}: {len(stream.channels)} channels at {stream.sample_rate:.9g} Hz")
+    for notice in getattr(opened.source, "notices", ()):
+        note(f"note: {notice}")
+    if out is None:
+        return _check(opened.source, seconds)
+    if live:
+        tally = record_live(opened, out, address=live_address, port=live_port, at_once=at_once)
+    else:
+        with progress(f"recording {Path(out).name}", opened.source.n_samples) as update:
+            tally = record_session(opened, out, progress=update)
+    if tally is None:
+        say("stopped before Start; nothing was recorded")
+        return None
+    say(tally.summary())
+    story = tally.device_story()
+    for line in (*story.losses, *story.notices):
+        say(f"device: {line}")
+    say_written([out])
+    warn(doubts_of_rate(out))
+    return tally
+
+
+def _check(source: Source, seconds: float) -> "Preflight":
+    """Listen to a source and judge its channels; concerns end the command with an error."""
+    heard = listen(source, seconds)
+    checked = preflight(heard.streams, heard.doubts)
+    show(checked.table())
+    for tap in checked.taps:
+        say(f"tap: {tap.acceleration.name} {1e6 * tap.delay:+.0f} us after {tap.force.name}")
+    concerns = checked.concerns()
+    for line in concerns:
+        say(f"concern: {line}")
+    if concerns:
+        raise MillfrfError(f"pre-flight: {len(concerns)} concerns about {len(checked.checks)} channels; see above")
+    say("pre-flight: nothing wrong")
+    return checked
 
 
 @dataclass(frozen=True)
@@ -136,14 +238,13 @@ def open_session(path: str | os.PathLike[str]) -> OpenedSession:
     return OpenedSession(session, build_source(session, text, Path(path).parent, sampled), Path(path))
 
 
-def acquire(
+def record_session(
     opened: OpenedSession,
     out: str | os.PathLike[str],
     *,
     watchers: Sequence[Watcher] = (),
     stop: Callable[[], bool] = lambda: False,
     progress: Callable[[int], None] | None = None,
-    overwrite: bool = False,
 ) -> Tally:
     """Record a session; Ctrl-C, ``stop`` and the session's duration end it in order.
 
@@ -159,8 +260,6 @@ def acquire(
         Function that is asked before every block; True ends the recording.
     progress
         Function that is called with the number of samples written.
-    overwrite
-        Whether a recording of that name may be replaced.
 
     Raises
     ------
@@ -188,9 +287,8 @@ def acquire(
                 opened.source,
                 out,
                 observer=observe,
-                progress=progress,
                 provenance=made("acquire", [opened.path]),
-                overwrite=overwrite,
+                overwrite=True,
                 stop=lambda: ended(interrupted() or stop() or tally.seconds() >= duration),
             )
     except (DeviceError, DiskFull) as error:
@@ -264,15 +362,13 @@ def _number(table: dict[str, Any], key: str) -> float:
     return float(value) if isinstance(value, int | float) else 0.0
 
 
-def acquire_live(
+def record_live(
     opened: OpenedSession,
     out: str | os.PathLike[str],
     *,
     address: str = LOOPBACK,
     port: int = 0,
     at_once: bool = False,
-    overwrite: bool = False,
-    say: Callable[[str], object] = str,
 ) -> Tally | None:
     """Show a session's signals on a page and record them from Start to Stop.
 
@@ -286,10 +382,6 @@ def acquire_live(
         Network address and port of the page.
     at_once
         Whether to record without waiting for Start.
-    overwrite
-        Whether a recording of that name may be replaced.
-    say
-        Function that is told the page's address.
 
     Returns
     -------
@@ -315,7 +407,7 @@ def acquire_live(
                 monitor.restart()
                 source = WithFeeds(opened.source, [control])
                 stop = _stopping(control)
-                tally = acquire(replace(opened, source=source), out, watchers=[monitor], stop=stop, overwrite=overwrite)
+                tally = record_session(replace(opened, source=source), out, watchers=[monitor], stop=stop)
                 monitor.finish()
                 control.ended("; ".join([f"Wrote {os.fspath(out)}: {tally.summary()}", *tally.device_story().losses]))
             except MillfrfError as error:

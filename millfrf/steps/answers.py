@@ -3,22 +3,21 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from estimation import Frf, SweepPlan, read_frf
-from millfrf.core.file_kinds import FRF, LOBES, MODEL
+from estimation import Frf, SweepPlan
 from millfrf.core.terminal import Table
-from millfrf.stability import JudgedCut, StabilityLobes, read_lobes
-from modal_fit import ModalModel, frequency_and_damping_errors, read_modal_model
+from modal_fit import ModalModel, frequency_and_damping_errors
 
-from .inspect import Findings
+if TYPE_CHECKING:  # the solvers and the chatter verdicts load slowly
+    from millfrf.stability import JudgedCut, StabilityLobes
 
 RPM = np.pi / 30
 
 
-def lobes_answer(lobes: StabilityLobes) -> dict[str, Any]:
+def lobes_answer(lobes: "StabilityLobes") -> dict[str, Any]:
     """The lowest limit, and the limit at each speed with its chatter frequency, bifurcation and status.
 
     Parameters
@@ -44,7 +43,7 @@ def lobes_answer(lobes: StabilityLobes) -> dict[str, Any]:
     }
 
 
-def cuts_answer(cuts: Sequence[JudgedCut]) -> dict[str, Any]:
+def cuts_answer(cuts: "Sequence[JudgedCut]") -> dict[str, Any]:
     """The verdict on each cut with its reason and numbers.
 
     Parameters
@@ -130,32 +129,6 @@ def frf_answer(frf: Frf) -> dict[str, Any]:
 DEGREE = RPM / 6
 
 
-def inspected(file: Path, findings: Findings) -> dict[str, Any]:
-    """Kind, one line, notes and tables of a file; the numbers of FRFs, models and lobes.
-
-    Parameters
-    ----------
-    file
-        File that was looked at.
-    findings
-        What was seen.
-    """
-    fields: dict[str, Any] = {
-        "file": file,
-        "kind": findings.kind,
-        "summary": findings.summary,
-        "notes": findings.notes,
-        "tables": tables_answer(findings.tables),
-    }
-    if findings.kind == MODEL:
-        fields |= model_answer(read_modal_model(file))
-    elif findings.kind == FRF:
-        fields |= frf_answer(read_frf(file))
-    elif findings.kind == LOBES:
-        fields |= lobes_answer(read_lobes(file))
-    return fields
-
-
 def tables_answer(tables: Sequence[Table]) -> list[dict[str, Any]]:
     """Tables as the terminal shows them: title, headings, rows of text.
 
@@ -203,3 +176,11 @@ def plan_answer(plan: SweepPlan) -> dict[str, Any]:
         "frequencies_hz": plan.frequencies,
         "frf_standard_errors_m_per_n": plan.frf_errors,
     }
+
+
+def size_of(frf: Frf) -> str:
+    """What an FRF matrix holds, in words: quantity, responses, excitations, valid lines."""
+    return (
+        f"{frf.quantity}, {len(frf.responses)} responses x {len(frf.excitations)} excitations, "
+        f"{int(frf.valid.sum())} of {len(frf.frequencies)} lines valid"
+    )

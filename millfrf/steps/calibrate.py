@@ -3,44 +3,82 @@
 import os
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from estimation import Frf
 from millfrf.core import writing_whole_file
-from millfrf.core.progress import Progress, silent
+from millfrf.core.progress import progress
 from millfrf.core.provenance import add_to_json, read_provenance, sources, versions
+from millfrf.core.steps import File, Reads, Writes, step
+from millfrf.core.terminal import say_written, show, tell, warn
 from millfrf.gate import check_model, check_tip_and_sensor, stored_doubts, terms_left_out
-from modal_fit import ModalModel, TipCalibration, calibrate_to_tip, write_modal_model
+from millfrf.reports.tables import mode_table
+from modal_fit import TipCalibration, calibrate_to_tip, write_modal_model
+
+from .answers import model_answer
+from .given import FrfGiven, ModelGiven, files_among, frf_of, model_of
 
 
-def calibrate_model(
-    model: ModalModel,
-    tip: Frf,
-    sensor: Frf,
-    progress: Progress = silent,
-    names: tuple[str, str] = ("the tip's FRF", "the sensor's FRF"),
+@step
+def calibrate(
+    model: ModelGiven,
+    /,
+    tip: Annotated[FrfGiven, Reads("TT.h5")],
+    sensor: Annotated[FrfGiven, Reads("ST.h5")],
+    *,
+    out: Annotated[File | None, Writes(suffixes=(".json",), needed=True)] = None,
 ) -> TipCalibration:
-    """Carry a model to the tool tip by two hammer FRFs.
+    """Carry an in-process model from the sensor to the tool tip by two hammer FRFs: ``phi_tip / phi_sensor`` a mode.
+
+    Parameters
+    ----------
+    model
+        In-process modal model at the sensor.
+    tip
+        FRF of hammer taps at the tip with the motion there.
+    sensor
+        FRF of the same taps with the motion at the sensor.
+    out
+        Model file to write.
+
+    Returns
+    -------
+    TipCalibration
+        The model at the tip, the ratios and the warnings.
 
     Raises
     ------
     InputError
-        Directions, points or modes that do not match, or inputs that :mod:`millfrf.gate` refuses; ``names`` are those
-        of the FRFs in its messages.
+        Directions, points or modes that do not match, or inputs that :mod:`millfrf.gate` refuses.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf calibrate housing.json --tip tt.h5 --sensor st.h5 --out tip.json
     """
-    doubts = [*check_model(model), *terms_left_out(model), *check_tip_and_sensor(model, tip, sensor, names)]
+    known, _, _ = model_of(model)
+    (at_tip, tip_name, _), (at_sensor, sensor_name, _) = frf_of(tip), frf_of(sensor)
+    names = (tip_name, sensor_name) if tip_name != sensor_name else ("the tip's FRF", "the sensor's FRF")
+    doubts = [*check_model(known), *terms_left_out(known), *check_tip_and_sensor(known, at_tip, at_sensor, names)]
     with progress("calibrating to the tool tip"):
-        found = calibrate_to_tip(model, tip, sensor)
-    return replace(found, warnings=(*doubts, *found.warnings))
+        result = calibrate_to_tip(known, at_tip, at_sensor)
+    result = replace(result, warnings=(*doubts, *result.warnings))
+    if out is not None:
+        write_calibration(out, result, files_among(model, tip, sensor))
+    warn(result.warnings)
+    tell(lambda: model_answer(result.model))
+    show(mode_table(result.model))
+    say_written([out])
+    return result
 
 
 def write_calibration(
     path: str | os.PathLike[str], calibration: TipCalibration, inputs: Sequence[str | os.PathLike[str]]
 ) -> None:
     """Write the tip's model with the ratios and with the provenance of the model it came from (the first input)."""
-    before = read_provenance(inputs[0])
+    before = read_provenance(inputs[0]) if inputs else {}
     of_taps = [text for path in inputs[1:] for text in stored_doubts(path)]
     provenance: dict[str, Any] = {
         **{key: before[key] for key in ("band_hz", "method") if key in before},

@@ -6,22 +6,115 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
-from acquisition import Channel, Recording
+from acquisition import Channel, Recording, all_opened, path_of
 from estimation import choose_channels, derivative_orders, require_room
 from millfrf.core import DegreeOfFreedom, InputError
-from millfrf.core.progress import Progress, silent
+from millfrf.core.progress import progress
+from millfrf.core.provenance import of_chatter
+from millfrf.core.steps import File, Names, Reads, Typed, Writes, names_of, step
+from millfrf.core.terminal import say, say_written, show, tell, warn
 from millfrf.cutting import MillingProcess
-from millfrf.gate import check_one_speed, check_recordings
-from millfrf.stability import JudgedCut, KeptCut, ModelledCut, classify_cut, cut_spectrum, gather_evidence
+from millfrf.gate import check_one_speed, check_recordings, read_checked_cutting
+from millfrf.reports.tables import tone_table, verdict_table
+from millfrf.stability import (
+    JudgedCut,
+    KeptCut,
+    ModelledCut,
+    classify_cut,
+    cut_spectrum,
+    gather_evidence,
+    write_cuts,
+)
 from modal_fit import ModalModel
+
+from .answers import cuts_answer
+from .given import ModelGiven, RecordingGiven, files_among, model_of
 
 OTHERS = "name the other channels with --response"
 """Remedy of a channel that cannot be used."""
 SPEED_EVENTS = "spindle_speed_rpm"
 """Event series, and key of any table of the set-up, that states the spindle's speed."""
+
+
+@step
+def chatter(
+    *recordings: RecordingGiven,
+    cutting: Annotated[File, Reads("CUT.toml")],
+    speed: Annotated[float, Typed("RPM")] | None = None,
+    responses: Names = (),
+    model: ModelGiven | None = None,
+    stream: str | None = None,
+    out: Annotated[File | None, Writes(suffixes=(".json",))] = None,
+) -> tuple[JudgedCut, ...]:
+    """Classify cuts as stable, Hopf chatter, period doubling or inconclusive from their vibration.
+
+    The spindle is followed in the recording (its speed within 1 % comes from --speed, from events `spindle_speed_rpm`
+    or from the set-up), its orders are taken away, and lines that stand out of the noise are named: chatter, or a
+    foreign tone. Where the cutting file gives the feed, a vibration is also judged by its effect on the chip. Where it
+    gives a runout, teeth are taken to cut unequal chips: with an even number of teeth, period doubling is then only
+    reported while it grows, or where the chip changes by more than runout explains.
+
+    Parameters
+    ----------
+    recordings
+        Recordings of cuts, each at one constant speed.
+    cutting
+        Cutting file: teeth, feed and runout.
+    speed : rpm
+        Spindle speed; without it what each recording states.
+    responses
+        Channels to judge by; without it all that respond.
+    model
+        Modal model of the structure: the line nearest to a mode is the chatter frequency.
+    stream
+        Sample clock; needed where a recording has several.
+    out
+        File of verdicts and spectra to write, for a report.
+
+    Returns
+    -------
+    tuple of JudgedCut
+        Verdict on each recording.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be used, no speed, or too short a cut.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf chatter rec1.h5 rec2.h5 --cutting cut.toml --model tip.json --out chatter.json
+    """
+    process, doubts = read_checked_cutting(cutting)
+    structure = None if model is None else model_of(model)[0]
+    chip = process.thickest_chip or math.nan
+    runout = stated_runout(cutting, process)
+    options = CutOptions(process.teeth, speed, runout, chip, names_of(responses), stream, structure, process)
+    with all_opened(recordings) as cuts_recorded:
+        doubts += doubts_of_cuts(cuts_recorded, process, options)
+        cuts = judge_recordings(cuts_recorded, options)
+        kept = keep_spectra(cuts_recorded, cuts, options) if out is not None else ()
+    warn(doubts)
+    tell(lambda: cuts_answer(cuts))
+    show(verdict_table(cuts))
+    if any(cut.verdict.foreign for cut in cuts):
+        show(tone_table(cuts))
+    for cut in cuts:
+        say(f"{cut.name}: {cut.verdict.kind}: {cut.verdict.reason}")
+        warn(cut.doubts)
+    if out is not None:
+        stored = [*doubts, *(doubt for cut in cuts for doubt in cut.doubts)]
+        inputs = files_among(*map(path_of, recordings), cutting, model)
+        asked = {"speed_rpm": speed, "responses": list(options.responses), "stream": stream}
+        write_cuts(out, kept, of_chatter(inputs, asked, stored))
+        say_written([out])
+    return cuts
 
 
 @dataclass(frozen=True)
@@ -67,9 +160,7 @@ TIP_NODE = "TCP"
 """Node of the tool's tip."""
 
 
-def judge_recordings(
-    paths: Sequence[str | os.PathLike[str]], options: CutOptions, progress: Progress = silent
-) -> tuple[JudgedCut, ...]:
+def judge_recordings(recordings: Sequence[Recording], options: CutOptions) -> tuple[JudgedCut, ...]:
     """The verdict on each recording.
 
     Raises
@@ -78,26 +169,25 @@ def judge_recordings(
         A file that cannot be used, no speed, or too short a cut.
     """
     cuts = []
-    for path in paths:
-        with Recording(path) as recording:
-            stream = recording.stream(options.stream)
-            _, responses = choose_channels(stream, None, options.responses or None)
-            rpm, tool = _speed(recording, options), tool_channels(responses)
-            with progress(f"judging {Path(path).name}"):
-                samples = stream.read(channels=[channel.name for channel in responses])
-                found = classify_cut(
-                    samples,
-                    stream.sample_rate,
-                    rpm * math.pi / 30,
-                    options.teeth,
-                    runout=options.runout,
-                    derivatives=derivative_orders(responses).tolist(),
-                    natural_frequencies=() if options.model is None else options.model.natural_frequencies.tolist(),
-                    chip=options.chip if tool else math.nan,
-                    tool=tool,
-                    modelled=modelled_cut(options, responses),
-                )
-        cuts.append(JudgedCut(Path(path).name, rpm, found))
+    for recording in recordings:
+        stream = recording.stream(options.stream)
+        _, responses = choose_channels(stream, None, options.responses or None)
+        rpm, tool = _speed(recording, options), tool_channels(responses)
+        with progress(f"judging {recording.path.name}"):
+            samples = stream.read(channels=[channel.name for channel in responses])
+            found = classify_cut(
+                samples,
+                stream.sample_rate,
+                rpm * math.pi / 30,
+                options.teeth,
+                runout=options.runout,
+                derivatives=derivative_orders(responses).tolist(),
+                natural_frequencies=() if options.model is None else options.model.natural_frequencies.tolist(),
+                chip=options.chip if tool else math.nan,
+                tool=tool,
+                modelled=modelled_cut(options, responses),
+            )
+        cuts.append(JudgedCut(recording.path.name, rpm, found))
     return tuple(cuts)
 
 
@@ -142,9 +232,7 @@ def stated_runout(cutting: str | os.PathLike[str], process: MillingProcess) -> f
     return process.runout if "runout_m" in table else math.nan
 
 
-def doubts_of_cuts(
-    paths: Sequence[str | os.PathLike[str]], process: MillingProcess, options: CutOptions, progress: Progress = silent
-) -> list[str]:
+def doubts_of_cuts(recordings: Sequence[Recording], process: MillingProcess, options: CutOptions) -> list[str]:
     """Judge recordings before they are classified: their channels, and what they state of speed and teeth.
 
     Raises
@@ -153,14 +241,13 @@ def doubts_of_cuts(
         A channel that is dead or cannot be, a speed sweep, or a speed in another unit than rpm.
     """
     doubts = []
-    for path in paths:
-        with Recording(path) as recording:
-            stream = recording.stream(options.stream)
-            _, responses = choose_channels(stream, None, options.responses or None)
-            require_room(stream, len(responses), BYTES_A_VALUE)
-            doubts += check_one_speed(recording.path.name, recording.setup, process, options.speed_rpm)
+    for recording in recordings:
+        stream = recording.stream(options.stream)
+        _, responses = choose_channels(stream, None, options.responses or None)
+        require_room(stream, len(responses), BYTES_A_VALUE)
+        doubts += check_one_speed(recording.path.name, recording.setup, process, options.speed_rpm)
         names = [channel.name for channel in responses]
-        doubts += check_recordings([path], stream=options.stream, responses=names, progress=progress, remedy=OTHERS)
+        doubts += check_recordings([recording], stream=options.stream, responses=names, remedy=OTHERS)
     return doubts
 
 
@@ -190,13 +277,13 @@ def _stated(setup: str) -> float | None:
 
 
 def keep_spectra(
-    paths: Sequence[str | os.PathLike[str]], cuts: Sequence[JudgedCut], options: CutOptions, progress: Progress = silent
+    recordings: Sequence[Recording], cuts: Sequence[JudgedCut], options: CutOptions
 ) -> tuple[KeptCut, ...]:
     """Compute the spectrum behind each verdict.
 
     Parameters
     ----------
-    paths
+    recordings
         Recordings, in the order of their verdicts.
     cuts
         Judged cuts, from :func:`millfrf.chain.chatter.judge_recordings` with the same options.
@@ -204,11 +291,10 @@ def keep_spectra(
         Options with which they were judged.
     """
     kept = []
-    for path, cut in zip(paths, cuts, strict=True):
-        with Recording(path) as recording:
-            stream = recording.stream(options.stream)
-            _, responses = choose_channels(stream, None, options.responses or None)
-            samples = stream.read(channels=[channel.name for channel in responses])
+    for recording, cut in zip(recordings, cuts, strict=True):
+        stream = recording.stream(options.stream)
+        _, responses = choose_channels(stream, None, options.responses or None)
+        samples = stream.read(channels=[channel.name for channel in responses])
         with progress(f"spectrum of {cut.name}"):
             speed = cut.stated_rpm * math.pi / 30
             evidence = gather_evidence(samples, stream.sample_rate, speed, options.teeth)

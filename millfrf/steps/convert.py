@@ -7,8 +7,10 @@ import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+from acquisition import SUFFIXES as CAN_LOGS
+from acquisition import add_can_log
 from acquisition import convert as convert_recording
 from estimation import (
     ImportedFrf,
@@ -22,14 +24,87 @@ from estimation import (
     write_frf_uff,
     write_geometry,
 )
-from millfrf.core import InputError, writing_whole_file
+from millfrf.core import InputError, refuse_replacing, writing_whole_file
+from millfrf.core.progress import progress
 from millfrf.core.provenance import add_comment, add_to_json, made, origin, sources, versions
+from millfrf.core.steps import File, Reads, Typed, check_output, step
+from millfrf.core.terminal import note, say_written, tell, warn
 from millfrf.gate import check_frf, doubts_of_rate
 from modal_fit import ModalModel, import_modes_uff, read_modal_model, write_modal_model, write_modes_uff
 
 UFF_SUFFIXES = (".uff", ".unv")
 
 Files = Sequence[str | os.PathLike[str]]
+
+
+@step
+def convert(
+    *files: Annotated[File, Reads("IN... OUT")],
+    map: Annotated[File | None, Reads("MAP.toml")] = None,
+    span: Annotated[tuple[float, float], Typed("FIRST LAST")] | None = None,
+) -> tuple[Path, ...]:
+    """Convert files of other programs into recordings, FRFs, modal models and geometries, and back; suffixes tell.
+
+    Recordings .h5 .npz .npy .mat .tdms .csv .wav .uff into .h5 .npz .mat .csv; FRFs .uff .unv .mat .npz .csv .txt .gz
+    (several files make one matrix) into .h5 .uff; modal models .json into .uff and back; geometries .uff .unv .csv into
+    .toml; CAN logs .blf .asc into the events of a recording.
+
+    Parameters
+    ----------
+    files
+        Files to read, and last the file to write.
+    map
+        TOML file that says which array or column is which channel or FRF.
+    span : s
+        First and last time of the part of a recording to keep; without it all.
+
+    Returns
+    -------
+    tuple of Path
+        Files that were written.
+
+    Raises
+    ------
+    InputError
+        Files that cannot be read or written.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf convert cut1.mat rec1.h5 --map channels.toml
+    """
+    if len(files) < 2:
+        raise InputError(f"{files[0]} alone: give files to read and a file to write: millfrf convert IN... OUT")
+    *sources_, target = (Path(file) for file in files)
+    mapping = None if map is None else Path(map)
+    if not any(path.exists() and target.exists() and target.samefile(path) for path in sources_):
+        refuse_replacing(target)
+    if sources_[0].suffix.lower() in CAN_LOGS and not is_frf_conversion(sources_, mapping):
+        return (_add_can_log(sources_[0], target, mapping),)
+    if is_frf_conversion(sources_, mapping):
+        check_output(target, FRF_SUFFIXES, sources_)
+    elif mapping is None and is_uff_conversion(sources_[0], target):
+        check_output(target, (*FRF_SUFFIXES, ".json", ".toml"), sources_)
+    with progress(f"converting {sources_[0].name}") as update:
+        written, remarks = convert_files(sources_, target, mapping, update, span)
+    tell(lambda: {"inferred": remarks.inferred})
+    for text in remarks.inferred:
+        note(f"note: {text}")
+    warn(remarks.doubts)
+    for path in written:
+        say_written([path])
+    return tuple(written)
+
+
+def _add_can_log(source: Path, target: Path, mapping: Path | None) -> Path:
+    """Add a CAN log to the events of a recording."""
+    if mapping is None:
+        raise InputError(f"{source} needs --map MAP.toml with recording, dbc and signals")
+    with progress(f"adding {source.name}") as update:
+        path = add_can_log(source, target, mapping, update, made("convert", [source, mapping]))
+    say_written([path])
+    return Path(path)
 
 
 @dataclass(frozen=True)
@@ -186,7 +261,7 @@ def convert_files(
         return [target], convert_uff(sources[0], target)
     now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
     origin = made("convert", [sources[0], *([] if mapping is None else [mapping])], {"span_s": span, "at": now})
-    written = convert_recording(sources[0], target, mapping, progress=progress, span=span, provenance=origin)
+    written = convert_recording(sources[0], target, mapping, span=span, provenance=origin)
     doubts = tuple(doubt for path in written for doubt in doubts_of_rate(path))
     return written, Told((), doubts)
 

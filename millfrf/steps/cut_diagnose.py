@@ -2,13 +2,17 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Annotated
 
-from acquisition import Recording
+from annotated_types import Gt, Lt
+
+from acquisition import opened
 from millfrf.core import InputError, writing_whole_folder
-from millfrf.core.progress import bar
+from millfrf.core.progress import progress
 from millfrf.core.provenance import add_comment, add_to_json, origin
+from millfrf.core.steps import File, Reads, Typed, Writes, step
+from millfrf.core.terminal import say, tell, warn
 from millfrf.cutting import MillingProcess
 from millfrf.gate import RECORD_AGAIN, check_depth, check_one_speed, check_recordings, read_checked_cutting
 from millfrf.mismatch import (
@@ -21,12 +25,16 @@ from millfrf.mismatch import (
     write_diagnosis,
     write_improved_cut,
 )
-from millfrf.report.diagnoses.cut_and_robot_pages import write_cut_report
-from millfrf.report.results_page import FigureFiles
-from millfrf.report.tables import evidence_in_words, with_error
-from modal_fit import read_modal_model
+from millfrf.reports.diagnoses.cut_and_robot_pages import write_cut_report
+from millfrf.reports.results_page import FigureFiles
+from millfrf.reports.tables import evidence_in_words, with_error
 
-from .result_folder import refuse_file
+from .answers import stored_answer
+from .diagnose import refuse_file
+from .given import FigureFormat, Figures, ModelGiven, files_among, model_of
+
+FILES = ("diagnosis.json", "improved_cut.toml", "report.html")
+"""Files that a diagnosis writes into its folder."""
 
 UNITS = {"radial_offset_m": ("µm", 1e6), "angle_rad": ("deg", 180 / math.pi), "coefficient_n_per_m": ("kN/m", 1e-3)}
 """How numbers are told to a reader: unit and factor from SI."""
@@ -99,72 +107,120 @@ def _sentence(found: CutDiagnosis) -> str:
     }[found.verdict]
 
 
-@dataclass(frozen=True)
-class Asking:
-    """Options of a cutting diagnosis as they were typed; None where left out."""
+@step
+def cut_diagnose(
+    cutting: Annotated[File, Reads("CUT.toml")],
+    /,
+    *recordings: Annotated[File, Reads("REC...")],
+    depth: Annotated[float, Typed("M")],
+    out: Annotated[File | None, Writes("DIR", needed=True, files=FILES)] = None,
+    speed: Annotated[float, Typed("RPM")] | None = None,
+    model: ModelGiven | None = None,
+    coefficient_error: Annotated[float, Gt(0), Lt(1)] = 0.15,
+    force_error: Annotated[float, Gt(0), Lt(1)] = 0.01,
+    stream: str | None = None,
+    figures: Figures = None,
+    figure_format: FigureFormat = "svg",
+) -> CutDiagnosis:
+    """Which physics does the computed cutting force leave out: runout, regenerative feedback, process damping?
 
-    depth: float
-    speed: float | None
-    model: Path | None
-    coefficient_error: float
-    force_error: float
-    stream: str | None
+    Parameters
+    ----------
+    cutting
+        Cutter, engagement and force coefficients.
+    recordings
+        Recordings of that cut.
+    depth : m
+        Axial depth of the cut.
+    out
+        Folder for the diagnosis, the improved cutting file and a report.
+    speed : rpm
+        Spindle speed within 2 %; without it as the recording states it.
+    model
+        Receptance of the tip, where no motion was measured there.
+    coefficient_error
+        Uncertainty of a laboratory's force coefficients, as a share.
+    force_error
+        Uncertainty of each line of a right computed force, as a share.
+    stream
+        Sample clock; needed where a recording has several.
+    figures
+        Folder for each figure of the report as a file.
+    figure_format
+        Format of these files.
 
-
-def diagnose_cut_files(
-    cutting: Path, paths: Sequence[Path], out: Path, asking: Asking, figures: FigureFiles | None = None
-) -> list[str]:
-    """Diagnose, write ``diagnosis.json``, ``improved_cut.toml`` and ``report.html``; lines that sum it up.
+    Returns
+    -------
+    CutDiagnosis
+        Verdict, causes with their evidence, errors on held-out blocks.
 
     Raises
     ------
     InputError
         Files that cannot be used together, or a folder that cannot be made.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf cut diagnose cut.toml low.h5 high.h5 --depth 0.001 --out diagnosis
     """
-    refuse_file(out)
+    paths = [Path(recording) for recording in recordings]
+    folder = None if out is None else Path(out)
+    if folder is not None:
+        refuse_file(folder)
     names = [path.stem for path in paths]
     if len(set(names)) < len(names):
-        raise InputError(f"recordings need different names to tell their results apart, not {', '.join(names)}")
+        raise InputError(f"recordings need different names to distinguish their results, not {', '.join(names)}")
     process, doubts = read_checked_cutting(cutting)
-    doubts += _checked(paths, process, asking)
-    model = None if asking.model is None else read_modal_model(asking.model)
-    speed = None if asking.speed is None else asking.speed * math.pi / 30
-    recordings = [read_cut_recording(path, process, speed=speed, model=model, stream=asking.stream) for path in paths]
-    with bar("diagnosing"):
-        found = diagnose_cut(
-            process,
-            asking.depth,
-            recordings,
-            coefficient_error=asking.coefficient_error,
-            force_error=asking.force_error,
-        )
-    lines = [*summary(found), *(f"warning: {doubt}" for doubt in doubts)]
-    with writing_whole_folder(out) as folder:
-        write_diagnosis(folder / "diagnosis.json", found)
-        write_improved_cut(folder / "improved_cut.toml", found)
-        made_of = origin("cut diagnose", [cutting, *paths, *([asking.model] if asking.model else [])], asdict(asking))
-        add_to_json(folder / "diagnosis.json", made_of)
-        add_comment(folder / "improved_cut.toml", made_of)
-        with bar("writing the report"):
-            write_cut_report(folder / "report.html", found, cutting.name, lines, figures)
-    written = ", ".join(str(out / name) for name in ("diagnosis.json", "improved_cut.toml", "report.html"))
-    return [*lines, f"wrote {written}"]
+    doubts += _checked(paths, process, depth, speed, stream)
+    structure = None if model is None else model_of(model)[0]
+    turning = None if speed is None else speed * math.pi / 30
+    cuts = [read_cut_recording(path, process, speed=turning, model=structure, stream=stream) for path in paths]
+    with progress("diagnosing"):
+        found = diagnose_cut(process, depth, cuts, coefficient_error=coefficient_error, force_error=force_error)
+    lines = summary(found)
+    if folder is not None:
+        drawn = None if figures is None else FigureFiles(Path(figures), figure_format)
+        asked = {
+            "depth": depth,
+            "speed": speed,
+            "model": model,
+            "coefficient_error": coefficient_error,
+            "force_error": force_error,
+            "stream": stream,
+        }
+        made_of = origin("cut diagnose", files_among(cutting, *paths, model), asked)
+        with writing_whole_folder(folder) as unfinished:
+            write_diagnosis(unfinished / FILES[0], found)
+            write_improved_cut(unfinished / FILES[1], found)
+            add_to_json(unfinished / FILES[0], made_of)
+            add_comment(unfinished / FILES[1], made_of)
+            warned = [*lines, *(f"warning: {doubt}" for doubt in doubts)]
+            with progress("writing the report"):
+                write_cut_report(unfinished / FILES[2], found, Path(cutting).name, warned, drawn)
+        tell(lambda: {"diagnosis": stored_answer(folder / FILES[0])})
+    for line in lines:
+        say(line)
+    warn(doubts)
+    if folder is not None:
+        say(f"wrote {', '.join(str(folder / name) for name in FILES)}")
+    return found
 
 
-def _checked(paths: Sequence[Path], process: MillingProcess, asking: Asking) -> list[str]:
+def _checked(
+    paths: Sequence[Path], process: MillingProcess, depth: float, speed: float | None, stream: str | None
+) -> list[str]:
     """Judge what was typed and the recordings; doubts."""
-    doubts = check_depth(asking.depth, process, "depth")
-    for name, share in (("--coefficient-error", asking.coefficient_error), ("--force-error", asking.force_error)):
-        if not 0 < share < 1:
-            raise InputError(f"{name} {share:g} must be a share above 0 and below 1, for example {share / 100:g}")
+    doubts = check_depth(depth, process, "depth")
     judged = []
     for path in paths:
-        with Recording(path) as recording:
-            doubts += check_one_speed(recording.path.name, recording.setup, process, asking.speed)
-            kinds = {channel.quantity for channel in recording.stream(asking.stream).channels}
-        require_room_for_cut(path, process, asking.stream)
+        with opened(path) as recording:
+            doubts += check_one_speed(recording.path.name, recording.setup, process, speed)
+            kinds = {channel.quantity for channel in recording.stream(stream).channels}
+        require_room_for_cut(path, process, stream)
         if "force" in kinds and kinds & {"acceleration", "velocity", "displacement"}:
             judged.append(path)  # what the others lack is said where it is needed
     if not judged:
         return doubts
-    return doubts + check_recordings(judged, stream=asking.stream, progress=bar, remedy=RECORD_AGAIN)
+    return doubts + check_recordings(judged, stream=stream, remedy=RECORD_AGAIN)

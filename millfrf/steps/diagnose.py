@@ -1,21 +1,27 @@
 """Step ``diagnose``: what a modal model leaves out of recordings."""
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Annotated, Any
 
-from millfrf.core import Band, writing_whole_folder
-from millfrf.core.progress import Progress, silent
+from annotated_types import Gt
+
+from acquisition import Recording, all_opened, path_of
+from millfrf.core import InputError, writing_whole_folder
+from millfrf.core.progress import progress
 from millfrf.core.provenance import add_to_json, origin
+from millfrf.core.steps import Band, File, PythonOnly, Reads, Shares, Typed, Writes, step
+from millfrf.core.terminal import manner, say, silently, tell, warn
 from millfrf.cutting import MillingProcess
 from millfrf.gate import check_model_and_recordings
 from millfrf.mismatch import (
     AcceptedCause,
+    LabError,
+    SearchSettings,
     Settings,
-    SpindleSpeed,
     StructureDiagnosis,
-    diagnose,
     improved_model_of,
     joint_in_words,
     measured_part,
@@ -25,14 +31,185 @@ from millfrf.mismatch import (
     tip_axes,
     write_diagnosis,
 )
-from millfrf.report.diagnoses.answers import left_in_words
-from millfrf.report.diagnoses.structure_page import write_diagnosis_report
-from millfrf.report.results_page import FigureFiles
-from millfrf.report.tables import evidence_in_words
-from modal_fit import ModalModel, read_modal_model, write_modal_model
+from millfrf.mismatch import diagnose as diagnose_structure
+from millfrf.reports.diagnoses.answers import left_in_words
+from millfrf.reports.diagnoses.structure_page import write_diagnosis_report
+from millfrf.reports.results_page import FigureFiles
+from millfrf.reports.tables import evidence_in_words
+from modal_fit import ModalModel, write_modal_model
 
-from .fit import SUBSPACE, FitOptions, fit_recordings
-from .result_folder import refuse_file
+from .answers import stored_answer
+from .fit import fit
+from .given import CutGiven, FigureFormat, Figures, HasModel, RecordingGiven, files_among, model_of, process_of
+
+FILES = ("diagnosis.json", "improved_model.json", "report.html")
+"""Files that a diagnosis writes into its folder."""
+
+
+@step
+def diagnose(
+    model: Annotated[File | ModalModel | HasModel | Recording, Reads("MODEL.json")],
+    /,
+    *recordings: RecordingGiven,
+    out: Annotated[File | None, Writes("DIR", needed=True, files=FILES)] = None,
+    simulated: Annotated[File | None, Reads("SIM.h5")] = None,
+    band: Band | None = None,
+    lab_error: Shares = (0.01, 0.12, 0.03),
+    cutting: CutGiven | None = None,
+    search_time: Annotated[float, Typed("SECONDS"), Gt(0)] = 120.0,
+    stream: str | None = None,
+    figures: Figures = None,
+    figure_format: FigureFormat = "svg",
+    settings: Annotated[Settings | None, PythonOnly()] = None,
+) -> StructureDiagnosis:
+    """Locate where a model and recordings disagree, name the physics left out, model it, show that the fit improves.
+
+    The folder that is written holds the diagnosis, the improved model and a report.
+
+    Parameters
+    ----------
+    model
+        Nominal modal model; with --simulated the first of the recordings.
+    recordings
+        Recordings to compare it with, best at several levels.
+    out
+        Folder for diagnosis, improved model and report.
+    simulated
+        Simulated recording to fit the nominal model from, in --band.
+    band : Hz
+        Band that is compared; without it that of the model.
+    lab_error
+        Uncertainty of a laboratory's own fit, as shares: frequency, damping, shapes; one number stands for all.
+    cutting
+        Cut whose stability lobes the report shows.
+    search_time : s
+        Time after which no further cause is looked for.
+    stream
+        Sample clock; needed where a recording has several.
+    figures
+        Folder for each figure of the report as a file.
+    figure_format
+        Format of these files.
+    settings
+        Thresholds of the decisions; without it those that lab_error and search_time give.
+
+    Returns
+    -------
+    StructureDiagnosis
+        Verdict, causes with their evidence, errors on held-out data, and the warnings.
+
+    Raises
+    ------
+    InputError
+        No recording, a model and recordings that cannot be compared, or a folder that cannot be made.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf diagnose idle.json low.h5 mid.h5 high.h5 --out diagnosis
+    """
+    check_shares("lab-error", lab_error)
+    drawn = None if figures is None else FigureFiles(Path(figures), figure_format)
+    given: tuple[Any, ...] = recordings if simulated is None else (model, *recordings)
+    if not given:
+        raise InputError("no recording given; name the nominal model and then one or more recordings")
+    source: Any = model if simulated is None else nominal_from_simulation(simulated, band, out, stream)
+    process, doubts = (None, []) if cutting is None else process_of(cutting)
+    warn(doubts)
+    nominal, _, _ = model_of(source)
+    named = source if isinstance(source, str | os.PathLike) else "the model"
+    chosen = settings or Settings(LabError(*lab_error), search=SearchSettings(longest=search_time))
+    with all_opened(given) as opened_recordings:
+        diagnosis = _diagnosed(nominal, opened_recordings, chosen, named, stream, band)
+        lines = _lines(nominal, opened_recordings, diagnosis, stream)
+    if out is not None:
+        asked = {"stream": stream, "band_hz": band, "settings": chosen}
+        made_of = origin("diagnose", files_among(source, *map(path_of, given)), asked)
+        write_diagnosis_folder(Path(out), diagnosis, Path(named).name, made_of, process, figures=drawn)
+        tell(lambda: {"diagnosis": stored_answer(Path(out) / FILES[0])})
+    if manner().silent:
+        warn(diagnosis.doubts)
+    for line in lines:  # the doubts stand among them
+        say(line)
+    if out is not None:
+        say(f"wrote {', '.join(str(Path(out) / name) for name in FILES)}")
+    return diagnosis
+
+
+def _diagnosed(
+    model: ModalModel,
+    recordings: Sequence[Recording],
+    settings: Settings,
+    model_file: File,
+    stream: str | None,
+    band: Band | None,
+) -> StructureDiagnosis:
+    """Judge a nominal model by recordings, with the doubts of the gate; responses without a recording are left out."""
+    compared = measured_part(model, recordings, stream=stream)
+    require_room_for_comparison(recordings, compared, stream=stream, band=band)
+    doubts = check_model_and_recordings(model_file, compared, recordings, stream)
+    trials = read_recordings(recordings, compared, stream=stream, band=band)
+    stated = {recording.path.stem: spindle_speed(recording) for recording in recordings}
+    speeds = {name: speed for name, speed in stated.items() if speed is not None}
+    with progress("diagnosing"):
+        diagnosis = diagnose_structure(compared, trials, settings, speeds=speeds, band=band)
+    return replace(diagnosis, doubts=(*doubts, *diagnosis.doubts))
+
+
+def _lines(
+    model: ModalModel, recordings: Sequence[Recording], diagnosis: StructureDiagnosis, stream: str | None
+) -> list[str]:
+    """The diagnosis in a few lines, and which responses were left out."""
+    measured = measured_part(model, recordings, stream=stream).responses
+    missing = [label for label in model.responses if label not in measured]
+    note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []
+    return [*note, *diagnosis_lines(diagnosis)]
+
+
+def write_diagnosis_folder(
+    folder: Path,
+    diagnosis: StructureDiagnosis,
+    model_name: str,
+    made_of: Mapping[str, Any],
+    process: MillingProcess | None = None,
+    *,
+    dated: bool = True,
+    figures: FigureFiles | None = None,
+) -> None:
+    """Write diagnosis, improved model and report into a folder, made if need be.
+
+    Parameters
+    ----------
+    folder
+        Folder to write into.
+    diagnosis
+        Diagnosis of a structure.
+    model_name
+        Name of the nominal model's file.
+    made_of
+        Provenance of the diagnosis.
+    process
+        Cut whose lobes the report shows; None: none.
+    dated
+        Whether the report tells when it was written; without it, equal input gives equal bytes.
+    figures
+        Where each figure of the report is written as a file too; None: nowhere.
+
+    Raises
+    ------
+    InputError
+        A folder that cannot be made.
+    """
+    refuse_file(folder)
+    with writing_whole_folder(folder) as unfinished:
+        paths = [unfinished / name for name in FILES]
+        write_diagnosis(paths[0], diagnosis)
+        write_modal_model(paths[1], improved_model_of(diagnosis))
+        for path in paths[:2]:
+            add_to_json(path, made_of)
+        with progress("writing the report"):
+            write_diagnosis_report(paths[2], diagnosis, model_name, process, dated=dated, figures=figures)
 
 
 def diagnosis_lines(diagnosis: StructureDiagnosis) -> list[str]:
@@ -107,111 +284,7 @@ def _error_line(diagnosis: StructureDiagnosis) -> str:
     return f"error on {gain.where}, held out: {said}{test}"
 
 
-@dataclass(frozen=True)
-class DiagnosisFiles:
-    """Files that a diagnosis wrote, and lines that sum it up."""
-
-    diagnosis: StructureDiagnosis
-    written: tuple[Path, ...]
-    summary: tuple[str, ...]
-
-
-def diagnose_files(
-    model_path: str | os.PathLike[str],
-    recordings: Sequence[str | os.PathLike[str]],
-    out: str | os.PathLike[str],
-    settings: Settings | None = None,
-    *,
-    stream: str | None = None,
-    band: Band | None = None,
-    process: MillingProcess | None = None,
-    dated: bool = True,
-    figures: FigureFiles | None = None,
-    progress: Progress = silent,
-) -> DiagnosisFiles:
-    """Diagnose and write diagnosis, improved model and report into a folder, made if need be.
-
-    A report that is not ``dated`` does not tell when it was written, so that equal input gives equal bytes. With
-    ``figures`` each of its figures becomes a file too.
-
-    Raises
-    ------
-    InputError
-        Files that cannot be used together, or a folder that cannot be made.
-    """
-    folder = Path(out)
-    refuse_file(folder)
-    whole = read_modal_model(model_path)
-    diagnosis = diagnose_recordings(
-        whole, recordings, settings, model_file=model_path, stream=stream, band=band, progress=progress
-    )
-    names = ("diagnosis.json", "improved_model.json", "report.html")
-    with writing_whole_folder(folder) as unfinished:
-        paths = [unfinished / name for name in names]
-        write_diagnosis(paths[0], diagnosis)
-        write_modal_model(paths[1], improved_model_of(diagnosis))
-        asked = {"stream": stream, "band_hz": band, "settings": settings}
-        for path in paths[:2]:
-            add_to_json(path, origin("diagnose", [model_path, *recordings], asked))
-        with progress("writing the report"):
-            write_diagnosis_report(paths[2], diagnosis, Path(model_path).name, process, dated=dated, figures=figures)
-    measured = measured_part(whole, recordings, stream=stream).responses
-    missing = [label for label in whole.responses if label not in measured]
-    note = [f"no recording of {', '.join(missing)}: left out of the comparison and of the model"] if missing else []
-    return DiagnosisFiles(diagnosis, tuple(folder / name for name in names), (*note, *diagnosis_lines(diagnosis)))
-
-
-def diagnose_recordings(
-    model: ModalModel,
-    recordings: Sequence[str | os.PathLike[str]],
-    settings: Settings | None = None,
-    *,
-    model_file: str | os.PathLike[str] = "the model",
-    stream: str | None = None,
-    band: Band | None = None,
-    progress: Progress = silent,
-) -> StructureDiagnosis:
-    """Judge a nominal model beside recordings, with the doubts of the gate; nothing is written.
-
-    Parameters
-    ----------
-    model
-        Nominal modal model; responses that no recording measures are left out.
-    recordings
-        Recordings to compare it with, best at several levels.
-    settings
-        Thresholds of the decisions; None: the defaults.
-    model_file
-        File of the model, whose stored doubts count, and its name in messages.
-    stream
-        Name of the sample clock; None: the only one.
-    band
-        Band that is compared, Hz; None: that of the model.
-    progress
-        Shows progress while recordings are read and causes are tried.
-
-    Raises
-    ------
-    InputError
-        A model and recordings that cannot be compared.
-    """
-    compared = measured_part(model, recordings, stream=stream)
-    require_room_for_comparison(recordings, compared, stream=stream, band=band)
-    doubts = check_model_and_recordings(model_file, compared, recordings, stream, progress)
-    trials = read_recordings(recordings, compared, stream=stream, band=band)
-    with progress("diagnosing"):
-        found = diagnose(compared, trials, settings, speeds=_speeds(recordings), band=band)
-    return replace(found, doubts=(*doubts, *found.doubts))
-
-
-def nominal_from_simulation(
-    simulated: str | os.PathLike[str],
-    band: tuple[float, float],
-    out: str | os.PathLike[str],
-    *,
-    stream: str | None = None,
-    progress: Progress = silent,
-) -> Path:
+def nominal_from_simulation(simulated: File, band: Band | None, out: File | None, stream: str | None = None) -> Path:
     """Fit the nominal model to a simulated recording, by the subspace method; write it as ``nominal.json``.
 
     Raises
@@ -219,14 +292,38 @@ def nominal_from_simulation(
     InputError
         A recording that cannot be fitted in that band.
     """
-    fitted = fit_recordings([simulated], FitOptions(band, SUBSPACE, stream=stream), progress)
+    if band is None or out is None:
+        raise InputError("--simulated needs --band LO HI, the band in which the nominal model is fitted and compared")
+    with silently():
+        fitted = fit(simulated, band=band, stream=stream)
     Path(out).mkdir(parents=True, exist_ok=True)
     path = Path(out) / "nominal.json"
     write_modal_model(path, fitted.model)
     return path
 
 
-def _speeds(recordings: Sequence[str | os.PathLike[str]]) -> dict[str, SpindleSpeed]:
-    """Spindle speed by recording's name, where it is stated."""
-    stated = {Path(path).stem: spindle_speed(path) for path in recordings}
-    return {name: speed for name, speed in stated.items() if speed is not None}
+def refuse_file(folder: Path) -> None:
+    """Check before long work that results can go into a folder.
+
+    Raises
+    ------
+    InputError
+        There is a file of that name.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder} is a file; name a folder with --out")
+
+
+def check_shares(option: str, given: tuple[float, ...], example: tuple[float, ...] = (0.01, 0.12, 0.03)) -> None:
+    """Refuse errors that are no shares, such as percent.
+
+    Raises
+    ------
+    InputError
+        With the values and an example.
+    """
+    if not all(0 < share < 1 for share in given):
+        typed, right = (" ".join(f"{share:g}" for share in shares) for shares in (given, example))
+        raise InputError(
+            f"--{option} {typed}: give {len(given)} positive shares below 1 (0.12 is 12 %), for example {right}"
+        )

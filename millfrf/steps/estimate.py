@@ -1,16 +1,22 @@
 """Step ``estimate``: FRF matrix from recordings."""
 
 import json
-import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, replace
-from pathlib import Path
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+from annotated_types import Ge, Gt, Lt
 
+from acquisition import Recording, all_opened
 from estimation import (
+    AveragingSettings,
+    BandRecording,
     CrossSpectra,
     Frf,
+    InputIndependence,
+    band_of_channels,
+    choose_channels,
     correct_high_pass,
     h1,
     h1_side_by_side,
@@ -19,13 +25,20 @@ from estimation import (
     input_independence,
     instrumental_variable,
     known_band,
+    local_polynomial,
+    only_inputs,
+    require_room_for_band,
     spectra_for_judging,
+    spectra_in_band,
+    spectra_of_tests,
     sum_tests,
     write_frf,
 )
-from millfrf.core import InputError
-from millfrf.core.progress import Progress, silent
+from millfrf.core import InputError, Result, Summary, counted, doubts_line
+from millfrf.core.progress import progress
 from millfrf.core.provenance import sources, versions
+from millfrf.core.steps import Band, File, Names, Writes, names_of, step
+from millfrf.core.terminal import say_written, tell, warn
 from millfrf.gate import (
     Gain,
     Segmentation,
@@ -34,57 +47,232 @@ from millfrf.gate import (
     check_recordings,
     check_sample_rates,
     driven_lines,
+    gain_of,
 )
 
-from .test_spectra import (
-    INSTRUMENTAL,
-    LOCAL,
-    TITLES,
-    Estimate,
-    EstimateOptions,
-    band_recordings,
-    check_options,
-    gain_of_test,
-    lines_of,
-    local_frf,
-    only_inputs,
-    require_room_for_recordings,
-    spectra_of_tests,
-    with_instruments,
-    without_instruments,
-)
+from .answers import frf_answer, size_of
+from .given import RecordingGiven
 
-SPECTRAL: dict[str, Callable[[CrossSpectra], Frf]] = {"h1": h1, "h2": h2, "hv": hv}
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Estimator = Literal["h1", "h2", "hv", "instrumental-variable", "local-polynomial"]
+INSTRUMENTAL, LOCAL = "instrumental-variable", "local-polynomial"
+TITLES = {INSTRUMENTAL: "FRF by instrumental variables", LOCAL: "FRF by local polynomials"}
+SPECTRAL: Mapping[str, Callable[[CrossSpectra], Frf]] = {"h1": h1, "h2": h2, "hv": hv}
 
 
-def estimate_recordings(
-    paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, progress: Progress = silent
-) -> Estimate:
-    """FRF over one or many recordings.
+@step
+def estimate(
+    *recordings: RecordingGiven,
+    out: Annotated[File | None, Writes(suffixes=(".h5", ".hdf5"), needed=True)] = None,
+    segment: Annotated[float, Gt(0)] = 8.0,
+    overlap: Annotated[float, Ge(0), Lt(1)] = 0.5,
+    window: Literal["hann", "hamming", "boxcar"] = "hann",
+    stack: Literal["sum", "side-by-side"] = "sum",
+    excitations: Names = (),
+    responses: Names = (),
+    band: Band | None = None,
+    stream: str | None = None,
+    estimator: Estimator = "h1",
+    exclude: bool = False,
+    instruments: Names = (),
+) -> "Estimate":
+    """FRF matrix over one or many tests of one set-up, with coherence and covariance: ``X = H F``.
+
+    h1: noise on responses. h2: on excitations. hv: on both. instrumental-variable: a disturbance moves the structure
+    and, by feedback, the force; instruments are what it does not reach. local-polynomial: whole records instead of
+    segments, without leakage, for short records and forces that are rough in frequency.
+
+    Parameters
+    ----------
+    recordings
+        Recordings of one set-up, one a test.
+    out
+        FRF file to write.
+    segment : s
+        Duration of a segment.
+    overlap
+        Share of a segment that the next one shares, 0 to below 1.
+    window
+        Window of the segments.
+    stack
+        How tests are stacked: their spectra summed, or their segments side by side.
+    excitations
+        Channels that excite; without it forces and voltages.
+    responses
+        Channels that respond; without it accelerations, velocities and displacements.
+    band : Hz
+        Lowest and highest frequency to keep; without it all lines.
+    stream
+        Sample clock; needed where a recording has several.
+    estimator
+        Estimator of the FRF.
+    exclude
+        Leave out segments with overload, clipping or dropped samples.
+    instruments
+        Channels that drive the forces and that no disturbance reaches, for instrumental-variable.
+
+    Returns
+    -------
+    Estimate
+        The FRF, the spectra of each test and the warnings.
 
     Raises
     ------
     InputError
-        A file or option that cannot be used, or inputs that are dependent wherever they have power: fewer tests than
-        inputs, or tests that are too much alike.
+        A recording or an option that cannot be used, or inputs that are dependent wherever they have power.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf estimate rec1.h5 rec2.h5 rec3.h5 --out frf.h5
     """
-    check_options(options)
-    if options.estimator == LOCAL:
-        return _local_estimate(paths, options, progress)
-    if not paths:
+    options = EstimateOptions(
+        segment, overlap, window, stack, names_of(excitations), names_of(responses),
+        band, stream, estimator, exclude, names_of(instruments),
+    )  # fmt: skip
+    options.check()
+    if not recordings:
         raise InputError("no recording given; name at least one")
-    taken = with_instruments(paths[0], options)
+    with all_opened(recordings) as opened_recordings:
+        measured = _local if estimator == LOCAL else _from_spectra
+        result = measured(opened_recordings, options)
+        paths = [recording.path for recording in opened_recordings]
+    if out is not None:
+        write_estimate(out, result, sources(paths))
+    warn(result.warnings)
+    frf = result.frf
+    tell(lambda: frf_answer(frf))
+    say_written([out], f"{size_of(frf)}, {frf.frequencies[0]:g} to {frf.frequencies[-1]:g} Hz")
+    return result
+
+
+@dataclass(frozen=True)
+class EstimateOptions:
+    """Options of :func:`estimate`, which describes them; names of channels as tuples."""
+
+    segment: float
+    overlap: float
+    window: str
+    stack: str
+    excitations: tuple[str, ...]
+    responses: tuple[str, ...]
+    band: tuple[float, float] | None
+    stream: str | None
+    estimator: str
+    exclude: bool
+    instruments: tuple[str, ...]
+
+    def check(self) -> None:
+        """Refuse options that contradict each other.
+
+        Raises
+        ------
+        InputError
+            With the option and the remedy.
+        """
+        if self.stack != "sum" and self.estimator != "h1":
+            raise InputError(f"estimator {self.estimator} takes summed tests only; use --stack sum")
+        if self.estimator == INSTRUMENTAL and not self.instruments:
+            raise InputError(
+                f"estimator {INSTRUMENTAL} needs instruments: name channels that drive the forces and that no "
+                "disturbance reaches with --instrument"
+            )
+        if self.instruments and self.estimator != INSTRUMENTAL:
+            raise InputError(f"--instrument is for --estimator {INSTRUMENTAL}, not for {self.estimator}; leave it out")
+        if self.estimator == LOCAL and self.band is None:
+            raise InputError(f"estimator {LOCAL} gives every line of the whole records: say which with --band LO HI")
+        if self.estimator == LOCAL and self.exclude:
+            raise InputError(
+                f"estimator {LOCAL} has no segments to leave out: drop --exclude, or use another estimator"
+            )
+
+    def settings(self, recording: Recording) -> AveragingSettings:
+        """How the spectra of a test are computed: with instruments, all channels are named.
+
+        Parameters
+        ----------
+        recording
+            Recording with the channels of all tests.
+
+        Raises
+        ------
+        InputError
+            An instrument that the recording does not have, or no channel left beside them.
+        """
+        excitations, responses = self.excitations, self.responses
+        if self.estimator == INSTRUMENTAL:
+            forces, responses = _channels_without_instruments(recording, self)
+            excitations = (*forces, *self.instruments)
+        return AveragingSettings(
+            self.segment, self.overlap, self.window, excitations, responses, self.band, self.stream, self.exclude
+        )
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Estimate(Result):
+    """An estimated FRF, with the spectra it was made from.
+
+    Parameters
+    ----------
+    frf
+        FRF in the recordings' own quantity (accelerance from accelerations).
+    tests
+        Spectra, test by test.
+    independence
+        Independence of the stacked inputs, line by line.
+    warnings
+        Doubts about the FRF, one sentence each.
+    options
+        How the recordings were turned into the FRF.
+    """
+
+    frf: Frf
+    tests: tuple[CrossSpectra, ...]
+    independence: InputIndependence
+    warnings: tuple[str, ...]
+    options: EstimateOptions
+
+    def plot(self, axes: "Axes | None" = None, **choices: Any) -> "Axes":
+        """Draw entries of the FRF and return the axes; see :func:`millfrf.figures.draw_frf` for the choices."""
+        return self.frf.plot(axes, **choices)
+
+    def _summary(self) -> Summary:
+        frf, averages = self.frf, sum(test.effective_averages for test in self.tests)
+        shape = f"{counted(len(frf.responses), 'response')} x {counted(len(frf.excitations), 'excitation')}"
+        holds = "" if frf.band is None else f"; holds in {frf.band[0]:.4g} to {frf.band[1]:.4g} Hz"
+        rows = tuple(
+            (str(number + 1), str(test.n_segments), f"{test.effective_averages:.3g}", str(test.n_excluded))
+            for number, test in enumerate(self.tests)
+        )
+        return Summary(
+            f"Estimate by {self.options.estimator}: {counted(len(self.tests), 'test')} worth {averages:.3g} averages",
+            (
+                f"frf: {frf.quantity} in {frf.unit}, {shape}, {counted(len(frf.frequencies), 'line')}{holds}",
+                *doubts_line(self.warnings),
+            ),
+            ("test", "segments", "effective averages", "left out"),
+            rows,
+        )
+
+
+def _from_spectra(recordings: Sequence[Recording], options: EstimateOptions) -> Estimate:
+    """Estimate from averaged spectra of segments."""
+    settings = options.settings(recordings[0])
     doubts = check_recordings(
-        paths,
-        stream=taken.stream,
-        excitations=taken.excitations,
-        responses=taken.responses,
-        excluding=taken.exclude,
-        segments=Segmentation(taken.segment, taken.overlap, taken.window),
-        progress=progress,
+        recordings,
+        stream=settings.stream,
+        excitations=settings.excitations,
+        responses=settings.responses,
+        excluding=settings.exclude,
+        segments=Segmentation(settings.segment, settings.overlap, settings.window),
     )
-    tests = spectra_of_tests(paths, taken, progress)
-    gains = [gain_of_test(test, Path(path).name, options) for test, path in zip(tests, paths, strict=True)]
+    tests = spectra_of_tests(recordings, settings)
+    gains = [
+        gain_of_test(test, recording.path.name, options) for test, recording in zip(tests, recordings, strict=True)
+    ]
     return estimate_of_spectra(tests, gains, doubts, options)
 
 
@@ -96,7 +284,7 @@ def estimate_of_spectra(
     Parameters
     ----------
     tests
-        Spectra with the channels of :func:`with_instruments`; side by side each must be of one test.
+        Spectra, with the channels of :meth:`EstimateOptions.settings`; side by side each must be of one test.
     gains
         Gain of each test, see :func:`gain_of_test`.
     doubts
@@ -111,53 +299,102 @@ def estimate_of_spectra(
     """
     total = sum_tests(tests)
     kept = tuple(without_instruments(test, options) for test in tests)
-    found = [*doubts, *check_sample_rates(gains)]
+    warnings = [*doubts, *check_sample_rates(gains)]
     if options.estimator == INSTRUMENTAL:
-        found += check_inputs(only_inputs(total, options.instruments))
+        warnings += check_inputs(only_inputs(total, options.instruments))
         frf = instrumental_variable(total, options.instruments)
     else:
-        found += check_inputs(total)
+        warnings += check_inputs(total)
         frf = SPECTRAL[options.estimator](total) if options.stack == "sum" else h1_side_by_side(kept)
     if total.n_excluded:
-        found.append(
+        warnings.append(
             f"{total.n_excluded} of {total.n_excluded + total.n_segments} segments hold overload, clipping or dropped "
             "samples and were left out"
         )
-    return _finished(frf, kept, found, options)
+    return _completed(frf, kept, warnings, options)
 
 
-def _local_estimate(paths: Sequence[str | os.PathLike[str]], options: EstimateOptions, progress: Progress) -> Estimate:
+def _local(recordings: Sequence[Recording], options: EstimateOptions) -> Estimate:
     """Estimate by local polynomials over whole recordings; the inputs are judged by spectra as everywhere."""
-    assert options.band is not None
-    names = (options.excitations, options.responses)
-    require_room_for_recordings(paths, names, options.stream, options.band[1])
+    band = options.band
+    assert band is not None
+    for recording in recordings:  # memory is checked before anything is read
+        stream = recording.stream(options.stream)
+        forces, motions = choose_channels(stream, options.excitations or None, options.responses or None)
+        require_room_for_band(stream, len(forces) + len(motions), band[1])
     doubts = check_recordings(
-        paths, stream=options.stream, excitations=names[0], responses=names[1], segments=None, progress=progress
+        recordings, stream=options.stream, excitations=options.excitations, responses=options.responses
     )
-    found = band_recordings(paths, names, options.stream, options.band[1], progress)
-    tests = tuple(lines_of(test, options.band) for test in spectra_for_judging(found))
-    gains = [gain_of_test(test, Path(path).name, options) for test, path in zip(tests, paths, strict=True)]
+    records = _band_recordings(recordings, options, band[1])
+    tests = tuple(spectra_in_band(test, band) for test in spectra_for_judging(records))
+    gains = [
+        gain_of_test(test, recording.path.name, options) for test, recording in zip(tests, recordings, strict=True)
+    ]
     doubts += [*check_sample_rates(gains), *check_inputs(sum_tests(tests))]
-    frf = local_frf(found, options.band, progress)
-    return _finished(frf, tests, [*doubts, *check_local_frf(frf, len(found))], options)
+    with progress(f"local polynomials, {band[0]:g} to {band[1]:g} Hz"):
+        frf = local_polynomial(records, band)
+    return _completed(frf, tests, [*doubts, *check_local_frf(frf, len(records))], options)
 
 
-def _finished(frf: Frf, tests: tuple[CrossSpectra, ...], doubts: Sequence[str], options: EstimateOptions) -> Estimate:
+def _band_recordings(
+    recordings: Sequence[Recording], options: EstimateOptions, highest: float
+) -> tuple[BandRecording, ...]:
+    """Read each recording up to ``highest`` (Hz); rates that differ are refused."""
+    records = []
+    for recording in recordings:
+        stream = recording.stream(options.stream)
+        channels = choose_channels(stream, options.excitations or None, options.responses or None)
+        with progress(f"reading {recording.path.name}", stream.n_samples) as update:
+            records.append(band_of_channels(stream, *channels, highest, update))
+    for recording, record in zip(recordings, records, strict=True):
+        if record.rate != records[0].rate:
+            raise InputError(
+                f"{recording.path.name} and {recordings[0].path.name} have other sample rates; stack tests of one rate"
+            )
+    return tuple(records)
+
+
+def _channels_without_instruments(
+    recording: Recording, options: EstimateOptions
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of forces and of responses, without the instruments among them; none left is refused."""
+    stream, instruments = recording.stream(options.stream), options.instruments
+    stream.columns(instruments)  # refuses names that are not there
+    chosen = choose_channels(stream, options.excitations or None, options.responses or None)
+    forces, responses = (tuple(one.name for one in each if one.name not in instruments) for each in chosen)
+    if not forces or not responses:
+        role = "excites" if not forces else "responds"
+        raise InputError(
+            f"no channel {role} beside the instrument{'s' if len(instruments) > 1 else ''} {', '.join(instruments)}; "
+            f"name {'--excitation' if not forces else '--response'} channels and others as --instrument"
+        )
+    return forces, responses
+
+
+def gain_of_test(test: CrossSpectra, name: str, options: EstimateOptions) -> Gain:
+    """Gain from the forces of one test, by which sample rates are compared; ``name`` is that of its file."""
+    return gain_of(without_instruments(test, options), name, test.sample_rate)
+
+
+def without_instruments(test: CrossSpectra, options: EstimateOptions) -> CrossSpectra:
+    """The spectra of a test without the instruments among its excitations."""
+    names = [channel.name for channel in test.excitations if channel.name not in options.instruments]
+    return only_inputs(test, names) if options.estimator == INSTRUMENTAL else test
+
+
+def _completed(
+    frf: Frf, tests: tuple[CrossSpectra, ...], warnings: Sequence[str], options: EstimateOptions
+) -> Estimate:
     """Take out the sensors' high-pass, and state the band in which the FRF is known."""
     total = sum_tests(tests)
     corners = [[one.high_pass_hz for one in channels] for channels in (total.responses, total.excitations)]
     frf = correct_high_pass(frf, *corners)
     driven = np.interp(frf.frequencies, total.frequencies, driven_lines(total).astype(float)) >= 0.5
     frf = replace(frf, band=known_band(frf, driven))
-    return Estimate(frf, tests, input_independence(total), tuple(doubts), options)
+    return Estimate(frf, tests, input_independence(total), tuple(warnings), options)
 
 
-def write_estimate(
-    path: str | os.PathLike[str],
-    estimate: Estimate,
-    recordings: Sequence[str | os.PathLike[str]],
-    stated: Sequence[Mapping[str, str]] | None = None,
-) -> None:
+def write_estimate(path: File, estimate: Estimate, recordings: Sequence[Mapping[str, str]]) -> None:
     """Write the FRF with its provenance: recordings, settings, averages, warnings, versions.
 
     Parameters
@@ -167,16 +404,14 @@ def write_estimate(
     estimate
         FRF with what it was made from.
     recordings
-        Recordings it was made from.
-    stated
-        Name and SHA-256 of each, where they are known; None: the files are read.
+        Name and SHA-256 of each recording.
     """
     first, options = estimate.tests[0], estimate.options
     length = first.settings.segment_length / first.sample_rate
     judged_by = {"segment": length} if options.estimator == LOCAL else {}  # it has no segments of its own
     provenance = {
         "step": "estimate",
-        "sources": sources(recordings) if stated is None else list(stated),
+        "sources": list(recordings),
         "options": asdict(options) | judged_by,
         "settings": asdict(first.settings),
         "sample_rate_hz": first.sample_rate,
@@ -188,6 +423,5 @@ def write_estimate(
         "warnings": list(estimate.warnings),
         "versions": versions(),
     }
-    count = f"{len(recordings)} recording{'s' if len(recordings) != 1 else ''}"
-    title = f"{TITLES.get(options.estimator, options.estimator.upper())} of {count}"
+    title = f"{TITLES.get(options.estimator, options.estimator.upper())} of {counted(len(recordings), 'recording')}"
     write_frf(path, estimate.frf, title=title, provenance=json.dumps(provenance))

@@ -4,16 +4,29 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated, Literal, TypeVar, cast
 
 import numpy as np
+from annotated_types import Ge
 
-from acquisition import Recording, Stream
+from acquisition import Channel, Recording, RecordingFile, Stream, all_opened
 from estimation import BandRecording, Frf, band_of_channels, choose_channels, require_room_for_band, widest_band
 from millfrf.core import InputError, writing_whole_file
-from millfrf.core.file_kinds import FRF, kind_of
-from millfrf.core.progress import Progress, silent
+from millfrf.core.progress import progress
 from millfrf.core.provenance import add_to_json, sources, versions
-from millfrf.gate import check_band_recordings, check_frf_for_fit, check_recordings, fit_doubts, smearing_doubts
+from millfrf.core.steps import Band, File, Names, Reads, Writes, names_of, step
+from millfrf.core.terminal import say, say_written, show, tell, warn
+from millfrf.gate import (
+    FileKind,
+    check_band_recordings,
+    check_frf_for_fit,
+    check_recordings,
+    fit_doubts,
+    kind_of,
+    smearing_doubts,
+)
+from millfrf.live.picking_server import pick_in_browser
+from millfrf.reports.tables import error_table, mode_table
 from modal_fit import (
     ModalFit,
     SubspaceFit,
@@ -27,112 +40,206 @@ from modal_fit import (
     write_pole_candidates,
 )
 
+from .answers import model_answer
+from .given import HasFrf, files_among, frf_of
+
+Method = Literal["polyreference", "subspace"]
 POLYREFERENCE, SUBSPACE = "polyreference", "subspace"
-METHODS = (POLYREFERENCE, SUBSPACE)
 SUBSPACE_ORDER = 30
 """Highest order of the state space where none is asked for."""
 
 KEPT_ABOVE = 1.6
 """Records are kept up to this multiple of the band's upper end, where their sample rate reaches so far."""
 
+Fit = TypeVar("Fit", ModalFit, SubspaceFit)
 
-@dataclass(frozen=True)
-class FitOptions:
-    """Options with which a model is fitted.
+
+@step
+def fit(
+    *sources: Annotated[File | Frf | HasFrf | Recording, Reads("FRF.h5|REC...")],
+    out: Annotated[File | None, Writes(suffixes=(".json",), needed=True)] = None,
+    band: Band | None = None,
+    method: Method | None = None,
+    max_order: Annotated[int, Ge(1)] | None = None,
+    modes: Annotated[int, Ge(1)] | None = None,
+    excitations: Names = (),
+    responses: Names = (),
+    stream: str | None = None,
+    poles: Annotated[File | None, Reads()] = None,
+    refine: bool = False,
+    candidates: Annotated[File | None, Writes(suffixes=(".json",))] = None,
+    pick: Annotated[File | None, Writes(suffixes=(".toml",))] = None,
+) -> ModalFit | SubspaceFit:
+    """Modal model of one FRF or of recordings, with error bars: ``H(w) = sum_r right left / (i w - pole) + ...``.
+
+    Recordings are fitted as they are, tests stacked, without windows or leakage; that is more accurate for heavily
+    damped modes. The model holds poles, vectors, residuals and a stabilisation chart that reports show.
 
     Parameters
     ----------
+    sources
+        One FRF, or recordings of one set-up.
+    out
+        Model file to write.
     band : Hz
-        Lowest and highest frequency of the fit.
+        Lowest and highest frequency of the fit; without it the band in which the FRF holds. Recordings need one.
     method
-        Name of the method: ``polyreference`` of an FRF, ``subspace`` of recordings.
+        polyreference of an FRF or subspace of recordings; without it by what is given.
     max_order
-        Highest order of the denominator or of the state space; None: by the data, or the method's own.
-    n_modes
-        Number of modes to keep; None: as many as are found.
-    excitations, responses
-        Names of the channels, for recordings; empty: chosen by quantity.
+        Highest order of the denominator or of the state space; without it by the data, or the method's own.
+    modes
+        Number of modes to keep; without it as many as the data need.
+    excitations
+        Channels of recordings that excite; without it forces.
+    responses
+        Channels of recordings that respond; without it accelerations, velocities and displacements.
     stream
-        Name of the sample clock, for recordings; None: the only one.
+        Sample clock of recordings; needed where a recording has several.
     poles
-        File of picked poles, for an FRF; None: the modes are chosen by the fit.
+        File of poles picked by hand, for an FRF: the model has these and no others.
     refine
-        Whether picked poles are refined; False: they are kept.
-    """
+        Refine picked poles; otherwise they are kept as they are.
+    candidates
+        File to write candidate poles to, for picking by hand.
+    pick
+        File to write poles to that are picked in the browser; it can be given to --poles.
 
-    band: tuple[float, float]
-    method: str = POLYREFERENCE
-    max_order: int | None = None
-    n_modes: int | None = None
-    excitations: tuple[str, ...] = ()
-    responses: tuple[str, ...] = ()
-    stream: str | None = None
-    poles: str | os.PathLike[str] | None = None
-    refine: bool = False
-
-
-def check_picking(options: FitOptions) -> None:
-    """Refuse options that contradict a picked fit, before anything is computed.
+    Returns
+    -------
+    ModalFit or SubspaceFit
+        The model with the evidence for it and the warnings.
 
     Raises
     ------
     InputError
-        A count of modes beside picked poles, or a refinement of an automatic fit, which is refined anyway.
+        Sources of mixed kinds, several FRFs, a method that does not fit them, or a band without enough lines.
+    MillfrfError
+        No stable pole was found.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf fit rec1.h5 rec2.h5 rec3.h5 --band 13 60 --out housing.json
     """
-    if options.poles is not None and options.n_modes is not None:
-        raise InputError(f"--poles names the modes, --modes {options.n_modes} a number of them; give one of the two")
-    if options.refine and options.poles is None:
+    kinds = {_kind(source) for source in sources}
+    of_recordings = kinds == {FileKind.RECORDING}
+    if not of_recordings and not (kinds == {FileKind.FRF} and len(sources) == 1):
+        count = f"{len(sources)} file{'s' if len(sources) != 1 else ''}"
+        raise InputError(f"cannot fit {count} of {' and '.join(sorted(kinds))}; give one FRF, or recordings")
+    frf, name, stored = (None, "", []) if of_recordings else frf_of(sources[0])
+    if band is None:
+        band = _band_of(frf)
+    used = cast(Method, method or (SUBSPACE if of_recordings else POLYREFERENCE))
+    _check_picking(kinds, poles, modes, refine, candidates, pick)
+    given = FitOptions(band, used, max_order, modes, names_of(excitations), names_of(responses), stream, poles, refine)
+    fitted: ModalFit | SubspaceFit
+    if frf is None:
+        with all_opened(cast(Sequence[RecordingFile], sources)) as recordings:
+            fitted = _counted(fit_recordings(recordings, given), modes)
+    else:
+        if pick is not None:
+            automatic = fit_frf(frf, given, name)
+            given = replace(
+                given,
+                poles=pick_in_browser(pick, Path(cast(File, sources[0])), frf, automatic, max_order),
+                n_modes=None,
+            )
+        fitted = _counted(fit_frf(frf, given, name), given.n_modes)
+        fitted = replace(fitted, warnings=(*stored, *fitted.warnings))
+    if out is not None:
+        write_fit(out, fitted, files_among(*sources), given)
+    _say_fit(fitted, given, out)
+    if candidates is not None and isinstance(fitted, ModalFit):
+        groups = write_candidates(candidates, fitted, files_among(*sources))
+        say_written([candidates], f"{groups} groups of poles to pick from")
+    return fitted
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """Options of :func:`fit`, which describes them; the number of modes is ``n_modes`` here."""
+
+    band: Band
+    method: Method
+    max_order: int | None
+    n_modes: int | None
+    excitations: tuple[str, ...]
+    responses: tuple[str, ...]
+    stream: str | None
+    poles: File | None
+    refine: bool
+
+
+def _say_fit(fitted: ModalFit | SubspaceFit, options: FitOptions, out: File | None) -> None:
+    """Print warnings, modes and what was written."""
+    warn(fitted.warnings, 5)
+    tell(lambda: {"method": options.method, **model_answer(fitted.model)})
+    show(mode_table(fitted.model))
+    by_source = error_table(fitted.model)
+    if by_source is not None:
+        show(by_source)
+    if options.poles is not None:
+        how = "refined from there" if options.refine else "kept as they are, vectors and residuals fitted"
+        say(f"{len(fitted.model.poles)} poles picked in {Path(options.poles).name}, {how}")
+    say_written([out])
+
+
+def _kind(source: object) -> str:
+    """Kind of a source: a file is looked into; any object is an FRF or a recording."""
+    if isinstance(source, str | os.PathLike):
+        return kind_of(source)
+    return FileKind.FRF if isinstance(getattr(source, "frf", source), Frf) else FileKind.RECORDING
+
+
+def _band_of(frf: Frf | None) -> Band:
+    """The band in which an FRF holds, else that of its valid lines above 0 Hz."""
+    if frf is None:
+        raise InputError("a fit of recordings needs its band in Hz, for example --band 13 60")
+    if frf.band is not None:
+        return frf.band
+    lines = frf.frequencies[frf.valid & (frf.frequencies > 0)]
+    if not len(lines):
+        raise InputError("the FRF has no valid line above 0 Hz; estimate it anew")
+    return float(lines[0]), float(lines[-1])
+
+
+def _counted(fitted: Fit, asked: int | None) -> Fit:
+    """The fit, with a warning where it has fewer modes than were asked for."""
+    count = len(fitted.model.poles)
+    if asked is None or count >= asked:
+        return fitted
+    doubt = f"{asked} modes were asked for, {count} were found in {fitted.band[0]:g} to {fitted.band[1]:g} Hz"
+    return replace(fitted, warnings=(*fitted.warnings, doubt))
+
+
+def _check_picking(
+    kinds: set[str],
+    poles: File | None,
+    modes: int | None,
+    refine: bool,
+    candidates: File | None,
+    pick: File | None,
+) -> None:
+    """Refuse options about picked poles that contradict each other, before anything is computed."""
+    if poles is not None and modes is not None:
+        raise InputError(f"--poles names the modes, --modes {modes} a number of them; give one of the two")
+    if refine and poles is None and pick is None:
         raise InputError("--refine is of picked poles; an automatic fit is refined anyway: leave it out")
-
-
-def check_candidates(path: Path, out: Path, poles: Path | None, files: Sequence[Path]) -> None:
-    """Refuse a file of candidates that cannot be made or written, before anything is computed.
-
-    Raises
-    ------
-    InputError
-        Candidates of a fit that was picked or that is of recordings, the name of another file, or a name that cannot be
-        written.
-    """
-    if poles is not None:
+    if pick is not None and poles is not None:
+        raise InputError("--pick chooses the poles that --poles would name; give one of the two")
+    if pick is not None and candidates is not None:
+        raise InputError("--candidates is for another picker; leave it out beside --pick")
+    if candidates is not None and poles is not None:
         raise InputError("--candidates offers what an automatic fit finds; leave --poles out")
-    if kind_of(files[0]) != FRF:
-        raise InputError("--candidates are poles of an FRF; estimate one from these recordings first")
-    if path.resolve() == out.resolve():
-        raise InputError(f"{path} is the model of --out; choose another file for --candidates")
-    if path.suffix.lower() != ".json" or not path.parent.is_dir():
-        raise InputError(f"cannot write {path}: give --candidates a name that ends in .json, in a folder that exists")
+    for option, given in (("--candidates are", candidates), ("--pick shows the", pick)):
+        if given is not None and kinds != {FileKind.FRF}:
+            raise InputError(f"{option} poles of an FRF; estimate one from these recordings first")
+    if poles is not None and kinds != {FileKind.FRF}:
+        raise InputError("--poles picks poles of an FRF; estimate one from these recordings first")
 
 
-def fit_picked(frf: Frf, options: FitOptions) -> ModalFit:
-    """Fit exactly the poles that ``options.poles`` names.
-
-    Raises
-    ------
-    InputError
-        A file that names no usable poles, or poles that the band does not hold.
-    """
-    assert options.poles is not None
-    poles = read_picked_poles(options.poles)
-    return fit_picked_poles(frf, options.band, poles, refine=options.refine, max_order=options.max_order)
-
-
-def write_candidates(path: str | os.PathLike[str], fit: ModalFit, frf: str | os.PathLike[str]) -> int:
-    """Write the groups of an automatic fit for a picker; returns how many there are."""
-    groups = candidate_groups(fit)
-    made = {"step": "candidates", "sources": sources([frf]), "versions": versions()}
-    write_pole_candidates(path, groups, fit.band, chart_to_json(fit.chart), made)
-    return len(groups)
-
-
-def picked_in_words(fit: ModalFit, options: FitOptions) -> str:
-    """One line on what became of picked poles."""
-    assert options.poles is not None
-    how = "refined from there" if options.refine else "kept as they are, vectors and residuals fitted"
-    return f"{len(fit.model.poles)} poles picked in {Path(options.poles).name}, {how}"
-
-
-def fit_model(frf: Frf, options: FitOptions, progress: Progress = silent, name: str = "the FRF") -> ModalFit:
+def fit_frf(frf: Frf, options: FitOptions, name: str = "the FRF") -> ModalFit:
     """Fit a modal model to an FRF; ``name`` is that of its file, for messages.
 
     Raises
@@ -145,21 +252,19 @@ def fit_model(frf: Frf, options: FitOptions, progress: Progress = silent, name: 
     """
     if options.method != POLYREFERENCE:
         raise InputError(f"method {options.method!r} does not fit an FRF; use {POLYREFERENCE}, or give recordings")
-    check_picking(options)
-    doubts = check_frf_for_fit(frf, options.band, name)
-    with progress(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
+    band = options.band
+    doubts = check_frf_for_fit(frf, band, name)
+    with progress(f"fitting {band[0]:g} to {band[1]:g} Hz"):
         if options.poles is None:
-            fit = fit_polyreference(frf, options.band, max_order=options.max_order, n_modes=options.n_modes)
+            fitted = fit_polyreference(frf, band, max_order=options.max_order, n_modes=options.n_modes)
         else:
-            fit = fit_picked(frf, options)
-    poor = fit_doubts(fit.reduced_chi_square, fit.relative_error, fit.warnings)
-    smeared = smearing_doubts(fit.model, frf)
-    return replace(fit, warnings=(*doubts, *fit.warnings, *poor, *smeared))
+            poles = read_picked_poles(options.poles)
+            fitted = fit_picked_poles(frf, band, poles, refine=options.refine, max_order=options.max_order)
+    poor = fit_doubts(fitted.reduced_chi_square, fitted.relative_error, fitted.warnings)
+    return replace(fitted, warnings=(*doubts, *fitted.warnings, *poor, *smearing_doubts(fitted.model, frf)))
 
 
-def fit_recordings(
-    paths: Sequence[str | os.PathLike[str]], options: FitOptions, progress: Progress = silent
-) -> SubspaceFit:
+def fit_recordings(recordings: Sequence[Recording], options: FitOptions) -> SubspaceFit:
     """Fit a modal model to recordings of one set-up, without spectra in between.
 
     Raises
@@ -171,78 +276,84 @@ def fit_recordings(
     """
     if options.method != SUBSPACE:
         raise InputError(f"method {options.method!r} does not fit recordings; use {SUBSPACE}, or estimate an FRF first")
-    if options.poles is not None or options.refine:
-        raise InputError("--poles picks poles of an FRF; estimate one from these recordings first")
-    for path in paths:
-        _require_room(path, options)
+    for recording in recordings:  # memory is checked before anything is read
+        stream = recording.stream(options.stream)
+        forces, motions = _channels(stream, options)
+        require_room_for_band(stream, len(forces) + len(motions), _kept_up_to(stream, options.band))
     doubts = check_recordings(
-        paths, stream=options.stream, excitations=options.excitations, responses=options.responses, progress=progress
+        recordings, stream=options.stream, excitations=options.excitations, responses=options.responses
     )
-    records = [_band_recording(path, options, progress) for path in paths]
-    doubts += check_band_recordings(
-        [record for record, _ in records],
-        options.band,
-        [Path(path).name for path in paths],
-        [rate for _, rate in records],
-    )
+    records = [_band_recording(recording, options) for recording in recordings]
+    rates = [recording.stream(options.stream).sample_rate for recording in recordings]
+    doubts += check_band_recordings(records, options.band, [recording.path.name for recording in recordings], rates)
     with progress(f"fitting {options.band[0]:g} to {options.band[1]:g} Hz"):
-        fit = fit_subspace(
-            [record for record, _ in records],
-            options.band,
-            max_order=options.max_order or SUBSPACE_ORDER,
-            n_modes=options.n_modes,
+        fitted = fit_subspace(
+            records, options.band, max_order=options.max_order or SUBSPACE_ORDER, n_modes=options.n_modes
         )
-    return replace(fit, warnings=(*doubts, *fit.warnings, *fit_doubts(fit.reduced_chi_square, None)))
+    return replace(fitted, warnings=(*doubts, *fitted.warnings, *fit_doubts(fitted.reduced_chi_square, None)))
 
 
-def _band_recording(
-    path: str | os.PathLike[str], options: FitOptions, progress: Progress
-) -> tuple[BandRecording, float]:
-    with Recording(path) as recording:
-        stream = recording.stream(options.stream)
-        channels = choose_channels(stream, options.excitations or None, options.responses or None)
-        with progress(f"reading {Path(path).name}", stream.n_samples) as update:
-            made = band_of_channels(stream, *channels, _kept_up_to(stream, options), update)
-    return made, stream.sample_rate
+def _channels(stream: Stream, options: FitOptions) -> tuple[tuple[Channel, ...], tuple[Channel, ...]]:
+    return choose_channels(stream, options.excitations or None, options.responses or None)
 
 
-def _kept_up_to(stream: Stream, options: FitOptions) -> float:
+def _band_recording(recording: Recording, options: FitOptions) -> BandRecording:
+    stream = recording.stream(options.stream)
+    with progress(f"reading {recording.path.name}", stream.n_samples) as update:
+        forces, motions = _channels(stream, options)
+        return band_of_channels(stream, forces, motions, _kept_up_to(stream, options.band), update)
+
+
+def _kept_up_to(stream: Stream, band: Band) -> float:
     """Upper end of the band that stays flat, Hz: above that of the fit, where the sample rate allows it."""
-    return max(options.band[1], min(KEPT_ABOVE * options.band[1], widest_band(stream.sample_rate)))
+    return max(band[1], min(KEPT_ABOVE * band[1], widest_band(stream.sample_rate)))
 
 
-def _require_room(path: str | os.PathLike[str], options: FitOptions) -> None:
-    """Refuse a recording that memory has no room for, before it is looked through."""
-    with Recording(path) as recording:
-        stream = recording.stream(options.stream)
-        forces, motions = choose_channels(stream, options.excitations or None, options.responses or None)
-        require_room_for_band(stream, len(forces) + len(motions), _kept_up_to(stream, options))
+def write_candidates(path: File, fitted: ModalFit, frf: Sequence[Path]) -> int:
+    """Write the groups of an automatic fit for picking by hand; returns how many there are."""
+    groups = candidate_groups(fitted)
+    made = {"step": "candidates", "sources": sources(frf), "versions": versions()}
+    write_pole_candidates(path, groups, fitted.band, chart_to_json(fitted.chart), made)
+    return len(groups)
 
 
 def write_fit(
-    path: str | os.PathLike[str],
-    fit: ModalFit | SubspaceFit,
-    inputs: Sequence[str | os.PathLike[str]],
+    path: File,
+    fitted: ModalFit | SubspaceFit,
+    inputs: Sequence[Path],
     options: FitOptions,
 ) -> None:
-    """Write the model with its provenance: files, band, quality, stabilisation chart, warnings, versions."""
+    """Write the model with its provenance: files, band, quality, stabilisation chart, warnings, versions.
+
+    Parameters
+    ----------
+    path
+        File to write.
+    fitted
+        Model with its evidence.
+    inputs
+        FRF or recordings.
+    options
+        How the model was fitted.
+    """
     provenance = {
         "step": "fit",
         "sources": sources(inputs),
         "method": options.method,
-        "status": fit.status if isinstance(fit, ModalFit) else None,
+        "status": fitted.status if isinstance(fitted, ModalFit) else None,
         "picked_poles": None if options.poles is None else sources([options.poles])[0],
-        "max_order": options.max_order or (int(fit.chart.orders.max()) if len(fit.chart.orders) else None),
-        "band_hz": list(fit.band),
-        "reduced_chi_square": None if np.isnan(fit.reduced_chi_square) else fit.reduced_chi_square,
-        "relative_error": fit.relative_error.tolist() if isinstance(fit, ModalFit) else None,
-        "warnings": list(fit.warnings),
+        "max_order": options.max_order or (int(fitted.chart.orders.max()) if len(fitted.chart.orders) else None),
+        "band_hz": list(fitted.band),
+        "reduced_chi_square": None if np.isnan(fitted.reduced_chi_square) else fitted.reduced_chi_square,
+        "relative_error": fitted.relative_error.tolist() if isinstance(fitted, ModalFit) else None,
+        "warnings": list(fitted.warnings),
         "dropped": [
-            {"frequency_hz": g.frequency, "damping_ratio": g.damping_ratio, "reason": g.reason} for g in fit.dropped
+            {"frequency_hz": group.frequency, "damping_ratio": group.damping_ratio, "reason": group.reason}
+            for group in fitted.dropped
         ],
-        "stabilisation": chart_to_json(fit.chart),
+        "stabilisation": chart_to_json(fitted.chart),
         "versions": versions(),
     }
     with writing_whole_file(path) as temporary:
-        write_modal_model(temporary, fit.model)
+        write_modal_model(temporary, fitted.model)
         add_to_json(temporary, provenance)

@@ -4,30 +4,33 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquisition import DEVICES, DeviceStory, Recording, device_story
 from estimation import Frf, Geometry, read_frf, read_geometry
-from millfrf.core.file_kinds import CHATTER, CUTTING, DIAGNOSIS, FRF, GEOMETRY, LOBES, MODEL, POLES, RECORDING, kind_of
-from millfrf.core.progress import Progress, silent
 from millfrf.core.provenance import read_provenance
-from millfrf.core.terminal import Table
+from millfrf.core.steps import File, Reads, step
+from millfrf.core.terminal import Table, say, say_concern, show, tell
 from millfrf.gate import (
+    FileKind,
     check_frf,
     check_model,
     check_model_reciprocity,
     check_reciprocity,
     clock_concerns,
     doubts_of,
+    kind_of,
     level_table,
     look,
     missing_concerns,
     read_checked_cutting,
     stored_doubts,
+    tap_concerns,
 )
-from millfrf.report.tables import (
+from millfrf.reports.tables import (
     error_table,
     mode_table,
     pair_table,
@@ -42,7 +45,7 @@ from millfrf.report.tables import (
 from millfrf.stability import STATUSES, read_cuts, read_lobes
 from modal_fit import read_modal_model
 
-from .tap import tap_concerns
+from .answers import frf_answer, lobes_answer, model_answer, tables_answer
 
 LARGEST = 100.0
 """m; a structure of some hundred millimetres spans more where they are taken for metres."""
@@ -71,7 +74,48 @@ class Findings:
     notes: tuple[str, ...] = ()
 
 
-def inspect_file(path: str | os.PathLike[str], progress: Progress = silent) -> Findings:
+@step
+def inspect(file: Annotated[File, Reads()], /) -> "Findings":
+    """Say what is in a file, and what looks wrong: levels, overload, dead channels, missing samples.
+
+    Where forces repeat: their period, the noise between periods, and distortion.
+
+    Parameters
+    ----------
+    file
+        Recording, FRF, model, lobes, cutting file or geometry.
+
+    Returns
+    -------
+    Findings
+        Kind, summary, tables, notes and concerns.
+
+    Raises
+    ------
+    InputError
+        No such file, or none of these.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf inspect rec1.h5
+    """
+    findings = inspect_file(file)
+    tell(lambda: _answer(Path(file), findings))
+    say(f"{Path(file).name}: {findings.summary}")
+    for table in findings.tables:
+        show(table)
+    for note in findings.notes:
+        say(note)
+    for concern in findings.concerns:
+        say_concern(concern)
+    if not findings.concerns:
+        say("nothing looks wrong")
+    return findings
+
+
+def inspect_file(path: str | os.PathLike[str]) -> Findings:
     """Look at a recording, an FRF, a model, lobes, a cutting file or a geometry.
 
     Raises
@@ -80,22 +124,22 @@ def inspect_file(path: str | os.PathLike[str], progress: Progress = silent) -> F
         No such file, or none of these.
     """
     kind = kind_of(path)
-    if kind == RECORDING:
-        return _recording(path, progress)
+    if kind == FileKind.RECORDING:
+        return _recording(path)
     readers: dict[str, Callable[[str | os.PathLike[str]], Findings]] = {
-        FRF: _frf,
-        MODEL: _model,
-        LOBES: _lobes,
-        CUTTING: _cutting,
-        GEOMETRY: _geometry,
-        CHATTER: _chatter,
-        POLES: _poles,
-        DIAGNOSIS: _diagnosis,
+        FileKind.FRF: _frf,
+        FileKind.MODEL: _model,
+        FileKind.LOBES: _lobes,
+        FileKind.CUTTING: _cutting,
+        FileKind.GEOMETRY: _geometry,
+        FileKind.CHATTER: _chatter,
+        FileKind.POLES: _poles,
+        FileKind.DIAGNOSIS: _diagnosis,
     }
     return readers[kind](path)
 
 
-def _recording(path: str | os.PathLike[str], progress: Progress) -> Findings:
+def _recording(path: str | os.PathLike[str]) -> Findings:
     tables, concerns = [], []
     notes: list[str] = []
     with Recording(path) as recording:
@@ -108,7 +152,7 @@ def _recording(path: str | os.PathLike[str], progress: Progress) -> Findings:
             if stream.n_samples == 0:
                 concerns.append(f"stream {stream.name} holds no sample")
                 continue
-            seen = look(stream, progress=progress)
+            seen = look(stream)
             tables.append(level_table(stream, seen.levels))
             concerns += [*seen.concerns(stream.sample_rate), *tap_concerns(stream, seen.levels)]
             concerns += [*clock_concerns(recording, stream.name), *missing_concerns(recording, stream.name)]
@@ -127,7 +171,7 @@ def _recording(path: str | os.PathLike[str], progress: Progress) -> Findings:
             story = _device_story(recording)
             concerns += story.losses
             notes += story.notices
-    return Findings(RECORDING, summary, tuple(tables), tuple(concerns), tuple(notes))
+    return Findings(FileKind.RECORDING, summary, tuple(tables), tuple(concerns), tuple(notes))
 
 
 def _device_story(recording: Recording) -> DeviceStory:
@@ -170,7 +214,7 @@ def _frf(path: str | os.PathLike[str]) -> Findings:
     concerns += stored_doubts(path)
     pairs = pair_table(frf)
     table = Table("responses", ("response", "largest value", "at (Hz)", "median coherence"), tuple(rows))
-    return Findings(FRF, summary, (table,) if pairs is None else (table, pairs), tuple(concerns))
+    return Findings(FileKind.FRF, summary, (table,) if pairs is None else (table, pairs), tuple(concerns))
 
 
 def _inside(frf: Frf) -> NDArray[np.bool_]:
@@ -198,13 +242,13 @@ def _model(path: str | os.PathLike[str]) -> Findings:
     tables = [
         table for table in (mode_table(model), by_source, shape_table(model), vector_table(model)) if table is not None
     ]
-    return Findings(MODEL, summary, tuple(tables), tuple(concerns))
+    return Findings(FileKind.MODEL, summary, tuple(tables), tuple(concerns))
 
 
 def _lobes(path: str | os.PathLike[str]) -> Findings:
     lobes = read_lobes(path)
     if not len(lobes.spindle_speeds):
-        return Findings(LOBES, "stability lobes", concerns=("the table holds no spindle speed",))
+        return Findings(FileKind.LOBES, "stability lobes", concerns=("the table holds no spindle speed",))
     rpm, depths = lobes.spindle_speeds_rpm, lobes.depth_limits
     summary = f"stability lobes at {len(rpm)} speeds, {rpm.min():.0f} to {rpm.max():.0f} rpm"
     known = np.isfinite(depths)
@@ -214,7 +258,7 @@ def _lobes(path: str | os.PathLike[str]) -> Findings:
     counts = [f"{lobes.status.count(name)} {name}" for name in STATUSES if name in lobes.status]
     summary += f"; {', '.join(counts)}"
     concerns = ("no depth limit at any speed",) if not np.isfinite(depths).any() else ()
-    return Findings(LOBES, summary, concerns=(*concerns, *lobes.warnings))
+    return Findings(FileKind.LOBES, summary, concerns=(*concerns, *lobes.warnings))
 
 
 def _chatter(path: str | os.PathLike[str]) -> Findings:
@@ -223,7 +267,9 @@ def _chatter(path: str | os.PathLike[str]) -> Findings:
     if any(cut.verdict.foreign for cut in cuts):
         tables.append(tone_table(cuts))
     concerns = read_provenance(path).get("warnings", [])
-    return Findings(CHATTER, f"verdicts on {len(cuts)} cuts", tuple(tables), tuple(str(one) for one in concerns))
+    return Findings(
+        FileKind.CHATTER, f"verdicts on {len(cuts)} cuts", tuple(tables), tuple(str(one) for one in concerns)
+    )
 
 
 def _cutting(path: str | os.PathLike[str]) -> Findings:
@@ -233,12 +279,12 @@ def _cutting(path: str | os.PathLike[str]) -> Findings:
         f"cutting data of {Path(path).name}: {process.teeth} teeth, {1e3 * process.diameter:g} mm, "
         f"Ktc {process.ktc / 1e6:g} MPa, immersion {immersion[0]:g} to {immersion[1]:g} deg"
     )
-    return Findings(CUTTING, summary, concerns=tuple(doubts))
+    return Findings(FileKind.CUTTING, summary, concerns=tuple(doubts))
 
 
 def _poles(path: str | os.PathLike[str]) -> Findings:
     summary, tables = poles_in_words(path)
-    return Findings(POLES, summary, tables)
+    return Findings(FileKind.POLES, summary, tables)
 
 
 def _geometry(path: str | os.PathLike[str]) -> Findings:
@@ -252,7 +298,7 @@ def _geometry(path: str | os.PathLike[str]) -> Findings:
         for name, position in zip(geometry.nodes, geometry.positions, strict=True)
     )
     table = Table("nodes", ("node", "X (m)", "Y (m)", "Z (m)"), rows)
-    return Findings(GEOMETRY, summary, (table,), tuple(_geometry_concerns(geometry)))
+    return Findings(FileKind.GEOMETRY, summary, (table,), tuple(_geometry_concerns(geometry)))
 
 
 def _geometry_concerns(geometry: Geometry) -> list[str]:
@@ -272,4 +318,32 @@ def _diagnosis(path: str | os.PathLike[str]) -> Findings:
     causes = ", ".join(cause.name for cause in found.physics) or "no cause"
     gain = found.improvement
     error = f"error on {gain.where} {100 * gain.before:.3g} % nominal, {100 * gain.after:.3g} % improved"
-    return Findings(DIAGNOSIS, f"diagnosis of a {found.compared}: {found.verdict}, {causes}; {error}", (), found.doubts)
+    return Findings(
+        FileKind.DIAGNOSIS, f"diagnosis of a {found.compared}: {found.verdict}, {causes}; {error}", (), found.doubts
+    )
+
+
+def _answer(file: Path, findings: Findings) -> dict[str, Any]:
+    """Kind, one line, notes and tables of a file; the numbers of FRFs, models and lobes.
+
+    Parameters
+    ----------
+    file
+        File that was looked at.
+    findings
+        What was seen.
+    """
+    fields: dict[str, Any] = {
+        "file": file,
+        "kind": findings.kind,
+        "summary": findings.summary,
+        "notes": findings.notes,
+        "tables": tables_answer(findings.tables),
+    }
+    if findings.kind == FileKind.MODEL:
+        fields |= model_answer(read_modal_model(file))
+    elif findings.kind == FileKind.FRF:
+        fields |= frf_answer(read_frf(file))
+    elif findings.kind == FileKind.LOBES:
+        fields |= lobes_answer(read_lobes(file))
+    return fields

@@ -3,25 +3,29 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimation import Frf, to_receptance
 from millfrf.core import InputError
-from millfrf.core.file_kinds import MODEL, kind_of
-from millfrf.core.progress import Progress, silent
+from millfrf.core.progress import progress
+from millfrf.core.provenance import of_lobes
+from millfrf.core.steps import File, Grid, Typed, Writes, step
+from millfrf.core.terminal import manner, say, say_written, tell, warn
 from millfrf.cutting import MillingProcess
-from millfrf.figures import StableAbove, lobes_figure, save_figure
 from millfrf.gate import (
     check_band_of_lobes,
+    check_depth,
     check_frf,
     check_model,
+    check_speeds,
     check_window_damping,
-    read_checked_cutting,
+    lowest_frequency,
+    rigid_directions,
     terms_left_out,
 )
-from millfrf.report.islands import stable_above
 from millfrf.stability import (
     ModeCouplingLimit,
     StabilityLobes,
@@ -31,9 +35,13 @@ from millfrf.stability import (
     multi_frequency,
     nyquist_limits,
     semi_discretisation,
+    write_lobes,
     zero_order,
 )
-from modal_fit import ModalModel, read_modal_model
+from modal_fit import ModalModel
+
+from .answers import lobes_answer
+from .given import CutGiven, DynamicsGiven, dynamics_of, files_among, process_of
 
 Speeds = NDArray[np.float64]
 
@@ -51,9 +59,103 @@ OF_MODELS: dict[str, Callable[[ModalModel, MillingProcess, Speeds, float], Stabi
 """Solvers that need a modal model."""
 
 CERTIFIED = "certified"
-"""The default: ``stability.certified_lobes``, each limit of a modal model verified."""
 
-LOBE_METHODS = (CERTIFIED, *OF_ANY, *OF_MODELS)
+LobeMethod = Literal["certified", "zero-order", "nyquist", "multi-frequency", "collocation", "semi-discretization"]
+
+
+SPEEDS = 100
+"""Spindle speeds where none are given."""
+
+SMALL = 0.1
+"""Modes whose largest resonant term is below this share of the largest do not choose the range of speeds."""
+
+
+@step
+def lobes(
+    dynamics: DynamicsGiven,
+    /,
+    cutting: CutGiven,
+    *,
+    speeds: Grid | None = None,
+    max_depth: Annotated[float, Typed("M")] | None = None,
+    out: Annotated[File | None, Writes(suffixes=(".csv",), needed=True)] = None,
+    method: LobeMethod = "certified",
+    picture: Annotated[File | None, Writes(suffixes=(".png", ".pdf", ".svg"))] = None,
+) -> StabilityLobes:
+    """Stability lobes from a modal model or straight from a measured FRF: the largest stable depth at each speed.
+
+    certified: collocation, each limit verified by Floquet multipliers; of an FRF the multi-frequency solution. Other
+    solvers are taken by name.
+
+    Parameters
+    ----------
+    dynamics
+        Modal model or FRF at the tool tip.
+    cutting
+        Cutter, engagement and force coefficients.
+    speeds : rpm
+        Lowest and highest spindle speed, and their number; without it 100 speeds at which the teeth pass at a third of
+        the lowest to 1.2 times the highest natural frequency of the modes that move the tip.
+    max_depth : m
+        Largest axial depth that is searched; without it one diameter of the cutter.
+    out
+        Table of lobes to write.
+    method
+        Solver of the depth limits.
+    picture
+        Picture of the lobes to write, islands drawn.
+
+    Returns
+    -------
+    StabilityLobes
+        Limits with their status, and the warnings.
+
+    Raises
+    ------
+    InputError
+        Dynamics, a cut, speeds or a depth that cannot be used.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf lobes tip.json --cutting cut.toml --speeds 300 2400 200 --max-depth 0.01 --out lobes.csv
+    """
+    known, name, stored = dynamics_of(dynamics)
+    process, doubts = process_of(cutting)
+    depth = process.diameter if max_depth is None else max_depth
+    axis = _speeds(known, process) if speeds is None else speeds
+    doubts += [*check_depth(depth, process), *rigid_directions(known)]
+    mode = lowest_frequency(known.natural_frequencies) if isinstance(known, ModalModel) else None
+    doubts += check_speeds(axis, process, mode)
+    result = compute_lobes(known, process, speed_axis(*axis), depth, method, name)
+    result = replace(result, warnings=(*stored, *doubts, *result.warnings))
+    if out is not None:
+        asked = {"speeds_rpm": axis, "max_depth_m": depth, "method": method}
+        write_lobes(out, result, provenance=of_lobes(files_among(dynamics, cutting), asked))
+    if picture is not None:  # matplotlib takes as long to load as lobes take to compute
+        from millfrf.figures import lobes_figure, save_figure
+        from millfrf.reports.islands import stable_above
+
+        islands = stable_above(known, process, result, depth) if isinstance(known, ModalModel) else ()
+        save_figure(lobes_figure({result.method: result}, stable_above=islands), Path(picture))
+    warn(result.warnings)
+    tell(lambda: {"max_depth_m": depth, **lobes_answer(result)})
+    say_written([file for file in (out, picture) if file is not None], lobes_summary(result, depth))
+    if isinstance(known, ModalModel) and not manner().silent:
+        say(mode_coupling_line(known, process, depth))
+    return result
+
+
+def _speeds(known: ModalModel | Frf, process: MillingProcess) -> tuple[float, float, int]:
+    """Speeds over the lobes of the modes that move the tip; lowest and highest in rpm."""
+    if isinstance(known, Frf):
+        raise InputError("lobes of an FRF need spindle speeds in rpm, for example --speeds 300 2400 100")
+    if not len(known.poles):
+        raise InputError("the model has no mode: give speeds in rpm, for example --speeds 300 2400 100")
+    size = np.abs(known.right).max(axis=1) * np.abs(known.left).max(axis=1) / np.abs(known.poles.real)
+    chosen = known.natural_frequencies[size >= SMALL * size.max()]
+    return 60 * float(chosen.min()) / (3 * process.teeth), 1.2 * 60 * float(chosen.max()) / process.teeth, SPEEDS
 
 
 def speed_axis(lowest: float, highest: float, count: int) -> NDArray[np.float64]:
@@ -77,7 +179,6 @@ def compute_lobes(
     spindle_speeds: NDArray[np.float64],
     max_depth: float,
     method: str = CERTIFIED,
-    progress: Progress = silent,
     name: str = "the structure",
 ) -> StabilityLobes:
     """Depth limit at each spindle speed (rad/s), up to ``max_depth`` (m), certified unless a solver is named.
@@ -87,10 +188,8 @@ def compute_lobes(
     Raises
     ------
     InputError
-        An unknown method, or dynamics that are not a receptance at the tool tip or that :mod:`millfrf.gate` refuses.
+        Dynamics that are not a receptance at the tool tip or that :mod:`millfrf.gate` refuses.
     """
-    if method not in LOBE_METHODS:
-        raise InputError(f"unknown method {method!r}; use one of {', '.join(LOBE_METHODS)}")
     if not (np.isfinite(max_depth) and max_depth > 0):
         raise InputError(f"largest depth {max_depth!r} m must be positive, for example 0.005 (5 mm)")
     known = to_receptance(dynamics) if isinstance(dynamics, Frf) else dynamics
@@ -156,23 +255,3 @@ def _coupling(found: ModeCouplingLimit) -> str:
     if found.kind == "fold":
         return f"from {1e3 * found.depth:.3g} mm the cutting force exceeds the structure's stiffness; {beside}"
     return f"from {1e3 * found.depth:.3g} mm at {found.frequency:.4g} Hz; {beside}"
-
-
-def draw_lobes_of(dynamics: Path, cutting: Path, lobes: StabilityLobes, max_depth: float, picture: Path) -> None:
-    """Lobes as a picture file, with what is stable above islands where the dynamics are a modal model.
-
-    Parameters
-    ----------
-    dynamics, cutting
-        Files that the lobes were made from.
-    lobes
-        Lowest limit at each speed, with its status.
-    max_depth : m
-        Largest depth that was looked at.
-    picture
-        ``.png``, ``.pdf`` or ``.svg``.
-    """
-    islands: tuple[StableAbove, ...] = ()
-    if kind_of(dynamics) == MODEL:
-        islands = stable_above(read_modal_model(dynamics), read_checked_cutting(cutting)[0], lobes, max_depth)
-    save_figure(lobes_figure({lobes.method: lobes}, stable_above=islands), picture)

@@ -5,25 +5,24 @@ from typing import Any
 
 from acquisition import Recording
 from estimation import read_frf, read_geometry
-from millfrf.core.file_kinds import CHATTER, CUTTING, DIAGNOSIS, FRF, GEOMETRY, LOBES, MODEL, POLES, RECORDING, kind_of
+from millfrf.core.steps import File
+from millfrf.core.terminal import warn
 from millfrf.cutting import read_cutting_process
-from millfrf.gate import stored_doubts
+from millfrf.gate import FileKind, kind_of, stored_doubts
 from millfrf.mismatch import read_diagnosis
 from millfrf.stability import read_cuts, read_lobes
 from modal_fit import read_modal_model, read_picked_poles
 
-from .given import File, warn_of
-
 READERS: Mapping[str, Callable[[File], Any]] = {
-    RECORDING: Recording,
-    FRF: read_frf,
-    MODEL: read_modal_model,
-    LOBES: read_lobes,
-    CUTTING: read_cutting_process,
-    GEOMETRY: read_geometry,
-    CHATTER: read_cuts,
-    POLES: read_picked_poles,
-    DIAGNOSIS: read_diagnosis,
+    FileKind.RECORDING: Recording,
+    FileKind.FRF: read_frf,
+    FileKind.MODEL: read_modal_model,
+    FileKind.LOBES: read_lobes,
+    FileKind.CUTTING: read_cutting_process,
+    FileKind.GEOMETRY: read_geometry,
+    FileKind.CHATTER: read_cuts,
+    FileKind.POLES: read_picked_poles,
+    FileKind.DIAGNOSIS: read_diagnosis,
 }
 """What reads each kind of file."""
 
@@ -52,6 +51,6 @@ def open(path: File) -> Any:
     """
     kind = kind_of(path)
     found = READERS[kind](path)
-    if kind in (FRF, MODEL):
-        warn_of(stored_doubts(path))
+    if kind in (FileKind.FRF, FileKind.MODEL):
+        warn(stored_doubts(path), 3)
     return found

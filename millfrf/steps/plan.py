@@ -10,8 +10,11 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from estimation import SweepDemand, SweepPlan, plan_sweeps
 from millfrf.core import FileFormatError, mistake_in_words
-from millfrf.core.terminal import Table
+from millfrf.core.steps import File, Reads, step
+from millfrf.core.terminal import Table, show, tell, warn
 from millfrf.gate import check_demand, check_duration, read_checked_cutting
+
+from .answers import plan_answer
 
 RPM = math.pi / 30
 
@@ -43,6 +46,39 @@ class PlanTable(BaseModel):
     acceleration_noise: Annotated[float, Field(description="m/s^2/sqrt(Hz)")]
     frf_error_m_per_n: float
     immersion_widths_deg: tuple[float, ...] = (30.0, 45.0, 60.0)
+
+
+@step
+def plan(session: Annotated[File, Reads("SESSION.toml")], /) -> SweepPlan:
+    """Propose three speed sweeps whose forces are independent, long enough for the FRF error that is wanted.
+
+    Parameters
+    ----------
+    session
+        TOML file with the tables [cutting] and [plan].
+
+    Returns
+    -------
+    SweepPlan
+        Speeds, immersions and durations, and the errors that they give.
+
+    Raises
+    ------
+    InputError
+        No such file, values out of range, or a demand that cannot be met.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf plan cut.toml
+    """
+    found, doubts = plan_from_file(session)
+    warn(doubts)
+    tell(lambda: plan_answer(found))
+    for table in plan_tables(found):
+        show(table)
+    return found
 
 
 def plan_from_file(path: str | os.PathLike[str]) -> tuple[SweepPlan, list[str]]:

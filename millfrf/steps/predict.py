@@ -1,18 +1,86 @@
 """Step ``predict``: responses that a model gives for recorded forces."""
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Recording, RecordingWriter, StreamDescription
+from acquisition import RecordingFile, RecordingWriter, StreamDescription, opened, path_of
 from millfrf.core import Result, Summary, doubts_line, listed, writing_whole_file
 from millfrf.core.provenance import made, with_warnings
+from millfrf.core.steps import File, Reads, Writes, step
+from millfrf.core.terminal import say, say_written, tell, warn
 from millfrf.gate import check_model_and_recordings, check_scales
-from millfrf.mismatch import Prediction, predict, read_recording, require_room_for_comparison
-from modal_fit import ModalModel
+from millfrf.mismatch import Prediction, read_recording, require_room_for_comparison
+from millfrf.mismatch import predict as predict_responses
+
+from .given import ModelGiven, files_among, model_of
+
+
+@step
+def predict(
+    model: ModelGiven,
+    recording: Annotated[RecordingFile, Reads("REC.h5")],
+    /,
+    *,
+    out: Annotated[File | None, Writes(suffixes=(".h5",), needed=True)] = None,
+    stream: str | None = None,
+) -> "Predicted":
+    """Simulate a recording's forces through a model and compare with the measured responses.
+
+    Parameters
+    ----------
+    model
+        Modal model with or without terms of physics.
+    recording
+        Recording whose forces are used.
+    out
+        Recording of the predicted responses to write.
+    stream
+        Sample clock; needed where a recording has several.
+
+    Returns
+    -------
+    Predicted
+        Predicted and measured responses, their errors and the warnings.
+
+    Raises
+    ------
+    InputError
+        A model and a recording that cannot be compared.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf predict tip.json rec1.h5 --out predicted.h5
+    """
+    known, _, _ = model_of(model)
+    named = model if isinstance(model, str | os.PathLike) else "the model"
+    with opened(recording) as source:
+        require_room_for_comparison([source], known, stream=stream)
+        doubts = check_model_and_recordings(named, known, [source], stream)
+        recorded = read_recording(source, known, stream=stream)
+        prediction = predict_responses(known, recorded)
+        clock = source.stream(stream)
+        start_time, clock_name, setup = clock.start_time, clock.name, source.setup
+    names = tuple(channel.name for channel in recorded.responses)
+    kept = slice(prediction.run_in, None)
+    doubts += check_scales(names, recorded.response[kept], prediction.response[kept])
+    description = StreamDescription(clock_name, recorded.rate, start_time + recorded.start, recorded.responses)
+    result = Predicted(prediction, recorded.response, description, setup, tuple(doubts))
+    if out is not None:
+        write_prediction(out, result, files_among(model, path_of(recording)))
+    warn(result.warnings)
+    tell(lambda: _errors(result))
+    for line in prediction_lines(result):
+        say(line)
+    say_written([out])
+    return result
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,50 +128,10 @@ class Predicted(Result):
         )
 
 
-def predict_recording(
-    model: ModalModel,
-    recording_path: str | os.PathLike[str],
-    *,
-    stream: str | None = None,
-    model_file: str | os.PathLike[str] = "the model",
-) -> Predicted:
-    """Simulate the forces of a recording through a model.
-
-    Parameters
-    ----------
-    model
-        Modal model with or without terms of physics.
-    recording_path
-        Recording whose forces are used.
-    stream
-        Name of the sample clock; None: the only one.
-    model_file
-        File of the model, whose stored doubts count, and its name in messages.
-
-    Raises
-    ------
-    InputError
-        A model and a recording that cannot be compared.
-    """
-    require_room_for_comparison([recording_path], model, stream=stream)
-    doubts = check_model_and_recordings(model_file, model, [recording_path], stream)
-    recorded = read_recording(recording_path, model, stream=stream)
-    result = predict(model, recorded)
-    with Recording(recording_path) as recording:
-        source = recording.stream(stream)
-        start_time, clock, setup = source.start_time, source.name, recording.setup
-    names = tuple(channel.name for channel in recorded.responses)
-    kept = slice(result.run_in, None)
-    doubts += check_scales(names, recorded.response[kept], result.response[kept])
-    description = StreamDescription(clock, recorded.rate, start_time + recorded.start, recorded.responses)
-    return Predicted(result, recorded.response, description, setup, tuple(doubts))
-
-
 def write_prediction(
     out: str | os.PathLike[str],
     predicted: Predicted,
-    model_path: str | os.PathLike[str],
-    recording_path: str | os.PathLike[str],
+    inputs: Sequence[Path],
 ) -> None:
     """Write predicted responses as a recording, with the doubts in its set-up.
 
@@ -113,12 +141,13 @@ def write_prediction(
         Recording to write.
     predicted
         Responses that a model gave.
-    model_path, recording_path
-        Files that it was made from, for the title.
+    inputs
+        Files of the model and of the recording, for the title.
     """
-    title = f"responses predicted for {Path(recording_path).name} by {Path(model_path).name}"
+    by = f" by {inputs[0].name}" if len(inputs) > 1 else ""
+    title = f"responses predicted for {inputs[-1].name}{by}"
     setup = with_warnings(predicted.setup, predicted.warnings)
-    origin = made("predict", [model_path, recording_path])
+    origin = made("predict", inputs)
     with (
         writing_whole_file(out) as temporary,
         RecordingWriter(
@@ -140,3 +169,15 @@ def prediction_lines(predicted: Predicted) -> list[str]:
         f"all responses: {100 * found.total_error:.3g} % ({low:.3g} to {high:.3g} Hz, after "
         f"{predicted.run_in:.3g} s of run-in)",
     ]
+
+
+def _errors(found: Predicted) -> dict[str, object]:
+    """How far each response is off, for a script."""
+    prediction = found.prediction
+    names = [channel.name for channel in found.description.channels]
+    return {
+        "error_share": prediction.total_error,
+        "error_shares": dict(zip(names, prediction.error, strict=True)),
+        "band_hz": prediction.band,
+        "run_in_s": found.run_in,
+    }

@@ -25,6 +25,9 @@ RPM = math.pi / 30
 SPEED_EVENTS = "spindle_speed_rpm"
 _ENGAGEMENT = ("start_angle_deg", "exit_angle_deg", "immersion", "radial_depth_m")
 
+SWEEP_RPM, SWEEP_SECONDS, SWEEP_DEPTH = (450.0, 690.0), 60.0, 2e-3
+"""Sweep of the demonstration: first and last spindle speed (rpm), duration (s), axial depth (m)."""
+
 
 def simulated_device(session: Session, path: str | os.PathLike[str]) -> Source:
     """Set the simulated cell up as a session describes it, in real time or faster.
@@ -44,7 +47,6 @@ def simulated_device(session: Session, path: str | os.PathLike[str]) -> Source:
     InputError
         A cutter, an immersion or a speed that cannot be milled with.
     """
-    from .demo import SWEEP_DEPTH
 
     device = session.device
     assert isinstance(device, SimulatedDevice)
@@ -69,7 +71,6 @@ def simulated_device(session: Session, path: str | os.PathLike[str]) -> Source:
 
 def _profile(session: Session, device: SimulatedDevice, path: str | os.PathLike[str]) -> SpeedProfile:
     """A steady speed where one is given; else the sweep that is given, that is planned, or of the demonstration."""
-    from .demo import SWEEP_RPM, SWEEP_SECONDS
 
     if device.spindle_speed_rpm is not None:
         return ConstantSpeed(device.spindle_speed_rpm * RPM)

@@ -4,11 +4,13 @@ import json
 import os
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from annotated_types import Ge, Gt
 
-from acquisition import Stream
+from acquisition import path_of
 from estimation import (
     Decay,
     FoundTaps,
@@ -19,7 +21,6 @@ from estimation import (
     TapTest,
     answer_decay,
     choose_segments,
-    find_taps,
     found_taps,
     merge_taps,
     placed,
@@ -29,24 +30,129 @@ from estimation import (
     window_for,
     write_frf,
 )
-from millfrf.core import Band, InputError, Result, Summary, counted, doubts_line
-from millfrf.core.progress import Progress, silent
+from millfrf.core import InputError, Result, Summary, counted, doubts_line
+from millfrf.core.progress import progress
 from millfrf.core.provenance import sources, versions
-from millfrf.core.terminal import Table
+from millfrf.core.steps import Band, File, Names, Reads, Typed, Writes, names_of, step
+from millfrf.core.terminal import Table, say_written, show, tell, warn
 from millfrf.gate import (
-    IMPULSIVE,
-    LONGEST,
-    ChannelLevel,
     check_tap_recordings,
     check_taps_found,
     check_taps_used,
     doubts_of_taps,
 )
 
-from .tap_points import TapOptions, tests_of
+from .answers import frf_answer, size_of
+from .given import RecordingGiven
+from .tap_points import AUTO, TapOptions, tests_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+
+@step
+def tap(
+    *recordings: RecordingGiven,
+    out: Annotated[File | None, Writes(suffixes=(".h5", ".hdf5"), needed=True)] = None,
+    points: Annotated[File | None, Reads("TABLE")] = None,
+    point: Annotated[str, Typed("NODE:DIRECTION")] = "",
+    segment: Annotated[float, Gt(0)] | None = None,
+    pre_trigger: Annotated[float, Ge(0)] | None = None,
+    force_window: str = AUTO,
+    exponential: str = AUTO,
+    excitations: Names = (),
+    responses: Names = (),
+    band: Band | None = None,
+    stream: str | None = None,
+) -> "TapResult":
+    """FRF matrix of hammer tests, roving hammer or roving sensor, with the coherence of each entry.
+
+    Taps are detected; double hits, overloads and taps without room for a segment are left out and listed. Files that
+    hit one point are averaged; files that hit or measure different points become columns and rows of one matrix. The
+    point that was hit is taken from --points, --point, the recording's set-up, or the force channel.
+
+    Parameters
+    ----------
+    recordings
+        Recordings of hammer tests.
+    out
+        FRF file to write.
+    points
+        CSV or TOML table: point hit, and where sensors stood, in each file.
+    point
+        Point hit in all recordings, such as TCP:+X; without it as the files say.
+    segment : s
+        Duration of a segment; without it the time between taps.
+    pre_trigger : s
+        Time before a tap's peak; without it twice the longest contact.
+    force_window : s
+        Time after the peak at which the force is cut off, or auto, or none.
+    exponential : s
+        Time constant of the exponential window, or auto (where responses have not died out), or none.
+    excitations
+        Channels of the hammer; without it forces.
+    responses
+        Channels that respond; without it accelerations, velocities and displacements.
+    band : Hz
+        Lowest and highest frequency to keep; without it all lines that are driven.
+    stream
+        Sample clock; needed where a recording has several.
+
+    Returns
+    -------
+    TapResult
+        The FRF, the taps with the reason why one was left out, and the warnings.
+
+    Raises
+    ------
+    InputError
+        A recording or an option that cannot be used; recordings without a usable tap, or of different rates; entries
+        of the matrix that no tap gives.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf tap hit1.h5 hit2.h5 --out taps.h5
+    """
+    table = None if points is None else Path(points)
+    channels = names_of(excitations), names_of(responses)
+    options = TapOptions(segment, pre_trigger, force_window, exponential, point, table, *channels, band, stream)
+    if not recordings:
+        raise InputError("no recording given; name at least one")
+    paths = [path_of(recording) for recording in recordings]
+    tests = tests_of(paths, options)
+    for test in tests:
+        require_room_for_taps(test)
+    doubts = check_tap_recordings(paths, tests)
+    found = _found(tests)
+    settings = choose_segments(
+        found, segment=segment, pre_trigger=pre_trigger, force_window=options.force_window_seconds
+    )
+    found = _screened(found, settings)
+    with progress("how long the answers ring"):
+        decay = answer_decay(found, settings)
+    asked = options.time_constant
+    settings = replace(settings, time_constant=window_for(decay.left, settings) if asked is None else asked or None)
+    merged = merge_taps(_sums(found, settings, band), settings.time_constant)
+    doubts += doubts_of_taps(merged, found, settings, decay)
+    result = TapResult(merged, tuple(found), settings, decay, tuple(dict.fromkeys(doubts)), options)
+    if out is not None:
+        write_taps(out, result, paths)
+    tell(lambda: {**frf_answer(result.frf), "segment_s": settings.duration})
+    for summary in tap_tables(result):
+        show(summary)
+    warn(result.warnings)
+    say_written([out], _in_words(result))
+    return result
+
+
+def _in_words(result: "TapResult") -> str:
+    """FRF, band, segments and window of hammer tests in one line."""
+    frf, tau = result.frf, result.settings.time_constant
+    window = "" if tau is None else f"; exponential window of {tau:.4g} s, whose damping the fit takes off"
+    known = "no common band" if frf.band is None else f"band {frf.band[0]:.4g} to {frf.band[1]:.4g} Hz"
+    return f"{size_of(frf)}, {known}, segments of {result.settings.duration:.4g} s{window}"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,41 +206,7 @@ class TapResult(Result):
         )
 
 
-def tap_recordings(
-    paths: Sequence[str | os.PathLike[str]], options: TapOptions, progress: Progress = silent
-) -> TapResult:
-    """FRF of the taps in one or many recordings.
-
-    Raises
-    ------
-    InputError
-        A file or option that cannot be used; recordings without a usable tap, or of different rates; entries of the
-        matrix that no tap gives.
-    """
-    if not paths:
-        raise InputError("no recording given; name at least one")
-    tests = tests_of(paths, options)
-    for test in tests:
-        require_room_for_taps(test)
-    doubts = check_tap_recordings(paths, tests, progress)
-    found = _found(tests, progress)
-    settings = choose_segments(
-        found,
-        segment=options.segment,
-        pre_trigger=options.pre_trigger,
-        force_window=options.force_window_seconds,
-    )
-    found = _screened(found, settings, progress)
-    with progress("how long the answers ring"):
-        decay = answer_decay(found, settings)
-    asked = options.time_constant
-    settings = replace(settings, time_constant=window_for(decay.left, settings) if asked is None else asked or None)
-    merged = merge_taps(_sums(found, settings, options.band, progress), settings.time_constant)
-    doubts += doubts_of_taps(merged, found, settings, decay)
-    return TapResult(merged, tuple(found), settings, decay, tuple(dict.fromkeys(doubts)), options)
-
-
-def _found(tests: Sequence[TapTest], progress: Progress) -> list[FoundTaps]:
+def _found(tests: Sequence[TapTest]) -> list[FoundTaps]:
     found = []
     with progress("finding taps", len(tests)) as update:
         for number, test in enumerate(tests):
@@ -144,7 +216,7 @@ def _found(tests: Sequence[TapTest], progress: Progress) -> list[FoundTaps]:
     return found
 
 
-def _screened(found: Sequence[FoundTaps], settings: TapSettings, progress: Progress) -> list[FoundTaps]:
+def _screened(found: Sequence[FoundTaps], settings: TapSettings) -> list[FoundTaps]:
     judged = []
     with progress("judging taps", len(found)) as update:
         for number, each in enumerate(found):
@@ -154,7 +226,7 @@ def _screened(found: Sequence[FoundTaps], settings: TapSettings, progress: Progr
     return judged
 
 
-def _sums(found: Sequence[FoundTaps], settings: TapSettings, band: Band | None, progress: Progress) -> list[TapSums]:
+def _sums(found: Sequence[FoundTaps], settings: TapSettings, band: Band | None) -> list[TapSums]:
     places = {each.test.excitations[one.tap.channel].degree_of_freedom for each in found for one in each.used}
     sums = []
     with progress("spectra of the taps", len(found)) as update:
@@ -264,24 +336,3 @@ def _points(result: TapResult) -> Table:
     note = f" (the first {MOST_LISTED} of {len(frf.excitations)})" if len(frf.excitations) > MOST_LISTED else ""
     columns = ("hit at", "averages", "force within 20 dB (Hz)", "median coherence there")
     return Table(f"Points hit{note}", columns, tuple(rows))
-
-
-def tap_concerns(stream: Stream, levels: Sequence[ChannelLevel]) -> list[str]:
-    """One sentence for each force channel with double hits."""
-    found = []
-    for level in levels:
-        if level.channel.quantity != "force" or stream.duration > LONGEST or level.n_missing:
-            continue
-        if level.deviation == 0 or level.peak < IMPULSIVE * level.deviation:
-            continue
-        force = np.concatenate([block[:, 0] for block in stream.blocks(channels=[level.channel.name])])
-        taps = find_taps(force, stream.sample_rate)
-        double = [tap for tap in taps if tap.second_hit is not None]
-        if double:
-            times = ", ".join(f"{stream.start_time + tap.time:.3f} s" for tap in double[:5])
-            found.append(
-                f"{level.channel.name}: {len(double)} of {len(taps)} taps hit twice (at {times}; the first after "
-                f"{1e3 * (double[0].second_hit or 0):.1f} ms with {100 * double[0].second_share:.0f} %); "
-                "'millfrf tap' leaves them out"
-            )
-    return found

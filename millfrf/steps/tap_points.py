@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from acquisition import Channel, Recording
+from acquisition import Channel, opened
 from estimation import TapTest, choose_channels
 from millfrf.core import Band, DegreeOfFreedom, FileFormatError, InputError, mistake_in_words
 
@@ -20,45 +20,18 @@ AUTO, NONE = "auto", "none"
 
 @dataclass(frozen=True)
 class TapOptions:
-    """How recordings of hammer tests are turned into an FRF.
+    """Options of :func:`millfrf.steps.tap.tap`, which describes them; names of channels as tuples."""
 
-    Parameters
-    ----------
-    segment
-        Duration of a segment, s; None: the time between the taps.
-    pre_trigger
-        Time before a tap's peak, s; None: twice the longest contact.
-    force_window
-        ``auto`` (twice the longest contact after the peak), ``none``, or the time after the peak in s.
-    exponential
-        ``auto`` (where an answer has not died out), ``none``, or the time constant in s.
-    point
-        Point hit in all recordings, ``node:direction``; empty: as the files say.
-    points
-        Table that says which point was hit in which file; None: as the files say.
-    excitations, responses
-        Channel names; empty: chosen by quantity.
-    band
-        Lines to keep, Hz; None: all that are driven.
-    stream
-        Sample clock; None: the only one.
-
-    Raises
-    ------
-    InputError
-        A point and a table of points at once, or a window that is none of those.
-    """
-
-    segment: float | None = None
-    pre_trigger: float | None = None
-    force_window: str = AUTO
-    exponential: str = AUTO
-    point: str = ""
-    points: Path | None = None
-    excitations: tuple[str, ...] = ()
-    responses: tuple[str, ...] = ()
-    band: Band | None = None
-    stream: str | None = None
+    segment: float | None
+    pre_trigger: float | None
+    force_window: str
+    exponential: str
+    point: str
+    points: Path | None
+    excitations: tuple[str, ...]
+    responses: tuple[str, ...]
+    band: Band | None
+    stream: str | None
 
     def __post_init__(self) -> None:
         if self.point and self.points is not None:
@@ -229,7 +202,7 @@ def tests_of(paths: Sequence[str | os.PathLike[str]], options: TapOptions) -> li
 
 
 def _tests(path: Path, table: PointsTable | None, options: TapOptions) -> list[TapTest]:
-    with Recording(path) as recording:
+    with opened(path) as recording:
         source = recording.stream(options.stream)
         forces = options.excitations or [channel.name for channel in source.channels if channel.quantity == "force"]
         exciting, responding = choose_channels(source, forces or None, options.responses or None)

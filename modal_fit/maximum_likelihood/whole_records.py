@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from estimation import DERIVATIVE_ORDERS, BandRecording, before_high_pass, derivative_orders, high_pass_corners
 from millfrf.core import InputError
@@ -196,7 +196,7 @@ def _reweighted(
     floor = 1e-3 * expected
     for _ in range(8):
         weighted = design / scale / expected[:, None]
-        solved, _ = nnls(weighted, observed / expected)
+        solved, _ = scipy.optimize.nnls(weighted, observed / expected)
         expected = np.maximum(design @ (solved / scale), floor)
     weighted = design / scale / expected[:, None]
     variance = np.diag(np.linalg.pinv(weighted.T @ weighted))

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from estimation import FRF_ORDERS, Frf
 from millfrf.core import Band, InputError, Real, Summary, counted, doubts_line, listed
@@ -257,7 +257,7 @@ def compare_modes(first: ModalModel, second: ModalModel) -> tuple[ModePair, ...]
             "give models of the same degrees of freedom"
         )
     distance = np.abs(np.log(first.poles)[:, None] - np.log(second.poles)[None, :])
-    rows, columns = linear_sum_assignment(np.minimum(distance, 2 * _REACH))
+    rows, columns = scipy.optimize.linear_sum_assignment(np.minimum(distance, 2 * _REACH))
     right, left = modal_assurance(first.right, second.right), modal_assurance(first.left, second.left)
     errors = [_errors(model) for model in (first, second)]
     pairs = []

@@ -28,7 +28,7 @@ from replay_data import table_one_model
 OPENER = """
 import contextlib, faulthandler, io, json, os, pathlib, resource, sys
 faulthandler.enable()
-from millfrf.__main__ import run
+from millfrf.command_line import run
 
 def open_file(group, file):
     arguments = [group["command"], file]

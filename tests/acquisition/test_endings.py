@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.core import MillfrfError
-from millfrf.steps.acquire import acquire, open_session
+from millfrf.steps.acquire import open_session, record_session
 
 RunWithDaqmx = Callable[..., subprocess.CompletedProcess[str]]
 SESSION = """
@@ -31,7 +31,7 @@ units_per_volt = 100
 """
 ENDINGS = """
 import os, signal, sys, time
-from millfrf.__main__ import run
+from millfrf.command_line import run
 
 def acquire(name):
     print(name, run(["acquire", "s.toml", "--out", name + ".h5"]))
@@ -127,7 +127,7 @@ def test_a_second_writer_is_refused_and_the_first_goes_on(tmp_path: Path, capsys
         assert run(["inspect", str(out)]) == 0
         assert run(["recover", str(out)]) == 2
 
-    tally = acquire(open_session(session), out, watchers=[second])
+    tally = record_session(open_session(session), out, watchers=[second])
     assert tally.samples == {"main": 3000}
     said, complained = capsys.readouterr()
     refused, forced, unneeded = complained.splitlines()
@@ -149,7 +149,7 @@ def test_a_second_ctrl_c_ends_at_once_and_says_what_is_kept(tmp_path: Path) -> N
         signal.raise_signal(signal.SIGINT)
 
     with pytest.raises(MillfrfError, match=r"stopped at once; .*a\.h5 holds the 4\.10 s before"):
-        acquire(open_session(_replayed(tmp_path, 9000)), tmp_path / "a.h5", watchers=[impatient])
+        record_session(open_session(_replayed(tmp_path, 9000)), tmp_path / "a.h5", watchers=[impatient])
     with Recording(tmp_path / "a.h5") as recording:
         assert (recording.complete, recording.stream().n_samples) == (False, 4096)
         assert recording.ending.startswith("KeyboardInterrupt")

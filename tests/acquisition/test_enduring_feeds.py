@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from acquisition import HOST_AXIS, Block, Channel, Events, Recording, StreamDescription, WithFeeds, record
 from acquisition.errors import Disconnected
 from acquisition.sources.timing import Stamped, SteadyStamps
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.core import InputError
-from millfrf.steps.acquire import acquire, open_session
+from millfrf.steps.acquire import open_session, record_session
 
 STREAM = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))
 REPLAY = '[device]\ndriver = "replay"\nfile = "whole.h5"\nspeed = 1.0\n'
@@ -117,7 +117,7 @@ def test_acquire_and_inspect_tell_what_was_lost(tmp_path: Path, capsys: pytest.C
     (tmp_path / "s.toml").write_text(REPLAY)
     opened = open_session(tmp_path / "s.toml")
     source = WithFeeds(opened.source, [Frail([1], Disconnected("frail device is gone; x"), closed_for=1000)], retry=0.1)
-    tally = acquire(replace(opened, source=source), tmp_path / "a.h5")
+    tally = record_session(replace(opened, source=source), tmp_path / "a.h5")
     [loss] = tally.device_story().losses
     begun = loss.removeprefix("frail device: lost (is gone) at ").removesuffix(" s, not back until the end")
     assert float(begun) == pytest.approx(1.0, abs=0.2)
@@ -148,7 +148,7 @@ def test_a_session_that_is_stopped_lets_its_devices_say_their_last_words(tmp_pat
     opened = open_session(tmp_path / "s.toml")
     inner = WithFeeds(opened.source, [Talkative([], ValueError())])
     source = WithFeeds(inner, [])
-    tally = acquire(replace(opened, source=source), tmp_path / "a.h5", stop=lambda: source._source._feeds != ())
+    tally = record_session(replace(opened, source=source), tmp_path / "a.h5", stop=lambda: source._source._feeds != ())
     assert tally.device_story().notices[0].startswith("frail device: 3 packets were lost (")
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.complete

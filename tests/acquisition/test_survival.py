@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription, recover
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.core import FileFormatError, InputError
 
 STREAM = StreamDescription("main", 1000.0, 0.0, (Channel("fx", "force", "N"),))

@@ -138,7 +138,7 @@ class Rig:
 
 
 def main(drivers: Path, port: int) -> None:
-    from millfrf.__main__ import run
+    from millfrf.command_line import run
     from millfrf.steps.acquire import acquire, open_session
 
     Path("s.toml").write_text(SESSION % port)

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))  # benchmarks are n
 from benchmarks.robot_update_trial.cases import KINDS, draw_case
 from benchmarks.robot_update_trial.independent_cell import cell_at, read_tables, recorded
 from benchmarks.robot_update_trial.run_trial import NOISE, RATE, ROBOT, SECONDS, run_case
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.robot_model.files.robot_files import robot_text
 
 SEED = 11

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from millfrf.core import InputError
 from millfrf.cutting import MillingProcess, engaged_share, tooth_force, wrapped_immersion
-from millfrf.cutting.tooth_force import rigid_chip_thickness, rigid_force
+from millfrf.cutting.tooth import rigid_chip_thickness, rigid_force
 
 QUARTER, HALF = math.pi / 2, math.pi
 immersions = st.floats(0, math.pi)

@@ -20,7 +20,7 @@ from millfrf.cutting import (
     read_cutting_process,
     turn_harmonics,
 )
-from millfrf.cutting.tooth_force import rigid_force
+from millfrf.cutting.tooth import rigid_force
 
 
 def _cutter(**changes: object) -> MillingProcess:

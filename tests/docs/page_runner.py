@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from millfrf.__main__ import run
+from millfrf.command_line import run
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMANDS, PROGRAMS = ("console", "sh"), ("python",)

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from tests.docs.page_runner import COMMANDS, PROGRAMS, ROOT, run_page, steps
 
 DOCS = ROOT / "docs"

@@ -1,17 +1,18 @@
 """The pages of the reference hold every option of every command and every key of every file."""
 
 import importlib
-import re
+import inspect
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
 
-from millfrf.__main__ import app
+from millfrf.command_line import flags_of
+from millfrf.commands import STEPS, function_of
 from millfrf.core.described_tables import TomlFile, schemas_in
+from millfrf.core.steps import describe
 from millfrf.new.toml_files import toml_files
 
 EXTENSIONS = Path(__file__).resolve().parents[2] / "docs" / "extensions"
@@ -25,26 +26,12 @@ def pages() -> Iterator[Any]:
     sys.path.remove(str(EXTENSIONS))
 
 
-def _parsed(group: Any, before: str = "") -> Iterator[tuple[str, Any]]:
-    """Commands as the parser knows them, which the pages do not ask."""
-    for name, command in group.commands.items():
-        words = f"{before} {name}".strip()
-        if hasattr(command, "commands"):
-            yield from _parsed(command, words)
-        else:
-            yield words, command
-
-
-def test_every_option_of_every_command_stands_on_its_page(pages: Any) -> None:
-    commands, _ = pages
-    written = {command.words: commands.command_page(command) for command in commands.commands()}
-    parsed = dict(_parsed(typer.main.get_command(app)))
-    assert set(written) == set(parsed)
-    for words, command in parsed.items():
-        typed = [option for one in command.params if one.name != "help" for option in one.opts if option[0] == "-"]
-        shown = {name for cell in re.findall(r"^\| `(.*?)`", written[words], re.MULTILINE) for name in cell.split(", ")}
-        missing = [option for option in typed if option not in shown]
-        assert not missing, f"{words}: {missing}"
+@pytest.mark.parametrize("words", STEPS)
+def test_every_option_of_a_command_stands_on_its_page(words: str, pages: Any) -> None:
+    page = pages[0].command_page(words)
+    typed = [option.typed for option in describe(inspect.unwrap(function_of(words))).options if option.public]
+    assert not [name for name in typed if f"| `{name}" not in page.replace("\\|", "|")]
+    assert all(f"| `--{flag}` |" in page for flag in flags_of(words))
 
 
 @pytest.mark.parametrize("file", toml_files(), ids=lambda file: file.name)
@@ -56,9 +43,5 @@ def test_every_key_of_every_file_stands_on_its_page(file: TomlFile, pages: Any) 
 
 
 def test_needed_options_are_marked_and_defaults_told(pages: Any) -> None:
-    commands, _ = pages
-    fit = next(command for command in commands.commands() if command.words == "fit")
-    page = commands.command_page(fit)
-    assert "| `--band` | `LO HI` | **needed** |" in page
-    session = next(command for command in commands.commands() if command.words == "new session")
-    assert "| `--driver` | `ni \\| replay \\| simulated` | `ni` |" in commands.command_page(session)
+    assert "| `--out` | `FILE` | **needed** |" in pages[0].command_page("fit")
+    assert "| `--segment` | `NUMBER` | `8.0` | Duration of a segment. [s] |" in pages[0].command_page("estimate")

@@ -9,7 +9,7 @@ import pytest
 
 from acquisition import Recording
 from estimation import read_frf
-from millfrf.new.mapping_file import mapping_for
+from millfrf.new.mapping_file import new_mapping
 from millfrf.stability import read_lobes
 from modal_fit import read_modal_model
 from tests.docs.page_runner import ROOT, run_page
@@ -85,7 +85,7 @@ def test_the_mappings_that_ship_differ_from_the_templates_by_what_the_reader_fil
     """Names, arrays and columns are those that `millfrf new mapping` proposes."""
     runpy.run_path(str(ROOT / "examples" / "lab_files.py"))["write_lab_files"](folder, 1.0)
     for source, name in (("cut_down.mat", "cuts"), ("hit_x.mat", "hits")):
-        proposed = tomllib.loads(mapping_for(folder / source).text)
+        proposed = tomllib.loads(new_mapping(folder / source).text)
         filled = tomllib.loads((ROOT / "examples" / f"lab_{name}.toml").read_text(encoding="utf-8"))
         assert proposed["sample_rate"] == filled["sample_rate"]
         for given, complete in zip(proposed["channels"], filled["channels"], strict=True):

@@ -60,8 +60,10 @@ class House:
         return module in self.files and self.files[module].name == "__init__.py"
 
     def _shown(self, package: str) -> Iterator[tuple[str, str]]:
-        for node in ast.parse(self.files[package].read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.ImportFrom) and node.level:
+        stub = self.files[package].with_suffix(".pyi")
+        listed = stub if stub.exists() else self.files[package]
+        for node in ast.parse(listed.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ImportFrom) and (node.level or stub.exists()):
                 yield from ((alias.name, self._source(package, node)) for alias in node.names)
 
     def _source(self, module: str, node: ast.ImportFrom) -> str:

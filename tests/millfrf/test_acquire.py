@@ -12,7 +12,7 @@ import pytest
 
 from acquisition import Channel, Events, Recording, RecordingWriter, StreamDescription
 from acquisition.sources.source import SAMPLES_AXIS
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.steps.signal_check import preflight
 
 SIMULATED = """

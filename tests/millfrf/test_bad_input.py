@@ -12,7 +12,7 @@ import pytest
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from estimation import write_frf
-from millfrf.__main__ import BAD_INPUT, DONE, FAILED, run
+from millfrf.command_line import BAD_INPUT, DONE, FAILED, run
 from modal_fit import write_modal_model
 from replay_data import table_one_model
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from millfrf.core import InputError
-from millfrf.steps.concealment import (
+from millfrf.demonstration.concealment import (
     PADDED,
     ConcealOptions,
     concealment_table,

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from acquisition import record
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.cutting import MillingProcess, read_cutting_process, write_cutting_process
 from modal_fit import write_modal_model
 from replay_data import (

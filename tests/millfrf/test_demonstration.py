@@ -13,7 +13,7 @@ import pytest
 
 import millfrf as mf
 from estimation import read_frf
-from millfrf.steps.demo import (
+from millfrf.demonstration.whole_chain import (
     FIT_BAND,
     SUBSPACE_BAND,
     DemoOptions,
@@ -22,7 +22,7 @@ from millfrf.steps.demo import (
     nearest_modes,
     run_demo,
 )
-from millfrf.steps.diagnose import diagnose_files
+from millfrf.steps.diagnose import diagnose, diagnosis_lines
 from modal_fit import read_modal_model
 from replay_data import default_structure, table_one_model, tip_model
 
@@ -81,15 +81,15 @@ def test_its_own_model_explains_its_own_recordings(demo: DemoResult, tmp_path: P
     """The structure has modes at 83 and 127 Hz, and the sensors a high-pass: neither is missing from 13 to 60 Hz."""
     folder = demo.report.parent
     sweeps = sorted((folder / "recordings").glob("sweep_*.h5"))
-    found = diagnose_files(folder / "model_housing.json", sweeps, tmp_path / "out")
-    assert found.diagnosis.verdict == "none"
-    assert found.diagnosis.physics == ()
-    assert found.diagnosis.details.band.edges == SUBSPACE_BAND
+    found = diagnose(folder / "model_housing.json", *sweeps, out=tmp_path / "out")
+    assert found.verdict == "none"
+    assert found.physics == ()
+    assert found.details.band.edges == SUBSPACE_BAND
     # beside the noise a model may leave the error that goes with the signal: 0.2 % (decision 42)
-    error = found.diagnosis.improvement
+    error = found.improvement
     assert error.before < np.hypot(error.noise_floor, 0.002)
     assert error.before < error.refitted
-    assert any("13 to 60 Hz" in line for line in found.summary)
+    assert any("13 to 60 Hz" in line for line in diagnosis_lines(found))
     assert "13 to 60 Hz" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
 

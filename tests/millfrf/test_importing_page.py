@@ -12,7 +12,7 @@ import pyuff
 from scipy.io import savemat
 
 from estimation import read_frf, read_geometry
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from modal_fit import ModalModel, read_modal_model
 
 PAGE = (Path(__file__).parents[2] / "docs" / "importing.md").read_text(encoding="utf-8")

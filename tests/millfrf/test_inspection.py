@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from acquisition import Channel, RecordingWriter, StreamDescription
-from millfrf.__main__ import run
+from millfrf.command_line import run
 
 RATE = 5120.0
 CHANNELS = (

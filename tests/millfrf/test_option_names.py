@@ -1,96 +1,70 @@
-"""One name for one option everywhere: the table of all options, compared with what the parser knows."""
+"""One name for one option in all commands: it takes the same, in the same unit."""
 
+import inspect
 import re
-import tomllib
-from pathlib import Path
-from typing import Any
 
 import pytest
-import typer
 
-from millfrf.__main__ import app, run
-from millfrf.usage import FORMER_NAMES, WRITING, commands_in, with_examples
-
-TABLE: dict[str, list[str]] = tomllib.loads(Path(__file__).with_name("option_table.toml").read_text(encoding="utf-8"))[
-    "options"
-]
-COMMANDS = dict(commands_in(with_examples(typer.main.get_command(app))))
-OPTIONS = [
-    (words, name, option)
-    for words, command in COMMANDS.items()
-    for option in command.params
-    for name in option.opts
-    if name.startswith("-") and option.name != "help"
-]
+from millfrf.command_line import COMMON, flags_of, run
+from millfrf.commands import FORMER_NAMES, STEPS, function_of
+from millfrf.core.steps import Option, Writes, describe
 
 
-def _takes(option: Any) -> str:
+def _named(words: str) -> list[Option]:
+    options = describe(inspect.unwrap(function_of(words))).options
+    return [option for option in options if option.public and not option.positional]
+
+
+OPTIONS = [(words, option.typed, option) for words in STEPS for option in _named(words)]
+
+
+def _takes(option: Option) -> str:
     """What an option takes, without the name of a file."""
-    if option.is_flag:
+    shown = option.marker.metavar
+    if option.count == 0:
         return "nothing"
-    shown = option.metavar or "one of a list"
+    if option.choices:
+        return "one of a list"
     if shown.startswith("DIR|"):
         return "FILE|DIR"
-    return "FILE" if re.fullmatch(r"FILE|[A-Z]+\.\w+", shown) else str(shown)
-
-
-def test_the_table_holds_every_option_and_no_other() -> None:
-    assert {name for _, name, _ in OPTIONS} == set(TABLE)
-
-
-def test_no_two_names_have_one_meaning() -> None:
-    meanings = [meaning for meaning, _, _ in TABLE.values()]
-    assert [one for one in meanings if meanings.count(one) > 1] == []
+    return "FILE" if re.fullmatch(r"FILE|[A-Z]+\.\w+", shown) else shown
 
 
 def test_a_name_takes_the_same_in_every_command() -> None:
-    clashes = [
-        f"{words} {name} takes {_takes(option)}, not {TABLE[name][1]}"
-        for words, name, option in OPTIONS
-        if _takes(option) not in TABLE[name][1].split("|") and _takes(option) != TABLE[name][1]
-    ]
-    assert clashes == []
+    uses: dict[str, set[tuple[str, str]]] = {}
+    for _, name, option in OPTIONS:
+        uses.setdefault(name, set()).add((_takes(option), option.unit))
+    del uses["--out"]  # a file or a folder, by the command
+    assert {name: use for name, use in uses.items() if len(use) > 1} == {}
 
 
-SAID = {
-    "m": r"\bm\b|metres|\bM\b",
-    "mm": r"\bMM\b",
-    "um": r"\bUM\b",
-    "deg": r"\bDEG\b|degrees",
-    "degrees": "degrees|DEG",
-    "s": r"\bs\b",
-    "Hz": r"\bHz\b",
-    "rpm": r"\brpm\b|\bRPM\b",
-    "kg": r"\bKG\b",
-    "%": "PERCENT",
-    "N": r"\bN\b",
-}
-"""How the unit is told in what an option takes or in its help."""
+def test_no_option_has_the_name_of_a_common_flag() -> None:
+    assert {name for _, name, _ in OPTIONS} & {f"--{flag}" for flag in COMMON} == set()
+    assert {flag for words in STEPS for flag in flags_of(words)} == set(COMMON)
 
 
-def test_help_tells_the_unit_of_every_option_that_has_one() -> None:
-    silent = []
-    for words, name, option in OPTIONS:
-        unit = TABLE[name][2]
-        said = f"{option.metavar} {option.help}"
-        if unit and not re.search(SAID.get(unit, re.escape(unit)), said):
-            silent.append(f"{words} {name}: no {unit} in '{said}'")
-    assert silent == []
+def test_names_that_state_a_unit_have_it() -> None:
+    """What is typed in another unit than the SI's says so in the unit of its docstring, which help and tables show."""
+    angles = [option.unit for _, name, option in OPTIONS if re.search(r"turns|angle|joint-step|limit-margin", name)]
+    assert angles
+    assert set(angles) == {"deg"}
 
 
 def test_types_are_told_in_plain_words() -> None:
     shown = {_takes(option) for _, _, option in OPTIONS}
-    assert [one for one in shown if re.search(r"<|\bPath\b|\bfloat\b|\bstr\b|INTEGER|FLOAT|\blist\b\[", one)] == []
+    assert [word for word in shown if re.search(r"<|\bPath\b|\bfloat\b|\bstr\b|INTEGER|FLOAT|\blist\b\[", word)] == []
 
 
 def test_options_that_write_are_known_to_the_guard() -> None:
-    writes = {name for name, (meaning, _, _) in TABLE.items() if re.search(r"to write|^folder for|^file for", meaning)}
-    assert writes == set(WRITING)
+    writes = re.compile(r"\bto write\b|^Folder for|^File for")
+    assert {name for _, name, option in OPTIONS if writes.search(option.text)} <= {
+        name for _, name, option in OPTIONS if isinstance(option.marker, Writes)
+    }
 
 
 @pytest.mark.parametrize("words", FORMER_NAMES)
 def test_former_names_are_hidden_and_lead_to_options_of_today(words: str) -> None:
-    own = {name for one, name, _ in OPTIONS if one == words}
+    own = {name for command, name, _ in OPTIONS if command == words}
     for former, today in FORMER_NAMES[words].items():
         assert today in own
         assert former not in own

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-import typer
 
 from estimation import write_frf
-from millfrf.__main__ import app, run
-from millfrf.core import writing_whole_file
-from millfrf.core.terminal import answer, note, plain, say, speaking, tell
-from millfrf.usage import ANSWERING, commands_in, framed
+from millfrf.command_line import call, flags_of, run
+from millfrf.commands import STEPS
+from millfrf.core import MillfrfWarning, writing_whole_file
+from millfrf.core.steps import step
+from millfrf.core.terminal import aside, manner, note, plain, say, say_concern, say_written, speaking, tell, warn
 from modal_fit import ModalModel, write_modal_model
 
 CUT = """[cutting]
@@ -115,44 +115,57 @@ def test_quiet_leaves_warnings_and_the_answer(bench: Path, capsys: pytest.Captur
     assert capsys.readouterr().out == ""
 
 
-def test_every_command_can_be_quiet_and_those_of_the_list_answer_in_json() -> None:
-    commands = dict(commands_in(typer.main.get_command(app)))
-    options = {words: {name for one in command.params for name in one.opts} for words, command in commands.items()}
-    assert [words for words, names in options.items() if "--quiet" not in names] == []
-    assert {words for words, names in options.items() if "--json" in names} == set(ANSWERING)
+def test_every_command_can_be_quiet_and_answers_in_json() -> None:
+    assert all({"quiet", "json"} <= set(flags_of(words)) for words in STEPS)
 
 
 def test_lines_of_each_kind(capsys: pytest.CaptureFixture[str]) -> None:
     def speak() -> tuple[str, str]:
-        for line in ("note: a", "wrote b", "wrote c: d", "warning: e", "f"):
-            say(line)
-        answer("warning: g")
-        note("h ...")
+        say_written(["b"])
+        say_written(["c", "d"], "e")
+        warn(["f", "f"])
+        say("g")
+        say_concern("h")
+        note("i ...")
+        aside("j")
         said = capsys.readouterr()
         return said.out, said.err
 
-    assert speak() == ("note: a\nwrote b\nwrote c: d\nf\nwarning: g\nh ...\n", "warning: e\n")
+    with speaking():
+        assert speak() == ("wrote b\nwrote c and d: e\ng\nwarning: h\ni ...\n", "warning: f\nnote: j\n")
     with speaking(quiet=True):
-        assert speak() == ("c: d\nf\nwarning: g\n", "warning: e\n")
+        assert speak() == ("c and d: e\ng\nwarning: h\n", "warning: f\n")
     with speaking(as_json=True) as manner:
         out, shown = speak()
         assert out == ""
-        assert "wrote c: d" in shown
-        assert manner.warnings == ["e", "g"]
+        assert "wrote c and d: e" in shown
+        assert manner.warnings == ["f", "h"]
         tell(lambda: {"depth_m": np.float64(np.nan)})
         assert plain(manner.answers) == {"depth_m": None}
     tell(lambda: pytest.fail("made though nobody asked"))
 
 
+def test_outside_of_a_command_nothing_is_printed_and_warnings_are_python_s(capsys: pytest.CaptureFixture[str]) -> None:
+    say("a")
+    note("b")
+    aside("c")
+    say_written(["d"])
+    with pytest.warns(MillfrfWarning, match="e"):
+        warn(["e"])
+    said = capsys.readouterr()
+    assert (said.out, said.err) == ("", "")
+
+
 def test_what_ends_with_a_code_still_answers(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    @step
     def plan() -> None:
+        """Write a file, and end with a code."""
         with writing_whole_file(tmp_path / "a.txt") as temporary:
             temporary.write_text("a")
         tell(lambda: {"left": 2})
-        raise typer.Exit(1)
+        manner().exit_code = 1
 
-    with pytest.raises(typer.Exit):
-        framed("plan", plan)(as_json=True)
+    assert call("plan", plan, [], {}, json=True) == 1
     told = _document(capsys.readouterr().out)
     assert told["left"] == 2
     assert told["written"] == [str(tmp_path / "a.txt")]

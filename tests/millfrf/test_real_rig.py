@@ -8,7 +8,7 @@ import pytest
 
 from acquisition import Recording
 from estimation import read_frf
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from modal_fit import ModalModel, compare_modes, read_modal_model
 
 BAND = (500.0, 2900.0)

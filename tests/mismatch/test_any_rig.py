@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from one_mode_rig import Real, Rig, written
 
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import InputError
 from millfrf.mismatch import diagnose, library, predict, rig_of
 from millfrf.mismatch.physics.library import offered

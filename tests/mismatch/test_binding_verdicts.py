@@ -28,7 +28,7 @@ from millfrf.mismatch.residual.structured_residual import leftover
 from millfrf.mismatch.structure.answer import verdict_of_structure
 from millfrf.mismatch.structure.confirmation import helps
 from millfrf.mismatch.structure.held_out import block_powers
-from millfrf.report.diagnoses.answers import named, verdict_sentence
+from millfrf.reports.diagnoses.answers import named, verdict_sentence
 from modal_fit import ModalModel
 
 TONE = 11.37

@@ -17,7 +17,7 @@ from millfrf.mismatch import (
     predict,
     write_diagnosis,
 )
-from millfrf.report.diagnoses.answers import how_sure
+from millfrf.reports.diagnoses.answers import how_sure
 from millfrf.steps.diagnose import diagnosis_lines
 
 LEVELS = (20.0, 40.0, 60.0)

@@ -22,7 +22,7 @@ from millfrf.mismatch import (
 from millfrf.mismatch.faults.clipping_repair import repair_faults
 from millfrf.mismatch.records.held_out_parts import with_measured_noise
 from millfrf.mismatch.records.reading import in_deflections
-from millfrf.steps.fit import FitOptions, fit_recordings
+from millfrf.steps.fit import fit as fit_model
 
 pytestmark = pytest.mark.shared_data
 
@@ -111,7 +111,7 @@ def test_slip_at_the_payload_of_an_aircraft_is_told_in_part(shared_data: Path, b
     """F-16 ground vibration: bolts that slip between wing and payload; the periods repeat to 1 %, so that what is left
     is no noise. A table's mass, a gain or a resonating force cell are no answer."""
     files = [shared_data / "f16-ground-vibration" / f"level_{level}.h5" for level in (1, 3)]
-    model = fit_recordings(files[:1], FitOptions(band, "subspace")).model
+    model = fit_model(files[0], band=band).model
     found = diagnose(model, read_recordings(files, model))
     names = {cause.name for cause in found.physics}
     assert found.verdict in ("partly explained", "unexplained")

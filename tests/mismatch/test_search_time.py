@@ -5,8 +5,8 @@ from inspect import signature
 import numpy as np
 from one_mode_rig import Rig
 
-from millfrf.commands.diagnose import diagnose as command
 from millfrf.mismatch import SearchSettings, Settings, diagnose
+from millfrf.steps.diagnose import diagnose as command
 
 
 def test_a_search_without_time_tells_what_it_has() -> None:

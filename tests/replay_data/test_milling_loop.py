@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from millfrf.cutting import MillingProcess, tooth_force, tooth_offsets
-from millfrf.cutting.tooth_force import rigid_force
+from millfrf.cutting.tooth import rigid_force
 from modal_fit import ModalModel
 from replay_data import ConstantSpeed, LinearSweep, SpeedProfile, default_structure, table_one_model, tip_model
 from replay_data.material import material_named

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from estimation import read_frf
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import apart
 from millfrf.cutting import MillingProcess
 from millfrf.robot_model import modal_model_at, read_planar_robot, read_spatial_robot, rigid_model, tool_down
 from millfrf.stability import certified_lobes, multipliers, read_lobes
-from millfrf.steps.robot.lobes import at_the_tip
 from millfrf.steps.robot.maps import depth_limits, depth_over_places, depth_over_redundancy
+from millfrf.steps.robot.tip_lobes import at_the_tip
 from modal_fit import read_modal_model
 from replay_data import MillingCell
 

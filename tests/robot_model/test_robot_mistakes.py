@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from millfrf.__main__ import BAD_INPUT, run
+from millfrf.command_line import BAD_INPUT, run
 from millfrf.robot_model import read_robot
 
 FOLDER = Path(__file__).parents[2] / "millfrf" / "robot_model" / "robots"
@@ -86,28 +86,31 @@ TYPED = [
     (["stiffness", KUKA, "--tip-force", "-3"], "--tip-force -3"),
     (["stiffness", KUKA, "--payload", "nan"], "payload nan"),
     (["stiffness", KUKA, "--payload-at", "0", "0", "0.1"], "--payload KG"),
-    (["stiffness", KUKA, "--payload", "5", "--payload-at", "0", "0", "200"], "metres"),
+    (
+        ["stiffness", KUKA, "--payload", "5", "--payload-at", "0", "0", "200"],
+        "--payload-at 200 m: give a number at most 5 m",
+    ),
     (["stiffness", CHEN, "--payload", "5", "--payload-at", "0", "0", "0.2"], "planar"),
-    (["stiffness", KUKA, "--at", "1500", "0", "800"], "metres"),
-    (["stiffness", KUKA, "--at", "1.5", "0", "nan"], "metres"),
-    (["stiffness", KUKA, "--at", "1.5", "0", "0.8", "--feed", "inf"], "degrees"),
+    (["stiffness", KUKA, "--at", "1500", "0", "800"], "--at 1500 m: give a number at most 20 m"),
+    (["stiffness", KUKA, "--at", "1.5", "0", "nan"], "--at nan m: give a number"),
+    (["stiffness", KUKA, "--at", "1.5", "0", "0.8", "--feed", "inf"], "--feed inf deg: give a number at most 1080 deg"),
     (["modes", KUKA, "--joints", "0,-10,100,0,90"], "5 joint values for 6"),
     (["modes", KUKA, "--joints", "0;-10;100;0;90;0"], "list of degrees"),
     (["modes", KUKA, "--joints", "0,-10,nan,0,90,0"], "joint 3 = nan"),
     (["modes", KUKA, "--modes", "0"], "--modes 0"),
     (["modes", "kuka"], "no robot kuka"),
     (["modes", "kuka.toml"], "no robot file"),
-    (["frf", KUKA, "--out", "x.h5", "--band", "1", "inf"], "--band inf"),
-    (["frf", KUKA, "--out", "x.json", "--sensor-at", "60", "0", "250"], "metres"),
+    (["frf", KUKA, "--out", "x.h5", "--band", "1", "inf"], "--band: band 1 to inf Hz"),
+    (["frf", KUKA, "--out", "x.json", "--sensor-at", "60", "0", "250"], "--sensor-at 60 m: give a number at most 5 m"),
     (["deviation", KUKA, "--x", "1500", "2000", "5"], "metres"),
     (["deviation", KUKA, "--x", "2", "1.5", "5"], "LO <= HI"),
     (["deviation", KUKA, "--drill", "0"], "--drill 0"),
     (["deviation", KUKA, "--feed-per-rev", "nan"], "--feed-per-rev nan"),
-    (["deviation", KUKA, "--repeatability", "40"], "millimetres"),
+    (["deviation", KUKA, "--repeatability", "40"], "--repeatability 40 mm: give a number at most 5 mm"),
     (["deviation", KUKA, "--position-tolerance", "0"], "--position-tolerance 0"),
     (["deviation", KUKA, "--force-uncertainty", "500"], "500 %"),
     (["deviation", "fanuc_s420if"], "spherical wrist"),
-    (["map", KUKA, "--picture", "x.png", "--z", "800"], "metres"),
+    (["map", KUKA, "--picture", "x.png", "--z", "800"], "--z 800 m: give a number at most 20 m"),
     (["map", KUKA, "--picture", "x.png", "--x", "1", "2", "0"], "1 to 1000"),
 ]
 

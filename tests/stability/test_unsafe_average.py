@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 from drawn_cuts import RPM, TIP, growth
 
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.cutting import MillingProcess, write_cutting_process
-from millfrf.report.collection import collect
-from millfrf.report.lobes_check import checked_lobes
-from millfrf.report.recommendation import recommendation
-from millfrf.report.sections.stability import stability_findings
+from millfrf.reports.collection import collect
+from millfrf.reports.lobes_check import checked_lobes
+from millfrf.reports.recommendation import recommendation
+from millfrf.reports.sections.stability import stability_findings
 from millfrf.stability import certified_lobes, multi_frequency, read_lobes, semi_discretisation, zero_order
 from millfrf.stability.recommendation import recommended_cut
 from modal_fit import ModalModel, write_modal_model

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import false_discovery_control
-from scipy.stats import t as student
+import scipy
 
 from .regression import Labels, Problem, weighted_fit
 from .trends import PooledTrend, Series, Trend, pool, trends_over
@@ -79,7 +78,7 @@ def drifts_apart(trend: Trend, others: PooledTrend, among: int) -> bool:
         Number of drifts that are compared so.
     """
     spread = float(np.hypot(np.hypot(trend.error, others.error), others.between))
-    p_value = 2 * student.sf(abs(trend.slope - others.slope) / spread, others.poses - 1)
+    p_value = 2 * scipy.stats.t.sf(abs(trend.slope - others.slope) / spread, others.poses - 1)
     return bool(p_value <= OWN_ALARMS / among)
 
 
@@ -132,7 +131,7 @@ def find_drifts(series: Sequence[Series], labels: Labels) -> Drifts:
     trends = [one for one in trends if np.isfinite(one.error)]
     pooled = [found for group in _by_mode(trends) if (found := pool(group)) is not None]
     probabilities = np.array([one.p_value for one in trends] + [one.p_value for one in pooled])
-    adjusted = false_discovery_control(probabilities) if len(probabilities) else probabilities
+    adjusted = scipy.stats.false_discovery_control(probabilities) if len(probabilities) else probabilities
     named = adjusted <= FALSE_ALARMS
     best: dict[tuple[str, int, str], tuple[Trend, float]] = {}
     for one, value, taken in zip(trends, adjusted[: len(trends)], named[: len(trends)], strict=True):
@@ -228,6 +227,6 @@ def _smallest(trends: Sequence[Trend], count: int) -> tuple[tuple[str, str, floa
     """Smallest change that the typical pose would have shown with 80 %, were it the only one that changes."""
     groups: dict[tuple[str, str], list[float]] = {}
     for one in trends:
-        far = student.isf(FALSE_ALARMS / (2 * count), one.freedom) + student.ppf(POWER, one.freedom)
+        far = scipy.stats.t.isf(FALSE_ALARMS / (2 * count), one.freedom) + scipy.stats.t.ppf(POWER, one.freedom)
         groups.setdefault((one.series.quantity, one.label), []).append(float(far * one.error * np.ptp(one.values)))
     return tuple((quantity, label, float(np.median(found))) for (quantity, label), found in sorted(groups.items()))

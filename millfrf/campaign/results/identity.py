@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.csgraph import minimum_spanning_tree
+import scipy
 
 from millfrf.core import Real
 
@@ -47,7 +47,11 @@ def families(
     distance, scales = _distances(poses, postures)
     parent = {(p, i): (p, i) for p, modes in enumerate(poses) for i in range(len(modes))}
     doubts: dict[Node, str] = {}
-    tree = np.argwhere(minimum_spanning_tree(distance).toarray() > 0) if len(poses) > 1 else np.zeros((0, 2), int)
+    tree = (
+        np.argwhere(scipy.sparse.csgraph.minimum_spanning_tree(distance).toarray() > 0)
+        if len(poses) > 1
+        else np.zeros((0, 2), int)
+    )
     for p, q in sorted((int(a), int(b)) for a, b in tree):
         for pair in pair_modes(poses[p], poses[q], float(scales[p, q])):
             _join(parent, (p, pair.first), (q, pair.second))

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.special import betaln, logsumexp
-from scipy.stats import t as student
+import scipy
 
 from millfrf.core import Real
 
@@ -56,7 +55,7 @@ class Moderated:
         ratio
             Value over its standard error where the variance factor is one.
         """
-        parts = 2 * student.sf(abs(ratio) / np.sqrt(self.factors), self.freedoms)
+        parts = 2 * scipy.stats.t.sf(abs(ratio) / np.sqrt(self.factors), self.freedoms)
         return min(1.0, float(self.weights @ parts))
 
 
@@ -109,7 +108,7 @@ class CommonVariance:
     def _elsewhere(self) -> dict[int, Real]:
         """Logarithm of the prior of the common degrees of freedom, and of what the other groups say of them."""
         prior = -0.5 * (np.log10(FREEDOM / USUAL_FREEDOM) / DECADES) ** 2
-        said = {group: np.asarray(logsumexp(one, axis=0)) for group, one in self._sums.items()}
+        said = {group: np.asarray(scipy.special.logsumexp(one, axis=0)) for group, one in self._sums.items()}
         total = np.sum(list(said.values()), axis=0)
         return {group: prior + total - one for group, one in said.items()}
 
@@ -142,5 +141,5 @@ class CommonVariance:
         return np.asarray(
             0.5 * freedom * np.log(freedom * ratio / FREEDOM)
             - 0.5 * (freedom + FREEDOM) * np.log1p(freedom * ratio / FREEDOM)
-            - betaln(freedom / 2, FREEDOM / 2)
+            - scipy.special.betaln(freedom / 2, FREEDOM / 2)
         )

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import false_discovery_control
-from scipy.stats import t as student
+import scipy
 
 from .drift import FALSE_ALARMS, Drifts, find_drifts
 from .moderated_variances import CommonVariance
@@ -98,7 +97,7 @@ def find_outliers(series: Sequence[Series], labels: Labels, drifts: Drifts) -> O
         for k in group:
             deviations += _deviations(*made[k], shared, common, number)
             number += 1
-    adjusted = false_discovery_control([one.p_value for one in deviations]) if deviations else np.zeros(0)
+    adjusted = scipy.stats.false_discovery_control([one.p_value for one in deviations]) if deviations else np.zeros(0)
     named = [one for one, value in zip(deviations, adjusted, strict=True) if value <= FALSE_ALARMS]
     checks = {
         quantity: check_error_bars([problem for one, problem in made if one.quantity == quantity])
@@ -151,7 +150,7 @@ def _deviations(
             continue
         variance = common.moderated(number, max(fit.misfit - own, 0.0), left)
         deviation, unit = float(fit.residuals[k] / free), float(np.sqrt(spread[k] / free))
-        width = float(student.ppf(0.975, variance.freedom) * np.sqrt(variance.factor)) * unit * np.exp(deviation)
+        width = float(scipy.stats.t.ppf(0.975, variance.freedom) * np.sqrt(variance.factor)) * unit * np.exp(deviation)
         p_value = variance.p_value(deviation / unit)
         found.append(Deviation(series, series.rows[k], float(np.expm1(deviation)), width, p_value))
     return found

@@ -7,8 +7,8 @@ import numpy as np
 
 from millfrf.core.terminal import Table
 from millfrf.figures import save_figure
-from millfrf.report.section import Fold, Picture, Section, picture_of
-from millfrf.report.tables import with_error
+from millfrf.reports.section import Fold, Picture, Section, picture_of
+from millfrf.reports.tables import with_error
 
 from .drift import Drift, Drifts
 from .identity import IdentifiedModes

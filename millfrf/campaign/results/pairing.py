@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from millfrf.core import Complex, DegreeOfFreedom, Real
 
@@ -164,6 +164,6 @@ def pair_modes(first: Sequence[SeenMode], second: Sequence[SeenMode], frequency_
 def _least(distance: Real) -> tuple[float, list[tuple[int, int]]]:
     """Least total of pairs, and of ``ALONE`` for every two modes without a partner."""
     gain = np.minimum(distance, ALONE) - ALONE
-    rows, columns = linear_sum_assignment(gain)
+    rows, columns = scipy.optimize.linear_sum_assignment(gain)
     kept = [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if distance[i, j] < ALONE]
     return float(sum(gain[i, j] for i, j in kept)), kept

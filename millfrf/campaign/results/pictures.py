@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from scipy.stats import t as student
 
 from millfrf.core import InputError, Real
 from millfrf.figures import COLOURS, SHADE, house_style, new_figure, panel_letter
@@ -156,7 +156,7 @@ def _trend_panel(axes: Axes, trend: Trend, every: Sequence[Trend]) -> None:
     x, y, spread = _points(trend)
     line = np.linspace(x.min(), x.max(), 50)
     middle = 100 * np.expm1(trend.slope * (line - trend.values.mean()))
-    band = 100 * student.ppf(0.975, trend.freedom) * trend.error * np.abs(line - trend.values.mean())
+    band = 100 * scipy.stats.t.ppf(0.975, trend.freedom) * trend.error * np.abs(line - trend.values.mean())
     axes.fill_between(line, middle - band, middle + band, color=COLOURS[2], alpha=0.25, linewidth=0, zorder=2)
     axes.plot(line, middle, color=COLOURS[2], zorder=3)
     axes.errorbar(x, y, 2 * spread, fmt="o", color="black", markersize=3.5, elinewidth=0.8, capsize=2, zorder=4)

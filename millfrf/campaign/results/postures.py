@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy.stats import false_discovery_control, norm
 
 from millfrf.core.terminal import Table
 from millfrf.figures import COLOURS, house_style, new_figure, panel_letter, save_figure
-from millfrf.report.section import Section, picture_of
+from millfrf.reports.section import Section, picture_of
 from millfrf.robot_model import (
     LearnedPostures,
     LeftOutPosture,
@@ -110,15 +110,15 @@ def _contradictions(left_out: Sequence[LeftOutPosture], poses: Sequence[str]) ->
             worst[pose] = sorted(found, key=lambda one: one[0])[len(found) // 2]
     if not worst:
         return ()
-    adjusted = false_discovery_control([p_value for p_value, _ in worst.values()])
+    adjusted = scipy.stats.false_discovery_control([p_value for p_value, _ in worst.values()])
     return tuple(one for (_, one), value in zip(worst.values(), adjusted, strict=True) if value <= FALSE_ALARMS)
 
 
 def _farthest(pose: str, one: LeftOutPosture) -> tuple[float, Contradiction]:
     half = np.log(one.high[:, 0] / one.low[:, 0]) / 2
-    away = np.abs(one.errors[:, 0]) / (half / norm.isf(0.025))
+    away = np.abs(one.errors[:, 0]) / (half / scipy.stats.norm.isf(0.025))
     k = int(np.argmax(away))
-    p_value = min(1.0, 2 * len(away) * float(norm.sf(away[k])))
+    p_value = min(1.0, 2 * len(away) * float(scipy.stats.norm.sf(away[k])))
     band = float(one.low[k, 0]), float(one.high[k, 0])
     return p_value, Contradiction(pose, float(one.measured[k, 0]), *band)
 

@@ -5,9 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.stats import binomtest, chi2
 
 from millfrf.core import Real
 
@@ -254,8 +253,8 @@ def shared_scatter(problems: Sequence[Problem]) -> float:
     if not useful:
         return 0.0
     freedom = np.array([one.freedom for one in useful])
-    cut = chi2.ppf(CUT, freedom)
-    expected = float(np.sum(freedom * chi2.cdf(cut, freedom + 2) + cut * (1 - CUT)))
+    cut = scipy.stats.chi2.ppf(CUT, freedom)
+    expected = float(np.sum(freedom * scipy.stats.chi2.cdf(cut, freedom + 2) + cut * (1 - CUT)))
 
     def excess(scatter: float) -> float:
         misfits = np.array([weighted_fit(one, scatter).misfit for one in useful])
@@ -264,7 +263,7 @@ def shared_scatter(problems: Sequence[Problem]) -> float:
     if excess(0.0) <= 0:
         return 0.0
     high = max(float(np.std(one.logs)) for one in useful) * np.sqrt(max(len(one.logs) for one in useful)) + 1e-8
-    return float(brentq(excess, 0.0, 4 * high, xtol=1e-9, rtol=1e-4))
+    return float(scipy.optimize.brentq(excess, 0.0, 4 * high, xtol=1e-9, rtol=1e-4))
 
 
 @dataclass(frozen=True)
@@ -302,9 +301,9 @@ def check_error_bars(problems: Sequence[Problem]) -> ErrorBarCheck:
         return ErrorBarCheck(float("nan"), 0, 1.0)
     freedom = np.array([one.freedom for one in useful])
     misfits = np.array([weighted_fit(one, 0.0).misfit for one in useful])
-    over = misfits / chi2.ppf(0.5, freedom)
+    over = misfits / scipy.stats.chi2.ppf(0.5, freedom)
     if len(useful) < FEW:
-        tail = chi2.sf(misfits.sum(), freedom.sum())
+        tail = scipy.stats.chi2.sf(misfits.sum(), freedom.sum())
         return ErrorBarCheck(float(misfits.sum() / freedom.sum()), int(freedom.sum()), 2 * min(tail, 1 - tail))
-    p_value = binomtest(int(np.sum(over > 1)), len(useful)).pvalue
+    p_value = scipy.stats.binomtest(int(np.sum(over > 1)), len(useful)).pvalue
     return ErrorBarCheck(float(np.median(over)), int(freedom.sum()), float(p_value))

@@ -8,8 +8,8 @@ from typing import Any
 
 from millfrf.core import InputError, Real, optional_library, warning_lines, writing_whole_file
 from millfrf.core.provenance import origin
-from millfrf.report.results_page import ResultsPage, write_results_page
-from millfrf.report.section import Section
+from millfrf.reports.results_page import ResultsPage, write_results_page
+from millfrf.reports.section import Section
 
 from .drift import Drifts
 from .identity import IdentifiedModes, identify_modes

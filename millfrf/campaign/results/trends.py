@@ -4,8 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.stats import t as student
+import scipy
 
 from millfrf.core import Real
 
@@ -146,7 +145,7 @@ class Trend:
     @property
     def half_width(self) -> float:
         """Half width of the 95 % interval of the change."""
-        spread = float(student.ppf(0.975, self.freedom)) * self.error * np.ptp(self.values)
+        spread = float(scipy.stats.t.ppf(0.975, self.freedom)) * self.error * np.ptp(self.values)
         return float(spread * (1 + self.change))
 
 
@@ -338,7 +337,7 @@ class PooledTrend:
     @property
     def half_width(self) -> float:
         """Half width of the 95 % interval of the change."""
-        return float(student.ppf(0.975, self.poses - 1) * self.error * self.span * (1 + self.change))
+        return float(scipy.stats.t.ppf(0.975, self.poses - 1) * self.error * self.span * (1 + self.change))
 
 
 def pool(trends: Sequence[Trend]) -> PooledTrend | None:
@@ -364,7 +363,7 @@ def pool(trends: Sequence[Trend]) -> PooledTrend | None:
     first = told[0].series
     frequencies = [one.series.frequency for one in told]
     span = float(np.median([np.ptp(one.values) for one in told]))
-    p_value = float(2 * student.sf(abs(slope) / error, len(told) - 1))
+    p_value = float(2 * scipy.stats.t.sf(abs(slope) / error, len(told) - 1))
     return PooledTrend(
         first.mode,
         float(np.exp(np.mean(np.log(frequencies)))) if first.mode else float("nan"),
@@ -389,4 +388,4 @@ def _between(slopes: Real, errors: Real) -> float:
 
     if excess(0.0) <= 0:
         return 0.0
-    return float(brentq(excess, 0.0, 10 * float(np.ptp(slopes)) + 1e-300))
+    return float(scipy.optimize.brentq(excess, 0.0, 10 * float(np.ptp(slopes)) + 1e-300))

@@ -11,7 +11,8 @@ import numpy as np
 
 from estimation import Frf, FrfCovariance, write_frf
 from millfrf.core import HOUSING, TIP, InputError, process_pool, writing_whole_folder
-from millfrf.core.progress import Progress, silent
+from millfrf.core.compilation import CUTTING, SIMULATION
+from millfrf.core.progress import progress
 from millfrf.cutting import write_cutting_process
 from millfrf.robot_model import named_posture, read_spatial_robot
 from modal_fit import ModalModel, write_modal_model
@@ -244,7 +245,7 @@ def laboratory_of(options: SimulatedCampaign) -> tuple[Laboratory, list[PlannedR
     return Laboratory(true, ROBOT, postures, drift), planned
 
 
-def make_campaign(options: SimulatedCampaign, progress: Progress = silent) -> None:
+def make_campaign(options: SimulatedCampaign) -> None:
     """Make recordings, taps, models at rest, campaign.toml, cut.toml and concealed.json.
 
     Raises
@@ -256,7 +257,7 @@ def make_campaign(options: SimulatedCampaign, progress: Progress = silent) -> No
     with writing_whole_folder(options.out) as folder:
         for name in ("recordings", "taps", "idle"):
             (folder / name).mkdir()
-        with progress("milling", len(planned)) as update, process_pool(WORKERS) as pool:
+        with progress("milling", len(planned)) as update, process_pool(WORKERS, (*CUTTING, *SIMULATION)) as pool:
             milled = pool.map(partial(write_recording, laboratory, folder=folder / "recordings"), planned)
             for number, _ in enumerate(milled, 1):
                 update(number)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
-from scipy.stats import qmc
+import scipy
 
 from millfrf.core import HOUSING, TIP, InputError, Real
 from millfrf.robot_model import (
@@ -230,7 +230,7 @@ def spread_postures(mechanism: Mechanism, ready: Real, count: int, generator: np
     InputError
         The robot reaches too few places of the area.
     """
-    halton = qmc.Halton(len(LOWEST), rng=generator)
+    halton = scipy.stats.qmc.Halton(len(LOWEST), rng=generator)
     found: list[Real] = []
     for _ in range(20 * count):
         x, y, z, turn = LOWEST + (WORK_AREA_HIGHEST - LOWEST) * halton.random(1)[0]

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.fft import rfft
+import scipy
 
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, MillfrfError, Real
@@ -179,7 +179,7 @@ def _part_moves(parts: list[slice], state: _State, lines: WindowedSpectrum, few:
     for part in parts:
         alone = np.zeros_like(left)
         alone[part] = left[part]
-        spectrum = rfft(alone, axis=0)[few.band]
+        spectrum = scipy.fft.rfft(alone, axis=0)[few.band]
         gradient = np.einsum("ckpi,ckp->i", state.slope, np.stack([spectrum.real, spectrum.imag]), optimize=True)
         moves.append(len(parts) * state.inverse @ gradient)
     found = np.array(moves)

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtr
+import scipy
 
 from millfrf.core import Real
 
@@ -156,7 +156,7 @@ def _drift(refits: Sequence[RefittedModes]) -> tuple[Real, Real]:
 
 def _chance(sigmas: float, freedom: float) -> float:
     """Chance of as many standard errors either way, where these were estimated themselves (Student's t)."""
-    return float(2 * stdtr(freedom, -abs(sigmas)))
+    return float(2 * scipy.special.stdtr(freedom, -abs(sigmas)))
 
 
 def _welch(errors: Real, freedom: tuple[int, int]) -> float:

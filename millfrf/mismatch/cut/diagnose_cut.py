@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from millfrf.core import InputError
+from millfrf.core.compilation import DIAGNOSIS, compile_kernels
 from millfrf.cutting import MillingProcess, write_cutting_process
 
 from ..inference.diagnosis import Candidate, Diagnosis, Findings, verdict_of
@@ -18,7 +19,7 @@ from .errors import cut_remainder, fit_halves, improvement, lowers
 from .fitting import CutFit, fit_cut, fit_turned, started
 from .force import Belief
 from .hypothesis import CutHypothesis, MeasuredCut
-from .library import library
+from .library import cut_library
 from .physics import CutPhysics
 from .recordings import CutChatter, CutRecording, chatter_of
 from .settings import CUT, CutSettings
@@ -167,12 +168,13 @@ def diagnose_cut(
     if not 0 <= force_error < 1:
         raise InputError(f"force error {force_error!r} must be a share from 0 to 1, for example 0.005")
     settings = replace(settings, force_error=force_error)
+    compile_kernels(*DIAGNOSIS)
     tell = progress or _silent
     tell("spindle and noise")
     spectra = tuple(force_spectra(recording, process.teeth) for recording in recordings)
     cut = MeasuredCut(Belief(process, settings.coefficient_error), depth, spectra, settings.force_error)
     known = all(recording.motion is not None for recording in recordings)
-    causes, closed = _weighable(process, settings.causes or library(), known)
+    causes, closed = _weighable(process, settings.causes or cut_library(), known)
     start = started(cut, [(cause, cause.stated(process)) for cause in causes])
     chatter = tuple(chatter_of(recording, process) for recording in recordings)
     if any(one.unstable for one in chatter):

@@ -6,8 +6,8 @@ from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import gammainccinv
 
 from millfrf.core import Real
 
@@ -234,8 +234,8 @@ def cut_remainder(cut: MeasuredCut, hypothesis: CutHypothesis, settings: CutSett
 def _stands_out(rest: Real, floor: Real, off: Real, chance: float) -> NDArray[np.bool_]:
     """Lines (n_blocks, n_lines, n_axes) whose power, alone or in the mean of blocks, noise reaches only by chance."""
     blocks = len(rest)
-    alone = rest > gammainccinv(1, chance) * floor + off
-    mean = rest.mean(axis=0) > gammainccinv(blocks, chance) / blocks * floor + off.mean(axis=0)
+    alone = rest > scipy.special.gammainccinv(1, chance) * floor + off
+    mean = rest.mean(axis=0) > scipy.special.gammainccinv(blocks, chance) / blocks * floor + off.mean(axis=0)
     return np.asarray(alone | mean)
 
 

@@ -216,7 +216,7 @@ def computed_force(process: MillingProcess, depth: float, view: CutView, acting:
 
     ``Ft = a (Ktc h + Kte / sin(gamma))`` and alike radial and axial (Mohammadi & Ahmadi, Eqs. 1 to 3), with
     ``h = min_k (k f sin(phi) sin(gamma) + e_0 - e_k)``, not below zero, where ``e_k`` is how far the edges that causes
-    displace stood out ``k`` tooth passings ago; turned into X, Y, Z as :func:`millfrf.cutting.tooth_force` does.
+    displace stood out ``k`` tooth passings ago; turned into X, Y, Z as :func:`millfrf.cutting.tooth` does.
 
     Parameters
     ----------

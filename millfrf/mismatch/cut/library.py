@@ -6,12 +6,12 @@ CAUSES: tuple[CutPhysics, ...] = (PROCESS_DAMPING, REGENERATIVE_FEEDBACK, RUNOUT
 """All causes of the library; a new one is added here."""
 
 
-def library() -> dict[str, CutPhysics]:
+def cut_library() -> dict[str, CutPhysics]:
     """All causes by name.
 
     Examples
     --------
-    >>> sorted(library())
+    >>> sorted(cut_library())
     ['process_damping', 'regenerative_feedback', 'runout']
     """
     return {cause.name: cause for cause in CAUSES}

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from acquisition import Recording, Stream
+from acquisition import Stream, opened
 from estimation import (
     DERIVATIVE_ORDERS,
     MatchedChannel,
@@ -210,7 +210,7 @@ def read_cut_recording(
     if not process.feed_per_tooth > 0:
         raise InputError("feed_per_tooth_m = 0: without a feed no force can be computed; give it in the cutting file")
     stated = stated_law(path, speed)
-    with Recording(path) as recording:
+    with opened(path) as recording:
         source = recording.stream(stream)
         pushing, moving, axes, wanted = _channels(source, process)
         # at its own rate: how much of it is needed depends on the speed that is found
@@ -240,7 +240,7 @@ def require_room_for_cut(path: str | os.PathLike[str], process: MillingProcess, 
     InputError
         A force is missing, or the recording is too long; the line says how long it may be.
     """
-    with Recording(path) as recording:
+    with opened(path) as recording:
         source = recording.stream(stream)
         pushing, moving, _, _ = _channels(source, process)
         rate = source.sample_rate

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import prev_fast_len, rfft
-from scipy.signal.windows import tukey
 
 from millfrf.core import Complex, Real
 
@@ -56,11 +55,11 @@ class ForceSpectra:
         fine
             Number of instants of the forces in each sample of the recording.
         """
-        window = tukey(self.size * fine, 0.1, sym=False)
+        window = scipy.signal.windows.tukey(self.size * fine, 0.1, sym=False)
         window = window / np.sqrt(np.sum(window[::fine] ** 2)) / fine
         kept = force[self.first * fine : (self.first + self.size * self.blocks) * fine]
         parts = kept.reshape(self.blocks, self.size * fine, -1) * window[None, :, None]
-        return np.asarray(rfft(parts, axis=1)[:, self.band])
+        return np.asarray(scipy.fft.rfft(parts, axis=1)[:, self.band])
 
 
 def force_spectra(recording: CutRecording, teeth: int) -> ForceSpectra:
@@ -79,7 +78,7 @@ def force_spectra(recording: CutRecording, teeth: int) -> ForceSpectra:
     margin = min(int(recording.rate / recording.corner), n // 16)
     kept = n - run_in - margin
     blocks = int(np.clip(kept * rotation / recording.rate // TURNS, 4, MOST_BLOCKS))
-    size = prev_fast_len(kept // blocks, real=True)
+    size = scipy.fft.prev_fast_len(kept // blocks, real=True)
     axis = np.arange(size // 2 + 1) * recording.rate / size
     top = min(0.4 * recording.rate, (MOST_ORDERS + 0.5) * teeth * rotation)
     band = np.flatnonzero((axis >= max(2.5 * recording.corner, 3 * recording.rate / size)) & (axis <= top))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquisition import Recording
+from acquisition import opened
 from millfrf.core import InputError, Real
 
 from ..location.maps import SPEED, spindle_speed
@@ -142,7 +142,7 @@ def stated_law(path: str | os.PathLike[str], speed: float | None = None) -> Spin
 
 
 def _stated_sweep(path: str | os.PathLike[str]) -> SpindleLaw | None:
-    with Recording(Path(path)) as recording:
+    with opened(path) as recording:
         setup = recording.setup
     try:
         tables = [table for table in tomllib.loads(setup).values() if isinstance(table, dict)]

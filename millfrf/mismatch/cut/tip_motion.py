@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
-from scipy.ndimage import median_filter, uniform_filter1d
+import scipy
 
 from estimation import kinematic_factor
 from millfrf.core import Complex, Real
@@ -133,13 +132,13 @@ def _quiet(spectrum: Complex, frequencies: Real) -> Real:
     """Power of the quietest lines, (n_channels,), taken for that of a sensor's white noise."""
     heard = frequencies < QUIET_BELOW * frequencies[-1]
     power = np.abs(spectrum[heard]) ** 2
-    return np.asarray(np.quantile(uniform_filter1d(power, 64, axis=0), 0.05, axis=0))
+    return np.asarray(np.quantile(scipy.ndimage.uniform_filter1d(power, 64, axis=0), 0.05, axis=0))
 
 
 def _true_part(spectrum: Complex, quiet: Real) -> Real:
     """``1 - S / P`` of each line: P the power around it, or its own if it stands out."""
     power = np.abs(spectrum) ** 2
-    around = median_filter(power, size=(17, 1)) / np.log(2)
+    around = scipy.ndimage.median_filter(power, size=(17, 1)) / np.log(2)
     own = np.where(power > STANDS_OUT * around, power, around)
     return np.asarray(np.maximum(1 - quiet / np.maximum(own, 1e-300), 0.0))
 
@@ -152,12 +151,14 @@ def _drawn(spectrum: Complex, frequencies: Real, seed: int) -> Complex:
 
 
 def _padded(samples: Real, rate: float, corner: float) -> tuple[Complex, Real]:
-    room = 2 * next_fast_len((len(samples) + int(2 * rate / corner) + 1) // 2, real=True)
+    room = 2 * scipy.fft.next_fast_len((len(samples) + int(2 * rate / corner) + 1) // 2, real=True)
     rise = min(int(0.25 * rate / corner), len(samples) // 4)
     ramp = np.ones(len(samples))
     ramp[:rise] = 0.5 - 0.5 * np.cos(np.pi * (np.arange(rise) + 0.5) / rise)
     ramp[-rise:] = ramp[:rise][::-1]
-    return np.asarray(rfft(samples * ramp[:, None], n=room, axis=0)), np.asarray(np.fft.rfftfreq(room, 1 / rate))
+    return np.asarray(scipy.fft.rfft(samples * ramp[:, None], n=room, axis=0)), np.asarray(
+        np.fft.rfftfreq(room, 1 / rate)
+    )
 
 
 def _motion(displacement: Complex, frequencies: Real, corner: float, n: int) -> tuple[Real, Real]:
@@ -165,7 +166,9 @@ def _motion(displacement: Complex, frequencies: Real, corner: float, n: int) -> 
     room = 2 * (len(frequencies) - 1)
     shown = displacement * fade[:, None]
     velocity = shown * _kinematic(frequencies, 1)
-    return np.asarray(irfft(shown, n=room, axis=0)[:n]), np.asarray(irfft(velocity, n=room, axis=0)[:n])
+    return np.asarray(scipy.fft.irfft(shown, n=room, axis=0)[:n]), np.asarray(
+        scipy.fft.irfft(velocity, n=room, axis=0)[:n]
+    )
 
 
 def _kinematic(frequencies: Real, order: int, high_pass: float = 0.0) -> Complex:

@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.fft import irfft
+import scipy
 
 from estimation import BandRecording, WindowedSpectrum
 from millfrf.core import Complex, Real
@@ -315,7 +315,7 @@ def residual_lines(hypothesis: Hypothesis, lines: WindowedSpectrum, faults: Sequ
     predicted = predict_lines(hypothesis, lines)
     if not faults:
         return lines.measured - predicted.response
-    signal = np.asarray(irfft(predicted.spectrum, n=lines.padded, axis=0)[: len(lines.recording.force)])
+    signal = np.asarray(scipy.fft.irfft(predicted.spectrum, n=lines.padded, axis=0)[: len(lines.recording.force)])
     return lines.measured - lines.cut(
         with_faults(signal, lines.recording, lines.start, [asdict(one) for one in faults])
     )

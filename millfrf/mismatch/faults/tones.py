@@ -4,10 +4,8 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft
-from scipy.ndimage import maximum_filter, median_filter
-from scipy.stats import t as student
 
 from estimation import WindowedSpectrum, windowed_spectrum
 from millfrf.core import Complex, Real
@@ -92,7 +90,7 @@ def mean_and_error(sizes: list[Real]) -> tuple[Real, Real]:
 
 def _widened(recordings: int) -> float:
     """Factor on a standard deviation over few recordings, of which 1.96 then make 95 %."""
-    return float(student.ppf(0.975, recordings - 1)) / 1.96
+    return float(scipy.stats.t.ppf(0.975, recordings - 1)) / 1.96
 
 
 def find_tone(fitted: Fit, lines: list[WindowedSpectrum], settings: FaultSettings = FAULTS) -> Tone | None:
@@ -274,7 +272,7 @@ def without_tone(fitted: Fit, lines: WindowedSpectrum, tone: Tone) -> WindowedSp
 def shown_signal(fitted: Fit, lines: WindowedSpectrum) -> Real:
     """Predicted responses in time, (n_samples, n_responses)."""
     spectrum = predict_lines(fitted.hypothesis, lines).spectrum
-    return np.asarray(irfft(spectrum, n=lines.padded, axis=0)[: len(lines.recording.force)])
+    return np.asarray(scipy.fft.irfft(spectrum, n=lines.padded, axis=0)[: len(lines.recording.force)])
 
 
 def _step(lines: WindowedSpectrum) -> float:
@@ -296,7 +294,7 @@ def sharp_contrast(power: Real) -> Real:
 def above_neighbours(power: Real, footprint: NDArray[np.bool_]) -> Real:
     """Each line of a power (n_lines,) over the median of the lines about it that the footprint holds."""
     # mirrored at its ends: a weak last line repeated would make its neighbours stand out
-    around = median_filter(power, footprint=footprint, mode="mirror")
+    around = scipy.ndimage.median_filter(power, footprint=footprint, mode="mirror")
     return np.asarray(power / np.maximum(around, 1e-3 * power.mean() + 1e-300))
 
 
@@ -318,7 +316,7 @@ def _at_a_sharp_resonance(fitted: Fit, lines: list[WindowedSpectrum], frequency:
 def force_contrast(lines: WindowedSpectrum) -> Real:
     """Power of the forces at each line or beside it against the median of its neighbourhood, (n_lines,)."""
     power = np.sum(np.abs(lines.force_here / levels(lines)[1]) ** 2, axis=1)
-    return np.asarray(maximum_filter(above_neighbours(power, NEAR), 3))
+    return np.asarray(scipy.ndimage.maximum_filter(above_neighbours(power, NEAR), 3))
 
 
 def _amplitudes(fitted: Fit, lines: list[WindowedSpectrum], frequency: float) -> list[Real]:

@@ -1,7 +1,7 @@
 """Paired tests over blocks of time, and errors of parameters that include the form of the law."""
 
 import numpy as np
-from scipy.stats import ttest_1samp, wilcoxon
+import scipy
 
 from millfrf.core import Real
 
@@ -25,7 +25,7 @@ def signed_ranks(before: Real, after: Real) -> float:
     1.0
     """
     fall = before - after
-    return float(wilcoxon(fall, alternative="greater").pvalue) if fall.any() else 1.0
+    return float(scipy.stats.wilcoxon(fall, alternative="greater").pvalue) if fall.any() else 1.0
 
 
 def students_test(before: Real, after: Real) -> float:
@@ -37,7 +37,7 @@ def students_test(before: Real, after: Real) -> float:
         Power of the residual in the same blocks of time, under two hypotheses.
     """
     fall = before - after
-    return float(ttest_1samp(fall, 0.0, alternative="greater").pvalue) if np.ptp(fall) > 0 else 1.0
+    return float(scipy.stats.ttest_1samp(fall, 0.0, alternative="greater").pvalue) if np.ptp(fall) > 0 else 1.0
 
 
 def ratio_interval(before: Real, after: Real) -> tuple[float, float]:

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from millfrf.core import Real
 
@@ -171,7 +171,7 @@ def rounded(measured: Real, shown: Real, sharp: Saturation) -> Saturation:
         return float(np.sum((seen - saturated(due, sharp.limit * float(numbers[0]), sharpness)) ** 2))
 
     start = np.array([[1.0, 0.02], [1.01, 0.06], [1.02, 0.2]])
-    best = minimize(
+    best = scipy.optimize.minimize(
         left, start[1], method="Nelder-Mead", options={"initial_simplex": start, "maxiter": 80, "xatol": 1e-4}
     )
     inverse = float(np.clip(best.x[1], 0.0, 1 / SOFTEST))

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import irfft, rfft
+import scipy
 
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
@@ -71,8 +71,8 @@ def joint_response(
     fine = fineness(model, lines.recording.rate)
     n = fine * lines.padded
     finer = fine * free
-    deflection = irfft(finer, n=n)
-    velocity = irfft(2j * np.pi * frequencies * finer, n=n)
+    deflection = scipy.fft.irfft(finer, n=n)
+    velocity = scipy.fft.irfft(2j * np.pi * frequencies * finer, n=n)
     step = 1.0 / (fine * lines.recording.rate)
     written = (np.empty(n), np.empty(n), np.empty(n))
     free_run(
@@ -85,7 +85,7 @@ def joint_response(
         (law.springs, law.yields),
         written,
     )
-    force_lines = np.asarray(rfft(written[0])[: len(frequencies)] / fine)
+    force_lines = np.asarray(scipy.fft.rfft(written[0])[: len(frequencies)] / fine)
     every = fine // substeps(model, lines.recording.rate, fine)
     return JointResponse(force_lines, written[1][::every].copy(), written[2][::every].copy())
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft
 
 from millfrf.core import Complex
 from millfrf.core.compilation import compiled
@@ -121,7 +121,7 @@ def _sources(force: Complex, padded: int, direct: int) -> Columns:
     for row in range(MOMENTS):
         np.multiply(own, filters[row], out=spectra[row : n * MOMENTS : MOMENTS, : len(force)])
     spectra[n * MOMENTS :, : len(force)] = own[:direct]
-    return np.ascontiguousarray(irfft(spectra, n=padded, axis=1).T)
+    return np.ascontiguousarray(scipy.fft.irfft(spectra, n=padded, axis=1).T)
 
 
 @lru_cache(maxsize=4)

@@ -17,7 +17,18 @@ TINY = np.float32(1e-26)
 """Added to each state at each step: a processor is far slower with numbers below 1e-38, to which states ring out."""
 
 
-@compiled
+@compiled(
+    "(UniTuple(float64[::1],2), UniTuple(complex128[::1],5), "
+    "Tuple((UniTuple(float64[::1],2),UniTuple(float64,2),float64[::1],UniTuple(float64[::1],2))), "
+    "Tuple((UniTuple(float32[:,::1],2),float32[:,::1],UniTuple(float32[:,::1],2),float64)), "
+    "Tuple((float32[:,::1],float32[::1],UniTuple(float32[:,::1],3),Tuple((int64,float64)))), "
+    "UniTuple(float32[:,::1],2), float32[::1], float32[:,::1])",
+    "(UniTuple(float64[::1],2), UniTuple(complex128[::1],5), "
+    "Tuple((UniTuple(float64[::1],2),UniTuple(float64,2),float64[::1],UniTuple(float64[::1],2))), "
+    "Tuple((UniTuple(float32[:,::1],2),float32[:,::1],Tuple((float32[:,::1],float32[::1,:])),float64)), "
+    "Tuple((float32[:,::1],float32[::1],UniTuple(float32[:,::1],3),Tuple((int64,float64)))), "
+    "UniTuple(float32[:,::1],2), float32[::1], float32[:,::1])",
+)
 def tangent_run(
     motion: tuple[Real, Real],
     dynamics: tuple[Complex, Complex, Complex, Complex, Complex],
@@ -79,7 +90,11 @@ def tangent_run(
         _write(dx, weights, begin, force)
 
 
-@compiled
+@compiled(
+    "(UniTuple(float64[::1],2), int64, "
+    "Tuple((UniTuple(float64[::1],2),UniTuple(float64,2),float64[::1],UniTuple(float64[::1],2))), "
+    "bool[:,::1], UniTuple(float64,2), float32[:,::1])",
+)
 def _slopes(
     motion: tuple[Real, Real],
     begin: int,
@@ -133,7 +148,10 @@ def _step_factors(dynamics: tuple[Complex, Complex, Complex, Complex, Complex]) 
     return factors, (own_x, own_v)
 
 
-@compiled
+@compiled(
+    "(float32[:,::1], float32[:,::1], float32[:,::1], UniTuple(float32[:,::1],2), "
+    "UniTuple(float32[:,::1],3), Tuple((float64[::1],bool[:,::1],bool[::1],float32[:,::1])), bool)",
+)
 def _answer(
     factors: Columns,
     gains: Columns,

@@ -43,7 +43,10 @@ def _same_cell(table: Real, cells: float, reach: float, one: float, other: float
     return cell_of(table, cells, reach, one) == cell_of(table, cells, reach, other)
 
 
-@compiled
+@compiled(
+    "(float64[::1], float64[::1], UniTuple(complex128[::1],5), UniTuple(float64[::1],2), "
+    "UniTuple(float64,2), float64[::1], UniTuple(float64[::1],2), UniTuple(float64[::1],3))",
+)
 def free_run(
     driven: Real,
     driven_speed: Real,
@@ -121,7 +124,12 @@ def free_run(
         force[k] = g
 
 
-@compiled
+@compiled(
+    "(float64[::1], float64[::1], UniTuple(float64[::1],2), UniTuple(float64,2), float64[::1], "
+    "UniTuple(float64[::1],2), float64[::1])",
+    "(float64[:], float64[:], UniTuple(float64[::1],2), UniTuple(float64,2), float64[::1], "
+    "UniTuple(float64[::1],2), float64[::1])",
+)
 def driven_run(
     deflection: Real,
     velocity: Real,
@@ -148,7 +156,17 @@ def driven_run(
 Columns = NDArray[np.float32]
 
 
-@compiled
+@compiled(
+    "(UniTuple(float64[::1],2), int64, Tuple((UniTuple(float64,2),float64[::1])), "
+    "Tuple((UniTuple(float32[:,::1],2),float32[:,::1],UniTuple(float32[:,::1],2),float64)), "
+    "UniTuple(float64[::1],2), Tuple((bool[:,::1],float32[:,::1])))",
+    "(UniTuple(float64[::1],2), int64, Tuple((UniTuple(float64,2),float64[::1])), "
+    "Tuple((UniTuple(float32[:,::1],2),float32[:,::1],Tuple((float32[:,::1],float32[::1,:])),float64)), "
+    "UniTuple(float64[::1],2), Tuple((bool[:,::1],float32[:,::1])))",
+    "(UniTuple(float64[:],2), int64, Tuple((UniTuple(float64,2),float64[::1])), "
+    "Tuple((UniTuple(float32[:,::1],2),float32[:,::1],UniTuple(float32[:,::1],2),float64)), "
+    "UniTuple(float64[::1],2), Tuple((bool[:,::1],float32[:,::1])))",
+)
 def law_change_run(
     motion: tuple[Real, Real],
     begin: int,
@@ -189,7 +207,14 @@ def law_change_run(
             _add_table(tables[side], spans[side], motion[side], begin, out)
 
 
-@compiled
+@compiled(
+    "(float64[::1], int64, float64[::1], UniTuple(float32[:,::1],2), UniTuple(float64[::1],2), "
+    "bool[:,::1], float32[:,::1])",
+    "(float64[::1], int64, float64[::1], Tuple((float32[:,::1],float32[::1,:])), "
+    "UniTuple(float64[::1],2), bool[:,::1], float32[:,::1])",
+    "(float64[:], int64, float64[::1], UniTuple(float32[:,::1],2), UniTuple(float64[::1],2), "
+    "bool[:,::1], float32[:,::1])",
+)
 def _stretch(
     x: Real,
     begin: int,

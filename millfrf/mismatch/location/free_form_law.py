@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, rfft
 
 from estimation import WindowedSpectrum
 from millfrf.core import Real
@@ -170,7 +170,7 @@ def _seen(
 def _in_band(signal: Real, lines: WindowedSpectrum) -> Real:
     axis = np.arange(len(signal) // 2 + 1) * lines.recording.rate / len(signal)
     inside = (axis >= lines.frequencies[0]) & (axis <= lines.frequencies[-1])
-    return np.asarray(irfft(rfft(signal) * inside, n=len(signal)))
+    return np.asarray(scipy.fft.irfft(scipy.fft.rfft(signal) * inside, n=len(signal)))
 
 
 def _joined(parts: list[_Sample]) -> _Sample:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import f as fisher
 
 from estimation import WindowedSpectrum
 from millfrf.core import Real
@@ -305,7 +305,7 @@ def _orders(view: ResidualView, speeds: Mapping[str, SpindleSpeed]) -> list[dict
         on, off, count = order_powers(blocks, speeds[blocks.recording])
         for k in np.flatnonzero(count > 0):
             ratio = float(on[k] / max(off[k], 1e-12))
-            chance = float(fisher.sf(ratio / view.noise.level, 2 * count[k], 2 / view.noise.spread**2))
+            chance = float(scipy.stats.f.sf(ratio / view.noise.level, 2 * count[k], 2 / view.noise.spread**2))
             rows.append(
                 {"recording": blocks.recording, "order": int(k + 1), "contrast": _plain(ratio), "p_value": chance}
             )

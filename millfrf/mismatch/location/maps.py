@@ -1,16 +1,13 @@
 """Maps of residual power over noise power: frequency, channel, time, spindle order."""
 
-import os
 import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-from scipy.fft import irfft, rfft
-from scipy.signal.windows import hann
+import scipy
 
-from acquisition import Recording
+from acquisition import RecordingFile, opened
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
 
@@ -220,12 +217,12 @@ def block_residual(hypothesis: Hypothesis, reference: Fit, number: int, lines: W
     length = int(rate * max(len(rest) / rate / BLOCKS, LEAST_PERIODS / lines.frequencies[0]))
     length = max(16, min(length, len(rest)))
     count = len(rest) // length
-    window = hann(length, sym=False)
+    window = scipy.signal.windows.hann(length, sym=False)
     window /= np.sqrt(np.sum(window**2))
     axis = np.arange(length // 2 + 1) * rate / length
     inside = (axis >= lines.frequencies[0]) & (axis <= lines.frequencies[-1])
     blocks = rest[: count * length].reshape(count, length, -1)
-    spectra = rfft(blocks * window[:, None], axis=1)[:, inside]
+    spectra = scipy.fft.rfft(blocks * window[:, None], axis=1)[:, inside]
     white = _whitening_at(reference, number, lines, axis[inside])
     small = np.einsum("kij,bkj->bki", white, spectra)
     times = (lines.start + length * np.arange(count + 1)) / rate
@@ -242,7 +239,7 @@ def _kept(lines: WindowedSpectrum, rest: Real) -> Real:
     right = np.clip(np.searchsorted(lines.frequencies, axis), 1, len(lines.frequencies) - 1)
     gap = lines.frequencies[right] - lines.frequencies[right - 1]
     between = (gap > 1.5 * step) & (axis > lines.frequencies[right - 1]) & (axis < lines.frequencies[right])
-    return np.asarray(irfft(rfft(rest, axis=0) * ~between[:, None], n=len(rest), axis=0))
+    return np.asarray(scipy.fft.irfft(scipy.fft.rfft(rest, axis=0) * ~between[:, None], n=len(rest), axis=0))
 
 
 def _whitening_at(reference: Fit, number: int, lines: WindowedSpectrum, axis: Real) -> Complex:
@@ -301,9 +298,9 @@ class SpindleSpeed:
         return bool((gaps & (self.time[:-1] < stop) & (self.time[1:] > start)).any())
 
 
-def spindle_speed(path: str | os.PathLike[str]) -> SpindleSpeed | None:
+def spindle_speed(path: RecordingFile) -> SpindleSpeed | None:
     """Return the speed from a recording's events, or a constant one from its set-up; None where neither states one."""
-    with Recording(Path(path)) as recording:
+    with opened(path) as recording:
         if SPEED in recording.events:
             time, rpm = recording.events[SPEED].read()
             good = np.isfinite(time) & np.isfinite(rpm)

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import polygamma
-from scipy.stats import f as fisher
 
 from estimation import BandRecording, WindowedSpectrum, windowed_spectrum
 from millfrf.core import Real
@@ -211,7 +210,7 @@ class NoiseSpread:
     def chance(self, ratio: ArrayLike, count: ArrayLike) -> Real:
         """Return the probability of a larger ratio in a cell of ``count`` independent lines of noise (F test)."""
         numerator = np.maximum(2 * np.asarray(count, dtype=float), 1e-9)
-        return np.asarray(fisher.sf(np.asarray(ratio) / self.level, numerator, 2 / self.spread**2))
+        return np.asarray(scipy.stats.f.sf(np.asarray(ratio) / self.level, numerator, 2 / self.spread**2))
 
 
 def noise_spread(
@@ -236,7 +235,7 @@ def noise_spread(
     logs = np.log(np.maximum(ratio, 1e-12)).ravel()
     middle = float(np.median(logs))
     scatter = (1.4826 * float(np.median(np.abs(logs - middle)))) ** 2
-    chance = float(np.median(polygamma(1, np.maximum(count, 0.5).ravel())))
+    chance = float(np.median(scipy.special.polygamma(1, np.maximum(count, 0.5).ravel())))
     spread = float(np.sqrt(max(scatter - chance, least**2)))
     return NoiseSpread(max(1.0, float(np.exp(middle))), min(spread, max(most, least)))
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft
 
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
@@ -267,8 +267,8 @@ def _in_time(
     used = spectra[:, : len(signals[0])]
     np.concatenate([one.T for one in signals], axis=0, out=used, casting="same_kind")
     used *= size[0]
-    deflection = np.ascontiguousarray(irfft(spectra, n=n, axis=1).T)
+    deflection = np.ascontiguousarray(scipy.fft.irfft(spectra, n=n, axis=1).T)
     if not size[1]:
         return deflection, deflection
     used *= np.asarray(2j * np.pi * lines.padded_frequencies[: used.shape[1]], dtype=np.complex64)
-    return deflection, np.ascontiguousarray(irfft(spectra, n=n, axis=1).T)
+    return deflection, np.ascontiguousarray(scipy.fft.irfft(spectra, n=n, axis=1).T)

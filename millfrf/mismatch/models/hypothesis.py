@@ -6,7 +6,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.fft import rfft
+import scipy
 
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
@@ -328,7 +328,7 @@ def predict_lines(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Predicted:
     for number, (cause, path) in enumerate(zip(hypothesis.laws, reach.paths, strict=True)):
         if cause.seen is not None:
             x, v = cause.seen[lines.recording.name]
-            answer = JointResponse(rfft(driven_force(lines, x, v, cause.law()), n=lines.padded), x, v)
+            answer = JointResponse(scipy.fft.rfft(driven_force(lines, x, v, cause.law()), n=lines.padded), x, v)
         else:
             free = displacement_at(model, frequencies, felt)[:, n + number]
             answer = joint_response(reach.model, lines, free, path.ends, cause.law())

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import rfft
 
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
@@ -171,7 +171,7 @@ def _driven_on(
     force = own.answer.force[:count]
     if mix is None:
         mix = np.eye(signals.shape[1], hypothesis.size, found.first)
-    spectra = rfft(np.ascontiguousarray(signals.T), n=lines.padded, axis=1)[:, :count].T
+    spectra = scipy.fft.rfft(np.ascontiguousarray(signals.T), n=lines.padded, axis=1)[:, :count].T
     turned = np.eye(found.turns.shape[1], hypothesis.size, found.angles)
     moved = [Moved(-found.push[:, None], spectra, mix)]
     moved += [Moved(-turn[:, None], force[:, None], row[None]) for turn, row in zip(found.turns.T, turned, strict=True)]

@@ -110,7 +110,9 @@ def closed_loop(receptance: Complex, feedback: Complex) -> Complex:
     return result
 
 
-@compiled
+@compiled(
+    "(complex128[:,:,::1], complex128[:,:,::1], complex128[:,:,::1])",
+)
 def _multiply(one: Complex, other: Complex, out: Complex) -> None:
     """Write the products."""
     for k in range(len(one)):
@@ -122,7 +124,9 @@ def _multiply(one: Complex, other: Complex, out: Complex) -> None:
                 out[k, i, c] = value
 
 
-@compiled
+@compiled(
+    "(complex128[:,:,::1], complex128[:,:,::1])",
+)
 def _solve(matrix: Complex, right: Complex) -> bool:
     """Overwrite ``right`` by ``A^-1 B`` (Gauss, with the largest pivot of each column); False where A is singular."""
     n = matrix.shape[1]

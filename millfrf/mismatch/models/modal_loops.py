@@ -13,7 +13,9 @@ def over(value: complex) -> complex:
     return value.conjugate() * (1.0 / (value.real**2 + value.imag**2))
 
 
-@compiled
+@compiled(
+    "(complex128[::1], complex128[::1], complex128[:,::1], complex128[:,::1], complex128[:,::1], complex128[:,::1])",
+)
 def modal_displacement(s: Complex, poles: Complex, right: Complex, left: Complex, force: Complex, out: Complex) -> None:
     """Write ``sum_r right_r (left_r . F) / (s - p_r)`` and its conjugate half.
 
@@ -45,7 +47,10 @@ def modal_displacement(s: Complex, poles: Complex, right: Complex, left: Complex
                 out[k, p] += right[r, p] * push + right[r, p].conjugate() * pull
 
 
-@compiled
+@compiled(
+    "(complex128[::1], Tuple((complex128[::1],complex128[:,:,::1])), UniTuple(float64[:,::1],2), "
+    "float64, complex128[:,::1], complex128[:,::1])",
+)
 def add_outside(
     s: Complex, terms: tuple[Complex, Complex], plain: tuple[Real, Real], lowest: float, force: Complex, out: Complex
 ) -> None:
@@ -83,7 +88,11 @@ def add_outside(
                     out[k, p] += (up * residue + down * residue.conjugate()) * force[k, q]
 
 
-@compiled
+@compiled(
+    "(complex128[::1], complex128[:,::1], Tuple((complex128[::1],complex128[:,::1],complex128[:,::1])), "
+    "Tuple((complex128[::1],complex128[::1],float64[::1],float64[::1])), complex128[:,:,::1], int64, "
+    "float64[:,:,:,::1])",
+)
 def modal_slopes(
     s: Complex,
     force: Complex,
@@ -144,7 +153,9 @@ def modal_slopes(
                     _put(out, k, i, first + 2 + 2 * n + m + q, b * force[k, q])
 
 
-@compiled
+@compiled(
+    "(complex128[:,::1], float64[:,:,::1], complex128[:,::1], complex128[:,:,::1], float64[:,:,:,::1], int64)",
+)
 def outside_slopes(basis: Complex, units: Real, force: Complex, factor: Complex, out: Real, first: int) -> None:
     """Write the derivative of ``M (H F)`` by the numbers of terms that stand for modes outside the band.
 
@@ -169,7 +180,9 @@ def outside_slopes(basis: Complex, units: Real, force: Complex, factor: Complex,
                         _put(out, k, i, first + (t * n + p) * m + q, units[t, p, q] * shown * force[k, q])
 
 
-@compiled
+@compiled(
+    "(complex128[:,::1], complex128[:,::1], int64, float64[:,:,:,::1])",
+)
 def add_outer(response: Complex, change: Complex, first: int, out: Real) -> None:
     """Add ``b_k c_k^T`` of every line to some columns.
 

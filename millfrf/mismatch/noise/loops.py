@@ -55,7 +55,9 @@ def _invert_in_place(lower: Complex) -> None:
             lower[i, j] = -value * lower[i, i].real
 
 
-@compiled
+@compiled(
+    "(complex128[:,:,::1],)",
+)
 def whiten_lines(covariance: Complex) -> float:
     """Whiten every V (n_lines, n, n) in place; return the sum of ln det V, infinity where one has none."""
     total = 0.0
@@ -64,7 +66,9 @@ def whiten_lines(covariance: Complex) -> float:
     return total
 
 
-@compiled
+@compiled(
+    "(complex128[:,:,::1], complex128[:,::1], float64[::1])",
+)
 def size_of_white(white: Complex, lines: Complex, sizes: Real) -> float:
     """Write ``|W_k r_k|^2`` of each line into sizes (n_lines,), for W (n_lines, n, n) lower triangular; return the sum.
 
@@ -90,7 +94,9 @@ def size_of_white(white: Complex, lines: Complex, sizes: Real) -> float:
     return total
 
 
-@compiled
+@compiled(
+    "(complex128[:,:,::1], complex128[:,:,::1], float64[:,:,:,::1])",
+)
 def whitened_columns(white: Complex, lines: Complex, out: Real) -> None:
     """Write ``W_k A_k`` of each line as real rows: real parts above imaginary ones.
 
@@ -114,7 +120,9 @@ def whitened_columns(white: Complex, lines: Complex, out: Real) -> None:
                 out[1, k, i, c] = value.imag
 
 
-@compiled
+@compiled(
+    "(int64[::1], complex128[:,::1], float64[::1], complex128[:,:,::1], complex128[:,:,::1], complex128[:,:,:,::1])",
+)
 def lump_lines(
     edges: NDArray[np.int64], residual: Complex, weights: Real, through: Complex, sample: Complex, passed: Complex
 ) -> None:
@@ -148,7 +156,9 @@ def lump_lines(
                         passed[b, q, i, j] += share * through[k, i, q] * through[k, j, q].conjugate()
 
 
-@compiled
+@compiled(
+    "(float64[:,::1], complex128[:,:,::1], float64[::1], complex128[:,:,::1])",
+)
 def line_covariances(own: Real, through: Complex, pushed: Real, out: Complex) -> None:
     """Write ``diag(own) + G diag(pushed) G^H`` of every line, with a trace of itself that keeps it positive definite.
 
@@ -178,7 +188,11 @@ def line_covariances(own: Real, through: Complex, pushed: Real, out: Complex) ->
             out[k, i, i] += own[k, i] + 1e-12 * trace
 
 
-@compiled
+@compiled(
+    "(Tuple((float64[::1],complex128[:,:,::1],complex128[:,:,:,::1],float64[:,::1])), float64[:,::1], "
+    "float64[::1], Tuple((float64[:,::1],float64[::1])), "
+    "Tuple((float64[:,:,::1],float64[:,:,::1],float64[:,::1])))",
+)
 def noise_likelihood(
     bands: tuple[Real, Complex, Complex, Real],
     own: Real,
@@ -272,7 +286,9 @@ def _curvature(
             by_force[q, p] += count * pushed[q] * pushed[p] * _trace_of_product(drawn[q], passed[p])
 
 
-@compiled
+@compiled(
+    "(complex128[:,::1], complex128[:,::1], complex128[:,::1])",
+)
 def _product(one: Complex, other: Complex, out: Complex) -> None:
     """Write ``A B``."""
     for i in range(len(one)):
@@ -283,7 +299,9 @@ def _product(one: Complex, other: Complex, out: Complex) -> None:
             out[i, j] = value
 
 
-@compiled
+@compiled(
+    "(complex128[:,:,::1], float64[::1], float64[::1], complex128[:,::1])",
+)
 def _covariance(through: Complex, own: Real, pushed: Real, out: Complex) -> None:
     """Write ``diag(own) + sum_q pushed_q T_q``, and a trace of itself that keeps it positive definite."""
     out[:] = 0.0
@@ -294,7 +312,9 @@ def _covariance(through: Complex, own: Real, pushed: Real, out: Complex) -> None
         out[i, i] += own[i] + ridge
 
 
-@compiled
+@compiled(
+    "(complex128[:,::1], complex128[:,::1], complex128[:,::1])",
+)
 def _slope(inverse: Complex, sample: Complex, out: Complex) -> float:
     """Write ``V^-1 - V^-1 S V^-1``; return ``tr V^-1 S``."""
     n = len(inverse)

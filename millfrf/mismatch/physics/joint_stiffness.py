@@ -1,7 +1,7 @@
 """Joint laws of stiffness: hardening, softening, play, drift."""
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from millfrf.core import Real
 
@@ -137,7 +137,7 @@ class PoseDrift:
         shape = min(bend / change, _bend_of(FASTEST)) if change else 0.0
         if shape <= _bend_of(1e-2):
             return values
-        rate = float(brentq(lambda a: _bend_of(a) - shape, 1e-3, FASTEST + 1e-6))
+        rate = float(scipy.optimize.brentq(lambda a: _bend_of(a) - shape, 1e-3, FASTEST + 1e-6))
         return np.append(values[0] / _projected(rate)[0], values[1:])
 
 

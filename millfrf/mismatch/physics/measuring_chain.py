@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.fft import rfft
-from scipy.spatial.transform import Rotation
+import scipy
 
 from estimation import BandRecording
 from millfrf.core import Complex, DegreeOfFreedom, Real
@@ -76,7 +75,7 @@ class AxisMisalignment:
         """Return the matrices of the cause at ``s`` (n,), rad/s."""
         columns = [int(place) for place in place.split()]
         rotation = np.eye(len(model.excitations))
-        rotation[np.ix_(columns, columns)] = Rotation.from_rotvec(values).as_matrix()
+        rotation[np.ix_(columns, columns)] = scipy.spatial.transform.Rotation.from_rotvec(values).as_matrix()
         return Chain(force=np.tile(rotation.astype(complex), (len(s), 1, 1)))
 
 
@@ -335,7 +334,7 @@ def tone_of(rest: Real, time: Real, frequency: float, start: int) -> Real:
     """
     kept, late = rest[start:], time[start:]
     fine = 8 * len(kept)
-    spectrum = np.abs(rfft(kept * np.hanning(len(kept))[:, None], n=fine, axis=0)) ** 2
+    spectrum = np.abs(scipy.fft.rfft(kept * np.hanning(len(kept))[:, None], n=fine, axis=0)) ** 2
     axis = np.arange(fine // 2 + 1) / fine / (late[1] - late[0])
     near = np.abs(axis - frequency) < 2.0 / (late[-1] - late[0])
     exact = float(axis[near][np.argmax(spectrum[near].sum(axis=1))]) if near.any() else frequency

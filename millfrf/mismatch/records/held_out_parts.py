@@ -4,9 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.fft import rfft
-from scipy.signal import convolve
-from scipy.signal.windows import hann
+import scipy
 
 from estimation import WindowedSpectrum, find_repeats, noise_of_periods, padded_force, steady_periods
 from millfrf.core import Complex, InputError, Real
@@ -156,7 +154,7 @@ def without_force_noise(spectrum: WindowedSpectrum, variance: Real) -> WindowedS
         the quietest lines is its upper bound.
     """
     n = spectrum.start + len(spectrum.window)
-    forces = rfft(spectrum.recording.force[spectrum.start : n] * spectrum.window[:, None], axis=0)
+    forces = scipy.fft.rfft(spectrum.recording.force[spectrum.start : n] * spectrum.window[:, None], axis=0)
     products = forces[:, :, None] * forces[:, None, :].conj()
     own = np.einsum("kqq->kq", products).real
     wide = min(WIDELY, len(own) // 5)
@@ -203,10 +201,12 @@ def _smoothed(products: Complex) -> tuple[Complex, Real]:
 def _around(power: Complex, count: int) -> Complex:
     """Return the tapered mean over ``count`` neighbouring lines."""
     flat = power.reshape(len(power), -1)
-    return np.asarray(convolve(flat, _weights(count)[:, None], mode="same", method="fft").reshape(power.shape))
+    return np.asarray(
+        scipy.signal.convolve(flat, _weights(count)[:, None], mode="same", method="fft").reshape(power.shape)
+    )
 
 
 def _weights(count: int) -> Real:
     """Return the weights of ``count`` neighbours in a mean."""
-    weights = hann(count + 2)[1:-1]
+    weights = scipy.signal.windows.hann(count + 2)[1:-1]
     return np.asarray(weights / weights.sum())

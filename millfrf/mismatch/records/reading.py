@@ -1,14 +1,12 @@
 """Recordings at the degrees of freedom of a model, resampled to the rate of the comparison."""
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
+import scipy
 
-from acquisition import Recording
+from acquisition import RecordingFile, opened, path_of
 from estimation import (
     DERIVATIVE_ORDERS,
     BandRecording,
@@ -49,7 +47,7 @@ def band_of(model: ModalModel, rate: float) -> tuple[float, float]:
 
 
 def read_recording(
-    path: str | os.PathLike[str], model: ModalModel, *, stream: str | None = None, band: Band | None = None
+    path: RecordingFile, model: ModalModel, *, stream: str | None = None, band: Band | None = None
 ) -> BandRecording:
     """Read one recording at the degrees of freedom of a model.
 
@@ -74,7 +72,7 @@ def read_recording(
 
 
 def read_at(
-    path: str | os.PathLike[str],
+    path: RecordingFile,
     excitations: Sequence[str],
     responses: Sequence[str],
     model: ModalModel,
@@ -117,7 +115,7 @@ def read_at(
     least = SHORTEST / float(model.natural_frequencies.min())
     if recording.duration < least:
         raise InputError(
-            f"{Path(path).name} lasts {recording.duration:.3g} s; {SHORTEST:g} periods of the lowest mode, "
+            f"{path_of(path).name} lasts {recording.duration:.3g} s; {SHORTEST:g} periods of the lowest mode, "
             f"{least:.3g} s, are the least"
         )
     return recording
@@ -130,7 +128,7 @@ def _needed_rate(model: ModalModel, band: Band | None) -> float:
 
 
 def require_room_for_comparison(
-    paths: Sequence[str | os.PathLike[str]],
+    paths: Sequence[RecordingFile],
     model: ModalModel,
     *,
     stream: str | None = None,
@@ -160,7 +158,7 @@ def require_room_for_comparison(
 
 
 def read_recordings(
-    paths: Sequence[str | os.PathLike[str]],
+    paths: Sequence[RecordingFile],
     model: ModalModel,
     *,
     stream: str | None = None,
@@ -192,9 +190,7 @@ def read_recordings(
     return sorted(found, key=lambda recording: recording.level)
 
 
-def measured_part(
-    model: ModalModel, paths: Sequence[str | os.PathLike[str]], *, stream: str | None = None
-) -> ModalModel:
+def measured_part(model: ModalModel, paths: Sequence[RecordingFile], *, stream: str | None = None) -> ModalModel:
     """Return the model reduced to the responses that every recording has, as not every sensor need be mounted.
 
     Parameters
@@ -213,7 +209,7 @@ def measured_part(
     """
     rows, motions = list(range(len(model.responses))), family_of(quantities_of_unit(model.unit)[0])
     for path in paths:
-        with Recording(path) as recording:
+        with opened(path) as recording:
             channels = recording.stream(stream).channels
             rows = [k for k in rows if channel_at(channels, model.responses[k], motions) is not None]
     if not rows:
@@ -288,8 +284,8 @@ def without_delay(
 def _later(recording: BandRecording, delay: float) -> BandRecording:
     """A recording whose excitations come later, s; what would come in from before its beginning is nothing."""
     n = len(recording.force)
-    padded = next_fast_len(n + int(2 * delay * recording.rate) + 64, real=True)
-    turn = np.exp(-2j * np.pi * rfftfreq(padded, 1 / recording.rate) * delay)[:, None]
+    padded = scipy.fft.next_fast_len(n + int(2 * delay * recording.rate) + 64, real=True)
+    turn = np.exp(-2j * np.pi * scipy.fft.rfftfreq(padded, 1 / recording.rate) * delay)[:, None]
     mean = recording.force.mean(axis=0)
-    late = irfft(rfft(recording.force - mean, n=padded, axis=0) * turn, n=padded, axis=0)[:n]
+    late = scipy.fft.irfft(scipy.fft.rfft(recording.force - mean, n=padded, axis=0) * turn, n=padded, axis=0)[:n]
     return replace(recording, force=np.asarray(late + mean))

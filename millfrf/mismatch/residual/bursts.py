@@ -3,11 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, rfft, rfftfreq
-from scipy.signal import welch
-from scipy.signal.windows import tukey
-from scipy.stats import gamma
 
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
@@ -106,15 +103,15 @@ def _whitened(rest: Real, rate: float, band: tuple[float, float]) -> Real:
 
     It fades in and out: what lies beyond the band, where nothing is modelled, would leak into it from sharp ends.
     """
-    axis, density = welch(
+    axis, density = scipy.signal.welch(
         rest, rate, nperseg=min(int(SEGMENT * rate), len(rest)), detrend=False, average="median", axis=0
     )
-    lines = rfftfreq(len(rest), 1 / rate)
+    lines = scipy.fft.rfftfreq(len(rest), 1 / rate)
     inside = (lines >= band[0]) & (lines <= band[1])
     level = np.stack([np.interp(lines, axis, column) for column in density.T], axis=1)
-    faded = rest * tukey(len(rest), 2 * ENDS * BLOCK * rate / len(rest))[:, None]
-    white = rfft(faded, axis=0) / np.sqrt(np.maximum(level, 1e-12 * density.max(axis=0)))
-    return np.asarray(irfft(white * inside[:, None], n=len(rest), axis=0))
+    faded = rest * scipy.signal.windows.tukey(len(rest), 2 * ENDS * BLOCK * rate / len(rest))[:, None]
+    white = scipy.fft.rfft(faded, axis=0) / np.sqrt(np.maximum(level, 1e-12 * density.max(axis=0)))
+    return np.asarray(scipy.fft.irfft(white * inside[:, None], n=len(rest), axis=0))
 
 
 def _block_powers(signal: Real, length: int) -> Real:
@@ -127,7 +124,7 @@ def _block_powers(signal: Real, length: int) -> Real:
 def _limit(band: tuple[float, float], blocks: int) -> float:
     """Power over the median block's above which noise of a bandwidth makes none of so many blocks."""
     shape = max((band[1] - band[0]) * BLOCK, 0.5)
-    return max(float(gamma.isf(CHANCE / blocks, shape) / gamma.ppf(0.5, shape)), CLEARLY)
+    return max(float(scipy.stats.gamma.isf(CHANCE / blocks, shape) / scipy.stats.gamma.ppf(0.5, shape)), CLEARLY)
 
 
 ASIDE = 1.3

@@ -1,9 +1,7 @@
 """Tests whether a residual is noise: whether it follows the signal or repeats with the forces."""
 
 import numpy as np
-from scipy.fft import irfft
-from scipy.signal import ShortTimeFFT
-from scipy.signal.windows import hann
+import scipy
 
 from estimation import WindowedSpectrum, repeat_of
 from millfrf.core import Real
@@ -40,7 +38,7 @@ def repeated_share(hypothesis: Hypothesis, lines: WindowedSpectrum) -> Real:
         return nothing
     spectrum = np.zeros((len(lines.window) // 2 + 1, len(nothing)), dtype=complex)
     spectrum[lines.band] = lines.measured - predict_lines(hypothesis, lines).response
-    rest = irfft(spectrum, n=len(lines.window), axis=0)
+    rest = scipy.fft.irfft(spectrum, n=len(lines.window), axis=0)
     first, later = rest[:-lag], rest[lag:]
     power = np.mean(first**2 + later**2, axis=0) / 2
     share = np.mean(first * later, axis=0) / np.maximum(power, 1e-300)
@@ -75,12 +73,14 @@ def shown_and_left(hypothesis: Hypothesis, one: WindowedSpectrum) -> tuple[Real,
         Windowed lines of the recording.
     """
     n = len(one.recording.force)
-    shown = irfft(predict_lines(hypothesis, one).spectrum, n=one.padded, axis=0)[:n]
+    shown = scipy.fft.irfft(predict_lines(hypothesis, one).spectrum, n=one.padded, axis=0)[:n]
     kept = slice(one.start, n - int(one.recording.rate) // 2)
     return np.asarray(shown[kept]), np.asarray((one.recording.response - shown)[kept])
 
 
-@compiled
+@compiled(
+    "(float64[:,::1], float64[:,::1], int64)",
+)
 def moving_power(rest: Real, shown: Real, bins: int) -> float:
     """Power of a residual that the prediction's power accounts for, in blocks of neighbouring bins.
 
@@ -247,7 +247,9 @@ def _shifts(count: int) -> list[int]:
 def _powers(signal: Real, lines: WindowedSpectrum) -> Real:
     """Power in cells, (n_bins, n_segments), in the band that is compared."""
     length = 2 * int(min(SEGMENT, lines.recording.duration / FEWEST) * lines.recording.rate / 2)
-    transform = ShortTimeFFT(hann(length, sym=False), length // 2, lines.recording.rate)
+    transform = scipy.signal.ShortTimeFFT(
+        scipy.signal.windows.hann(length, sym=False), length // 2, lines.recording.rate
+    )
     power = np.abs(transform.stft(signal, p0=1, p1=len(signal) // (length // 2))) ** 2
     inside = (transform.f >= lines.frequencies[0]) & (transform.f <= lines.frequencies[-1])
     return np.asarray(power[inside])

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from millfrf.core import Real
+from millfrf.core.compilation import DIAGNOSIS, compile_kernels
 from millfrf.robot_model import Change, SpatialRobot, possible_changes
 
 from ..inference.diagnosis import AcceptedCause, Candidate, Diagnosis, Findings, Remainder, verdict_of
@@ -223,6 +224,7 @@ def diagnose_robot(
     InputError
         No recording, a housing sensor without its place, or a band without modes.
     """
+    compile_kernels(*DIAGNOSIS)
     settings = settings or ROBOT
     most = replace(settings.search, most_causes=most_causes or settings.search.most_causes)
     settings = replace(settings, lab=error or settings.lab, search=most)

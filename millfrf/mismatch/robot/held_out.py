@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import irfft, rfft
+import scipy
 
 from estimation import WindowedSpectrum
 from millfrf.core import Real
@@ -128,11 +128,11 @@ def block_errors(modes: RobotModes, spectrum: WindowedSpectrum) -> Real:
     """
     frequencies, recording = spectrum.padded_frequencies, spectrum.recording
     inside = (frequencies >= spectrum.frequencies[0]) & (frequencies <= spectrum.frequencies[-1])
-    rest = rfft(recording.response, n=spectrum.padded, axis=0) * inside[:, None]
-    size = irfft(rest, n=spectrum.padded, axis=0)
+    rest = scipy.fft.rfft(recording.response, n=spectrum.padded, axis=0) * inside[:, None]
+    size = scipy.fft.irfft(rest, n=spectrum.padded, axis=0)
     moved = np.einsum("kpq,kq->kp", modes.receptance(frequencies[inside]), spectrum.force_lines[inside])
     rest[inside] -= moved * spectrum.padded_kinematic[inside]
-    left = irfft(rest, n=spectrum.padded, axis=0)
+    left = scipy.fft.irfft(rest, n=spectrum.padded, axis=0)
     kept = slice(spectrum.start, spectrum.start + len(spectrum.window))
     length = int(LIMITS.block * recording.rate)
     count = len(spectrum.window) // length

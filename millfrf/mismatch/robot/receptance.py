@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
-from acquisition import Recording, Stream
+from acquisition import Stream, opened
 from estimation import (
     DERIVATIVE_ORDERS,
     BandRecording,
@@ -141,7 +141,7 @@ def read_posed(
     InputError
         No force at the tip, no motion at tip or housing, or what :func:`millfrf.mismatch.read_recording` refuses.
     """
-    with Recording(path) as recording:
+    with opened(path) as recording:
         channels = recording.stream(stream).channels
     excitations = tuple(label for label in TIP if channel_at(channels, label, ("force",)))
     responses = tuple(label for label in (*TIP, *HOUSING) if channel_at(channels, label, DERIVATIVE_ORDERS))
@@ -261,7 +261,7 @@ class RobotModes:
         overlap = theirs @ mine.T
         sizes = np.outer(np.sum(theirs**2, axis=1), np.sum(mine**2, axis=1))
         apart = np.log(reference.natural[:near, None] / self.natural[:near]) / PAIRED
-        order = linear_sum_assignment(apart**2 + 4 * (1 - overlap**2 / np.maximum(sizes, 1e-300)))[1]
+        order = scipy.optimize.linear_sum_assignment(apart**2 + 4 * (1 - overlap**2 / np.maximum(sizes, 1e-300)))[1]
         whole = np.concatenate([order, np.arange(near, len(self.natural))])
         signs = np.ones(len(whole))
         signs[:near] = np.where(overlap[np.arange(near), order] < 0, -1.0, 1.0)

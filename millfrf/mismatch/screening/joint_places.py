@@ -6,9 +6,8 @@ from itertools import combinations
 from typing import Any, Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, rfft
-from scipy.optimize import minimize
 
 from millfrf.core import Complex, DegreeOfFreedom, Real
 
@@ -113,7 +112,7 @@ def find_direction(floor: Floor, hypothesis: Hypothesis) -> JointSighting:
     tries = np.vstack([tries, np.eye(n), *map(_eigenvectors, floor.records, reaches)])
     best = max(tries, key=gain)
     if n > 1:
-        answer = minimize(lambda d: -gain(d), best / np.linalg.norm(best), method="Nelder-Mead")
+        answer = scipy.optimize.minimize(lambda d: -gain(d), best / np.linalg.norm(best), method="Nelder-Mead")
         best = answer.x
     direction = best / np.linalg.norm(best)
     direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
@@ -171,11 +170,11 @@ def seen_motion(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis) ->
     n = len(lines.recording.force)
     frequencies = lines.padded_frequencies
     whole = np.zeros((lines.padded, lines.measured.shape[1]))
-    whole[:n] = lines.recording.response - irfft(predicted.spectrum, n=lines.padded, axis=0)[:n]
+    whole[:n] = lines.recording.response - scipy.fft.irfft(predicted.spectrum, n=lines.padded, axis=0)[:n]
     run_in = np.ones(n)
     run_in[: lines.start] = np.linspace(0, 1, lines.start) ** 4
     whole[:n] *= run_in[:, None]
-    rest = rfft(whole, axis=0)
+    rest = scipy.fft.rfft(whole, axis=0)
     filtered = _wiener(record, reached_by(record, hypothesis, axis) @ axis.entries)
     inside = (frequencies >= lines.frequencies[0]) & (frequencies <= lines.frequencies[-1])
     gains = np.zeros((len(frequencies), filtered.shape[1]), dtype=complex)
@@ -186,9 +185,9 @@ def seen_motion(record: FloorRecord, hypothesis: Hypothesis, axis: JointAxis) ->
     compliance = path.along @ receptance_at(reach.model, frequencies)
     felt = reach.forces(lines.force_lines) - reach.forces(predicted.joint)
     displacement = np.einsum("kq,kq->k", compliance, felt) + (compliance @ path.push) * force
-    deflection = irfft(displacement, n=lines.padded)[:n]
-    velocity = irfft(2j * np.pi * frequencies * displacement, n=lines.padded)[:n]
-    return SeenMotion(deflection, velocity, -irfft(force, n=lines.padded)[:n])
+    deflection = scipy.fft.irfft(displacement, n=lines.padded)[:n]
+    velocity = scipy.fft.irfft(2j * np.pi * frequencies * displacement, n=lines.padded)[:n]
+    return SeenMotion(deflection, velocity, -scipy.fft.irfft(force, n=lines.padded)[:n])
 
 
 def _wiener(record: FloorRecord, reached: Complex) -> Complex:
@@ -353,7 +352,7 @@ def _refined(bands: list[AxisBands], start: Real) -> Real:
         toward = np.einsum("b,bij,j->i", slope, pulls, parts) - np.einsum("b,bij,j->i", slope * z, weights, parts)
         return float(-2 * np.sum(counts * (z - 1 - np.log(z)))), -4 * toward
 
-    found = minimize(negative, start, jac=True, method="L-BFGS-B").x
+    found = scipy.optimize.minimize(negative, start, jac=True, method="L-BFGS-B").x
     return np.asarray(found / np.linalg.norm(found))
 
 

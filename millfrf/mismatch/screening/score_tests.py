@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.fft import rfft
+import scipy
 
 from millfrf.core import Real
 
@@ -140,7 +140,7 @@ def _column(record: FloorRecord, hypothesis: Hypothesis, seen: SeenMotion, cause
     assert cause.axis is not None
     lines = record.lines
     force = driven_force(lines, seen.deflection, seen.velocity, cause.law())
-    spectrum = rfft(force, n=lines.padded)
+    spectrum = scipy.fft.rfft(force, n=lines.padded)
     reach, n = hypothesis.reach_with(cause.axis), len(hypothesis.model.responses)
     receptance = receptance_at(reach.model, lines.padded_frequencies)[:, :n] @ reach.paths[-1].push
     response = -receptance * spectrum[:, None] * lines.padded_kinematic

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import gamma
+import scipy
 
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
@@ -150,7 +150,11 @@ def _floor_covariance(rest: Complex, through: Complex, level: tuple[Real, Real])
     bands = np.array_split(np.abs(rest) ** 2, min(150, max(4, len(rest) // 12)))
     # the fifth of bands that are quietest by chance alone is quieter than the noise
     count = float(np.mean([len(band) for band in bands]))
-    quiet = np.quantile(np.array([band.mean(axis=0) for band in bands]), 0.2, axis=0) * count / gamma.ppf(0.2, count)
+    quiet = (
+        np.quantile(np.array([band.mean(axis=0) for band in bands]), 0.2, axis=0)
+        * count
+        / scipy.stats.gamma.ppf(0.2, count)
+    )
     share = np.median(np.sqrt(quiet) / level[0])
     passed = through * (FORCE_SHARE * share * level[1])
     covariance = passed @ passed.conj().swapaxes(1, 2)

@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits
 
 from estimation import BandRecording, WindowedSpectrum
 from millfrf.core import Band, InputError
+from millfrf.core.compilation import DIAGNOSIS, compile_kernels
 from modal_fit import ModalModel
 
 from ..behaviour.behaviour_of_modes import behaviour_of
@@ -84,6 +85,7 @@ def diagnose(
     InputError
         Recordings that the model cannot be compared with.
     """
+    compile_kernels(*DIAGNOSIS)
     # matrices are small: threads inside the linear algebra only get in each other's way
     with threadpool_limits(1, user_api="blas"):
         delay, (model, recordings) = model.delay, without_delay(in_deflections(model), recordings)

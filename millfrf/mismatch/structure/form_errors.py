@@ -4,10 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft
-from scipy.stats import chi2
-from scipy.stats import t as student
 
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
@@ -169,7 +167,7 @@ def _signal(lines: WindowedSpectrum, part: Complex) -> Real:
     """Windowed signals in time of lines (n_lines, ...)."""
     spectrum = np.zeros((len(lines.window) // 2 + 1, *part.shape[1:]), dtype=complex)
     spectrum[lines.band] = part
-    return np.asarray(irfft(spectrum, n=len(lines.window), axis=0))
+    return np.asarray(scipy.fft.irfft(spectrum, n=len(lines.window), axis=0))
 
 
 def _answer(matrix: Real, gradient: Real) -> tuple[Real, Real]:
@@ -184,11 +182,11 @@ def _variance(steps: Real, variances: Real) -> float:
     freedom = len(steps) - 1
     mean = np.sum(weights * steps) / np.sum(weights)
     q = float(np.sum(weights * (steps - mean) ** 2))
-    if freedom < 1 or q < chi2.isf(DISAGREE, freedom):
+    if freedom < 1 or q < scipy.stats.chi2.isf(DISAGREE, freedom):
         return 0.0
     shared = float(np.sum(weights) - np.sum(weights**2) / np.sum(weights))
     if shared <= 0:
         # one part alone knows the number: the others cannot disagree
         return 0.0
     between = (q - freedom) / shared
-    return max(between, 0.0) * float(student.ppf(0.975, freedom) / NORMAL) ** 2
+    return max(between, 0.0) * float(scipy.stats.t.ppf(0.975, freedom) / NORMAL) ** 2

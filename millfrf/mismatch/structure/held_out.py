@@ -6,7 +6,7 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from scipy.fft import irfft
+import scipy
 
 from estimation import WindowedSpectrum
 from millfrf.core import Complex, Real
@@ -255,7 +255,7 @@ def block_powers(lines: WindowedSpectrum, rest: Complex) -> Real:
     """
     spectrum = np.zeros((len(lines.window) // 2 + 1, rest.shape[1]), dtype=complex)
     spectrum[lines.band] = rest
-    signal = irfft(spectrum, n=len(lines.window), axis=0)
+    signal = scipy.fft.irfft(spectrum, n=len(lines.window), axis=0)
     return np.array([np.sum(signal[block] ** 2) for block in block_slices(lines)]) * len(lines.window) / 2
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from estimation import BandRecording, Frf, WindowedSpectrum, windowed_spectrum
 from millfrf.core import Real
+from millfrf.core.compilation import DIAGNOSIS, compile_kernels
 from modal_fit import ModalModel
 
 from ..faults.clipping_repair import residual_lines, with_faults
@@ -196,6 +197,7 @@ def predict(model: ModalModel, trial: BandRecording) -> Prediction:
     InputError
         A recording that the model cannot be compared with.
     """
+    compile_kernels(*DIAGNOSIS)
     model, (trial,) = without_delay(in_deflections(model), [trial])
     hypothesis = hypothesis_of(model)
     band = band_of(model, trial.rate)

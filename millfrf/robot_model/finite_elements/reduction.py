@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.linalg import eig, eigh
+import scipy
 
 from millfrf.core import InputError, Real
 from modal_fit import ModalModel, Residuals
@@ -29,7 +29,7 @@ def modal_damping_matrix(mass: Real, stiffness: Real, ratios: Real) -> Real:
     given = np.asarray(ratios, dtype=float)
     if given.shape != (len(mass),):
         raise InputError(f"{given.size} damping ratios for {len(mass)} modes; give one a mode")
-    squares, shapes = eigh(stiffness, mass)
+    squares, shapes = scipy.linalg.eigh(stiffness, mass)
     if squares[0] <= 0:
         raise InputError(f"the structure is not held: lowest omega^2 = {squares[0]:.3g}; check stiffness and posture")
     carried = mass @ shapes
@@ -93,7 +93,7 @@ def modal_model(
     InputError
         The structure is not held (lowest omega^2 not positive).
     """
-    squares, shapes = eigh(stiffness, mass)
+    squares, shapes = scipy.linalg.eigh(stiffness, mass)
     if squares[0] <= 0:
         raise InputError(f"the structure is not held: lowest omega^2 = {squares[0]:.3g}; check stiffness and posture")
     modal = shapes.T @ damping @ shapes
@@ -127,7 +127,9 @@ def _from_complex_modes(
     mass: Real, damping: Real, stiffness: Real, observed: Real, labels: Sequence[str], highest_frequency: float
 ) -> ModalModel:
     zero = np.zeros_like(mass)
-    poles, vectors = eig(np.block([[-stiffness, zero], [zero, mass]]), np.block([[damping, mass], [mass, zero]]))
+    poles, vectors = scipy.linalg.eig(
+        np.block([[-stiffness, zero], [zero, mass]]), np.block([[damping, mass], [mass, zero]])
+    )
     kept = (poles.imag > 1e-9 * np.abs(poles)) & (np.abs(poles) < 2 * np.pi * highest_frequency)
     poles, upper = poles[kept], vectors[: len(mass), kept]
     order = np.argsort(np.abs(poles))

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import null_space
+import scipy
 
 from millfrf.core import Real
 
@@ -254,7 +254,7 @@ def coordinate_basis(structure: Structure) -> Real:
             basis[6 * node : 6 * node + 6, columns] += block
     left = rigid_rows(structure) @ basis
     if np.abs(left).max(initial=0.0) > 1e-9:
-        basis = basis @ null_space(left, rcond=1e-10)
+        basis = basis @ scipy.linalg.null_space(left, rcond=1e-10)
     return basis
 
 

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError
 
 from millfrf.core import Real
 
@@ -99,7 +99,7 @@ def _staged(problem: Problem, x: Real) -> tuple[Real, float]:
 def _mean_square(problem: Problem, x: Real) -> float:
     try:
         sums = sums_at(problem, x)
-    except (LinAlgError, np.linalg.LinAlgError):
+    except (scipy.linalg.LinAlgError, np.linalg.LinAlgError):
         return np.inf
     return sum(one.rr for one in sums) / sum(one.count for one in sums)
 
@@ -197,7 +197,7 @@ def _at(problem: Problem, x: Real, scale: float, off: float) -> tuple[float, Rea
     """Misfit plus belief, and the misfit's gradient and matrix; None where the numbers leave no robot."""
     try:
         misfit, gradient, matrix = weighed(sums_at(problem, x), scale, off)
-    except (LinAlgError, np.linalg.LinAlgError):
+    except (scipy.linalg.LinAlgError, np.linalg.LinAlgError):
         return None
     return misfit + float(problem.precision @ x**2), gradient, matrix
 

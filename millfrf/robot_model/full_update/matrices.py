@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import eigh
+import scipy
 
 from millfrf.core import HOUSING, TIP, InputError, Real
 
@@ -214,7 +214,7 @@ def _stiffness_of(structure: Structure, *, weight: bool = False, beams: bool = F
 
 def _rows(matrix: Real) -> Real:
     """F of a positive semi-definite matrix ``F^T F``, with as many rows as it has rank."""
-    values, vectors = eigh(matrix)
+    values, vectors = scipy.linalg.eigh(matrix)
     kept = values > 1e-12 * values[-1]
     return np.asarray((vectors[:, kept] * np.sqrt(values[kept])).T)
 

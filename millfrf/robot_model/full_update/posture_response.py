@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import LinAlgError, eigh
+import scipy
 
 from millfrf.core import Complex, Real
 
@@ -100,7 +100,7 @@ class _Known:
         self.system, self.parameters, self.x = system, parameters, x
         self.omega = 2 * np.pi * frequencies
         stiffness, mass = _assembled(system, parameters, x)
-        squares, shapes = eigh(stiffness, mass)
+        squares, shapes = scipy.linalg.eigh(stiffness, mass)
         self.squares = squares
         self.natural = np.sqrt(np.maximum(squares, 0.0))
         self.rows = system.observed @ shapes
@@ -297,7 +297,7 @@ def _assembled(system: PostureSystem, parameters: Sequence[UpdateParameter], x: 
             kilograms, place = _payload(system, parameters, x)
             mass += factor.T @ mass_block(kilograms, system.base_axes @ place) @ factor
     if np.linalg.eigvalsh(mass)[0] <= 0:
-        raise LinAlgError("no positive mass")
+        raise scipy.linalg.LinAlgError("no positive mass")
     return stiffness, mass
 
 

@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from millfrf.core import InputError, Real
 
@@ -195,7 +195,7 @@ def names_of(
     n = len(problem.parameters)
     shifted, errors = _with_masses_free(robot, problem, found)
     errors = np.maximum(np.maximum(errors, found.errors), _jackknife(held_out, n))
-    threshold = float(norm.isf(SIGNIFICANCE / (2 * n)))
+    threshold = float(scipy.stats.norm.isf(SIGNIFICANCE / (2 * n)))
     least = np.array([LEAST[one.kind] for one in problem.parameters])
     named = told_numbers(problem.parameters, found)
     for x in (found.x, shifted, *(one.x for one in held_out)):

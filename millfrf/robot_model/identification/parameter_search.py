@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import differential_evolution, least_squares
 
 from millfrf.core import InputError, Real
 
@@ -106,7 +106,7 @@ def identify(
         return np.concatenate([residuals(np.exp(x)), anchor @ (x - begin)])
 
     slope: Any = "2-point" if jacobian is None else lambda x: np.vstack([jacobian(np.exp(x)), anchor])
-    best = least_squares(
+    best = scipy.optimize.least_squares(
         whole,
         begin,
         slope,
@@ -123,7 +123,7 @@ def identify(
 
 def _searched(residuals: Callable[[Real], Real], low: Real, high: Real, seed: int, generations: int) -> Real:
     """Logarithms of the best parameters of a global search."""
-    search = differential_evolution(
+    search = scipy.optimize.differential_evolution(
         lambda x: float(np.sum(residuals(np.exp(x)) ** 2)),
         np.column_stack([low, high]),
         seed=seed,

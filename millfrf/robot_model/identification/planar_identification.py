@@ -5,8 +5,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import eigh, eigvalsh
 
 from estimation import Frf
 from millfrf.core import InputError, Real
@@ -90,13 +90,13 @@ def identify_from_frequencies(
 
 def _first_frequency(robot: PlanarRobot, angles: Real) -> float:
     mass, stiffness = rigid_matrices(robot, angles)
-    return float(np.sqrt(eigvalsh(stiffness, mass)[0]) / (2 * np.pi))
+    return float(np.sqrt(scipy.linalg.eigvalsh(stiffness, mass)[0]) / (2 * np.pi))
 
 
 def _receptance(robot: PlanarRobot, angles: Real, frequencies: Real) -> NDArray[np.complex128]:
     """Compute ``rigid_model(...).receptance(...)`` without its checks: the search calls it often."""
     mass, stiffness = rigid_matrices(robot, angles)
-    squares, shapes = eigh(stiffness, mass)
+    squares, shapes = scipy.linalg.eigh(stiffness, mass)
     tip = tip_jacobian(robot, angles) @ shapes
     omega = 2 * np.pi * frequencies[:, None]
     modes = 1 / (squares - omega**2 + 2j * robot.damping_ratios * np.sqrt(squares) * omega)

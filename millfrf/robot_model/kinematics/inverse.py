@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import qmc
+import scipy
 
 from millfrf.core import InputError, Real
 
@@ -181,7 +181,7 @@ def _starts(mechanism: Mechanism, start: Real, count: int) -> Real:
         raise InputError("a robot with closed loops is aimed in steps: inverse_kinematics")
     frames = [mechanism.frames[index] for index in mechanism.moving]
     ranges = np.array([_range(frame, value) for frame, value in zip(frames, start, strict=True)])
-    spread = qmc.Halton(len(frames), scramble=False).random(count + 1)[1:]
+    spread = scipy.stats.qmc.Halton(len(frames), scramble=False).random(count + 1)[1:]
     lower, upper = _bounds(mechanism)
     return np.vstack([np.clip(start, lower, upper), ranges[:, 0] + spread * (ranges[:, 1] - ranges[:, 0])])
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from millfrf.core import FileFormatError, InputError, Real, apart, warning_lines, writing_whole_file
 
@@ -155,14 +155,17 @@ def _few(doubts: dict[str, int]) -> tuple[str, ...]:
 
 def _matrix(place: Real) -> Real:
     whole = np.eye(4)
-    whole[:3, :3] = Rotation.from_rotvec(place[3:]).as_matrix()
+    whole[:3, :3] = scipy.spatial.transform.Rotation.from_rotvec(place[3:]).as_matrix()
     whole[:3, 3] = place[:3]
     return whole
 
 
 def _sum(place: Real, small: Real) -> Real:
     """Place (position, rotation vector) after a small displacement and rotation in the base frame."""
-    turned = (Rotation.from_rotvec(small[3:]) * Rotation.from_rotvec(place[3:])).as_rotvec()
+    turned = (
+        scipy.spatial.transform.Rotation.from_rotvec(small[3:])
+        * scipy.spatial.transform.Rotation.from_rotvec(place[3:])
+    ).as_rotvec()
     near = turned - 2 * np.pi * np.round((turned - place[3:]) @ _unit(turned) / (2 * np.pi)) * _unit(turned)
     return np.concatenate([place[:3] + small[:3], near])
 

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from millfrf.core import InputError, Real
 from modal_fit import ModalModel
@@ -132,9 +132,9 @@ def posture_map(
 def turned_place(place: CutPlace, angle: float, redundancy: str) -> CutPlace:
     """The place after the redundancy turned by ``angle``, rad."""
     if redundancy == "tool":
-        about_tool = Rotation.from_rotvec(angle * place.attitude[:, 2]).as_matrix()
+        about_tool = scipy.spatial.transform.Rotation.from_rotvec(angle * place.attitude[:, 2]).as_matrix()
         return CutPlace(place.position, about_tool @ place.attitude, place.axes)
-    about_feed = Rotation.from_rotvec(angle * place.axes[:, 0]).as_matrix()
+    about_feed = scipy.spatial.transform.Rotation.from_rotvec(angle * place.axes[:, 0]).as_matrix()
     return CutPlace(place.position, about_feed @ place.attitude, about_feed @ place.axes)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from millfrf.core import InputError, Real
 
@@ -284,7 +284,7 @@ def _fit(residuals: Callable[[Real], Real], change: Change) -> tuple[float, floa
     bounds = [change.to_fit(bound) for bound in change.bounds]
     start = min((change.to_fit(value) for value in change.values[::2]), key=lambda x: _size(residuals, x))
     scale = 0.1 if change.logarithmic or change.scale else 0.01
-    found = least_squares(residuals, [start], bounds=bounds, x_scale=scale, max_nfev=15, xtol=1e-6)
+    found = scipy.optimize.least_squares(residuals, [start], bounds=bounds, x_scale=scale, max_nfev=15, xtol=1e-6)
     slope = float(np.sqrt(found.jac[:, 0] @ found.jac[:, 0]))
     number, chi_square = change.from_fit(float(found.x[0])), float(found.fun @ found.fun)
     error = np.inf if slope == 0 else change.slope(number) / slope

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+import scipy
 
 from millfrf.core import InputError, Real
 
@@ -122,11 +122,11 @@ def most_probable(cell: MeasuredCell, rows: Rows, hyper: Real, stiffness: Real, 
 def _expected(cell: MeasuredCell, rows: Rows, hyper: Real, postures: list[int]) -> Real:
     """Mean of the unknowns in some of the measured postures, given rows, (n_postures, n_unknowns)."""
     distances = cell.distances()
-    factor = cho_factor(covariance_of(hyper, Evidence(rows, distances)), lower=True)
+    factor = scipy.linalg.cho_factor(covariance_of(hyper, Evidence(rows, distances)), lower=True)
     wanted = joined([unknown_rows(p, len(cell.bases[0].stiffness), len(cell.bases[0].mass)) for p in postures])
     parts = covariance_parts(wanted, rows, distances, float(np.exp(hyper[-1])), False)
     across = np.tensordot(np.exp(2 * hyper[:-1]), parts, 1)
-    return np.asarray((across @ cho_solve(factor, rows.value)).reshape(len(postures), -1))
+    return np.asarray((across @ scipy.linalg.cho_solve(factor, rows.value)).reshape(len(postures), -1))
 
 
 def _pairs(one: MeasuredModes, modes: CorrectedModes, scales: tuple[float, float]) -> tuple[tuple[int, int], ...]:

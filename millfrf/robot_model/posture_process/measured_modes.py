@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from millfrf.core import TIP, DegreeOfFreedom, InputError, Real
 from modal_fit import ModalModel, derived_covariance
@@ -190,5 +190,5 @@ def mode_pairs(
     apart = (first[:, None] ** 2 + second[None, :] ** 2 - 2 * np.abs(shapes @ moved.T)) / both
     cost = (ratio / scales[0]) ** 2 + np.minimum(apart, 4.0) / scales[1] ** 2
     cost[np.abs(ratio) > FARTHEST] = 1e4
-    rows, columns = linear_sum_assignment(cost)
+    rows, columns = scipy.optimize.linear_sum_assignment(cost)
     return tuple((int(i), int(j)) for i, j in zip(rows, columns, strict=True) if cost[i, j] < 1e4)

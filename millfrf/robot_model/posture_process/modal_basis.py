@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import eigh
+import scipy
 
 from millfrf.core import InputError, Real
 
@@ -213,7 +213,7 @@ def corrected_modes(basis: ModalBasis, stiffness: Real, mass: Real) -> Corrected
     inertias = np.exp(mass)[:, None, None] * basis.mass
     whole = np.diag(basis.squares) + np.tensordot(np.expm1(stiffness), basis.stiffness, 1)
     inertia = np.eye(len(whole)) + np.tensordot(np.expm1(mass), basis.mass, 1)
-    squares, vectors = eigh(whole, inertia)
+    squares, vectors = scipy.linalg.eigh(whole, inertia)
     squares = np.maximum(squares, 1e-6 * basis.squares[0])
     shares = np.einsum("ir,kij,jr->rk", vectors, parts, vectors, optimize=True) / squares[:, None]
     masses = np.einsum("ir,bij,jr->rb", vectors, inertias, vectors, optimize=True)

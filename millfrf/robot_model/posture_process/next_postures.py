@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from millfrf.core import InputError, Real
 
@@ -132,7 +132,7 @@ def _gains(
 ) -> tuple[float, Real]:
     """Mean variance of the targets' peaks given the rows so far, and how much each candidate takes from it."""
     whole = _covariance(learned, rows, rows, places, places, same=True)
-    factor = cho_factor(whole + np.diag(rows.noise**2), lower=True)
+    factor = scipy.linalg.cho_factor(whole + np.diag(rows.noise**2), lower=True)
     targets = joined([_at(one.rows, i) for i, one in enumerate(wanted)])
     at = [one.place for one in wanted]
     form = np.zeros((sum(len(one) for one in forms), len(targets)))
@@ -141,7 +141,7 @@ def _gains(
         form[row : row + len(one), column : column + one.shape[1]] = one
         row, column = row + len(one), column + one.shape[1]
     across = form @ _covariance(learned, targets, rows, at, places)
-    pulled = cho_solve(factor, across.T)
+    pulled = scipy.linalg.cho_solve(factor, across.T)
     own = form @ _covariance(learned, targets, targets, at, at) @ form.T
     before = float(np.mean(np.diag(own) - np.sum(across * pulled.T, axis=1)))
     gains = []
@@ -149,7 +149,7 @@ def _gains(
         there, seen = [candidate.place], candidate.rows
         to_known = _covariance(learned, seen, rows, there, places)
         spread = _covariance(learned, seen, seen, there, there, same=True) + np.diag(seen.noise**2)
-        spread = spread - to_known @ cho_solve(factor, to_known.T)
+        spread = spread - to_known @ scipy.linalg.cho_solve(factor, to_known.T)
         cross = form @ _covariance(learned, targets, seen, at, there) - pulled.T @ to_known.T
         gains.append(float(np.sum(cross * np.linalg.solve(spread, cross.T).T)) / len(form))
     return before, np.array(gains)

@@ -3,9 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.optimize import linear_sum_assignment
 
 from millfrf.core import TIP, Real
 from modal_fit import ModalModel, Residuals, pack_parameters
@@ -56,14 +55,14 @@ class Conditioned:
         squares = np.exp(2 * self.hyper[:-1])
         cross = np.tensordot(squares, covariance_parts(rows, self.evidence.rows, across, self.length, False), 1)
         own = np.tensordot(squares, covariance_parts(rows, rows, within, self.length, True), 1)
-        reduced = solve_triangular(self.root, cross.T, lower=True)
+        reduced = scipy.linalg.solve_triangular(self.root, cross.T, lower=True)
         return cross @ self.pulled, own - reduced.T @ reduced
 
 
 def conditioned(evidence: Evidence, hyper: Real) -> Conditioned:
     """Factor the measured rows' covariance once, for all that is asked of it."""
-    factor = cho_factor(covariance_of(hyper, evidence), lower=True)
-    return Conditioned(hyper, evidence, np.tril(factor[0]), cho_solve(factor, evidence.rows.value))
+    factor = scipy.linalg.cho_factor(covariance_of(hyper, evidence), lower=True)
+    return Conditioned(hyper, evidence, np.tril(factor[0]), scipy.linalg.cho_solve(factor, evidence.rows.value))
 
 
 def distances_to(learned: LearnedPostures, places: list[PosturePlace]) -> tuple[SquaredDistances, SquaredDistances]:
@@ -247,7 +246,7 @@ def _in_order(middle: CorrectedModes, modes: CorrectedModes, kept: int) -> tuple
     """Which mode of a draw is which in the middle, by their whole shapes, and the sign that makes them alike."""
     product = middle.vectors[:, :kept].T @ modes.vectors
     likeness = product**2 / np.sum(modes.vectors**2, axis=0)
-    order = linear_sum_assignment(-likeness)[1]
+    order = scipy.optimize.linear_sum_assignment(-likeness)[1]
     return order, np.where(product[np.arange(kept), order] < 0, -1.0, 1.0)
 
 

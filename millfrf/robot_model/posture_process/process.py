@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import minimize
 
 from millfrf.core import Real
 
@@ -182,9 +181,9 @@ def log_posterior(hyper: Real, evidence: Evidence) -> tuple[float, Real]:
     parts = covariance_parts(rows, rows, evidence.distances, float(np.exp(hyper[-1])), True)
     squares = np.exp(2 * hyper[:-1])
     whole = np.tensordot(squares, parts, 1) + np.diag(rows.noise**2)
-    factor = cho_factor(whole, lower=True)
-    pulled = cho_solve(factor, rows.value)
-    pull = np.outer(pulled, pulled) - cho_solve(factor, np.eye(len(rows)))
+    factor = scipy.linalg.cho_factor(whole, lower=True)
+    pulled = scipy.linalg.cho_solve(factor, rows.value)
+    pull = np.outer(pulled, pulled) - scipy.linalg.cho_solve(factor, np.eye(len(rows)))
     longer = covariance_parts(rows, rows, evidence.distances, float(np.exp(hyper[-1] + step)), True)
     slopes = np.append(
         squares * np.tensordot(parts, pull, 2), np.sum(np.tensordot(squares, longer - parts, 1) * pull) / (2 * step)
@@ -216,7 +215,7 @@ def best_hyperparameters(evidence: Evidence, start: Real, fixed: Sequence[int] =
     ]
     for k in fixed:
         spans[k] = (float(start[k]), float(start[k]))
-    found = minimize(negative, start, jac=True, method="L-BFGS-B", bounds=spans, options={"maxiter": 60})
+    found = scipy.optimize.minimize(negative, start, jac=True, method="L-BFGS-B", bounds=spans, options={"maxiter": 60})
     return np.asarray(found.x)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import qmc
+import scipy
 
 from millfrf.core import InputError, Real
 
@@ -274,7 +274,7 @@ def ready_posture(mechanism: Mechanism, tries: int = 400) -> tuple[Real, bool]:
     lower = np.where(empty, [frame.lower for frame in frames], lower)
     upper = np.where(empty, [frame.upper for frame in frames], upper)
     middle, width = (lower + upper) / 2, 0.8 * (upper - lower)
-    samples = middle + width * (qmc.Halton(len(frames), scramble=False).random(tries + 1)[1:] - 0.5)
+    samples = middle + width * (scipy.stats.qmc.Halton(len(frames), scramble=False).random(tries + 1)[1:] - 0.5)
     turning = [place for place, frame in enumerate(frames) if frame.motion == "revolute"]
     samples[:, turning[:1]] = np.clip(0.0, lower, upper)[turning[:1]]  # turning about the base changes nothing
     tool = mechanism.index(mechanism.tool)

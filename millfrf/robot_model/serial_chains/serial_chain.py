@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from millfrf.core import InputError, Real
 
@@ -141,7 +141,7 @@ def place_of(shift: Sequence[float], angles: Sequence[float]) -> Real:
     [0.0, -1.0, 0.0]
     """
     place = np.eye(4)
-    place[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix()
+    place[:3, :3] = scipy.spatial.transform.Rotation.from_euler("xyz", angles).as_matrix()
     place[:3, 3] = shift
     return place
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import eigh
+import scipy
 
 from estimation import Frf
 from millfrf.core import HOUSING, TIP, InputError, Real
@@ -54,7 +54,7 @@ def modes_at(robot: SpatialRobot, q: Real) -> StructureModes:
     stiffness = basis.T @ stiffness_matrix(structure) @ basis
     mass = basis.T @ mass_matrix(structure) @ basis
     try:
-        squares, vectors = eigh(stiffness, mass)
+        squares, vectors = scipy.linalg.eigh(stiffness, mass)
     except np.linalg.LinAlgError as error:
         raise InputError(
             "the mass matrix is singular: a node has no mass; add [[bodies]] to the robot's file"

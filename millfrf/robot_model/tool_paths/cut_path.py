@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from millfrf.core import FileFormatError, InputError, Real, apart
 
@@ -157,7 +157,9 @@ def read_cut_path(path: str | os.PathLike[str]) -> CutPath:
     names = _names(path)
     if all(name in names for name in (*VECTOR, *FORCE)):
         known = read_tool_path(path)
-        return cut_path(known.positions, Rotation.from_rotvec(known.attitudes).as_matrix(), known.wrenches)
+        return cut_path(
+            known.positions, scipy.spatial.transform.Rotation.from_rotvec(known.attitudes).as_matrix(), known.wrenches
+        )
     tool = AXIS if all(name in names for name in AXIS) else VECTOR
     missing = [name for name in (*POSITION, *tool) if name not in names]
     if missing:
@@ -174,7 +176,7 @@ def read_cut_path(path: str | os.PathLike[str]) -> CutPath:
         wrenches = np.zeros((len(table), 6))
         wrenches[:, : table.shape[1] - 6] = table[:, 6:]
     if tool == VECTOR:
-        return cut_path(table[:, :3], Rotation.from_rotvec(table[:, 3:6]).as_matrix(), wrenches)
+        return cut_path(table[:, :3], scipy.spatial.transform.Rotation.from_rotvec(table[:, 3:6]).as_matrix(), wrenches)
     sizes = np.linalg.norm(table[:, 3:6], axis=1)
     if np.abs(sizes - 1).max() > 0.01:
         raise FileFormatError(
@@ -252,6 +254,6 @@ class RotaryTable:
         if angle == 0.0:
             return place
         axis = np.asarray(self.direction) / np.linalg.norm(self.direction)
-        turn = Rotation.from_rotvec(angle * axis).as_matrix()
+        turn = scipy.spatial.transform.Rotation.from_rotvec(angle * axis).as_matrix()
         position = self.point + turn @ (place.position - self.point)
         return CutPlace(position, turn @ place.attitude, turn @ place.axes)

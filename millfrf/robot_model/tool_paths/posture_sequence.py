@@ -5,8 +5,8 @@ from dataclasses import dataclass, fields
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from millfrf.core import Index, InputError, Real
 
@@ -112,7 +112,9 @@ def _edges(first: Real, second: Real) -> tuple[Index, Index]:
     """Pairs of nodes whose coordinates all differ by at most 1."""
     if not len(first) or not len(second):
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    near = cKDTree(first).sparse_distance_matrix(cKDTree(second), 1.0 + 1e-9, p=np.inf, output_type="ndarray")
+    near = scipy.spatial.cKDTree(first).sparse_distance_matrix(
+        scipy.spatial.cKDTree(second), 1.0 + 1e-9, p=np.inf, output_type="ndarray"
+    )
     return near["i"].astype(np.int64), near["j"].astype(np.int64)
 
 

@@ -5,8 +5,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from estimation import Frf, FrfCovariance
 from millfrf.core import InputError, Real
@@ -300,7 +300,7 @@ def _aligned(model: ModalModel, wanted: ModalModel) -> ModalModel:
     product = np.abs(model.right @ wanted.right.conj().T)
     sizes = np.linalg.norm(model.right, axis=1)[:, None] * np.linalg.norm(wanted.right, axis=1)
     apart = apart + 0.1 * (1 - product / np.maximum(sizes, 1e-300))
-    rows, columns = linear_sum_assignment(apart)
+    rows, columns = scipy.optimize.linear_sum_assignment(apart)
     order = rows[np.argsort(columns)]
     right, left = model.right[order], model.left[order]
     norm = np.sum(np.abs(right) ** 2, axis=1)

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+import scipy
 
 from millfrf.core import Complex, Real
 
@@ -267,7 +267,7 @@ def irregular_change(spectrum: Spectrum, motion: ToolMotion, tones: Real) -> flo
         return 0.0
     counted = motion.scales > 0
     floor = _wide_floor(orders, power)
-    stands = uniform_filter1d(power, _NEIGHBOURS, axis=0) > ABOVE * floor
+    stands = scipy.ndimage.uniform_filter1d(power, _NEIGHBOURS, axis=0) > ABOVE * floor
     return motion.change(orders, np.where(stands & counted, np.maximum(power - floor, 0.0), 0.0))
 
 

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.signal import resample_poly
+import scipy
 
 from millfrf.core import Real
 
@@ -81,7 +80,7 @@ def to_revolutions(data: Real, sample_rate: float, track: SpindleTrack, teeth: i
         when = when - (track.revolutions(when) - angles) / np.interp(when, times, speed)
     samples = np.empty((len(when), data.shape[1]))
     for number, column in enumerate(data.T):  # a spline takes many times the memory of its samples
-        samples[:, number] = CubicSpline(times, resample_poly(column, 2, 1))(when)
+        samples[:, number] = scipy.interpolate.CubicSpline(times, scipy.signal.resample_poly(column, 2, 1))(when)
     return Revolutions(samples.reshape(count, places, -1), track.mean_frequency, teeth)
 
 

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import decimate
 
 from millfrf.core import Real
 
@@ -85,7 +85,7 @@ def _thinned(data: Real, sample_rate: float, stated: float) -> tuple[Real, float
     factor = int(sample_rate / (2.5 * _ORDERS * stated * (1 + LARGEST_ERROR)))
     if factor < 2:
         return data, sample_rate
-    return np.asarray(decimate(data, factor, ftype="fir", axis=0)), sample_rate / factor
+    return np.asarray(scipy.signal.decimate(data, factor, ftype="fir", axis=0)), sample_rate / factor
 
 
 def _floors(data: Real, sample_rate: float, stated: float) -> Real:

@@ -217,7 +217,11 @@ def _integration(count: int) -> tuple[Real, Real, Real]:
     return nodes, weights, np.ascontiguousarray(np.linalg.inv(derivative))
 
 
-@compiled
+@compiled(
+    "(complex128[::1], complex128[:,::1], complex128[:,::1], float64[::1], float64[:,::1], float64[::1], "
+    "float64[::1], int64[::1], float64[::1], float64, float64[:,:,:,:,::1], float64[:,:,:,::1], "
+    "int64[:,::1])",
+)
 def _fill(
     poles: Complex,
     seen: Complex,
@@ -327,7 +331,9 @@ def _impulses(poles: Complex, after: Real, weights: Real, block: int, duration: 
             impulse[r, i], impulse[modes + r, i] = push.real, push.imag
 
 
-@compiled
+@compiled(
+    "(float64[:,::1], float64[:,::1], float64[:,::1], int64, float64[:,:,::1], float64[:,:,:])",
+)
 def _powers(gain: Real, impulse: Real, motion: Real, block: int, coefficients: Real, chips: Real) -> int:
     """Write the powers from the first on, until they have died out; return how many there are."""
     most, size = coefficients.shape[0], coefficients.shape[1]

@@ -4,8 +4,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse.linalg import ArpackError, eigs
 
 from millfrf.core import Complex, InputError, Real
 from millfrf.cutting import MillingProcess
@@ -186,7 +186,9 @@ def _grows(matrix: Real) -> bool:
     """Whether one large matrix has an eigenvalue on or beyond the unit circle."""
     start = np.cos(np.arange(len(matrix)) ** 1.3)
     try:
-        values = eigs(matrix, k=6, v0=start, ncv=40, maxiter=60, tol=1e-12, return_eigenvectors=False)
-    except ArpackError:
+        values = scipy.sparse.linalg.eigs(
+            matrix, k=6, v0=start, ncv=40, maxiter=60, tol=1e-12, return_eigenvectors=False
+        )
+    except scipy.sparse.linalg.ArpackError:
         values = np.linalg.eigvals(matrix)
     return bool(np.abs(values).max() >= 1)

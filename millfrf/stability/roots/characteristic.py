@@ -17,7 +17,9 @@ def workspace(size: int, lanes: int) -> Real:
     return np.empty((6 + 6 * size * size, lanes))
 
 
-@compiled
+@compiled(
+    "(float64[:,:,:,::1], int64[::1], float64, float64[::1], float64[::1], int64, float64[:,::1], complex128[::1])",
+)
 def values(
     series: Real, needed: Index, radius: float, theta: Real, depth: Real, count: int, work: Real, out: Complex
 ) -> None:
@@ -127,7 +129,9 @@ def _determinant(work: Real, start: int, size: int, point: int, multiplier: comp
     return total
 
 
-@compiled
+@compiled(
+    "(complex128[:,::1], complex128[:,::1])",
+)
 def eliminate(matrix: Complex, right: Complex) -> complex:
     """Solve ``matrix x = right`` in place by elimination with row exchanges; return the determinant.
 
@@ -173,7 +177,9 @@ def _exchange(matrix: Complex, right: Complex, k: int) -> bool:
     return True
 
 
-@compiled
+@compiled(
+    "(float64[:,:,:,::1], float64, complex128)",
+)
 def transition(series: Real, radius: float, b: complex) -> tuple[Complex, Complex]:
     """M(b) and its derivative by b / radius, at one b (m) and with all powers."""
     windows, powers, size = series.shape[0], series.shape[1], series.shape[2]
@@ -203,7 +209,9 @@ def transition(series: Real, radius: float, b: complex) -> tuple[Complex, Comple
     return matrix, slope
 
 
-@compiled
+@compiled(
+    "(float64[:,:,:,::1], float64, float64, float64)",
+)
 def slopes(series: Real, radius: float, theta: float, depth: float) -> tuple[complex, complex]:
     """Logarithmic derivatives of F by theta (1/rad) and by depth (1/m)."""
     size = series.shape[2]

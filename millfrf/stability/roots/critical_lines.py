@@ -94,7 +94,11 @@ def _chips_of(
         state, after = after, state
 
 
-@compiled
+@compiled(
+    "(float64[:,:,:,:,::1], float64[:,:,:,::1], float64, int64[::1], float64[::1], float64[::1], "
+    "complex128[:,::1], complex128[:,::1], complex128[::1], complex128[:,::1], float64[::1], int64[::1], "
+    "float64[::1], float64[::1], float64[::1])",
+)
 def _lines(
     series: Real,
     chips: Real,

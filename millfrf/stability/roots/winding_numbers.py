@@ -168,7 +168,10 @@ def put(
     corners[at, 0], corners[at, 1], corners[at, 2], corners[at, 3] = f00, f10, f11, f01
 
 
-@compiled
+@compiled(
+    "(float64[:,:,:,::1], int64[::1], float64, float64[:,::1], complex128[:,::1], float64[:,::1], "
+    "float64[:,::1], int64)",
+)
 def search(
     series: Real,
     needed: Index,
@@ -230,7 +233,9 @@ WINDING_NUMBERS_AT_PI = 4
 """Steps in a row of cells at which the real F(pi, a) is looked at."""
 
 
-@compiled
+@compiled(
+    "(float64[:,:,:,::1], int64[::1], float64, float64[::1], float64[::1], bool, float64[:,::1])",
+)
 def roots(
     series: Real,
     needed: Index,
@@ -306,7 +311,9 @@ def roots(
     return filled, resolved
 
 
-@compiled
+@compiled(
+    "(float64[:,:,:,:,::1], int64[:,::1], float64, float64[::1], float64[:,::1], bool, float64[:,:,::1], float64[::1])",
+)
 def all_roots(
     series: Real,
     needed: Index,
@@ -351,7 +358,9 @@ def all_roots(
     return counts
 
 
-@compiled
+@compiled(
+    "(float64[:,:,:,:,::1], float64, int64[::1], float64[::1], float64[::1], float64[::1], float64[::1])",
+)
 def refined(finer: Real, radius: float, speed: Index, theta: Real, depth: Real, growth: Real, error: Real) -> None:
     """Move roots to where they lie on series with more nodes; what that changes is the error.
 

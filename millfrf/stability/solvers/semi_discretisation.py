@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from estimation import Frf
 from millfrf.core import InputError, Real
@@ -76,7 +76,7 @@ def semi_discretised(system: DelaySystem, speed: float, depth: float, *, steps: 
     state = np.eye(size, length)
     history, angle, row = [], 0.0, size
     for piece, count in zip(pieces, counts, strict=True):
-        state = expm(system.state_matrix * (piece.begin - angle) / speed) @ state
+        state = scipy.linalg.expm(system.state_matrix * (piece.begin - angle) / speed) @ state
         advance, delayed = _steps(system, piece, count, (speed, depth, order), moving)
         history.append(output @ state)
         for k in range(count):
@@ -87,7 +87,7 @@ def semi_discretised(system: DelaySystem, speed: float, depth: float, *, steps: 
         row += width * (count + 1)
         angle = piece.end
     pitch = 2 * np.pi / system.process.teeth
-    state = expm(system.state_matrix * (pitch - angle) / speed) @ state
+    state = scipy.linalg.expm(system.state_matrix * (pitch - angle) / speed) @ state
     values = np.linalg.eigvals(np.concatenate([state, *history]))
     return Multipliers(np.asarray(values[np.argsort(-np.abs(values))], dtype=complex), pitch / speed)
 
@@ -131,7 +131,7 @@ def _linear(matrices: Real, inputs: Real, h: float) -> tuple[Real, Real]:
     whole = np.zeros((count, size + 2 * width, size + 2 * width))
     whole[:, :size, :size], whole[:, :size, size : size + width] = h * matrices, h * inputs
     whole[:, size : size + width, size + width :] = np.eye(width)
-    step = expm(whole)[:, :size]
+    step = scipy.linalg.expm(whole)[:, :size]
     start, rise = step[:, :, size : size + width], step[:, :, size + width :]
     return step[:, :, :size], np.concatenate([start - rise, rise], axis=2)
 
@@ -149,7 +149,7 @@ def _cubic(matrices: Real, inputs: Real, h: float, points: Real) -> tuple[Real, 
                 share = np.prod((at - others) / (nodes[j] - others))
                 whole[k, g, :size, size + j * width : size + (j + 1) * width] = h * share * inputs[k, g]
     one, two = whole[:, 0], whole[:, 1]
-    step = expm((one + two) / 2 + math.sqrt(3) / 12 * (two @ one - one @ two))[:, :size]
+    step = scipy.linalg.expm((one + two) / 2 + math.sqrt(3) / 12 * (two @ one - one @ two))[:, :size]
     return step[:, :, :size], step[:, :, size:]
 
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from estimation import Frf
 from millfrf.core import InputError, Real
@@ -163,7 +163,7 @@ def limit_band(
         As :func:`depth_errors`; a helix, unequal pitch or process damping is refused.
     """
     errors = depth_errors(structure, process, lobes)
-    half = ndtri(0.5 + CONFIDENCE / 2) * errors
+    half = scipy.special.ndtri(0.5 + CONFIDENCE / 2) * errors
     low, high = np.maximum(lobes.depth_limits - half, 0.0), lobes.depth_limits + half
     known = np.isfinite(low) & np.array([status != "unresolved" for status in lobes.status], dtype=bool)
     basis = np.where(known, "first-order", "none").astype(object)

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from estimation import Frf, to_receptance
 from millfrf.core import Complex, InputError, Real
@@ -267,7 +267,7 @@ def probability_of_stability(
     if not (np.isfinite(limits).all() and np.isfinite(errors_near).all()):
         worst = near[~(np.isfinite(limits) & np.isfinite(errors_near))][0] * 30 / math.pi
         raise InputError(f"the limit near {worst:.0f} rpm is not resolved, or its error is not; no probability there")
-    return float(np.min(ndtr((limits - depth) / np.maximum(errors_near, 1e-12))))
+    return float(np.min(scipy.special.ndtr((limits - depth) / np.maximum(errors_near, 1e-12))))
 
 
 def usable_limits(lobes: StabilityLobes, errors: Real, max_depth: float) -> tuple[Real, Real]:

@@ -1,18 +1,19 @@
-"""Step ``robot diagnose``: what is wrong with a robot's model."""
+"""Step ``robot diagnose``: which numbers of a robot's model are wrong."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Annotated, Any
 
 import numpy as np
 from h5py import is_hdf5
 
 from millfrf.core import InputError, Real, writing_whole_folder
-from millfrf.core.file_kinds import FRF, MODEL, kind_of
-from millfrf.core.progress import bar
+from millfrf.core.progress import progress
 from millfrf.core.provenance import add_to_json, origin
-from millfrf.gate import RECORD_AGAIN, check_channels
+from millfrf.core.steps import Band, File, Reads, Shares, Writes, step
+from millfrf.core.terminal import say, say_written, tell, warn
+from millfrf.gate import RECORD_AGAIN, FileKind, check_channels, kind_of
 from millfrf.mismatch import (
     ROBOT,
     AcceptedCause,
@@ -21,23 +22,200 @@ from millfrf.mismatch import (
     PosedRecording,
     RobotDiagnosis,
     companions_of,
-    diagnose_robot,
     number_of,
     posed_channels,
     read_posed,
     write_diagnosis,
 )
-from millfrf.options import check_band
-from millfrf.report.diagnoses.robot_words import UNITS, refusal, told_number
-from millfrf.report.tables import evidence_in_words, with_error
-from millfrf.robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot, tool_down
+from millfrf.mismatch import diagnose_robot as diagnose_model
+from millfrf.reports.diagnoses.cut_and_robot_pages import write_robot_report
+from millfrf.reports.diagnoses.robot_words import UNITS, refusal, told_number
+from millfrf.reports.results_page import FigureFiles
+from millfrf.reports.tables import evidence_in_words, with_error
+from millfrf.robot_model import SpatialCase, close_loops, model_of_modes, modes_at, read_robot
 from modal_fit import write_modal_model
 
-from ..result_folder import refuse_file
-from .postures import Asked, posture_of, spatial
+from ..answers import stored_answer
+from ..diagnose import check_shares, refuse_file
+from ..given import FigureFormat, Figures
+from .common import Degrees, NearTip, Poses, Robot
+from .postures import axes_turned, band_of_modes, driven_of_each, spatial
 
-if TYPE_CHECKING:
-    from millfrf.report.results_page import FigureFiles
+FILES = ("robot_diagnosis.json", "report.html")
+"""Files that a diagnosis writes into its folder, besides a model for each recording."""
+
+
+@step
+def diagnose_robot(
+    robot: Robot,
+    /,
+    *recordings: Annotated[File, Reads("REC")],
+    poses: Poses = (),
+    out: Annotated[File | None, Writes("DIR", needed=True, files=FILES)] = None,
+    channels_turned: Degrees | None = None,
+    band: Band | None = None,
+    sensor_at: NearTip = None,
+    payload_at: NearTip = None,
+    rigid_links: bool = False,
+    model_error: Shares = (0.01, 0.15, 0.05),
+    stream: str | None = None,
+    figures: Figures = None,
+    figure_format: FigureFormat = "svg",
+) -> RobotDiagnosis:
+    """Which is wrong in a robot's model: joint stiffness, link flexibility, payload, tool, posture, damping?
+
+    Parameters
+    ----------
+    robot
+        Robot file (.toml), or a name that `robot list` shows.
+    recordings
+        Recordings, best in several postures.
+    poses
+        Posture of each recording in turn: a name of the robot's file, or DEG,DEG,...
+    out
+        Folder for the diagnosis, a model for each recording and a report.
+    channels_turned : deg
+        Angle of channel X from the base's x, with Z up; without it the axes of the base.
+    band : Hz
+        Band that is compared; without it 0.4 times the first to 1.3 times the fourth natural frequency.
+    sensor_at : m
+        Place of the housing sensor from the tip, in the channels' axes.
+    payload_at : m
+        Place of a payload from the tip, in the tool frame; without it the place is fitted.
+    rigid_links
+        Question the model with rigid links: is their flexibility missing?
+    model_error
+        Errors that a right model still has, as shares: frequency, damping, shapes; one number stands for all.
+    stream
+        Sample clock; needed where a recording has several.
+    figures
+        Folder for each figure of the report as a file.
+    figure_format
+        Format of these files.
+
+    Returns
+    -------
+    RobotDiagnosis
+        Verdict, changes with their evidence, errors on held-out data, and the warnings.
+
+    Raises
+    ------
+    InputError
+        Not one posture for each recording, files that cannot be used together, or a folder that cannot be made.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf robot diagnose robot.toml a.h5 b.h5 --pose home --pose 0,-10,100,0,90,0 --out found
+    """
+    check_shares("model-error", model_error, (0.01, 0.15, 0.05))
+    drawn = None if figures is None else FigureFiles(Path(figures), figure_format)
+    if out is not None:
+        refuse_file(Path(out))
+    case, paths = spatial(read_robot(robot)), [Path(recording) for recording in recordings]
+    driven = driven_of_each(case, poses, len(paths), "recordings")
+    _refuse_unusable(paths)
+    # each recording alone: a force that is zero in one posture tells nothing there of the robot
+    doubts = [doubt for path in paths for doubt in check_channels([path], posed_channels, stream, remedy=RECORD_AGAIN)]
+    postures = [close_loops(case.robot.mechanism, values) for values in driven]
+    band = band or band_of_modes(case.robot, postures, n_modes=4)
+    axes = axes_turned(channels_turned)
+    posed = [_read(case, path, q, band, axes, stream) for path, q in zip(paths, postures, strict=True)]
+    with progress("diagnosing"):
+        diagnosis = diagnose_model(
+            case.robot,
+            posed,
+            rigid_links=rigid_links,
+            payload_at=None if payload_at is None else np.array(payload_at),
+            sensor=None if sensor_at is None else np.array(sensor_at),
+            error=LabError(*model_error),
+        )
+    diagnosis = replace(diagnosis, doubts=tuple(doubts))
+    for line in summary(diagnosis):
+        say(line)
+    warn(doubts)
+    if out is not None:
+        folder = Path(out)
+        options = {"poses": poses, "channels_turned_deg": channels_turned, "band_hz": band, "sensor_at_m": sensor_at}
+        options |= {"payload_at_m": payload_at, "rigid_links": rigid_links, "error": model_error, "stream": stream}
+        made_of = origin("robot diagnose", [robot, *paths], options)
+        write_robot_diagnosis(folder, diagnosis, case.name, made_of, figures=drawn)
+        tell(lambda: {"diagnosis": stored_answer(folder / FILES[0])})
+        say_written([*(folder / name for name in FILES), "a model for each recording"])
+    return diagnosis
+
+
+def write_robot_diagnosis(
+    folder: Path,
+    diagnosis: RobotDiagnosis,
+    robot_name: str,
+    made_of: Mapping[str, Any],
+    *,
+    dated: bool = True,
+    figures: FigureFiles | None = None,
+) -> None:
+    """Write diagnosis, improved model for each recording, and report into a folder, made if need be.
+
+    Parameters
+    ----------
+    folder
+        Folder to write into.
+    diagnosis
+        Diagnosis of a robot.
+    robot_name
+        Name of the robot, for the title of the report.
+    made_of
+        Provenance of the diagnosis.
+    dated
+        Whether the report tells when it was written; without it, equal input gives equal bytes.
+    figures
+        Where each figure of the report is written as a file too; None: nowhere.
+
+    Raises
+    ------
+    InputError
+        A folder that cannot be made.
+    """
+    improved, offset = diagnosis.details.improved_robot()
+    with writing_whole_folder(folder) as unfinished:
+        write_diagnosis(unfinished / FILES[0], diagnosis)
+        for recording in diagnosis.details.robot.recordings:
+            modes = modes_at(improved, recording.q + offset)
+            top = 3 * float(recording.spectrum.frequencies[-1])
+            model = model_of_modes(modes, improved, axes=recording.axes, highest_frequency=top)
+            write_modal_model(unfinished / f"model_{recording.name}.json", model)
+        for path in unfinished.glob("*.json"):
+            add_to_json(path, made_of)
+        lines = summary(diagnosis)
+        with progress("writing the report"):
+            write_robot_report(unfinished / FILES[1], diagnosis, robot_name, lines, dated=dated, figures=figures)
+
+
+def _refuse_unusable(paths: Sequence[Path]) -> None:
+    """Refuse recordings of one name, files that are missing, and files that ``robot update`` reads."""
+    names = [path.stem for path in paths]
+    if len(set(names)) < len(names):
+        raise InputError(f"recordings need different names to tell their results apart, not {', '.join(names)}")
+    for path in paths:
+        if not path.is_file():
+            raise InputError(f"no file {path}; check the name")
+        kind = kind_of(path) if path.suffix == ".json" or is_hdf5(path) else ""
+        if kind in (FileKind.FRF, FileKind.MODEL):
+            raise InputError(
+                f"{path} is of the kind {kind}; this command reads recordings; 'millfrf robot update' takes FRFs "
+                "and modal models, says which numbers of the robot's file are wrong, and writes them"
+            )
+
+
+def _read(
+    case: SpatialCase, path: Path, q: Real, band: tuple[float, float], axes: Real, stream: str | None
+) -> PosedRecording:
+    """Read a recording made at joint values q."""
+    model = model_of_modes(modes_at(case.robot, q), case.robot, highest_frequency=band[1])
+    if not len(model.poles):
+        raise InputError(f"{path.name}: the robot has no damped mode below {band[1]:g} Hz; raise --band LO HI")
+    return read_posed(path, q, model, band, axes=axes, stream=stream)
 
 
 SENTENCES = {
@@ -53,49 +231,52 @@ SENTENCES = {
 }
 
 
-def summary(found: RobotDiagnosis) -> list[str]:
+def summary(diagnosis: RobotDiagnosis) -> list[str]:
     """A few lines for the terminal and the head of the report."""
-    lines = [f"verdict: {found.verdict}", _sentence(found)]
-    for cause in found.physics:
-        lines += [describe(cause), *_beside(cause)]
-    if found.equivalents:
-        lines.append(f"cannot be told from: {', '.join(found.equivalents)}; record in another posture")
-    if found.physics or found.verdict == "unexplained":
-        lines.append(what_is_left(found))
-    for one in found.held_out:
-        changed = f"{100 * one.after:.3g} % changed, " if found.physics else ""
+    lines = [f"verdict: {diagnosis.verdict}", _sentence(diagnosis)]
+    for cause in diagnosis.physics:
+        lines += [describe(cause), *_companions(cause)]
+    if diagnosis.equivalents:
+        lines.append(f"cannot be told from: {', '.join(diagnosis.equivalents)}; record in another posture")
+    if diagnosis.physics or diagnosis.verdict == "unexplained":
+        lines.append(_remaining(diagnosis))
+    for error in diagnosis.held_out:
+        changed = f"{100 * error.after:.3g} % changed, " if diagnosis.physics else ""
         lines.append(
-            f"error on {one.name}, held out: {100 * one.before:.3g} % as modelled, {changed}"
-            f"{100 * one.floor:.3g} % with modes fitted freely"
+            f"error on {error.name}, held out: {100 * error.before:.3g} % as modelled, {changed}"
+            f"{100 * error.floor:.3g} % with modes fitted freely"
         )
-    if found.physics:
-        lines.append(f"that the change does not lower the error held out has p = {found.improvement.p_value:.1g}")
+    if diagnosis.physics:
+        lines.append(f"that the change does not lower the error held out has p = {diagnosis.improvement.p_value:.1g}")
     else:
-        lines += [f"{one.name} was fitted, but {refusal(one)}" for one in found.candidates if refusal(one)]
+        refused = [(candidate.name, refusal(candidate)) for candidate in diagnosis.candidates]
+        lines += [f"{name} was fitted, but {reason}" for name, reason in refused if reason]
     return lines
 
 
-def what_is_left(found: RobotDiagnosis) -> str:
-    """State what is left, beside what may be left for `explained`."""
-    limits, share = ROBOT.verdict, found.after.size / max(found.before.size, 1e-300)
+def _remaining(diagnosis: RobotDiagnosis) -> str:
+    """Sentence on the remaining error, and on how large it may be for `explained`."""
+    limits, share = ROBOT.verdict, diagnosis.after.size / max(diagnosis.before.size, 1e-300)
+    most = 100 * (1 - limits.explained)
     return (
-        f"left: {100 * share:.2g} % of what the model leaves beyond noise, {found.after.share:.2g} times what a right "
-        f"model's modes are off; explained: at most {100 * (1 - limits.explained):.0f} % or {limits.noise_like:g} times"
+        f"left: {100 * share:.2g} % of what the model leaves beyond noise, {diagnosis.after.share:.2g} times what a "
+        f"right model's modes are off; explained: at most {most:.0f} % or {limits.noise_like:g} times"
     )
 
 
 def describe(cause: AcceptedCause) -> str:
-    """One cause with its number, in a user's units."""
+    """A cause with its number, in the units of a user."""
     number, unit = told_number(cause)
     what = f"times {number}" if not unit else f"{number} {unit}"
     lighter = " (lighter than modelled)" if cause.location["kind"] == "payload" and number_of(cause) < 0 else ""
     return f"{cause.name}: {what}{lighter}; {evidence_in_words(cause.evidence)}"
 
 
-def _beside(cause: AcceptedCause) -> list[str]:
-    """Companions that the recordings tell; a sentence on a place that they do not tell."""
-    lines = [f"  {cause.name}, {_companion(one)}" for one in companions_of(cause) if one.told]
-    hidden = [one.name.removesuffix(" from the tip") for one in companions_of(cause) if not one.told]
+def _companions(cause: AcceptedCause) -> list[str]:
+    """Further numbers of a cause that the recordings determine; a sentence on a place that they do not."""
+    companions = companions_of(cause)
+    lines = [f"  {cause.name}, {_companion(number)}" for number in companions if number.told]
+    hidden = [number.name.removesuffix(" from the tip") for number in companions if not number.told]
     if hidden and cause.location["kind"] == "payload":
         lines.append(
             f"  {cause.name}: mass and {', '.join(hidden)} cannot be told apart by these recordings; "
@@ -104,153 +285,16 @@ def _beside(cause: AcceptedCause) -> list[str]:
     return lines
 
 
-def _companion(one: CompanionNumber) -> str:
-    unit, factor = UNITS.get(one.unit, (one.unit, 1.0))
-    return f"{one.name}: {with_error(factor * one.number, factor * one.standard_error)} {unit}"
+def _companion(number: CompanionNumber) -> str:
+    unit, factor = UNITS.get(number.unit, (number.unit, 1.0))
+    return f"{number.name}: {with_error(factor * number.number, factor * number.standard_error)} {unit}"
 
 
-def _sentence(found: RobotDiagnosis) -> str:
-    if found.verdict != "explained":
-        return SENTENCES[found.verdict]
+def _sentence(diagnosis: RobotDiagnosis) -> str:
+    if diagnosis.verdict != "explained":
+        return SENTENCES[diagnosis.verdict]
     return (
-        "one change explains the recordings and stands alone" if len(found.physics) == 1 else "two changes together do"
+        "one change explains the recordings and stands alone"
+        if len(diagnosis.physics) == 1
+        else "two changes together do"
     )
-
-
-LOWEST, HIGHEST = 0.4, 1.3
-"""Band that is compared where none is given: from so many times the first mode to so many times the fourth."""
-
-
-@dataclass(frozen=True)
-class Asking:
-    """Options of a robot's diagnosis as they were typed; None where left out."""
-
-    poses: tuple[str, ...]
-    feed: float | None
-    band: tuple[float, float] | None
-    sensor: tuple[float, float, float] | None
-    payload_at: tuple[float, float, float] | None
-    rigid_links: bool
-    error: LabError
-    stream: str | None
-
-
-def diagnose_robot_files(
-    robot: str,
-    paths: Sequence[Path],
-    out: Path,
-    asking: Asking,
-    *,
-    dated: bool = True,
-    figures: "FigureFiles | None" = None,
-) -> list[str]:
-    """Diagnose, write ``robot_diagnosis.json``, ``model_<recording>.json`` and ``report.html``; lines that sum it up.
-
-    A report that is not ``dated`` does not tell when it was written, so that equal input gives equal bytes. With
-    ``figures`` each of its figures becomes a file too.
-
-    Raises
-    ------
-    InputError
-        Files that cannot be used together, or a folder that cannot be made.
-    """
-    from millfrf.report.diagnoses.cut_and_robot_pages import (
-        write_robot_report,  # the report asks this room for its words
-    )
-
-    refuse_file(out)
-    case = spatial(read_robot(robot))
-    _refuse_unlike(paths, asking)
-    _refuse_what_an_update_takes(paths)
-    doubts = _doubts(paths, asking.stream)
-    recordings = _recordings(case, paths, asking)
-    with bar("diagnosing"):
-        found = diagnose_robot(
-            case.robot,
-            recordings,
-            rigid_links=asking.rigid_links,
-            payload_at=_place(asking.payload_at),
-            sensor=_place(asking.sensor),
-            error=asking.error,
-        )
-    found = replace(found, doubts=tuple(doubts))
-    lines = summary(found)
-    improved, offset = found.details.improved_robot()
-    with writing_whole_folder(out) as folder:
-        write_diagnosis(folder / "robot_diagnosis.json", found)
-        for recording in recordings:
-            modes = modes_at(improved, recording.q + offset)
-            top = 3 * float(recording.spectrum.frequencies[-1])
-            model = model_of_modes(modes, improved, axes=recording.axes, highest_frequency=top)
-            write_modal_model(folder / f"model_{recording.name}.json", model)
-        for path in folder.glob("*.json"):
-            add_to_json(path, origin("robot diagnose", [robot, *paths], asdict(asking)))
-        with bar("writing the report"):
-            write_robot_report(folder / "report.html", found, case.name, lines, dated=dated, figures=figures)
-    lines += [f"warning: {doubt}" for doubt in doubts]
-    return [*lines, f"wrote {out / 'robot_diagnosis.json'}, {out / 'report.html'} and a model for each recording"]
-
-
-def _doubts(paths: Sequence[Path], stream: str | None) -> list[str]:
-    """Judge each recording alone: a force that rests in one posture tells nothing there of the robot."""
-    return [
-        doubt
-        for path in paths
-        for doubt in check_channels([path], posed_channels, stream, progress=bar, remedy=RECORD_AGAIN)
-    ]
-
-
-def _refuse_what_an_update_takes(paths: Sequence[Path]) -> None:
-    for path in paths:
-        if path.suffix == ".json" or (path.is_file() and is_hdf5(path)):
-            kind = kind_of(path)
-            if kind in (FRF, MODEL):
-                raise InputError(
-                    f"{path} is of the kind {kind}; this command reads recordings; 'millfrf robot update' takes FRFs "
-                    "and modal models, says which numbers of the robot's file are wrong, and writes them"
-                )
-
-
-def _refuse_unlike(paths: Sequence[Path], asking: Asking) -> None:
-    """One posture a recording, one name a recording, and all of them there."""
-    if len(asking.poses) != len(paths):
-        raise InputError(
-            f"{len(asking.poses)} postures for {len(paths)} recordings; give --pose once for each, in the same order"
-        )
-    names = [path.stem for path in paths]
-    if len(set(names)) < len(names):
-        raise InputError(f"recordings need different names to tell their results apart, not {', '.join(names)}")
-    for path in paths:
-        if not path.is_file():
-            raise InputError(f"no file {path}; check the name")
-
-
-def _recordings(case: SpatialCase, paths: Sequence[Path], asking: Asking) -> list[PosedRecording]:
-    axes = np.eye(3) if asking.feed is None else tool_down([0.0, 0.0, 0.0], np.radians(asking.feed)).axes
-    postures = [close_loops(case.robot.mechanism, _driven(case, pose)) for pose in asking.poses]
-    band = check_band(asking.band) or _band(case, postures)
-    recordings = []
-    for path, q in zip(paths, postures, strict=True):
-        model = model_of_modes(modes_at(case.robot, q), case.robot, highest_frequency=band[1])
-        if not len(model.poles):
-            raise InputError(f"{path.name}: the robot has no damped mode below {band[1]:g} Hz; raise --band LO HI")
-        recordings.append(read_posed(path, q, model, band, axes=axes, stream=asking.stream))
-    return recordings
-
-
-def _driven(case: SpatialCase, pose: str) -> Real:
-    """Driven joint values of a name, or of degrees with commas."""
-    asked = Asked(joints=pose) if "," in pose else Asked(pose=pose)
-    return posture_of(case, asked)[0]
-
-
-def _band(case: SpatialCase, postures: Sequence[Real]) -> tuple[float, float]:
-    frequencies = [modes_at(case.robot, q).frequencies for q in postures]
-    return (
-        LOWEST * min(float(one[0]) for one in frequencies),
-        HIGHEST * max(float(one[min(3, len(one) - 1)]) for one in frequencies),
-    )
-
-
-def _place(given: tuple[float, float, float] | None) -> Real | None:
-    return None if given is None else np.array(given)

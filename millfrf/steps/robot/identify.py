@@ -4,15 +4,16 @@ import tomllib
 from collections.abc import Sequence
 from math import log
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from annotated_types import Gt, Le
 
 from millfrf.core import InputError, MillfrfError, writing_whole_file
-from millfrf.core.progress import bar
+from millfrf.core.progress import progress
 from millfrf.core.provenance import add_comment, origin
-from millfrf.core.terminal import Table, say, show
-from millfrf.options import check_output
+from millfrf.core.steps import File, Reads, Typed, Writes, step
+from millfrf.core.terminal import Table, say, say_written, show, warn
 from millfrf.robot_model import (
     ElasticParameter,
     HeldOut,
@@ -33,7 +34,8 @@ from millfrf.robot_model import (
     verify_elastic,
 )
 
-from .postures import check_positive, spatial
+from .common import Robot
+from .postures import spatial
 
 Place = tuple[str | int, ...]
 
@@ -46,8 +48,81 @@ KEYS = {
 """Keys of a joint's stiffnesses in a robot's file."""
 
 
+@step
+def identify_stiffness(
+    robot: Robot,
+    deflections: Annotated[File, Reads("DEFLECTIONS.csv")],
+    /,
+    *,
+    out: Annotated[File | None, Writes(suffixes=(".toml",), needed=True)] = None,
+    error: Annotated[float, Typed("UM"), Gt(0), Le(10_000)],
+    links: bool = False,
+    prior: Annotated[float, Typed("FACTOR"), Gt(1), Le(1000)] = 2.7,
+) -> Identification:
+    """Joint stiffnesses (and link sections) with errors, from deflections that a tracker measured.
+
+    A row is a posture, the change of force on the tool and the change of place that it caused, in the base frame. The
+    file is written only if the identified numbers predict postures that were left out better than the file's.
+
+    Parameters
+    ----------
+    robot
+        Robot file (.toml), or a name that `robot list` shows.
+    deflections
+        Table with columns joint_1_deg ... fx_n fy_n fz_n dx_m dy_m dz_m.
+    out
+        Robot file with the identified numbers to write.
+    error : um
+        Standard error of a measured displacement.
+    links
+        Identify the sections of flexible links too, not joint stiffnesses alone.
+    prior
+        Factor within which the numbers of the file are known.
+
+    Returns
+    -------
+    Identification
+        Numbers with their errors, and combinations that the data does not fix.
+
+    Raises
+    ------
+    InputError
+        Options or files that cannot be used.
+    MillfrfError
+        The identified numbers predict postures that were left out no better than the file's, or leave a third of the
+        deflections.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf robot identify robot.toml deflections.csv --error 37 --out identified.toml
+    """
+    case = spatial(read_robot(robot))
+    measured = read_deflections(deflections, case.robot.mechanism)
+    parameters: tuple[ElasticParameter, ...] = joint_parameters(case.robot)
+    parameters += link_parameters(case.robot) if links else ()
+    metres, spread = 1e-6 * error, log(prior)
+    with progress("identifying"):
+        held = verify_elastic(case.robot, measured, metres, parameters, prior=spread)
+        identified = identify_elastic(case.robot, measured, metres, parameters, prior=spread)
+    _show_identified(case, parameters, identified)
+    _say_held_out(held, metres)
+    warn([*_radians(case, measured), *_doubts(identified, held, metres), *_forgotten(case)])
+    if held is not None:
+        _refuse_what_does_not_hold(held, metres)
+    if out is not None:
+        values = identified_values(robot, Path(deflections).name, parameters, identified, spread)
+        with writing_whole_file(out) as unfinished:
+            unfinished.write_text(changed_robot_text(robot, values), encoding="utf-8")
+            add_comment(unfinished, origin("robot identify", [robot, deflections], {"error_m": metres, "prior": prior}))
+            read_robot(unfinished)  # refuses what the checks of robot files refuse, before the file has its name
+    say_written([out], f"{identified.identifiable.sum()} of {len(parameters)} numbers are fixed by the data")
+    return identified
+
+
 def identified_values(
-    robot: str, table: str, parameters: Sequence[ElasticParameter], found: Identification, prior: float
+    robot: File, table: str, parameters: Sequence[ElasticParameter], identified: Identification, prior: float
 ) -> dict[Place, Any]:
     """New values by their place in the file, :func:`millfrf.robot_model.changed_robot_text`.
 
@@ -56,20 +131,20 @@ def identified_values(
     Parameters
     ----------
     robot
-        The file that was identified, or the name of a robot that comes along.
+        The file that was identified, or the name of a robot that comes with the program.
     table
         Name of the table of deflections, for the sources.
-    parameters, found
-        Numbers that were identified, and what was found of them.
+    parameters, identified
+        Numbers that were identified, and their values.
     prior
-        Standard deviation of ln p before the data spoke.
+        Standard deviation of ln p before the measurement.
     """
     content = tomllib.loads(numbered_robot_text(robot))
     changes: dict[Place, Any] = {}
     words: dict[Place, tuple[list[str], list[str]]] = {}
     tubes: dict[int, dict[str, tuple[float, bool]]] = {}
     for parameter, value, error, known in zip(
-        parameters, found.values, found.relative_errors, found.identifiable, strict=True
+        parameters, identified.values, identified.relative_errors, identified.identifiable, strict=True
     ):
         if isinstance(parameter, JointStiffness):
             place: Place = ("joints", parameter.joint)
@@ -79,42 +154,52 @@ def identified_values(
             assert isinstance(parameter, LinkSection)
             place, what = ("links", parameter.link, "tube"), parameter.part
             tubes.setdefault(parameter.link, {})[what] = (float(value), bool(known))
-        told, untold = words.setdefault(place, ([], []))
-        (told.append(f"{what} +-{100 * error:.2g} %") if known else untold.append(what))
+        fixed, free = words.setdefault(place, ([], []))
+        (fixed.append(f"{what} +-{100 * error:.2g} %") if known else free.append(what))
     for link, parts in tubes.items():
         tube = content["links"][link]["tube"]
         outer, inner = _tube(tube, parts["bending"][0], parts["axial"][0] if parts["axial"][1] else None)
         changes["links", link, "tube", "outer_m"], changes["links", link, "tube", "inner_m"] = outer, inner
-    changes["update",] = _update_table(robot, table, parameters, found, prior)
-    for place, (told, untold) in words.items():
-        source: Any = content
-        for step in place:
-            source = source[step]
-        changes[*place, "source"] = _source(table, told, untold, source["source"])
+    changes["update",] = _update_table(robot, table, parameters, identified, prior)
+    for place, (fixed, free) in words.items():
+        entry: Any = content
+        for key in place:
+            entry = entry[key]
+        changes[*place, "source"] = _source(table, fixed, free, entry["source"])
     return changes
 
 
 def _update_table(
-    robot: str, table: str, parameters: Sequence[ElasticParameter], found: Identification, prior: float
+    robot: File, table: str, parameters: Sequence[ElasticParameter], identified: Identification, prior: float
 ) -> dict[str, Any]:
-    """The file's ``[update]``: what is open of the joints' stiffnesses, from which bands follow elsewhere.
+    """The file's ``[update]``: uncertainty of the joints' stiffnesses, from which other steps compute bands.
 
-    Sections of links have no number there: they are taken as certain, the stiffnesses with the rest left open.
+    Sections of links have no number there: they are taken as certain.
     """
     content, source = tomllib.loads(numbered_robot_text(robot)), f"robot identify: {table}"
-    joints = [index for index, one in enumerate(parameters) if isinstance(one, JointStiffness)]
-    numbers = []
-    for index in joints:
-        one = parameters[index]
-        assert isinstance(one, JointStiffness)
-        row, error = content["joints"][one.joint], float(found.relative_errors[index])
-        number = {"name": f"joint {row['frame']} {one.group}", "kind": "stiffness", "frame": row["frame"]}
-        number |= {"group": one.group, "spread": prior, "value": log(found.values[index] / row[KEYS[one.group]])}
-        numbers.append(number | {"standard_error": error, "told": bool(found.identifiable[index]), "source": source})
-    covariance = found.covariance[np.ix_(joints, joints)]
-    told = [str(number["name"]) for number in numbers if number["told"]]
+    joints, numbers = [], []
+    for index, parameter in enumerate(parameters):
+        if not isinstance(parameter, JointStiffness):
+            continue
+        joints.append(index)
+        row, group = content["joints"][parameter.joint], parameter.group
+        numbers.append(
+            {
+                "name": f"joint {row['frame']} {group}",
+                "kind": "stiffness",
+                "frame": row["frame"],
+                "group": group,
+                "spread": prior,
+                "value": log(identified.values[index] / row[KEYS[group]]),
+                "standard_error": float(identified.relative_errors[index]),
+                "told": bool(identified.identifiable[index]),
+                "source": source,
+            }
+        )
+    covariance = identified.covariance[np.ix_(joints, joints)]
+    named = [str(number["name"]) for number in numbers if number["told"]]
     rows = [[float(f"{value:.10g}") for value in row] for row in covariance]
-    return {"source": source, "verdict": "identified", "named": told, "covariance": rows, "numbers": numbers}
+    return {"source": source, "verdict": "identified", "named": named, "covariance": rows, "numbers": numbers}
 
 
 def _tube(tube: dict[str, float], bending: float, axial: float | None) -> tuple[float, float]:
@@ -128,75 +213,37 @@ def _tube(tube: dict[str, float], bending: float, axial: float | None) -> tuple[
         return smaller * outer, smaller * inner
 
 
-def _source(table: str, told: list[str], untold: list[str], before: str) -> str:
-    """Where a table's numbers come from now; what the data did not fix keeps its older origin."""
-    parts = [f"identified from {table}: {', '.join(told)}"] if told else []
-    if untold:
-        parts.append(f"not fixed by {table}: {', '.join(untold)} (before: {before})")
+def _source(table: str, fixed: list[str], free: list[str], before: str) -> str:
+    """Source of a table's numbers; what the data did not fix keeps its older source."""
+    parts = [f"identified from {table}: {', '.join(fixed)}"] if fixed else []
+    if free:
+        parts.append(f"not fixed by {table}: {', '.join(free)} (before: {before})")
     return "; ".join(parts)
 
 
 _MUCH = 2.0
-"""What may be left on postures held out, in standard errors of the measurement, before a warning."""
+"""Error on postures left out, in standard errors of the measurement, above which a warning is given."""
 
 _MOST_LEFT = 1 / 3
-"""Share of the deflections that may be left where it is more than the measurement's error."""
+"""Share of the deflections that may remain where it is more than the measurement's error."""
 
 
-def write_identified(robot: str, table: Path, out: Path, error: float, links: bool, prior: float) -> None:
-    """Identify, print what was found and how well it holds, and write the robot's file.
-
-    Raises
-    ------
-    InputError
-        Options or files that cannot be used.
-    MillfrfError
-        What was found predicts postures held out no better than the file's numbers, or leaves a third of them.
-    """
-    check_output(out, (".toml",), [table, Path(robot)])
-    check_positive("error", 1e6 * error, "micrometres", 1e4)
-    if not 1 < prior <= 1e3:
-        raise InputError(
-            f"--prior {prior:g}: give a factor above 1, such as 2.7: the file's numbers are that uncertain"
-        )
-    case = spatial(read_robot(robot))
-    measured = read_deflections(table, case.robot.mechanism)
-    parameters: tuple[ElasticParameter, ...] = joint_parameters(case.robot)
-    parameters += link_parameters(case.robot) if links else ()
-    with bar("identifying"):
-        held = verify_elastic(case.robot, measured, error, parameters, prior=float(np.log(prior)))
-        found = identify_elastic(case.robot, measured, error, parameters, prior=float(np.log(prior)))
-    _show_found(case, parameters, found)
-    doubts = [*_radians(case, measured), *_doubts(found, held, error), *_forgotten(case)]
-    _show_held_out(held, error)
-    for doubt in doubts:
-        say(f"warning: {doubt}")
-    if held is not None:
-        _refuse_what_does_not_hold(held, error)
-    text = changed_robot_text(robot, identified_values(robot, table.name, parameters, found, float(np.log(prior))))
-    with writing_whole_file(out) as unfinished:
-        unfinished.write_text(text, encoding="utf-8")
-        add_comment(unfinished, origin("robot identify", [robot, table], {"error_m": error, "prior": prior}))
-        read_robot(unfinished)  # refuses what the checks of robot files refuse, before the file has its name
-    say(f"wrote {out}: {found.identifiable.sum()} of {len(parameters)} numbers are fixed by the data")
-
-
-def _show_found(case: SpatialCase, parameters: Sequence[ElasticParameter], found: Identification) -> None:
+def _show_identified(case: SpatialCase, parameters: Sequence[ElasticParameter], identified: Identification) -> None:
     rows = []
     for parameter, value, error, known in zip(
-        parameters, found.values, found.relative_errors, found.identifiable, strict=True
+        parameters, identified.values, identified.relative_errors, identified.identifiable, strict=True
     ):
-        told = f"{100 * error:.2g}" if known else "not fixed by the data"
-        rows.append((parameter.name(case.robot), f"{parameter.value(case.robot):.3e}", f"{value:.3e}", told))
+        shown = f"{100 * error:.2g}" if known else "not fixed by the data"
+        rows.append((parameter.name(case.robot), f"{parameter.value(case.robot):.3e}", f"{value:.3e}", shown))
     title = "Stiffnesses (N/m, N m/rad; links N m^2 and N)"
     show(Table(title, ("number", "file", "found", "standard error (%)"), tuple(rows)))
-    for line in found.unidentifiable[:5]:
+    for line in identified.unidentifiable[:5]:
         say(f"not told apart: {line}")
-    if len(found.unidentifiable) > 5:
-        say(f"and {len(found.unidentifiable) - 5} more combinations like these")
+    if len(identified.unidentifiable) > 5:
+        say(f"and {len(identified.unidentifiable) - 5} more combinations like these")
 
 
-def _show_held_out(held: HeldOut | None, error: float) -> None:
+def _say_held_out(held: HeldOut | None, error: float) -> None:
     if held is None:
         say("fewer than 10 postures: none is held out, so what the numbers predict elsewhere is not known")
         return
@@ -209,7 +256,7 @@ def _show_held_out(held: HeldOut | None, error: float) -> None:
 
 
 def _refuse_what_does_not_hold(held: HeldOut, error: float) -> None:
-    before, after, size = (float(np.sqrt(np.mean(one**2))) for one in (held.before, held.after, held.deflections))
+    before, after, size = (float(np.sqrt(np.mean(x**2))) for x in (held.before, held.after, held.deflections))
     if after >= before:
         holds = before / np.sqrt(3) <= _MUCH * error
         remedy = "the file's hold already" if holds else "measure more postures, or larger loads"
@@ -224,23 +271,23 @@ def _refuse_what_does_not_hold(held: HeldOut, error: float) -> None:
         )
 
 
-def _doubts(found: Identification, held: HeldOut | None, error: float) -> list[str]:
+def _doubts(identified: Identification, held: HeldOut | None, error: float) -> list[str]:
     doubts = []
-    left = found.residual if held is None else held.times(error)
+    left = identified.residual if held is None else held.times(error)
     if left > _MUCH:
         doubts.append(
             f"the deflections differ from the model by {left:.2g} times their stated error: it does not hold as it is "
             "(play, friction, axes or signs of the measurement, a load beside its place); error bars are widened by it"
         )
-    if found.at_bound:
-        doubts.append(f"at a bound, so their errors mean little: {', '.join(found.at_bound)}")
+    if identified.at_bound:
+        doubts.append(f"at a bound, so their errors mean little: {', '.join(identified.at_bound)}")
     return doubts
 
 
 def _forgotten(case: SpatialCase) -> list[str]:
-    """What an earlier update left open of numbers that are not identified here."""
+    """Warning about numbers of an earlier update that are not identified here."""
     freed = () if case.uncertainty is None else case.uncertainty.parameters
-    other = [one.name for one in freed if one.kind != "stiffness"]
+    other = [parameter.name for parameter in freed if parameter.kind != "stiffness"]
     if not other:
         return []
     return [
@@ -251,6 +298,6 @@ def _forgotten(case: SpatialCase) -> list[str]:
 
 def _radians(case: SpatialCase, measured: Sequence[Any]) -> tuple[str, ...]:
     mechanism = case.robot.mechanism
-    driven = np.array([case_.q[mechanism.active] for case_ in measured])
+    driven = np.array([deflection.q[mechanism.active] for deflection in measured])
     largest = driven[np.argmax(np.abs(driven), axis=0), np.arange(driven.shape[1])]
     return unit_doubts(mechanism, list(typed_values(mechanism, largest)))

@@ -1,18 +1,22 @@
 """Step ``robot path``: depth limits and deviation along a tool path, and the best postures."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
+from annotated_types import Ge, Gt, Le
 from scipy.spatial.transform import Rotation
 
-from millfrf.core import InputError, Real, process_pool, writing_whole_file
-from millfrf.core.progress import bar
+from millfrf.core import InputError, Real, process_pool, refuse_replacing, writing_whole_file
+from millfrf.core.compilation import STABILITY
+from millfrf.core.progress import progress
 from millfrf.core.provenance import add_comment, origin
-from millfrf.core.terminal import answer, say
+from millfrf.core.steps import File, Grid, Reads, Typed, Writes, step
+from millfrf.core.terminal import say, say_written, warn
 from millfrf.cutting import MillingProcess, force_harmonics
-from millfrf.gate import check_depth, check_speed, read_checked_cutting
-from millfrf.options import check_output
+from millfrf.gate import check_depth, check_speed
 from millfrf.robot_model import (
     CompensatedPath,
     CutPath,
@@ -22,175 +26,198 @@ from millfrf.robot_model import (
     ToolPath,
     close_loops,
     compensate_path,
-    named_posture,
     read_cut_path,
     read_robot,
     write_compensated_path,
 )
 
-from ..result_folder import refuse_file
-from .common import RPM, say_doubts
-from .path_optimum import PathOptimum, optimised
-from .path_results import doubts, draw_path, summary, write_path_table
-from .path_search import Wanted
-from .path_state import OBJECTIVES, Loading
-from .path_values import PathCut
-from .postures import Asked, Loads, check_degrees, check_places, check_positive, posture_of, spatial
+from ..diagnose import refuse_file
+from ..given import CutGiven, files_among, process_of
+from .along_path.optimum import PathOptimum, optimised
+from .along_path.results import doubts, draw_path, summary, write_path_table
+from .along_path.search import Wanted
+from .along_path.state import Loading, Objective
+from .along_path.values import PathCut
+from .common import RPM, At, Depth, Joints, Kilograms, NearTip, Pose, Robot, Speed, Weight
+from .postures import Loads, loads_of, posture_of, spatial
 
-
-@dataclass(frozen=True)
-class AskedPath:
-    """Options of the optimisation.
-
-    Parameters
-    ----------
-    objective, balance
-        ``depth``, ``deviation`` or ``both``; share of depth where both count.
-    turns
-        Range and number of the turns about the tool, degrees.
-    table
-        Range and number of the turns of a rotary table, degrees; None: there is none.
-    table_at, table_about
-        A point (m) and the direction of the table's axis; None: the path's first point and its mean direction.
-    joint_step, table_step
-        Largest step of a joint (degrees; prismatic joints: m, as radians) and of the table between two points.
-    limit_margin
-        Least distance to a joint limit, degrees.
-    singularity_margin
-        Least singular value of the tool Jacobian (m, rad).
-    """
-
-    objective: str = "depth"
-    balance: float = 0.5
-    turns: tuple[float, float, int] = (-180.0, 165.0, 24)
-    table: tuple[float, float, int] | None = None
-    table_at: tuple[float, float, float] | None = None
-    table_about: tuple[float, float, float] | None = None
-    joint_step: float = 15.0
-    table_step: float = 10.0
-    limit_margin: float = 5.0
-    singularity_margin: float = 0.05
-
-    def check(self) -> None:
-        """Refuse what makes no sense.
-
-        Raises
-        ------
-        InputError
-            With the option, the value and the remedy.
-        """
-        if self.objective not in OBJECTIVES:
-            raise InputError(f"--optimise {self.objective!r} is none of {', '.join(OBJECTIVES)}")
-        if not 0 <= self.balance <= 1:
-            raise InputError(f"--balance {self.balance:g}: give the share of depth, from 0 to 1")
-        for name, axis in (("turns", self.turns), ("table", self.table)):
-            if axis is not None and not (axis[0] <= axis[1] and 1 <= axis[2] <= 360 and axis[1] - axis[0] <= 720):
-                raise InputError(
-                    f"--{name} {axis[0]:g} {axis[1]:g} {axis[2]}: give LO HI N in degrees, LO <= HI, N 1 to 360"
-                )
-            if axis is not None:
-                check_degrees(**{name: axis[0]})
-        self._check_bounds()
-
-    def _check_bounds(self) -> None:
-        check_positive("joint-step", self.joint_step, "degrees", 180)
-        check_positive("table-step", self.table_step, "degrees", 180)
-        if not 0 <= self.limit_margin <= 90:
-            raise InputError(f"--limit-margin {self.limit_margin:g}: give degrees, from 0 to 90")
-        if not 0 <= self.singularity_margin <= 1:
-            raise InputError(f"--singularity-margin {self.singularity_margin:g}: give a singular value, from 0 to 1")
-        if self.table is None and (self.table_at is not None or self.table_about is not None):
-            raise InputError(
-                "--table-at and --table-about say where a rotary table is: give its range too, --table-turns LO HI N"
-            )
-        if self.table_at is not None:
-            for value in self.table_at:
-                check_places(**{"table-at": value})
-
-    def redundancy(self, path: CutPath) -> Redundancy:
-        """Sampled angles, zero among them where it lies in the range, and the margins."""
-        tool, rotary, table = _sampled(self.turns), None, np.zeros(1)
-        if self.table is not None:
-            at = path.positions[0] if self.table_at is None else np.array(self.table_at)
-            along = path.positions[-1] - path.positions[0]
-            if self.table_about is None and np.linalg.norm(along) < 1e-6:
-                raise InputError(
-                    "the path ends where it begins: say about which direction the table turns, --table-about"
-                )
-            rotary = RotaryTable(at, along if self.table_about is None else np.array(self.table_about))
-            table = _sampled(self.table)
-        return Redundancy(tool, table, rotary, np.radians(self.limit_margin), self.singularity_margin)
-
-    def wanted(self) -> Wanted:
-        """What is optimised, in rad."""
-        return Wanted(self.objective, self.balance, np.radians(self.joint_step), np.radians(self.table_step))
-
-
-def _sampled(axis: tuple[float, float, int]) -> np.ndarray:
-    return np.radians(np.linspace(*axis))
-
+FILES = ("path.csv", "path.png", "compensated.csv")
+"""Files that are written into a folder."""
 
 WORKERS = 2
 """Processes that evaluate postures."""
 
 
-def write_optimised_path(
-    robot: str,
-    path_file: Path,
-    cutting: Path,
-    speeds: tuple[float, float, float | None],
-    asked: AskedPath,
-    start: Asked,
-    loads: Loads,
-    out: Path,
-) -> None:
-    """Optimise a path and write table, picture and compensated path.
+@step
+def robot_path(
+    robot: Robot,
+    path: Annotated[File, Reads("PATH.csv")],
+    /,
+    *,
+    cutting: CutGiven,
+    speed: Speed,
+    out: Annotated[File | None, Writes("DIR|FILE.csv", needed=True, files=FILES)] = None,
+    optimise: Objective = "depth",
+    depth: Depth | None = None,
+    max_depth: Annotated[float, Typed("M"), Gt(0), Le(1)] = 0.02,
+    turns: Grid = (-180.0, 165.0, 24),
+    table_turns: Grid | None = None,
+    table_at: At = None,
+    table_about: Annotated[tuple[float, float, float] | None, Typed("X Y Z")] = None,
+    balance: Annotated[float, Typed("0...1"), Ge(0), Le(1)] = 0.5,
+    joint_step: Annotated[float, Typed("DEG"), Gt(0), Le(180)] = 15.0,
+    table_step: Annotated[float, Typed("DEG"), Gt(0), Le(180)] = 10.0,
+    limit_margin: Annotated[float, Typed("DEG"), Ge(0), Le(90)] = 5.0,
+    singularity_margin: Annotated[float, Ge(0), Le(1)] = 0.05,
+    pose: Pose = None,
+    joints: Joints = None,
+    payload: Kilograms = 0.0,
+    payload_at: NearTip = None,
+    weight: Weight = "all",
+) -> PathOptimum:
+    """Postures along a tool path by its redundancy: largest depth, least deviation or both; the compensated path.
 
     Parameters
     ----------
-    speeds
-        Spindle speed (rpm), largest depth (m), and depth of the planned cut (m) or None.
+    robot
+        Robot file (.toml), or a name that `robot list` shows.
+    path
+        Path of the tool tip: columns x_m y_m z_m, and i j k (tool axis) or rx_rad ry_rad rz_rad.
+    cutting
+        Cutter, engagement and force coefficients.
+    speed : rpm
+        Spindle speed along the whole path.
     out
-        A folder, or a ``.csv`` for the table alone.
+        Folder for table, picture and compensated path; or .csv for the table alone.
+    optimise
+        What is optimised: smallest depth limit, largest deviation, or both.
+    depth : m
+        Depth of the planned cut, whose mean force bends the robot; without it the path's columns fx_n fy_n fz_n.
+    max_depth : m
+        Largest axial depth that is searched.
+    turns : deg
+        Lowest and highest turn about the tool's axis, and their number.
+    table_turns : deg
+        Lowest and highest turn of a rotary table that carries the work, and their number.
+    table_at : m
+        Point of the table's axis; without it the path's first point.
+    table_about
+        Direction of the table's axis; without it that from the path's first to its last point.
+    balance
+        Share of depth against deviation, where both are optimised.
+    joint_step : deg
+        Largest step of a joint between two points; of prismatic joints in metres, as radians.
+    table_step : deg
+        Largest step of the table between two points.
+    limit_margin : deg
+        Least distance to a joint limit.
+    singularity_margin
+        Least singular value of the tool Jacobian (m, rad).
+    pose
+        Posture named in the robot's file near which the path begins; without it the first one.
+    joints : deg
+        Values of the driven joints near which the path begins; of prismatic joints in metres.
+    payload : kg
+        Mass that the robot carries besides the bodies of its file.
+    payload_at : m
+        Centre of mass of the payload from the tip, in the tool frame; without it the tip.
+    weight
+        Deflection under weight that counts: all; its change from the first place, where the work was touched off; none.
+
+    Returns
+    -------
+    PathOptimum
+        Postures, depth limits and deviations with the redundancy at zero and as chosen.
+
+    Raises
+    ------
+    InputError
+        A path that the robot does not reach within the margins, no continuous sequence, or no forces.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf robot path kuka_kr90_r3100 path.csv --cutting cut.toml --speed 3000 --out along
     """
-    rpm, max_depth, depth = speeds
-    asked.check()
-    alone = out.suffix.lower() == ".csv"
-    check_output(out, (".csv",), [path_file]) if alone else refuse_file(out)
-    check_positive("max-depth", max_depth, "metres", 1.0)
-    process, warnings = read_checked_cutting(cutting)
-    warnings += [*check_depth(max_depth, process), *check_speed(rpm, process)]
-    case = spatial(read_robot(robot))
-    say_doubts(case.assumed)
+    check_turns("turns", turns)
+    if table_turns is not None:
+        check_turns("table-turns", table_turns)
+    elif table_at is not None or table_about is not None:
+        raise InputError(
+            "--table-at and --table-about say where a rotary table is: give its range too, --table-turns LO HI N"
+        )
+    alone = out is not None and Path(out).suffix.lower() == ".csv"
+    if out is not None:
+        refuse_replacing(Path(out)) if alone else refuse_file(Path(out))
+    process, warnings = process_of(cutting)
+    warnings += [*check_depth(max_depth, process), *check_speed(speed, process)]
+    case, loads = spatial(read_robot(robot)), loads_of(payload, payload_at, weight)
+    warn(case.assumed)
     if not case.robot.bodies:
         raise InputError(f"{robot} gives no masses: it has statics, but no modes and no depth limits; add [[bodies]]")
-    path = read_cut_path(path_file)
-    loading = Loading(_wrenches(path, process, depth), loads.weight)
-    cut = PathCut(case.robot, process, rpm * RPM, max_depth, loads.payload)
-    first = close_loops(case.robot.mechanism, posture_of(case, start)[0])
-    with bar("postures along the path"), process_pool(WORKERS) as pool:
-        found = optimised(cut, path, asked.redundancy(path), loading, asked.wanted(), first, pool)
-    warnings += doubts(found, path)
-    for line in summary(found, asked.wanted(), max_depth, depth):
-        answer(line)
-    told = origin(
-        "robot path", [robot, path_file, cutting], {"rpm": rpm, "depth_m": depth, "asked": asked, "loads": loads}
-    )
-    if alone:
-        _write_table(out, case, found, max_depth, warnings, told)
-    else:
-        corrected = _compensated(case, found, loading, loads)
-        warnings += corrected.warnings
-        out.mkdir(parents=True, exist_ok=True)
-        _write_table(out / "path.csv", case, found, max_depth, warnings, told)
-        draw_path(out / "path.png", path, found.before, found.after, max_depth, depth)
-        with writing_whole_file(out / "compensated.csv") as unfinished:
-            write_compensated_path(unfinished, corrected)
-            add_comment(unfinished, told)
-        left = 1e3 * np.linalg.norm(corrected.left[:, :3], axis=1).max()
-        say(f"compensated path: {1e3 * left:.2g} um are left by the same model")
-        say(f"wrote path.csv, path.png and compensated.csv in {out}")
-    say_doubts(warnings)
+    cut_path = read_cut_path(path)
+    loading = Loading(_wrenches(cut_path, process, depth), weight)
+    table = None if table_turns is None else rotary_table(cut_path, table_at, table_about)
+    angles = [np.zeros(1) if axis is None else np.radians(np.linspace(*axis)) for axis in (turns, table_turns)]
+    free = Redundancy(angles[0], angles[1], table, np.radians(limit_margin), singularity_margin)
+    wanted = Wanted(optimise, balance, np.radians(joint_step), np.radians(table_step))
+    cut = PathCut(case.robot, process, speed * RPM, max_depth, loads.payload)
+    start = close_loops(case.robot.mechanism, posture_of(case, pose, joints)[0])
+    with progress("postures along the path"), process_pool(WORKERS, STABILITY) as pool:
+        optimum = optimised(cut, cut_path, free, loading, wanted, start, pool)
+    warnings += doubts(optimum, cut_path)
+    for line in summary(optimum, wanted, max_depth, depth):
+        say(line)
+    if out is not None:
+        options: dict[str, Any] = {
+            "rpm": speed,
+            "depth_m": depth,
+            "loads": loads,
+            "optimise": wanted,
+            "turns_deg": turns,
+        }
+        options |= {"table_turns_deg": table_turns, "table_at_m": table_at, "table_about": table_about}
+        options |= {"limit_margin_deg": limit_margin, "singularity_margin": singularity_margin}
+        made_of = origin("robot path", files_among(robot, path, cutting), options)
+        if alone:
+            _write_table(Path(out), case, optimum, max_depth, warnings, made_of)
+            say_written([out])
+        else:
+            corrected = _compensated(case, optimum, loading, loads)
+            warnings += corrected.warnings
+            _write_folder(Path(out), case, cut_path, optimum, corrected, (max_depth, depth), warnings, made_of)
+    warn(warnings)
+    return optimum
+
+
+def check_turns(name: str, turns: tuple[float, float, int]) -> None:
+    """Refuse a range of angles that is empty, decreasing or more than two turns wide.
+
+    Raises
+    ------
+    InputError
+        With the option, the values and the remedy.
+    """
+    low, high, count = turns
+    if not (low <= high <= low + 720 and 1 <= count <= 360 and abs(low) <= 1080):
+        raise InputError(f"--{name} {low:g} {high:g} {count}: give LO HI N in degrees, LO <= HI, N 1 to 360")
+
+
+def rotary_table(
+    path: CutPath, at: tuple[float, float, float] | None, about: tuple[float, float, float] | None
+) -> RotaryTable:
+    """Rotary table with its axis through a point (m) and in a direction; None: as the path begins and leads.
+
+    Raises
+    ------
+    InputError
+        No direction, and a path that ends where it begins.
+    """
+    along = path.positions[-1] - path.positions[0]
+    if about is None and np.linalg.norm(along) < 1e-6:
+        raise InputError("the path ends where it begins: say about which direction the table turns, --table-about")
+    return RotaryTable(path.positions[0] if at is None else np.array(at), along if about is None else np.array(about))
 
 
 def _wrenches(path: CutPath, process: MillingProcess, depth: float | None) -> Real:
@@ -209,9 +236,9 @@ def _wrenches(path: CutPath, process: MillingProcess, depth: float | None) -> Re
     return np.array([turn.T @ wrench for turn, wrench in zip(turns, path.wrenches, strict=True)])
 
 
-def _compensated(case: SpatialCase, found: PathOptimum, loading: Loading, loads: Loads) -> CompensatedPath:
+def _compensated(case: SpatialCase, optimum: PathOptimum, loading: Loading, loads: Loads) -> CompensatedPath:
     """The chosen path moved against its deflection, in the chosen postures."""
-    after, active = found.after, case.robot.mechanism.active
+    after, active = optimum.after, case.robot.mechanism.active
     wrenches = np.einsum("kij,kj->ki", np.array([np.kron(np.eye(2), axes) for axes in after.axes]), loading.wrenches)
     attitudes = Rotation.from_matrix(after.attitudes).as_rotvec()
     path = ToolPath(after.positions, attitudes, wrenches)
@@ -219,13 +246,37 @@ def _compensated(case: SpatialCase, found: PathOptimum, loading: Loading, loads:
 
 
 def _write_table(
-    out: Path, case: SpatialCase, found: PathOptimum, max_depth: float, warnings: list[str], told: dict[str, object]
+    table: Path,
+    case: SpatialCase,
+    optimum: PathOptimum,
+    max_depth: float,
+    warnings: Sequence[str],
+    made_of: Mapping[str, Any],
 ) -> None:
-    with writing_whole_file(out) as unfinished:
-        write_path_table(unfinished, case.robot.mechanism, found.before, found.after, max_depth, warnings)
-        add_comment(unfinished, told)
+    with writing_whole_file(table) as unfinished:
+        write_path_table(unfinished, case.robot.mechanism, optimum.before, optimum.after, max_depth, warnings)
+        add_comment(unfinished, made_of)
 
 
-def start_of(case: SpatialCase) -> Real:
-    """Joint values (n_moving,) of the first posture of a robot's file."""
-    return close_loops(case.robot.mechanism, named_posture(case, None))
+def _write_folder(
+    folder: Path,
+    case: SpatialCase,
+    path: CutPath,
+    optimum: PathOptimum,
+    corrected: CompensatedPath,
+    depths: tuple[float, float | None],
+    warnings: Sequence[str],
+    made_of: Mapping[str, Any],
+) -> None:
+    """Write table, picture and compensated path; ``depths``: the largest that was searched, and the planned one, m."""
+    max_depth, planned = depths
+    folder.mkdir(parents=True, exist_ok=True)
+    table, picture, compensated = (folder / name for name in FILES)
+    _write_table(table, case, optimum, max_depth, warnings, made_of)
+    draw_path(picture, path, optimum.before, optimum.after, max_depth, planned)
+    with writing_whole_file(compensated) as unfinished:
+        write_compensated_path(unfinished, corrected)
+        add_comment(unfinished, made_of)
+    left = 1e3 * np.linalg.norm(corrected.left[:, :3], axis=1).max()
+    say(f"compensated path: {1e3 * left:.2g} um are left by the same model")
+    say_written([table, picture, compensated])

@@ -24,35 +24,17 @@ from millfrf.robot_model import (
     ToolPath,
     close_loops,
     drive_stiffness,
-    modes_at,
     tool_jacobian,
 )
 
-from .robot_page import mode_page, robot_figure
 
-
-def draw_modes(path: Path, case: SpatialCase, driven: Real) -> None:
-    """A picture of the first four modes, or (``.html``) a page on which they move."""
-    modes = modes_at(case.robot, close_loops(case.robot.mechanism, driven))
-    if path.suffix == ".html":
-        with writing_whole_file(path) as temporary:
-            temporary.write_text(mode_page(case.name, modes), encoding="utf-8")
-        return
-    _save(robot_figure(modes), path)
-
-
-def draw_deviation(path: Path, found: DeviationMap, shape: tuple[int, int], needed: Real, least: str = "") -> None:
-    """Deviation under thrust and the position tolerance that holes need, mm; white where not reached."""
-    _save(deviation_figure(found, shape, needed, least), path)
-
-
-def deviation_figure(found: DeviationMap, shape: tuple[int, int], needed: Real, least: str = "") -> Figure:
-    """Draw a deviation map and the position tolerance that each hole needs.
+def deviation_figure(deviations: DeviationMap, shape: tuple[int, int], needed: Real, least: str = "") -> Figure:
+    """Draw a deviation map and the position tolerance that each hole needs; white where a hole is not reached.
 
     Parameters
     ----------
-    found
-        Deviation map of the robot.
+    deviations
+        Deviation of each hole.
     shape
         Number of places along x and y.
     needed : (n,), m
@@ -60,22 +42,33 @@ def deviation_figure(found: DeviationMap, shape: tuple[int, int], needed: Real, 
     least
         Text ``at least `` where parts of the budget are unknown, for the label.
     """
-    sizes = 1e3 * np.linalg.norm(found.deviations, axis=1)
+    sizes = 1e3 * np.linalg.norm(deviations.deviations, axis=1)
     fields = [
         (sizes, "deviation under thrust (mm)"),
         (1e3 * needed, f"position tolerance, {least}(mm)" if least else "position tolerance (mm)"),
     ]
-    return map_figure(found.positions, shape, fields)
+    return map_figure(deviations.positions, shape, fields)
 
 
-def draw_workspace(path: Path, places: Sequence[CutPlace], shape: tuple[int, int], lowest: Real, limits: Real) -> None:
-    """Lowest frequency (Hz) over y and x, and beside it the depth limit (mm) where there is one."""
+def workspace_figure(places: Sequence[CutPlace], shape: tuple[int, int], lowest: Real, limits: Real) -> Figure:
+    """Draw the lowest frequency (Hz) over y and x, and the depth limit (mm) where there is one.
+
+    Parameters
+    ----------
+    places
+        Places of the tool.
+    shape
+        Number of places along x and y.
+    lowest, limits : (n,), Hz and m
+        Lowest natural frequency and depth limit at each place; NaN where the robot does not reach it.
+    """
     fields = [(lowest, "lowest natural frequency (Hz)")]
     if np.isfinite(limits).any():
         fields.append((1e3 * limits, "depth limit (mm)"))
-    _save(map_figure(np.array([place.position for place in places]), shape, fields), path)
+    return map_figure(np.array([place.position for place in places]), shape, fields)
 
 
+@house_style()
 def map_figure(positions: Real, shape: tuple[int, int], fields: Sequence[tuple[Real, str]]) -> Figure:
     """Draw fields over y (across) and x (reach), with contours that carry their values; white where not reached.
 
@@ -86,48 +79,41 @@ def map_figure(positions: Real, shape: tuple[int, int], fields: Sequence[tuple[R
     shape
         Number of places along x and y.
     fields
-        Values (n,) and label with unit, one a panel.
+        Values (n,) and label with unit, for each panel.
     """
     x, y = (positions[:, axis].reshape(shape) for axis in (0, 1))
     tall = float(np.ptp(x)) / max(float(np.ptp(y)), 1e-9)
-    with house_style():
-        figure = new_figure(float(np.clip(150.0 / len(fields) * tall + 18.0, 55.0, 120.0)))
-        figure.set_layout_engine("compressed")
-        panels = figure.subplots(1, len(fields), squeeze=False)[0]
-        for number, (axes, (field, label)) in enumerate(zip(panels, fields, strict=True)):
-            shown = np.ma.masked_invalid(field.reshape(shape))
-            drawn = axes.pcolormesh(y, x, shown, shading="nearest", cmap="viridis")
-            if min(shape) > 2 and shown.count() > 8 and np.ptp(shown.compressed()) > 0:
-                lines = axes.contour(y, x, shown, 6, colors="white", linewidths=0.7)
-                axes.clabel(lines, fontsize=7)
-            figure.colorbar(drawn, ax=axes, label=label, pad=0.02)
-            axes.set_xlabel("y (m)")
-            axes.set_ylabel("x (m)")
-            axes.set_aspect("equal")
-            axes.grid(visible=False)
-            if len(fields) > 1:
-                panel_letter(axes, number)
+    figure = new_figure(float(np.clip(150.0 / len(fields) * tall + 18.0, 55.0, 120.0)))
+    figure.set_layout_engine("compressed")
+    panels = figure.subplots(1, len(fields), squeeze=False)[0]
+    for number, (axes, (field, label)) in enumerate(zip(panels, fields, strict=True)):
+        shown = np.ma.masked_invalid(field.reshape(shape))
+        drawn = axes.pcolormesh(y, x, shown, shading="nearest", cmap="viridis")
+        if min(shape) > 2 and shown.count() > 8 and np.ptp(shown.compressed()) > 0:
+            lines = axes.contour(y, x, shown, 6, colors="white", linewidths=0.7)
+            axes.clabel(lines, fontsize=7)
+        figure.colorbar(drawn, ax=axes, label=label, pad=0.02)
+        axes.set_xlabel("y (m)")
+        axes.set_ylabel("x (m)")
+        axes.set_aspect("equal")
+        axes.grid(visible=False)
+        if len(fields) > 1:
+            panel_letter(axes, number)
     return figure
 
 
-def _save(figure: Figure, path: Path) -> None:
-    with house_style(), writing_whole_file(path) as temporary:
-        figure.savefig(temporary, format=path.suffix[1:], dpi=200)
-
-
-def draw_posture_map(path: Path, found: PostureMap, max_depth: float, depth: float | None, what: str) -> None:
+def draw_posture_map(path: Path, postures: PostureMap, max_depth: float, depth: float | None, what: str) -> None:
     """Write :func:`posture_figure` as ``.png``, ``.pdf`` or ``.svg``."""
-    with house_style():
-        figure = posture_figure(found, max_depth, depth, what)
-    save_figure(figure, path)
+    save_figure(posture_figure(postures, max_depth, depth, what), path)
 
 
-def posture_figure(found: PostureMap, max_depth: float, depth: float | None, what: str) -> Figure:
+@house_style()
+def posture_figure(postures: PostureMap, max_depth: float, depth: float | None, what: str) -> Figure:
     """Draw largest stable depth and lowest natural frequency over the angle, as Mousavi et al., Fig. 11.
 
     Parameters
     ----------
-    found
+    postures
         Posture map whose values are depth limits, m.
     max_depth : m
         Largest depth that was searched: limits at it lie beyond.
@@ -136,23 +122,23 @@ def posture_figure(found: PostureMap, max_depth: float, depth: float | None, wha
     what
         Words for the redundancy, for the axis: ``tool and table about the feed``.
     """
-    angles, limits = np.degrees(found.angles), 1e3 * found.values
+    angles, limits = np.degrees(postures.angles), 1e3 * postures.values
     figure = new_figure(95.0)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
     top = 1.1 * min(1e3 * max_depth, float(np.nanmax(limits, initial=0.0))) or 1.0
     upper.fill_between(angles, limits, top, color=SHADE, label="unstable")
     upper.plot(angles, limits, color=COLOURS[0], marker="o", markersize=2.5, label="depth limit")
     if depth is not None:
-        stable = found.reached & (found.values > depth)
+        stable = postures.reached & (postures.values > depth)
         upper.axhline(1e3 * depth, color=COLOURS[2], linestyle="--", label=f"cut of {1e3 * depth:g} mm")
         level = np.full(int(stable.sum()), 1e3 * depth)
         upper.plot(angles[stable], level, "s", color=COLOURS[1], markersize=4, label="stable there")
-        chatters = found.reached & ~stable
+        chatters = postures.reached & ~stable
         level = np.full(int(chatters.sum()), 1e3 * depth)
         upper.plot(angles[chatters], level, "x", color=COLOURS[2], markersize=4.5, label="chatters there")
     upper.set_ylabel("Depth of cut (mm)")
     upper.set_ylim(0, top)
-    lower.plot(angles, found.frequencies, color=COLOURS[0], marker="o", markersize=2.5)
+    lower.plot(angles, postures.frequencies, color=COLOURS[0], marker="o", markersize=2.5)
     lower.set_ylabel("Lowest natural\nfrequency (Hz)")
     lower.set_xlabel(f"Turn of {what} (degrees)")
     lower.set_xlim(angles.min(), angles.max())
@@ -163,13 +149,7 @@ def posture_figure(found: PostureMap, max_depth: float, depth: float | None, wha
     return figure
 
 
-def draw_compensation(path: Path, nominal: ToolPath, result: CompensatedPath) -> None:
-    """Write :func:`compensation_figure` as ``.png``, ``.pdf`` or ``.svg``."""
-    with house_style():
-        figure = compensation_figure(nominal, result)
-    save_figure(figure, path)
-
-
+@house_style()
 def compensation_figure(nominal: ToolPath, result: CompensatedPath) -> Figure:
     """Draw the predicted deviation in the base's x, y and z, its size, and what the correction leaves.
 
@@ -223,6 +203,7 @@ def joint_shares(case: PlanarCase | SpatialCase, driven: Real, direction: Real) 
     return names, arms**2 / drive_stiffness(case.robot)
 
 
+@house_style()
 def compliance_figure(result: PostureResult, force: float, shares: tuple[list[str], Real], softest: float) -> Figure:
     """Draw the displacement of the tip under a force that turns in each plane, and the share of each drive.
 
@@ -243,27 +224,26 @@ def compliance_figure(result: PostureResult, force: float, shares: tuple[list[st
     planes = [pair for pair in _PLANES if max(pair) < len(moving)]
     angles = np.linspace(0, 2 * np.pi, 181)
     reach = 1.1 * float(np.linalg.norm(compliance, 2))
-    with house_style():
-        figure = new_figure(105.0 if shares[0] else 70.0)
-        grid = figure.add_gridspec(2 if shares[0] else 1, len(planes), height_ratios=[1.5, 1] if shares[0] else [1])
-        for column, (first, second) in enumerate(planes):
-            axes = figure.add_subplot(grid[0, column])
-            along = np.zeros((len(moving), len(angles)))
-            along[first], along[second] = np.cos(angles), np.sin(angles)
-            moved = compliance @ along
-            axes.plot(moved[first], moved[second], color=COLOURS[1])
-            for point in range(0, 180, 15):
-                ends = [[0, moved[axis, point]] for axis in (first, second)]
-                axes.plot(*ends, color="0.75", linewidth=0.6)
-            axes.set_xlim(-reach, reach)
-            axes.set_ylim(-reach, reach)
-            axes.set_aspect("equal")
-            axes.set_xlabel(f"{names[moving[first]]} (mm)")
-            axes.set_ylabel(f"{names[moving[second]]} (mm)")
-            panel_letter(axes, column)
-        if shares[0]:
-            _bars(figure.add_subplot(grid[1, :]), shares, softest)
-        figure.suptitle(f"Displacement of the tool tip under {force:g} N in every direction", fontsize=9)
+    figure = new_figure(105.0 if shares[0] else 70.0)
+    grid = figure.add_gridspec(2 if shares[0] else 1, len(planes), height_ratios=[1.5, 1] if shares[0] else [1])
+    for column, (first, second) in enumerate(planes):
+        axes = figure.add_subplot(grid[0, column])
+        along = np.zeros((len(moving), len(angles)))
+        along[first], along[second] = np.cos(angles), np.sin(angles)
+        moved = compliance @ along
+        axes.plot(moved[first], moved[second], color=COLOURS[1])
+        for point in range(0, 180, 15):
+            ends = [[0, moved[axis, point]] for axis in (first, second)]
+            axes.plot(*ends, color="0.75", linewidth=0.6)
+        axes.set_xlim(-reach, reach)
+        axes.set_ylim(-reach, reach)
+        axes.set_aspect("equal")
+        axes.set_xlabel(f"{names[moving[first]]} (mm)")
+        axes.set_ylabel(f"{names[moving[second]]} (mm)")
+        panel_letter(axes, column)
+    if shares[0]:
+        _bars(figure.add_subplot(grid[1, :]), shares, softest)
+    figure.suptitle(f"Displacement of the tool tip under {force:g} N in every direction", fontsize=9)
     return figure
 
 
@@ -283,6 +263,7 @@ def _bars(axes: Axes, shares: tuple[list[str], Real], softest: float) -> None:
     panel_letter(axes, 3)
 
 
+@house_style()
 def receptance_figure(frf: Frf, resonances: np.ndarray) -> Figure:
     """Draw direct receptances over frequency, and in grey the largest that couples two directions.
 
@@ -296,30 +277,29 @@ def receptance_figure(frf: Frf, resonances: np.ndarray) -> Figure:
     names = [label.split(":")[1].lstrip("+") for label in frf.responses]
     direct = [(name, frf.values[:, i, i]) for i, name in enumerate(names)]
     apart = np.abs(frf.values) * (1 - np.eye(len(names)))
-    with house_style():
-        figure = new_figure(110.0)
-        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
-        if len(names) > 1:
-            cross = apart.reshape(len(apart), -1).max(axis=1)
-            upper.semilogy(frf.frequencies, 1e6 * cross, color="0.65", linewidth=1.0, label="largest across")
-        for number, (name, values) in enumerate(direct):
-            style = {"color": COLOURS[number], "linestyle": LINE_STYLES[number % len(LINE_STYLES)]}
-            upper.semilogy(frf.frequencies, 1e6 * np.abs(values), label=f"{name} under force in {name}", **style)
-            lower.plot(frf.frequencies, np.degrees(np.angle(values)), **style)
-        shown = resonances[(resonances >= frf.frequencies[0]) & (resonances <= frf.frequencies[-1])]
-        for axes in (upper, lower):
-            for value in shown:
-                axes.axvline(value, color="0.8", linewidth=0.6, zorder=0)
-        upper.set_ylabel("Receptance (µm/N)")
-        lower.set_ylabel("Phase (degrees)")
-        lower.set_ylim(-190, 190)
-        lower.set_yticks([-180, -90, 0, 90, 180])
-        lower.set_xlabel("Frequency (Hz)")
-        lower.set_xlim(frf.frequencies[0], frf.frequencies[-1])
-        for number, axes in enumerate((upper, lower)):
-            panel_letter(axes, number)
-        handles, labels = upper.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=4)
+    figure = new_figure(110.0)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2.2, 1))
+    if len(names) > 1:
+        cross = apart.reshape(len(apart), -1).max(axis=1)
+        upper.semilogy(frf.frequencies, 1e6 * cross, color="0.65", linewidth=1.0, label="largest across")
+    for number, (name, values) in enumerate(direct):
+        style = {"color": COLOURS[number], "linestyle": LINE_STYLES[number % len(LINE_STYLES)]}
+        upper.semilogy(frf.frequencies, 1e6 * np.abs(values), label=f"{name} under force in {name}", **style)
+        lower.plot(frf.frequencies, np.degrees(np.angle(values)), **style)
+    shown = resonances[(resonances >= frf.frequencies[0]) & (resonances <= frf.frequencies[-1])]
+    for axes in (upper, lower):
+        for value in shown:
+            axes.axvline(value, color="0.8", linewidth=0.6, zorder=0)
+    upper.set_ylabel("Receptance (µm/N)")
+    lower.set_ylabel("Phase (degrees)")
+    lower.set_ylim(-190, 190)
+    lower.set_yticks([-180, -90, 0, 90, 180])
+    lower.set_xlabel("Frequency (Hz)")
+    lower.set_xlim(frf.frequencies[0], frf.frequencies[-1])
+    for number, axes in enumerate((upper, lower)):
+        panel_letter(axes, number)
+    handles, labels = upper.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=4)
     return figure
 
 

@@ -1,11 +1,13 @@
-"""Postures and loads of a robot as a user types them, as checked numbers."""
+"""Postures and loads of a robot, from the options of the steps."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from millfrf.core import InputError, Real
-from millfrf.core.terminal import say
+from millfrf.core.terminal import warn
 from millfrf.robot_model import (
     CutPlace,
     Mechanism,
@@ -18,6 +20,7 @@ from millfrf.robot_model import (
     driven_values,
     has_spherical_wrist,
     inverse_kinematics,
+    modes_at,
     named_posture,
     nearest_solution,
     reach,
@@ -26,46 +29,33 @@ from millfrf.robot_model import (
     unit_doubts,
 )
 
-FURTHEST = 20.0
-"""Largest coordinate of a place that is taken, m."""
+LOWEST, HIGHEST = 0.4, 1.3
+"""Band about the first modes: multiples of the lowest and of the highest of their frequencies."""
 
 
 @dataclass(frozen=True)
 class Loads:
-    """Payload, and the part of the weight's deflection that counts: ``all``, ``change`` or ``none``."""
+    """Payload, and the part of the deflection under weight that counts: ``all``, ``change`` or ``none``."""
 
     payload: Payload
     weight: str = "all"
 
 
 def loads_of(payload: float, at: tuple[float, float, float] | None, weight: str = "all") -> Loads:
-    """Options ``--payload KG``, ``--payload-at X Y Z`` and ``--weight``.
+    """Loads from a mass (kg), its place from the tool tip (m) and the part of the weight that counts.
 
     Raises
     ------
     InputError
-        A place without a mass, or numbers that no payload has.
+        A place without a mass.
     """
     if at is not None and not payload:
         raise InputError("--payload-at says where a payload is: give its mass too, --payload KG")
     return Loads(Payload(payload, (0.0, 0.0, 0.0) if at is None else at), weight)
 
 
-def check_places(**coordinates: float) -> None:
-    """Refuse coordinates that are no numbers, or that look like millimetres.
-
-    Raises
-    ------
-    InputError
-        With the option, the value and the remedy.
-    """
-    for name, value in coordinates.items():
-        if not abs(value) <= FURTHEST:
-            raise InputError(f"--{name} {value:g}: give metres from the robot's base, at most {FURTHEST:g}")
-
-
 def check_axis(name: str, axis: tuple[float, float, int]) -> None:
-    """Refuse an area's axis ``LO HI N`` that is empty, falls, or looks like millimetres.
+    """Refuse an axis ``LO HI N`` of an area that is empty, decreasing, or in millimetres.
 
     Raises
     ------
@@ -74,93 +64,81 @@ def check_axis(name: str, axis: tuple[float, float, int]) -> None:
     """
     low, high, count = axis
     for value in (low, high):
-        check_places(**{name: value})
+        if not abs(value) <= 20:
+            raise InputError(f"--{name} {value:g}: give metres from the robot's base, at most 20")
     if low > high or not 1 <= count <= 1000:
         raise InputError(f"--{name} {low:g} {high:g} {count}: give LO HI N with LO <= HI and 1 to 1000 places")
 
 
-def check_near(name: str, place: tuple[float, float, float]) -> None:
-    """Refuse a place at the tool that is no number, or that looks like millimetres.
-
-    Raises
-    ------
-    InputError
-        With the option, the values and the remedy.
-    """
-    if not all(abs(value) <= 5 for value in place):
-        raise InputError(f"--{name} {' '.join(f'{v:g}' for v in place)}: give metres from the tool tip, at most 5")
-
-
-def check_degrees(**angles: float) -> None:
-    """Refuse angles that are no numbers or more than three turns.
-
-    Raises
-    ------
-    InputError
-        With the option, the value and the remedy.
-    """
-    for name, value in angles.items():
-        if not abs(value) <= 1080:
-            raise InputError(f"--{name} {value:g}: give degrees, at most 1080")
-
-
-def check_positive(name: str, value: float, unit: str, most: float) -> None:
-    """Refuse a number that is not positive, not finite or beyond what the option can mean.
-
-    Raises
-    ------
-    InputError
-        With the option, the value and the remedy.
-    """
-    if not (np.isfinite(value) and 0 < value <= most):
-        raise InputError(f"--{name} {value:g}: give {unit}, above 0 and at most {most:g}")
-
-
-@dataclass(frozen=True)
-class Asked:
-    """Options of a posture as they were typed.
+def cut_place(at: tuple[float, float, float] | None, feed: float, turn: float, redundancy: str) -> CutPlace | None:
+    """Place of a vertical tool whose redundancy is turned; None where no place is given.
 
     Parameters
     ----------
-    pose
-        Name in the robot's file, or None.
-    joints
-        Driven joint values, degrees (prismatic joints: metres), comma-separated, or None.
-    at
-        Place of a vertical tool, m, or None.
-    feed
-        Direction of feed in the horizontal plane from the base's x, degrees.
-    turn
-        Turn of the redundancy, degrees.
+    at : m
+        Place of the tool tip.
+    feed, turn : deg
+        Direction of the feed from the base's x, and turn of the redundancy.
     redundancy
         ``tool`` or ``table``.
     """
-
-    pose: str | None = None
-    joints: str | None = None
-    at: tuple[float, float, float] | None = None
-    feed: float = 0.0
-    turn: float = 0.0
-    redundancy: str = "tool"
+    if at is None:
+        return None
+    return turned_place(tool_down(at, np.radians(feed)), np.radians(turn), redundancy)
 
 
-def posture_of(case: PlanarCase | SpatialCase, asked: Asked) -> tuple[Real, Real | None]:
+def posture_of(
+    case: PlanarCase | SpatialCase,
+    pose: str | None,
+    joints: str | Sequence[float] | None,
+    place: CutPlace | None = None,
+) -> tuple[Real, Real | None]:
     """Driven joint values, rad (prismatic joints: m), and the axes of the cut (None: the base frame).
 
     Raises
     ------
     InputError
-        More than one way of saying it, joint values that are no numbers, or a place out of reach.
+        More than one statement of the posture, joint values that are no numbers, or a place out of reach.
     """
-    given = sum(option is not None for option in (asked.pose, asked.joints, asked.at))
-    if given > 1:
+    if sum(option is not None for option in (pose, joints, place)) > 1:
         raise InputError("give the posture once: --pose NAME, --joints DEG,DEG,... or --at X Y Z")
-    if asked.at is not None:
-        place = cut_place(asked)
+    if place is not None:
         return solve_place(spatial(case).robot, place, named_posture(case, None)), place.axes
-    if asked.joints is not None:
-        return _typed(case, asked.joints), None
-    return named_posture(case, asked.pose), None
+    if joints is not None:
+        return _joint_values(case, joints), None
+    return named_posture(case, pose), None
+
+
+def driven_of(case: PlanarCase | SpatialCase, pose: str) -> Real:
+    """Driven joint values of a posture's name, or of degrees (prismatic joints: metres) with commas."""
+    return posture_of(case, None, pose)[0] if "," in pose else named_posture(case, pose)
+
+
+def driven_of_each(case: SpatialCase, poses: str | Sequence[str], count: int, what: str) -> list[Real]:
+    """Driven joint values of one posture for each of ``count`` files; ``what`` names the files in the message.
+
+    Raises
+    ------
+    InputError
+        Another number of postures than of files.
+    """
+    listed = [poses] if isinstance(poses, str) else list(poses)
+    if len(listed) != count:
+        raise InputError(f"{len(listed)} postures for {count} {what}; give --pose once for each, in the same order")
+    return [driven_of(case, pose) for pose in listed]
+
+
+def axes_turned(channels_turned: float | None) -> Real:
+    """Axes of channels whose X is turned (deg) from the base's x, with Z up; None: the axes of the base."""
+    if channels_turned is None:
+        return np.eye(3)
+    return tool_down([0.0, 0.0, 0.0], np.radians(channels_turned)).axes
+
+
+def band_of_modes(robot: SpatialRobot, postures: Sequence[Real], n_modes: int) -> tuple[float, float]:
+    """Band about the first ``n_modes`` modes in all postures: 0.4 times the lowest to 1.3 times the highest, Hz."""
+    frequencies = [modes_at(robot, q).frequencies[:n_modes] for q in postures]
+    return LOWEST * min(float(each[0]) for each in frequencies), HIGHEST * max(float(each[-1]) for each in frequencies)
 
 
 def mechanism_of(case: PlanarCase | SpatialCase) -> Mechanism:
@@ -168,29 +146,18 @@ def mechanism_of(case: PlanarCase | SpatialCase) -> Mechanism:
     return case.mechanism if isinstance(case, PlanarCase) else case.robot.mechanism
 
 
-def _typed(case: PlanarCase | SpatialCase, text: str) -> Real:
-    """Joint values from ``0,-20,110,...``; a doubt about their unit is printed."""
+def _joint_values(case: PlanarCase | SpatialCase, joints: str | Sequence[float]) -> Real:
+    """Joint values from ``0,-20,110,...`` or numbers, with a warning where their unit is in doubt."""
     try:
-        typed = [float(value) for value in text.split(",")]
+        typed = [float(value) for value in (joints.split(",") if isinstance(joints, str) else joints)]
     except ValueError as error:
         raise InputError(
-            f"--joints {text!r} is not a list of degrees (prismatic joints: metres) such as 0,-20,110,0,90,0"
+            f"--joints {joints!r} is not a list of degrees (prismatic joints: metres) such as 0,-20,110,0,90,0"
         ) from error
     mechanism = mechanism_of(case)
     values = driven_values(mechanism, typed)
-    for doubt in unit_doubts(mechanism, typed):
-        say(f"warning: {doubt}")
+    warn(unit_doubts(mechanism, typed), 6)
     return values
-
-
-def cut_place(asked: Asked) -> CutPlace:
-    """The place of a vertical tool, after the redundancy turned."""
-    if asked.at is None:
-        raise InputError("give the place of the tool tip: --at X Y Z, in metres")
-    for value in asked.at:
-        check_places(at=value)
-    check_degrees(feed=asked.feed, turn=asked.turn)
-    return turned_place(tool_down(asked.at, np.radians(asked.feed)), np.radians(asked.turn), asked.redundancy)
 
 
 def solve_place(robot: SpatialRobot, place: CutPlace, start: Real) -> Real:
@@ -199,42 +166,38 @@ def solve_place(robot: SpatialRobot, place: CutPlace, start: Real) -> Real:
     Raises
     ------
     InputError
-        Out of reach; the line says how near the tool comes.
+        Out of reach; the message says how near the tool comes.
     """
-    target = np.eye(4)
-    target[:3, :3], target[:3, 3] = place.attitude, place.position
-    return _solve(robot, target, start)
+    return _solve(robot, place.attitude, place.position, start)
 
 
 def start_of_path(robot: SpatialRobot, path: ToolPath, start: Real) -> Real:
     """Driven joint values at a path's first place, within the limits; ``start`` itself where there are none."""
-    from scipy.spatial.transform import Rotation
-
-    target = np.eye(4)
-    target[:3, :3], target[:3, 3] = Rotation.from_rotvec(path.attitudes[0]).as_matrix(), path.positions[0]
     try:
-        return _solve(robot, target, start)
+        return _solve(robot, Rotation.from_rotvec(path.attitudes[0]).as_matrix(), path.positions[0], start)
     except InputError:
         return start
 
 
-def _solve(robot: SpatialRobot, target: Real, start: Real) -> Real:
+def _solve(robot: SpatialRobot, attitude: Real, position: Real, start: Real) -> Real:
+    target = np.eye(4)
+    target[:3, :3], target[:3, 3] = attitude, position
     if robot.mechanism.closures:
         q = inverse_kinematics(robot.mechanism, target, start)
         return np.asarray(q[robot.mechanism.active])
     if not has_spherical_wrist(robot.mechanism):
         return reach(robot.mechanism, target, start)
-    found = nearest_solution(robot.mechanism, target, close_loops(robot.mechanism, start))
-    return reach(robot.mechanism, target, start) if found is None else found
+    solution = nearest_solution(robot.mechanism, target, close_loops(robot.mechanism, start))
+    return reach(robot.mechanism, target, start) if solution is None else solution
 
 
 def spatial(case: PlanarCase | SpatialCase) -> SpatialCase:
-    """The robot, if it is one in space.
+    """The robot, if it moves in space.
 
     Raises
     ------
     InputError
-        A planar one.
+        A planar robot.
     """
     if isinstance(case, PlanarCase):
         raise InputError("this robot is planar; places, maps, pictures and paths need a robot in space")

@@ -2,20 +2,20 @@
 
 import webbrowser
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from millfrf.core import InputError, Real, writing_whole_file
+from millfrf.core import InputError, Real, free_name, writing_whole_file
 from millfrf.core.provenance import versions
-from millfrf.core.terminal import Table
+from millfrf.core.steps import File, Writes, step
+from millfrf.core.terminal import Table, say_written, warn
 from millfrf.figures import COLOURS, MovingShapes, house_style, new_figure
-from millfrf.options import check_output
-from millfrf.report.results_page import ResultsPage, page_text
-from millfrf.report.section import Section, picture_of
+from millfrf.reports.results_page import ResultsPage, page_text
+from millfrf.reports.section import Section, picture_of
 from millfrf.robot_model import (
     PostureResult,
     SpatialCase,
@@ -28,13 +28,85 @@ from millfrf.robot_model import (
     structure_at,
 )
 
-from .postures import Asked, posture_of, spatial
+from .common import At, Degrees, Joints, Pose, Robot, Turning
+from .postures import cut_place, posture_of, spatial
 
 _SHOWN = 0.25
 """Largest displacement drawn, m."""
 
 _REST = "0.78"
 """Grey of the robot at rest."""
+
+
+@step
+def show_robot(
+    robot: Robot,
+    /,
+    *,
+    out: Annotated[File | None, Writes(suffixes=(".html",))] = None,
+    pose: Pose = None,
+    joints: Joints = None,
+    at: At = None,
+    feed: Degrees = 0.0,
+    turn: Degrees = 0.0,
+    redundancy: Turning = "tool",
+    browser: bool = False,
+) -> Path:
+    """Page with the robot, its joints, its posture and its mode shapes: one file that needs no network.
+
+    Parameters
+    ----------
+    robot
+        Robot file (.toml), or a name that `robot list` shows.
+    out
+        Page to write; without it robot.html, or robot-2.html and so on where that exists.
+    pose
+        Posture named in the robot's file; without it the first one.
+    joints : deg
+        Values of the driven joints; of prismatic joints in metres.
+    at : m
+        Place of the tip of a vertical tool, instead of a posture.
+    feed : deg
+        Direction of the feed from the base's x, with --at.
+    turn : deg
+        Turn of the redundancy, with --at.
+    redundancy
+        What turns, with --at: the robot about the tool's axis (tool), or tool and workpiece about the feed (table).
+    browser
+        Open the page in the browser.
+
+    Returns
+    -------
+    Path
+        Name of the page.
+
+    Raises
+    ------
+    InputError
+        A planar robot, a posture that it does not reach, or no browser.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf robot show kuka_kr90_r3100 --at 2.0 0 0.8 --out robot.html
+    """
+    page = free_name(Path("robot.html")) if out is None else Path(out)
+    case = spatial(read_robot(robot))
+    driven, axes = posture_of(case, pose, joints, cut_place(at, feed, turn, redundancy))
+    q = close_loops(case.robot.mechanism, driven)
+    result = in_posture(case, driven, axes)
+    structure = structure_at(case.robot, q)
+    empty = StructureModes(structure, np.zeros(0), np.zeros((0, len(structure.positions), 6)))
+    modes = modes_at(case.robot, q) if len(result.frequencies) else empty
+    tables = (_joint_table(case, q), _posture_table(case, driven, q, result))
+    with writing_whole_file(page) as unfinished:
+        unfinished.write_text(mode_page(case.name, modes, tables, result.warnings), encoding="utf-8")
+    if browser and not webbrowser.open(page.resolve().as_uri()):
+        raise InputError(f"no browser was found; open {page} in one")
+    warn(result.warnings)
+    say_written([page], "open it in a browser")
+    return page
 
 
 def skeleton(modes: StructureModes) -> list[tuple[int, int]]:
@@ -47,27 +119,27 @@ def exaggeration(modes: StructureModes, mode: int) -> float:
     return float(_SHOWN / max(np.linalg.norm(modes.shapes[mode, :, :3], axis=1).max(), 1e-300))
 
 
+@house_style()
 def robot_figure(modes: StructureModes, n_modes: int = 4) -> Figure:
     """The robot at rest in grey and its lowest mode shapes in colour, largest displacement 0.25 m.
 
     Above from the front left, below from above: what swings sideways shows in one of them.
     """
-    with house_style():
-        figure = new_figure(105.0, layout=None)
-        shown = min(n_modes, len(modes.squares))
-        for mode in range(shown):
-            moved = modes.structure.positions + exaggeration(modes, mode) * modes.shapes[mode, :, :3]
-            left, width = 0.04 + mode * 0.95 / shown, 0.95 / shown
-            upper = figure.add_axes((left, 0.42, width, 0.55), projection="3d")
-            _lines(upper, modes, modes.structure.positions, _REST, 3.0)
-            _lines(upper, modes, moved, COLOURS[1], 1.3)
-            _equal_axes(upper, modes.structure.positions)
-            title = f"mode {mode + 1}, {modes.frequencies[mode]:.1f} Hz"
-            figure.text(left + 0.5 * width, 0.98, title, ha="center", va="top")
-            lower = figure.add_axes((left + 0.03, 0.11, width - 0.05, 0.30))
-            _from_above(lower, modes, moved)
-            if mode == 0:
-                lower.set_ylabel("y (m)")
+    figure = new_figure(105.0, layout=None)
+    shown = min(n_modes, len(modes.squares))
+    for mode in range(shown):
+        moved = modes.structure.positions + exaggeration(modes, mode) * modes.shapes[mode, :, :3]
+        left, width = 0.04 + mode * 0.95 / shown, 0.95 / shown
+        upper = figure.add_axes((left, 0.42, width, 0.55), projection="3d")
+        _lines(upper, modes, modes.structure.positions, _REST, 3.0)
+        _lines(upper, modes, moved, COLOURS[1], 1.3)
+        _equal_axes(upper, modes.structure.positions)
+        title = f"mode {mode + 1}, {modes.frequencies[mode]:.1f} Hz"
+        figure.text(left + 0.5 * width, 0.98, title, ha="center", va="top")
+        lower = figure.add_axes((left + 0.03, 0.11, width - 0.05, 0.30))
+        _from_above(lower, modes, moved)
+        if mode == 0:
+            lower.set_ylabel("y (m)")
     return figure
 
 
@@ -108,44 +180,39 @@ _AXIS = 0.09
 """Half the length of the line that shows the axis of a joint, m."""
 
 
-@dataclass(frozen=True)
-class Fact:
-    """A table below the picture: heading, names of the columns, rows of text."""
-
-    heading: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-
-
-def mode_page(
-    name: str,
-    modes: StructureModes,
-    facts: Sequence[Fact] = (),
-    warnings: Sequence[str] = (),
-) -> str:
+def mode_page(name: str, modes: StructureModes, tables: Sequence[Table] = (), warnings: Sequence[str] = ()) -> str:
     """HTML of an interactive picture: drag or arrow keys turn it, a list chooses the mode, a slider the exaggeration.
 
     Without modes the robot stands still. Joints are drawn as short lines along their axes.
+
+    Parameters
+    ----------
+    name
+        Name of the robot.
+    modes
+        Modes in the posture.
+    tables
+        Tables below the picture; a row on the softest direction stands at the head of the page too.
+    warnings
+        Warnings at the head of the page.
     """
     moving = _moving(modes)
     frequencies = ", ".join(f"{frequency:.2f}" for frequency in modes.frequencies[:4])
     verdict = (
         f"The lowest natural frequencies are {frequencies} Hz." if frequencies else "Without masses it has no modes."
     )
-    told = tuple(
-        f"{row[0].capitalize()}: {row[1]}." for fact in facts for row in fact.rows if row[0].startswith("softest")
+    softest = tuple(
+        f"{row[0].capitalize()}: {row[1]}." for table in tables for row in table.rows if row[0].startswith("softest")
     )
-    page = ResultsPage(
-        "Robot in a posture", name, f"Made by millfrf {versions()['millfrf']}", (verdict, *told), tuple(warnings)
-    )
+    made_by = f"Made by millfrf {versions()['millfrf']}"
+    page = ResultsPage("Robot in a posture", name, made_by, (verdict, *softest), tuple(warnings))
     caption = "Grey: at rest; orange: tool tip; black lines: axes of the joints. Displacements are exaggerated."
     words = f"{name} with its mode shapes" if len(moving.labels) else f"{name} at rest"
     picture = picture_of(robot_figure(modes), caption, words, moving=moving)
-    tables = [Section(fact.heading, tables=(Table(fact.heading, fact.columns, fact.rows),)) for fact in facts]
     rows = tuple((str(k + 1), f"{frequency:.3f}") for k, frequency in enumerate(modes.frequencies[:_MOST]))
     listed = Section("Natural frequencies", tables=(Table("Modes", ("mode", "frequency (Hz)"), rows),) if rows else ())
     shown = Section("Mode shapes" if len(moving.labels) else "Robot", pictures=(picture,))
-    return page_text(page, [shown, listed, *tables])
+    return page_text(page, [shown, listed, *(Section(table.title, tables=(table,)) for table in tables)])
 
 
 def _moving(modes: StructureModes) -> MovingShapes:
@@ -171,32 +238,8 @@ def _moving(modes: StructureModes) -> MovingShapes:
     )
 
 
-def show_robot(robot: str, asked: Asked, out: Path, browser: bool = False) -> list[str]:
-    """Write the page; lines that say what is on it.
-
-    Raises
-    ------
-    InputError
-        A planar robot, or a posture that is not there.
-    """
-    check_output(out, (".html",))
-    case = spatial(read_robot(robot))
-    driven, axes = posture_of(case, asked)
-    q = close_loops(case.robot.mechanism, driven)
-    result = in_posture(case, driven, axes)
-    structure = structure_at(case.robot, q)
-    empty = StructureModes(structure, np.zeros(0), np.zeros((0, len(structure.positions), 6)))
-    modes = modes_at(case.robot, q) if len(result.frequencies) else empty
-    facts = (_joint_facts(case, q), _posture_facts(case, driven, q, result))
-    with writing_whole_file(out) as unfinished:
-        unfinished.write_text(mode_page(case.name, modes, facts, result.warnings), encoding="utf-8")
-    if browser and not webbrowser.open(out.resolve().as_uri()):
-        raise InputError(f"no browser was found; open {out} in one")
-    return [*(f"warning: {warning}" for warning in result.warnings), f"wrote {out}: open it in a browser"]
-
-
-def _joint_facts(case: SpatialCase, q: Real) -> Fact:
-    """One row a moving joint: value, limits, stiffness along its own motion."""
+def _joint_table(case: SpatialCase, q: Real) -> Table:
+    """One row for each moving joint: value, limits, stiffness along its own motion."""
     mechanism, rows = case.robot.mechanism, []
     for index, value in zip(mechanism.moving, q, strict=True):
         frame = mechanism.frames[index]
@@ -210,10 +253,10 @@ def _joint_facts(case: SpatialCase, q: Real) -> Fact:
         if own and np.isfinite(sum(own)):
             stiffness = f"{sum(own):.3g} {'N/m' if sliding else 'N m/rad'}"
         rows.append((frame.name, frame.motion, f"{scale * value:.4g} {unit}", limits, stiffness))
-    return Fact("Joints", ("joint", "motion", "value", "limits", "stiffness along its motion"), tuple(rows))
+    return Table("Joints", ("joint", "motion", "value", "limits", "stiffness along its motion"), tuple(rows))
 
 
-def _posture_facts(case: SpatialCase, driven: Real, q: Real, result: PostureResult) -> Fact:
+def _posture_table(case: SpatialCase, driven: Real, q: Real, result: PostureResult) -> Table:
     """Place of the tip, moving mass, softest direction."""
     structure = structure_at(case.robot, q)
     place = ", ".join(f"{value:.4f}" for value in structure.positions[case.robot.tip])
@@ -230,4 +273,4 @@ def _posture_facts(case: SpatialCase, driven: Real, q: Real, result: PostureResu
         ("mass of bodies and links", f"{mass:.4g} kg" if mass else "not known"),
         ("softest direction of the tip", f"{1e-6 / values[-1]:.3g} N/µm along ({along})"),
     ]
-    return Fact("Posture", ("what", "value"), tuple(rows))
+    return Table("Posture", ("what", "value"), tuple(rows))

@@ -1,16 +1,19 @@
 """Step ``robot stiffness``: compliance and deflection in a posture."""
 
 import json
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from annotated_types import Gt, Le
 
 from millfrf.core import InputError, Real, writing_whole_file
 from millfrf.core.provenance import origin
-from millfrf.core.terminal import Table, say, show, tell
+from millfrf.core.steps import File, Typed, Writes, step
+from millfrf.core.terminal import Table, say, say_written, show, tell, warn
 from millfrf.figures import save_figure
-from millfrf.options import check_output
 from millfrf.robot_model import (
     STANDARD_GRAVITY,
     Payload,
@@ -25,9 +28,157 @@ from millfrf.robot_model import (
     tool_attitude,
 )
 
-from .common import check_drawn, warn
+from .common import At, Degrees, Joints, Kilograms, NearTip, Picture, Pose, Robot, TableFile, Turning
 from .pictures import compliance_figure, joint_shares, write_compliance_table
-from .postures import Asked, Loads, check_positive, mechanism_of, posture_of
+from .postures import cut_place, loads_of, mechanism_of, posture_of
+
+
+@dataclass(frozen=True, eq=False)
+class Stiffness:
+    """Compliance at the tool tip in a posture, and deflections.
+
+    Parameters
+    ----------
+    result
+        Compliance, own weight and warnings, with much else that a posture has.
+    posture
+        Joint values in words.
+    force : N
+        Force at the tip.
+    largest_deflection : m
+        Largest deflection of the tip under the force, over its directions.
+    deflections : m and rad
+        Deflection over ``result.labels`` by its cause: own weight, and payload.
+    largest_together : m
+        Largest deflection of the tip under the force, own weight and payload together.
+    """
+
+    result: PostureResult
+    posture: str
+    force: float
+    largest_deflection: float
+    deflections: Mapping[str, Real]
+    largest_together: float
+
+
+@step
+def robot_stiffness(
+    robot: Robot,
+    /,
+    *,
+    pose: Pose = None,
+    joints: Joints = None,
+    at: At = None,
+    feed: Degrees = 0.0,
+    turn: Degrees = 0.0,
+    redundancy: Turning = "tool",
+    links: bool = False,
+    tip_force: Annotated[float, Typed("N"), Gt(0), Le(1_000_000)] = 650.0,
+    payload: Kilograms = 0.0,
+    payload_at: NearTip = None,
+    out: Annotated[File | None, Writes(suffixes=(".json",))] = None,
+    picture: Picture = None,
+    table: TableFile = None,
+) -> Stiffness:
+    """Compliance at the tool tip, softest and stiffest directions, deflection under a force, weight and payload.
+
+    Parameters
+    ----------
+    robot
+        Robot file (.toml), or a name that `robot list` shows.
+    pose
+        Posture named in the robot's file; without it the first one.
+    joints : deg
+        Values of the driven joints; of prismatic joints in metres.
+    at : m
+        Place of the tip of a vertical tool, instead of a posture.
+    feed : deg
+        Direction of the feed from the base's x, with --at.
+    turn : deg
+        Turn of the redundancy, with --at.
+    redundancy
+        What turns, with --at: the robot about the tool's axis (tool), or tool and workpiece about the feed (table).
+    links
+        Include the flexible link sections of a planar robot's file; a robot in space always includes its links.
+    tip_force : N
+        Force at the tip.
+    payload : kg
+        Mass that the robot carries besides the bodies of its file.
+    payload_at : m
+        Centre of mass of the payload from the tip, in the tool frame; without it the tip.
+    out
+        File of all numbers and warnings to write.
+    picture
+        Picture of the deflection in every direction, and of the share of each joint, to write.
+    table
+        Table of the compliance to write.
+
+    Returns
+    -------
+    Stiffness
+        Compliance and deflections.
+
+    Raises
+    ------
+    InputError
+        A posture that the robot does not reach, or a payload without mass.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf robot stiffness kuka_kr90_r3100 --at 2.0 0 0.8 --table stiffness.csv
+    """
+    carried = loads_of(payload, payload_at).payload
+    case = read_robot(robot)
+    driven, axes = posture_of(case, pose, joints, cut_place(at, feed, turn, redundancy))
+    result = in_posture(case, driven, axes, links=links)
+    posture = shown_values(mechanism_of(case), driven)
+    moving = [i for i, label in enumerate(result.labels) if "R" not in _direction(label)]
+    compliance = result.compliance[np.ix_(moving, moving)]
+    values, directions = np.linalg.eigh(compliance)
+    deflections = _deflections(case, driven, axes, result, carried)
+    resting = np.sum(list(deflections.values()), axis=0) if deflections else np.zeros(len(result.labels))
+    found = Stiffness(
+        result,
+        posture,
+        tip_force,
+        float(tip_force * values[-1]),
+        deflections,
+        largest_together(resting[moving], tip_force * compliance),
+    )
+    _show_compliance(found)
+    _say_deflections(found, moving, values, directions)
+    warn(result.warnings)
+    if picture is not None:
+        softest = directions[:, -1] if axes is None else axes @ directions[:, -1]
+        shares = joint_shares(case, driven, softest)
+        save_figure(compliance_figure(result, tip_force, shares, float(values[-1])), picture)
+        say_written([picture])
+    if table is not None:
+        write_compliance_table(Path(table), result, origin("robot stiffness", [robot], {"posture": posture}))
+        say_written([table])
+    tell(lambda: _numbers(robot, found))
+    if out is not None:
+        _write(Path(out), robot, found)
+        say_written([out])
+    return found
+
+
+def _direction(label: str) -> str:
+    return label.split(":")[1]
+
+
+def _deflections(
+    case: PlanarCase | SpatialCase, driven: Real, axes: Real | None, result: PostureResult, payload: Payload
+) -> dict[str, Real]:
+    """Deflections under own weight and payload over the tool's degrees of freedom, by their cause."""
+    parts = {}
+    if result.own_weight is not None:
+        parts["the robot's own weight (links and bodies of its file)"] = result.own_weight
+    if payload.mass:
+        parts[f"a payload of {payload.mass:g} kg"] = result.compliance @ carried_wrench(case, driven, axes, payload)
+    return parts
 
 
 def carried_wrench(case: PlanarCase | SpatialCase, driven: Real, axes: Real | None, payload: Payload) -> Real:
@@ -36,7 +187,7 @@ def carried_wrench(case: PlanarCase | SpatialCase, driven: Real, axes: Real | No
     Raises
     ------
     InputError
-        A payload beside the tip of a planar robot.
+        A payload away from the tip of a planar robot.
     """
     if isinstance(case, PlanarCase):
         if any(payload.centre):
@@ -48,8 +199,8 @@ def carried_wrench(case: PlanarCase | SpatialCase, driven: Real, axes: Real | No
     return np.asarray(turn.T @ payload_wrench(case.robot, attitude, payload))
 
 
-def largest_together(sag: Real, gain: Real) -> float:
-    """``max |s + G u|`` over unit vectors u: the worst direction of a force of given size beside a fixed deflection.
+def largest_together(resting: Real, gain: Real) -> float:
+    """``max |s + G u|`` over unit vectors u: the worst direction of a force of given size with a fixed deflection.
 
     By repetition of ``u = G^T (s + G u) / |...|``, which never falls, from both ends of every principal direction.
 
@@ -62,121 +213,52 @@ def largest_together(sag: Real, gain: Real) -> float:
     best = 0.0
     for u in (*starts, *(-starts)):
         for _ in range(200):
-            pull = gain.T @ (sag + gain @ u)
+            pull = gain.T @ (resting + gain @ u)
             u = pull / max(float(np.linalg.norm(pull)), 1e-300)
-        best = max(best, float(np.linalg.norm(sag + gain @ u)))
+        best = max(best, float(np.linalg.norm(resting + gain @ u)))
     return best
 
 
-def show_stiffness(
-    robot: str,
-    asked: Asked,
-    force: float,
-    loads: Loads,
-    links: bool = False,
-    out: Path | None = None,
-    drawn: tuple[Path | None, Path | None] = (None, None),
-) -> None:
-    """Compliance, principal directions, deflection under the force, under weight, and both; picture and table."""
-    check_drawn(drawn, out)
-    check_positive("tip-force", force, "newtons", 1e6)
-    if out is not None:
-        check_output(out, (".json",))
-    case = read_robot(robot)
-    driven, axes = posture_of(case, asked)
-    result = in_posture(case, driven, axes, links=links)
-    names = [label.split(":")[1] for label in result.labels]
-    rows = tuple((name, *(f"{v:.3e}" for v in row)) for name, row in zip(names, result.compliance, strict=True))
-    posture = shown_values(mechanism_of(case), driven)
-    show(Table(f"Compliance at the tool (m/N, rad/N m), posture {posture}", ("", *names), rows))
-    moving = [i for i, name in enumerate(names) if "R" not in name]
-    compliance = result.compliance[np.ix_(moving, moving)]
-    values, directions = np.linalg.eigh(compliance)
+def _show_compliance(found: Stiffness) -> None:
+    names = [_direction(label) for label in found.result.labels]
+    rows = tuple((name, *(f"{v:.3e}" for v in row)) for name, row in zip(names, found.result.compliance, strict=True))
+    show(Table(f"Compliance at the tool (m/N, rad/N m), posture {found.posture}", ("", *names), rows))
+
+
+def _say_deflections(found: Stiffness, moving: list[int], values: Real, directions: Real) -> None:
+    """Print principal stiffnesses, and deflections under the force, under weight, and under both."""
+    names = [_direction(found.result.labels[i])[1:] for i in moving]
     for value, direction in zip(values[::-1], directions.T[::-1], strict=True):
-        parts = ", ".join(f"{names[i][1:]} {d:+.2f}" for i, d in zip(moving, direction, strict=True))
+        parts = ", ".join(f"{name} {part:+.2f}" for name, part in zip(names, direction, strict=True))
         say(f"{1e-6 / value:8.3f} N/um along ({parts})")
-    say(f"largest deflection under {force:g} N: {1e3 * force * values[-1]:.3f} mm")
-    parts_of_sag = _sags(case, driven, axes, result, loads)
-    sag = _show_sags(parts_of_sag, [names[i] for i in moving], len(names))
-    together = largest_together(sag[moving], force * compliance)
-    if sag.any():
-        say(f"largest deflection under weight and {force:g} N together: {1e3 * together:.3f} mm")
-    warn(result)
-    _draw(case, (driven, axes), result, force, drawn, origin("robot stiffness", [robot], {"posture": posture}))
-    found = {
-        "largest_deflection_m": float(force * values[-1]),
-        "deflection_under_m_rad": {what: moved.tolist() for what, moved in parts_of_sag},
-        "largest_deflection_together_m": float(together),
-    }
-    numbers = _numbers(robot, posture, result, force, found)
-    tell(lambda: numbers)
-    if out is not None:
-        _write(out, robot, result, numbers)
+    say(f"largest deflection under {found.force:g} N: {1e3 * found.largest_deflection:.3f} mm")
+    for cause, moved in found.deflections.items():
+        cells = ", ".join(f"{name} {1e3 * value:+.3f}" for name, value in zip(names, moved, strict=False))
+        say(f"deflection under {cause}: {1e3 * np.linalg.norm(moved[: len(names)]):.3f} mm ({cells})")
+    if any(moved.any() for moved in found.deflections.values()):
+        say(f"largest deflection under weight and {found.force:g} N together: {1e3 * found.largest_together:.3f} mm")
 
 
-def _draw(
-    case: PlanarCase | SpatialCase,
-    posture: tuple[Real, Real | None],
-    result: PostureResult,
-    force: float,
-    drawn: tuple[Path | None, Path | None],
-    stated: dict[str, Any],
-) -> None:
-    """Picture and table, where they were asked for."""
-    picture, table = drawn
-    if picture is not None:
-        driven, axes = posture
-        moving = [i for i, label in enumerate(result.labels) if "R" not in label.split(":")[1]]
-        values, directions = np.linalg.eigh(result.compliance[np.ix_(moving, moving)])
-        softest = directions[:, -1] if axes is None else axes @ directions[:, -1]
-        shares = joint_shares(case, driven, softest)
-        save_figure(compliance_figure(result, force, shares, float(values[-1])), picture)
-        say(f"wrote {picture}")
-    if table is not None:
-        write_compliance_table(table, result, stated)
-        say(f"wrote {table}")
-
-
-def _sags(
-    case: PlanarCase | SpatialCase, driven: Real, axes: Real | None, result: PostureResult, loads: Loads
-) -> list[tuple[str, Real]]:
-    """Deflections under own weight and payload over the tool's degrees of freedom, with their names."""
-    parts = []
-    if result.own_weight is not None:
-        parts.append(("the robot's own weight (links and bodies of its file)", result.own_weight))
-    if loads.payload.mass:
-        carried = result.compliance @ carried_wrench(case, driven, axes, loads.payload)
-        parts.append((f"a payload of {loads.payload.mass:g} kg", carried))
-    return parts
-
-
-def _show_sags(parts: list[tuple[str, Real]], names: list[str], size: int) -> Real:
-    """Print them; return their sum."""
-    for what, moved in parts:
-        cells = ", ".join(f"{name[1:]} {1e3 * value:+.3f}" for name, value in zip(names, moved, strict=False))
-        say(f"deflection under {what}: {1e3 * np.linalg.norm(moved[: len(names)]):.3f} mm ({cells})")
-    return np.sum([moved for _, moved in parts], axis=0) if parts else np.zeros(size)
-
-
-def _numbers(robot: str, posture: str, result: PostureResult, force: float, found: dict[str, object]) -> dict[str, Any]:
+def _numbers(robot: File, found: Stiffness) -> dict[str, Any]:
     return {
-        "robot": robot,
-        "posture": posture,
-        "degrees_of_freedom": list(result.labels),
-        "compliance": result.compliance.tolist(),
-        "force_n": force,
-        **found,
+        "robot": str(robot),
+        "posture": found.posture,
+        "degrees_of_freedom": list(found.result.labels),
+        "compliance": found.result.compliance.tolist(),
+        "force_n": found.force,
+        "largest_deflection_m": found.largest_deflection,
+        "deflection_under_m_rad": {cause: moved.tolist() for cause, moved in found.deflections.items()},
+        "largest_deflection_together_m": found.largest_together,
     }
 
 
-def _write(out: Path, robot: str, result: PostureResult, numbers: dict[str, Any]) -> None:
+def _write(path: Path, robot: File, found: Stiffness) -> None:
     content = {
         "format": "millfrf.robot_stiffness",
         "format_version": 1,
-        **numbers,
-        "warnings": list(result.warnings),
+        **_numbers(robot, found),
+        "warnings": list(found.result.warnings),
         "provenance": origin("robot stiffness", [robot]),
     }
-    with writing_whole_file(out) as temporary:
-        temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
-    say(f"wrote {out}")
+    with writing_whole_file(path) as unfinished:
+        unfinished.write_text(json.dumps(content, indent=1), encoding="utf-8")

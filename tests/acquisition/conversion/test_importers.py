@@ -7,7 +7,7 @@ import pytest
 from scipy.io import wavfile
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription, convert
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.core import FileFormatError, InputError
 
 pyuff = pytest.importorskip("pyuff")

@@ -8,7 +8,7 @@ import pytest
 import pyuff
 
 from estimation import Geometry, import_geometry, read_geometry, write_geometry
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.core import FileFormatError, InputError
 
 UNITS = {"type": 164, "units_code": 5, "units_description": "mm", "temp_mode": 1, "length": 1e3, "force": 1e3}

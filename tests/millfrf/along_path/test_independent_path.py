@@ -27,10 +27,10 @@ from millfrf.robot_model import (
 )
 from millfrf.robot_model.finite_elements.structure import coordinate_basis, mass_matrix, stiffness_matrix
 from millfrf.stability import certified_lobes
-from millfrf.steps.robot.path_optimum import optimised
-from millfrf.steps.robot.path_search import Wanted
-from millfrf.steps.robot.path_state import Loading
-from millfrf.steps.robot.path_values import PathCut, Request, values_of
+from millfrf.steps.robot.along_path.optimum import optimised
+from millfrf.steps.robot.along_path.search import Wanted
+from millfrf.steps.robot.along_path.state import Loading
+from millfrf.steps.robot.along_path.values import PathCut, Request, values_of
 from modal_fit import ModalModel
 
 CASE = read_spatial_robot("kuka_kr90_angled")

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from milling_of_a_path import CUT
 
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.core.provenance import read_provenance
 from millfrf.robot_model import modal_model_at, named_posture, read_robot
 from millfrf.stability import certified_lobes
-from millfrf.steps.robot.common import settled_modes
+from millfrf.steps.robot.tip_lobes import settled_modes
 
 
 @pytest.fixture(autouse=True)

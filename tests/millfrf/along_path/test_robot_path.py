@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from milling_of_a_path import CUT
 
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.cutting import force_harmonics, read_cutting_process
 from millfrf.robot_model import Payload, read_spatial_robot, tool_deflection, tool_down
 
@@ -22,8 +22,9 @@ def inputs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def command(robot: str, *more: str) -> list[str]:
-    words = f"robot path {robot} path.csv --cutting cut.toml --speed 6000 --depth 0.002 --turns -120 0 5"
-    return [*words.split(), *more]
+    words = f"robot path {robot} path.csv --cutting cut.toml --speed 6000 --depth 0.002"
+    turns = () if "--turns" in more else ("--turns", "-120", "0", "5")
+    return [*words.split(), *turns, *more]
 
 
 def table(path: Path) -> list[dict[str, str]]:
@@ -117,10 +118,10 @@ def test_weight_counts_from_the_first_point_where_the_change_is_asked(inputs: Pa
 @pytest.mark.parametrize(
     ("more", "words"),
     [
-        (("--optimise", "speed"), "is none of depth, deviation, both"),
-        (("--balance", "2"), "from 0 to 1"),
+        (("--optimise", "speed"), 'Invalid value "speed" for --optimise'),
+        (("--balance", "2"), "--balance 2: give a share at most 1"),
         (("--table-at", "1", "0", "0"), "--table-turns LO HI N"),
-        (("--limit-margin", "120"), "from 0 to 90"),
+        (("--limit-margin", "120"), "--limit-margin 120 deg: give a number at most 90 deg"),
         (("--limit-margin", "80"), "in no posture that keeps the margins"),
         (("--joint-step", "0.01", "--turns", "-90", "-90", "1"), "no continuous sequence"),
     ],

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from acquisition import Recording
-from millfrf.__main__ import BAD_INPUT, DONE, run
 from millfrf.campaign.simulated.make import SimulatedCampaign, laboratory_of, make_campaign
 from millfrf.campaign.simulated.recordings import write_recording
 from millfrf.campaign.simulated.true_robot import FAULTS, LOWEST, Condition
 from millfrf.campaign.simulated.true_robot import WORK_AREA_HIGHEST as HIGHEST
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import InputError
 from millfrf.gate import check_recordings
-from millfrf.steps.fit import SUBSPACE, FitOptions, fit_recordings
+from millfrf.steps.fit import fit
 
 POSES, RECORDINGS = 6, 36
 
@@ -154,7 +154,7 @@ def test_a_fit_of_three_immersions_finds_the_true_frequencies(folder: Path, trut
     drift = laboratory.drift
     chosen = [one for one in planned if one.pose == drift.pose and one.session == 2]
     paths = [folder / "recordings" / f"{one.name}.h5" for one in chosen]
-    model = fit_recordings(paths, FitOptions((8.0, 95.0), SUBSPACE)).model
+    model = fit(*paths, band=(8.0, 95.0)).model
     true = laboratory.true.structure(laboratory.postures[drift.pose], drift.condition(chosen[1]))
     known = model.standard_errors()
     assert known is not None

@@ -32,10 +32,10 @@ from millfrf.robot_model import (
 )
 from millfrf.robot_model.posture_process.measured_modes import MeasuredModes, mode_pairs
 from millfrf.stability import lowest_limits
-from millfrf.steps.calibrate import calibrate_model
-from millfrf.steps.fit import SUBSPACE, FitOptions, fit_recordings
+from millfrf.steps.calibrate import calibrate
+from millfrf.steps.fit import fit
 from millfrf.steps.robot.learned import depth_band
-from modal_fit import ModalModel, read_modal_model, write_modal_model
+from modal_fit import ModalModel, write_modal_model
 from replay_data import tip_model
 
 Real = NDArray[np.float64]
@@ -62,12 +62,12 @@ def fitted_sets(folder: Path, laboratory: Laboratory, planned: list[PlannedRecor
         if not out.is_file() and not refused.is_file():
             try:
                 paths = [folder / "recordings" / f"{one.name}.h5" for one in group if one.fault is None]
-                write_modal_model(out, fit_recordings(paths, FitOptions(BAND, SUBSPACE)).model)
+                write_modal_model(out, fit(*paths, band=BAND).model)
             except (InputError, MillfrfError) as error:
                 refused.write_text(str(error))
         if out.is_file():
             taps = [read_frf(folder / "taps" / f"{pose_name(pose)}_{place}.h5") for place in ("tip", "housing")]
-            found.append((pose, calibrate_model(read_modal_model(out), taps[0], taps[1]).model))
+            found.append((pose, calibrate(out, tip=taps[0], sensor=taps[1]).model))
     return found
 
 

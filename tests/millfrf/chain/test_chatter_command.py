@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from acquisition import record
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.cutting import MillingProcess
 from millfrf.stability import cut_spectrum, gather_evidence, read_cuts
 from modal_fit import write_modal_model

@@ -11,7 +11,7 @@ import pyuff
 from scipy.io import savemat
 
 from estimation import read_frf
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from modal_fit import ModalModel, read_modal_model
 
 AXIS = np.arange(1.0, 201.0, 0.25)

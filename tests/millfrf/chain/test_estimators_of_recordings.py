@@ -8,10 +8,9 @@ from scipy import signal
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from estimation import read_frf
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.core import InputError
-from millfrf.steps.estimate import estimate_recordings
-from millfrf.steps.test_spectra import EstimateOptions
+from millfrf.steps.estimate import estimate
 from modal_fit import ModalModel
 
 RATE = 200.0
@@ -53,7 +52,7 @@ def off(path: Path) -> float:
 def test_an_instrument_takes_out_what_feedback_does_to_h1(with_feedback: str, tmp_path: Path) -> None:
     common = [with_feedback, "--excitation", "f", "--response", "u", "--segment", "2", "--band", "1", "90"]
     assert run(["estimate", *common, "--out", str(tmp_path / "h1.h5")]) == 0
-    instrumental = ["--estimator", "instrumental_variable", "--instrument", "command"]
+    instrumental = ["--estimator", "instrumental-variable", "--instrument", "command"]
     assert run(["estimate", *common, *instrumental, "--out", str(tmp_path / "iv.h5")]) == 0
     assert off(tmp_path / "h1.h5") > 0.3
     assert off(tmp_path / "iv.h5") < 0.03
@@ -64,8 +63,9 @@ def test_an_instrument_takes_out_what_feedback_does_to_h1(with_feedback: str, tm
 
 
 def test_channels_are_chosen_by_quantity_beside_the_instrument(with_feedback: str) -> None:
-    options = EstimateOptions(2.0, band=(1.0, 90.0), estimator="instrumental-variable", instruments=("command",))
-    made = estimate_recordings([with_feedback], options)
+    made = estimate(
+        with_feedback, segment=2.0, band=(1.0, 90.0), estimator="instrumental-variable", instruments="command"
+    )
     assert made.frf.excitations == ("TCP:+X",)
     assert made.tests[0].excitations[0].name == "f"
 
@@ -132,4 +132,4 @@ def test_local_polynomials_see_short_records_without_leakage(short: list[str], t
 )
 def test_options_that_do_not_fit_are_refused(with_feedback: str, options: dict[str, object], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        estimate_recordings([with_feedback], EstimateOptions(2.0, **options))  # type: ignore[arg-type]
+        estimate(with_feedback, segment=2.0, **options)

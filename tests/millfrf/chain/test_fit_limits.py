@@ -7,7 +7,7 @@ import pytest
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from millfrf.core import InputError
-from millfrf.steps.fit import FitOptions, fit_recordings
+from millfrf.steps.fit import fit
 from modal_fit import ModalModel
 
 RATE, SAMPLES = 1024.0, 16384
@@ -51,12 +51,12 @@ def test_default_fits_recover_the_structure(
     damping = [0.02, 0.015, 0.01, 0.01]
     truth = structure([60.0, 150.0, 290.0, 370.0], damping, n_responses)
     record(tmp_path / "a.h5", truth)
-    fit = fit_recordings([tmp_path / "a.h5"], FitOptions(band, "subspace"))
-    np.testing.assert_allclose(fit.model.natural_frequencies, natural, rtol=1e-4)
-    np.testing.assert_allclose(fit.model.damping_ratios, damping[: len(natural)], rtol=5e-3)
+    fitted = fit(tmp_path / "a.h5", band=band)
+    np.testing.assert_allclose(fitted.model.natural_frequencies, natural, rtol=1e-4)
+    np.testing.assert_allclose(fitted.model.damping_ratios, damping[: len(natural)], rtol=5e-3)
 
 
 def test_beyond_the_flat_band_is_refused_with_the_band_that_was_asked_for(tmp_path: Path) -> None:
     record(tmp_path / "a.h5", structure([60.0], [0.02], 1))
     with pytest.raises(InputError, match=r"band up to 450 Hz does not fit .* 1024 Hz; stay below 409.6 Hz"):
-        fit_recordings([tmp_path / "a.h5"], FitOptions((20.0, 450.0), "subspace"))
+        fit(tmp_path / "a.h5", band=(20.0, 450.0))

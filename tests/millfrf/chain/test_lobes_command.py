@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimation import write_frf
-from millfrf.__main__ import DONE, run
+from millfrf.command_line import DONE, run
 from millfrf.cutting import MillingProcess, write_cutting_process
 from millfrf.stability import StabilityLobes, certified_lobes, read_lobes
 from millfrf.steps.lobes import lobes_summary, mode_coupling_line

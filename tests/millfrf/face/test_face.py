@@ -12,7 +12,7 @@ import pytest
 
 import millfrf as mf
 from estimation import write_frf
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from modal_fit import write_modal_model
 
 CUT = mf.MillingProcess(
@@ -127,7 +127,7 @@ def test_refusals_are_one_line_with_the_remedy(tmp_path: Path) -> None:
     with pytest.raises(mf.InputError, match="a int is no modal model"):
         mf.lobes(3, CUT)  # type: ignore[arg-type]
     frf = _model().frf(np.linspace(20.0, 130.0, 441))
-    with pytest.raises(mf.InputError, match=r"need spindle speeds in rpm, for example speeds="):
+    with pytest.raises(mf.InputError, match=r"need spindle speeds in rpm, for example --speeds"):
         mf.lobes(frf, CUT)
     with pytest.raises(mf.InputError, match="cannot fit 2 files of frf"):
         mf.fit(frf, frf)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimation import Frf, write_frf
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import Band
 from millfrf.core.provenance import read_provenance
 from modal_fit import ModalModel, write_modal_model

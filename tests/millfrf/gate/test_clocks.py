@@ -8,7 +8,7 @@ import pytest
 
 from acquisition import Block, Channel, Recording, RecordingWriter, StreamDescription, record
 from acquisition.errors import Overrun
-from millfrf.__main__ import run
+from millfrf.command_line import run
 
 CHANNELS = (Channel("fx", "force", "N", "TCP", "+X"), Channel("ax", "acceleration", "m/s^2", "TCP", "+X"))
 STREAM = StreamDescription("daq", 1024.0, 0.0, CHANNELS)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from estimation import Frf, FrfCovariance, read_frf, to_receptance, write_frf
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import InputError
 from millfrf.gate import check_frf, check_model, terms_left_out
 from modal_fit import ModalModel, read_modal_model, write_modal_model

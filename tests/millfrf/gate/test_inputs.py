@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 
 BAND = ["--band", "13", "25"]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from millfrf.__main__ import DONE, run
+from millfrf.command_line import DONE, run
 from millfrf.core import Band
 from millfrf.cutting import write_cutting_process
 from millfrf.gate import limits_inside_band

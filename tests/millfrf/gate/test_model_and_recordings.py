@@ -8,7 +8,7 @@ from pathlib import Path
 import h5py
 import pytest
 
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from modal_fit import ModalModel, write_modal_model
 from replay_data import default_structure
 

@@ -12,8 +12,7 @@ from acquisition import convert
 from estimation import Frf
 from millfrf.core import InputError
 from millfrf.gate import check_frf, check_model, check_recordings
-from millfrf.steps.estimate import estimate_recordings
-from millfrf.steps.test_spectra import EstimateOptions
+from millfrf.steps.estimate import estimate
 from modal_fit import read_modal_model
 
 MAPPING = Path(__file__).resolve().parents[3] / "examples" / "fsm_mapping.toml"
@@ -49,7 +48,7 @@ def beam(shared_data: Path) -> Frf:
 @pytest.mark.parametrize("level", [100, 300])
 def test_the_mirror_rig(shared_data: Path, tmp_path: Path, level: int) -> None:
     paths = fsm(shared_data, tmp_path, level)
-    found = estimate_recordings(paths, EstimateOptions(segment=1.28, overlap=0.0, window="boxcar", band=(0.7, 2999.0)))
+    found = estimate(*paths, segment=1.28, overlap=0.0, window="boxcar", band=(0.7, 2999.0))
     assert found.warnings == ()
     assert check_frf(found.frf) == []
     assert found.frf.band is not None
@@ -59,15 +58,14 @@ def test_the_mirror_rig(shared_data: Path, tmp_path: Path, level: int) -> None:
 @pytest.mark.parametrize("level", [1, 3])
 def test_the_aircraft(shared_data: Path, level: int) -> None:
     path = shared_data / "f16-ground-vibration" / f"level_{level}.h5"
-    options = EstimateOptions(segment=20.48, overlap=0.0, window="boxcar", band=(2.0, 15.0))
-    found = estimate_recordings([path], options)
+    found = estimate(path, segment=20.48, overlap=0.0, window="boxcar", band=(2.0, 15.0))
     assert found.warnings == ()
     assert check_frf(found.frf) == []
 
 
 def test_both_levels_of_the_aircraft_agree_on_the_time(shared_data: Path) -> None:
     paths = [shared_data / "f16-ground-vibration" / f"level_{level}.h5" for level in (1, 3)]
-    found = estimate_recordings(paths, EstimateOptions(segment=20.48, overlap=0.0, window="boxcar", band=(2.0, 15.0)))
+    found = estimate(*paths, segment=20.48, overlap=0.0, window="boxcar", band=(2.0, 15.0))
     assert found.warnings == ()
 
 

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core.provenance import read_provenance
 from millfrf.gate import check_recordings
 

@@ -8,7 +8,7 @@ import pytest
 
 from estimation import Frf, FrfCovariance, SpectralSettings, read_frf, write_frf
 from estimation.spectra.cross_spectra import spectral_width
-from millfrf.steps.fit import FitOptions, fit_model
+from millfrf.steps.fit import fit
 
 FREQUENCY, DAMPING = 11.3, 0.045
 
@@ -35,9 +35,9 @@ def smeared(seconds: float) -> Frf:
 @pytest.mark.parametrize("seconds", [4.0, 8.0])
 def test_a_damping_ratio_that_a_window_widens_is_doubted_by_enough(seconds: float) -> None:
     frf = smeared(seconds)
-    fit = fit_model(frf, FitOptions(band=(6.0, 20.0), n_modes=1))
-    excess = fit.model.damping_ratios[0] / DAMPING - 1
-    (said,) = [text for text in fit.warnings if "widens resonances" in text]
+    fitted = fit(frf, band=(6.0, 20.0), modes=1)
+    excess = fitted.model.damping_ratios[0] / DAMPING - 1
+    (said,) = [text for text in fitted.warnings if "widens resonances" in text]
     bound = float(said.split("up to about ")[1].split(" %")[0]) / 100
     assert 0.6 * bound < excess < 1.3 * bound
     assert "1 of 1 damping ratios" in said
@@ -45,8 +45,8 @@ def test_a_damping_ratio_that_a_window_widens_is_doubted_by_enough(seconds: floa
 
 def test_without_a_window_or_with_long_segments_nothing_is_doubted() -> None:
     for frf in (replace(smeared(8.0), spectral_width=None), smeared(120.0)):
-        fit = fit_model(frf, FitOptions(band=(6.0, 20.0), n_modes=1))
-        assert not any("widens resonances" in text for text in fit.warnings)
+        fitted = fit(frf, band=(6.0, 20.0), modes=1)
+        assert not any("widens resonances" in text for text in fitted.warnings)
 
 
 def test_the_width_travels_with_the_file(tmp_path: Path) -> None:

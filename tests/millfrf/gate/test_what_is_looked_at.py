@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from estimation import write_frf
-from millfrf.__main__ import DONE, run
+from millfrf.command_line import DONE, run
 from modal_fit import write_modal_model
 from replay_data import table_one_model
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from acquisition import Channel, Recording, RecordingWriter, StreamDescription
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.live.control import LiveControl
 from millfrf.live.monitor import LiveMonitor, LiveSettings
 from millfrf.steps.acquire import _preview, open_session

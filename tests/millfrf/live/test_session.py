@@ -12,7 +12,7 @@ import pytest
 from acquisition import Block, Channel, Recording
 from acquisition.drivers.replay import ReplaySource
 from estimation import CrossSpectra, SpectralAccumulator, settings_for, to_receptance
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.live.frequency_drawings import all_drawings, first_choice
 from millfrf.live.monitor import LiveMonitor, Snapshot
 from millfrf.live.spectra import BandProgress

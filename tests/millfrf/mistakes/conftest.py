@@ -8,7 +8,7 @@ import pytest
 
 _SPOIL = ("spoil_texts", "spoil_recordings", "spoil_results", "spoil_robots", "spoil_exports", "spoiling")
 
-for _name in ("good_files", *_SPOIL, "the_table", "page"):
+for _name in ("good_files", *_SPOIL, "the_table"):
     _spec = importlib.util.spec_from_file_location(_name, Path(__file__).with_name(f"{_name}.py"))
     assert _spec is not None
     assert _spec.loader is not None

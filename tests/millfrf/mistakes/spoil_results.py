@@ -113,7 +113,7 @@ JSON_CHANGES: dict[str, Callable[[dict[str, object]], None]] = {
 
 def lobes(folder: Path, file: str = "lobes.csv") -> None:
     """Lobes as the command writes them."""
-    from millfrf.__main__ import run
+    from millfrf.command_line import run
 
     base = [str(folder / "model_tip.json"), "--cutting", str(folder / "cut.toml"), "--max-depth", "0.01"]
     assert run(["lobes", *base, "--speeds", "600", "1200", "5", "--out", str(folder / file)]) == 0
@@ -121,7 +121,7 @@ def lobes(folder: Path, file: str = "lobes.csv") -> None:
 
 def estimated(folder: Path) -> None:
     """An FRF of the sweeps, as the command writes it."""
-    from millfrf.__main__ import run
+    from millfrf.command_line import run
 
     names = [str(folder / f"{name}.h5") for name in ("central", "down", "up")]
     assert run(["estimate", *names, "--segment", "4", "--band", "12", "30", "--out", str(folder / "frf.h5")]) == 0
@@ -129,6 +129,6 @@ def estimated(folder: Path) -> None:
 
 def fitted(folder: Path) -> None:
     """The model fitted to :func:`estimated`."""
-    from millfrf.__main__ import run
+    from millfrf.command_line import run
 
     assert run(["fit", str(folder / "frf.h5"), "--band", "15.2", "22.5", "--out", str(folder / "model.json")]) == 0

@@ -7,12 +7,11 @@ import shlex
 import shutil
 from pathlib import Path
 
-import page
 import pytest
 import spoiling
 from the_table import Mistake, mistakes
 
-from millfrf.__main__ import BAD_INPUT, DONE, FAILED, run
+from millfrf.command_line import BAD_INPUT, DONE, FAILED, run
 
 TABLE = mistakes()
 FOREIGN = re.compile(
@@ -93,10 +92,3 @@ def _words(page: Path) -> str:
 
 def _plain(text: str) -> str:
     return " ".join(text.split())
-
-
-def test_the_page_says_what_the_table_says() -> None:
-    told = page.lines_of_page()
-    assert set(told) == {row.did for row in TABLE}
-    for row in TABLE:
-        assert any(all(re.search(wanted, line, re.IGNORECASE) for wanted in row.says) for line in told[row.did]), row

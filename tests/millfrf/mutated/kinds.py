@@ -24,7 +24,7 @@ def _module(name: str, path: Path) -> ModuleType:
 
 
 _WRITING = _module("writing_commands_of_kinds", Path(__file__).parents[1] / "outputs" / "writing_commands.py")
-ROBOT = Path(__file__).parents[3] / "robot_model"
+ROBOT = Path(__file__).parents[3] / "millfrf" / "robot_model"
 LOBES = "--cutting cut.toml --speeds 600 1200 2 --max-depth 0.01 --method zero-order --out out.csv"
 ROWS = np.random.default_rng(0).standard_normal((200, 2))
 
@@ -84,7 +84,7 @@ KINDS = (
 
 def make_kinds(folder: Path) -> None:
     """Write the good files."""
-    from millfrf.__main__ import run
+    from millfrf.command_line import run
 
     _WRITING.make_inputs(folder)
     for words in (
@@ -104,7 +104,7 @@ def make_kinds(folder: Path) -> None:
 
 
 def _own_csv(folder: Path) -> None:
-    from millfrf.__main__ import run
+    from millfrf.command_line import run
 
     part = str(folder / "part.h5")
     assert run(["convert", str(folder / "steady.h5"), part, "--span", "0", "1"]) == 0

@@ -34,7 +34,7 @@ def read(words: list[str], sink: int) -> None:
     os.dup2(sink, 2)
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + MEMORY, resource.RLIM_INFINITY))
-    from millfrf.__main__ import run
+    from millfrf.command_line import run
 
     code = run(words)
     sys.stdout.flush()
@@ -75,7 +75,7 @@ def wrong(code: int, said: str, gigabytes: float) -> str:
 def main() -> None:
     """Deal the mutations to the kinds."""
     import millfrf.__main__
-    import millfrf.report.page
+    import millfrf.reports.page
     import millfrf.steps.robot.common  # noqa: F401  # what every kind needs is loaded once
 
     kinds, mutations = _load("kinds"), _load("mutations")

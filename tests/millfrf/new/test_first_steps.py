@@ -8,8 +8,8 @@ import pytest
 from scipy.io import savemat
 
 from acquisition import Recording
-from millfrf.__main__ import run
-from millfrf.new.mapping_file import mapping_for
+from millfrf.command_line import run
+from millfrf.new.mapping_file import new_mapping
 from millfrf.stability import StabilityLobes, write_lobes
 from millfrf.steps.inspect import inspect_file
 
@@ -47,7 +47,7 @@ def test_a_file_of_another_program_is_told_the_way_in(
 @pytest.mark.parametrize(
     ("words", "command"),
     [
-        (["fit", "x.h5", "--out", "m.json"], "millfrf fit"),
+        (["fit", "x.h5"], "millfrf fit"),
         (["lobes", "m.json"], "millfrf lobes"),
         (["robot", "modes"], "millfrf robot modes"),
         (["new", "cut"], "millfrf new cut"),
@@ -63,7 +63,7 @@ def test_a_wrong_command_line_names_the_help_of_its_command(
 def converted(folder: Path, recorded_at: str) -> Path:
     path, mapping, out = csv(folder), folder / "map.toml", folder / "rec.h5"
     line = f'recorded_at = "{recorded_at}"\n' if recorded_at else ""
-    mapping.write_text(line + mapping_for(path).text)
+    mapping.write_text(line + new_mapping(path).text)
     assert run(["convert", str(path), str(out), "--map", str(mapping)]) == 0
     return out
 
@@ -91,14 +91,14 @@ def test_a_date_and_a_time_with_its_zone_are_kept(tmp_path: Path, stated: str) -
 @pytest.mark.parametrize(("stated", "why"), [("2026-03-02T09:30:00", "has no zone"), ("11.03.2026", "is no time")])
 def test_other_times_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], stated: str, why: str) -> None:
     path, mapping = csv(tmp_path), tmp_path / "map.toml"
-    mapping.write_text(f'recorded_at = "{stated}"\n' + mapping_for(path).text)
+    mapping.write_text(f'recorded_at = "{stated}"\n' + new_mapping(path).text)
     assert why in said(["convert", path, tmp_path / "rec.h5", "--map", mapping], capsys)
 
 
 def test_the_time_is_asked_with_the_date_that_the_file_says(tmp_path: Path) -> None:
     path = tmp_path / "cut.mat"
     savemat(path, {"F": np.ones((400, 3)), "Hdr": {"date": "2026-03-11", "fs": 1000.0}})
-    assert "# recorded_at =    # when was it recorded? The file says Hdr.date = 2026-03-11." in mapping_for(path).text
+    assert "# recorded_at =    # when was it recorded? The file says Hdr.date = 2026-03-11." in new_mapping(path).text
 
 
 def test_a_look_at_lobes_shows_the_warnings_in_the_file(tmp_path: Path) -> None:

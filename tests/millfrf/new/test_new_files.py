@@ -8,11 +8,11 @@ import pytest
 from scipy.io import savemat
 
 from acquisition import Recording
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.core import InputError
 from millfrf.core.described_tables import described_tables
 from millfrf.cutting import read_cutting_process
-from millfrf.new.mapping_file import mapping_for
+from millfrf.new.mapping_file import new_mapping
 from millfrf.new.toml_files import toml_files
 
 SAMPLES = np.random.default_rng(3).standard_normal((400, 3))
@@ -82,7 +82,7 @@ def _units_filled(text: str, unit: str) -> str:
 def test_files_without_samples_are_refused(tmp_path: Path, name: str, content: dict[str, object], said: str) -> None:
     savemat(tmp_path / name, content)
     with pytest.raises(InputError, match=said):
-        mapping_for(tmp_path / name)
+        new_mapping(tmp_path / name)
 
 
 def test_a_filled_cut_is_read_and_an_unfilled_one_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

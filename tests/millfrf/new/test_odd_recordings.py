@@ -11,9 +11,9 @@ from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
 
 from acquisition import Recording, open_arrays
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.core import FileFormatError, InputError
-from millfrf.new.mapping_file import mapping_for
+from millfrf.new.mapping_file import new_mapping
 
 N = 40
 DATA = np.random.default_rng(8).standard_normal((N, 3))
@@ -22,7 +22,7 @@ ROWS = [f"{k / 1000:.3f};{a:.5f};{b:.5f}" for k, (a, b, _) in enumerate(DATA)]
 
 def made(path: Path) -> tuple[str, dict[str, Any]]:
     """Text of the mapping, and what it says."""
-    text = mapping_for(path).text
+    text = new_mapping(path).text
     return text, tomllib.loads(text)
 
 
@@ -150,7 +150,7 @@ def test_a_first_row_of_missing_values_is_a_row(tmp_path: Path, row: str, units:
     with pytest.raises(FileFormatError, match=rf"line {2 + len(units)}, column \d: .* is not a number"):
         open_arrays(path)
     with pytest.raises(InputError, match=f"line {2 + len(units)}"):
-        mapping_for(path)
+        new_mapping(path)
 
 
 def test_units_below_headings_are_units_with_dashes_too(tmp_path: Path) -> None:

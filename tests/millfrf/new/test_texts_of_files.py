@@ -10,8 +10,8 @@ import pytest
 from scipy.io import savemat
 
 from acquisition import Recording, open_arrays
-from millfrf.__main__ import run
-from millfrf.new.mapping_file import mapping_for
+from millfrf.command_line import run
+from millfrf.new.mapping_file import new_mapping
 
 DATA = np.random.default_rng(5).standard_normal((60, 4))
 NAMES, UNITS = ["Kraft_X", "Kraft_Y", "Acc_TCP_x", "Acc_TCP_y"], ["kN", "kN", "g", "g"]
@@ -28,7 +28,7 @@ def saved(folder: Path, **fields: Any) -> Path:
 
 
 def made(path: Path) -> tuple[str, dict[str, Any]]:
-    text = mapping_for(path).text
+    text = new_mapping(path).text
     return text, tomllib.loads(text)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from acquisition import Channel, Events, Recording, RecordingWriter, Stream, StreamDescription
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import InputError, require_memory
 
 RATE, N = 100.0, 4000

@@ -13,7 +13,7 @@ import pytest
 from scipy.io import loadmat
 from writing_commands import COMMANDS, Writing
 
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.core.provenance import read_provenance
 
 WITHOUT = {

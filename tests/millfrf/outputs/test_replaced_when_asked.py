@@ -2,14 +2,15 @@
 
 import re
 from pathlib import Path
+from typing import Annotated
 
 import pytest
-import typer
 from writing_commands import COMMANDS, Writing
 
-from millfrf.__main__ import app, run
+from millfrf.command_line import CONTINUED, call, flags_of, run
+from millfrf.commands import STEPS, function_of, words_of
 from millfrf.core import InputError, keeping_files, writing_whole_file, writing_whole_folder
-from millfrf.usage import FOLDERS, OWN_FOLDER, WRITING, commands_in, framed
+from millfrf.core.steps import Writes, outputs_of, step
 
 OLD = "a result that somebody may need"
 BAD_INPUT = 2
@@ -37,16 +38,16 @@ def test_each_output_is_refused_before_any_input_is_read(
 
 
 def test_every_command_that_names_an_output_has_the_option() -> None:
-    for words, command in commands_in(typer.main.get_command(app)):
-        options = {name for one in command.params for name in one.opts}
-        writes = bool(options & set(WRITING)) or words == "convert"
-        assert ("--force" in options) == (writes and words not in OWN_FOLDER), words
+    for words in STEPS:
+        writes = bool(outputs_of(function_of(words))) or words == "convert"
+        assert ("force" in flags_of(words)) == (writes and words not in CONTINUED), words
 
 
 @pytest.mark.parametrize("command", [one for one in COMMANDS if one.arguments.endswith("--out out")])
 def test_a_folder_of_results_is_known_by_its_files(command: Writing) -> None:
-    words = next(words for words in FOLDERS if command.arguments.startswith(words))
-    assert {f"out/{name}" for name in FOLDERS[words]} == set(command.outputs)
+    words = words_of(command.words)
+    [files] = [option.marker.files for option in outputs_of(function_of(words)) if option.name == "out"]
+    assert {f"out/{name}" for name in files} == set(command.outputs)
 
 
 def test_force_replaces_and_without_it_the_old_file_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -59,11 +60,6 @@ def test_force_replaces_and_without_it_the_old_file_stays(tmp_path: Path, capsys
     assert out.read_text() == OLD
     assert run([*typed, "--force"]) == 0
     assert out.read_text() == first
-
-
-def test_a_number_behind_force_is_told_how_it_is_typed_now(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["robot", "stiffness", "staubli_rx170", "--force", "650"]) == BAD_INPUT
-    assert "--tip-force" in capsys.readouterr().err
 
 
 def test_names_that_the_program_chooses_are_free(
@@ -79,20 +75,24 @@ def test_names_that_the_program_chooses_are_free(
 
 
 def test_a_file_that_comes_up_while_a_command_computes_stays(tmp_path: Path) -> None:
-    def late(out: Path) -> None:
+    @step
+    def late(*, out: Annotated[Path, Writes(suffixes=(".txt",))]) -> None:
+        """Write a file that somebody else writes meanwhile.
+
+        Parameters
+        ----------
+        out
+            File to write.
+        """
         with writing_whole_file(out) as temporary:
             temporary.write_text("new")
             out.write_text(OLD)
 
-    from typing import Annotated
-
-    late.__annotations__["out"] = Annotated[Path, typer.Option("--out")]
-    command = framed("late", late)
     out = tmp_path / "a.txt"
     with pytest.raises(InputError, match="exists; replace it with --force"):
-        command(out=out)
+        call("late", late, [], {"out": out})
     assert out.read_text() == OLD
-    command(out=out, force=True)
+    call("late", late, [], {"out": out}, force=True)
     assert out.read_text() == "new"
 
 

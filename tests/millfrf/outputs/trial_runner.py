@@ -23,7 +23,7 @@ def copy_of_this_process(trial: dict, sink: int) -> None:
     os.chdir(trial["folder"])
     if trial.get("largest_file") is not None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (trial["largest_file"], resource.RLIM_INFINITY))
-    from millfrf.__main__ import run
+    from millfrf.command_line import run
 
     code = run(trial["words"])
     sys.stdout.flush()
@@ -60,7 +60,7 @@ def attend(child: int, trial: dict) -> int:
 def main() -> None:
     """Serve trials until standard input ends."""
     import millfrf.__main__
-    import millfrf.report.page
+    import millfrf.reports.page
     import millfrf.steps.diagnose
     import millfrf.steps.robot.common  # noqa: F401  # what every copy needs is loaded once
 

@@ -103,7 +103,7 @@ COMMANDS = (
 
 def make_inputs(folder: Path) -> None:
     """Write the files that the commands read."""
-    from millfrf.__main__ import run
+    from millfrf.command_line import run
 
     good_files.make(folder)
     _killed(folder / "killed.h5")

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 
 from estimation import write_frf
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.core import InputError, MillfrfError
 from millfrf.live.picking import PickSession, Pole, as_poles, chosen_at_first, drawn_page, fitted_answer
-from millfrf.live.picking_server import check_pick, pick_poles, write_picked
+from millfrf.live.picking_server import pick_poles, write_picked
+from millfrf.steps.fit import fit
 from modal_fit import ModalModel, fit_polyreference, read_modal_model, read_picked_poles
 
 BAND = (5.0, 60.0)
@@ -116,7 +117,7 @@ def test_a_choice_is_saved_and_strangers_are_turned_away(session: PickSession) -
         assert status == 200
         assert b"Pick poles" in page
         assert "script-src 'self'" in headers["Content-Security-Policy"]
-        for name in ("page.js", "page.css", "page.json", "bokeh.min.js"):
+        for name in ("picking.js", "picking.css", "page.json", "bokeh.min.js"):
             assert _asked(url, "GET", name)[0] == 200
         assert _asked(url, "GET", "", Host="evil.example")[0] == 421
         assert _asked(url.replace(url[-8:], "xxxxxxx/"), "GET", "")[0] == 404
@@ -180,11 +181,11 @@ def test_options_that_contradict_a_choice_are_refused(session: PickSession, tmp_
     write_frf(frf, session.frf)
     out = tmp_path / "model.json"
     with pytest.raises(InputError, match="--poles would name"):
-        check_pick(picked, out, picked, None, [frf])
+        fit(frf, out=out, pick=picked, poles=tmp_path / "others.toml")
     with pytest.raises(InputError, match="another picker"):
-        check_pick(picked, out, None, tmp_path / "candidates.json", [frf])
+        fit(frf, out=out, pick=picked, candidates=tmp_path / "candidates.json")
     with pytest.raises(InputError, match="change the suffix"):
-        check_pick(tmp_path / "poles.txt", out, None, None, [frf])
+        fit(frf, out=out, pick=tmp_path / "poles.txt")
 
 
 def test_an_interrupt_leaves_nothing_open(session: PickSession) -> None:

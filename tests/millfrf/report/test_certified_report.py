@@ -8,12 +8,12 @@ import pytest
 
 from millfrf.core.provenance import of_lobes
 from millfrf.cutting import MillingProcess, write_cutting_process
-from millfrf.report.collection import collect
-from millfrf.report.lobes_check import checked_lobes
-from millfrf.report.page import ReportOptions, report_page
-from millfrf.report.recommendation import recommendation
-from millfrf.report.results_page import page_text
-from millfrf.report.sections.stability import stability_findings
+from millfrf.reports.collection import collect
+from millfrf.reports.lobes_check import checked_lobes
+from millfrf.reports.page import ReportOptions, report_page
+from millfrf.reports.recommendation import recommendation
+from millfrf.reports.results_page import page_text
+from millfrf.reports.sections.stability import stability_findings
 from millfrf.stability import certified_lobes, multipliers, write_lobes, zero_order
 from modal_fit import ModalModel, write_modal_model
 

@@ -10,10 +10,10 @@ import pytest
 from scipy.fft import irfft, rfft
 
 from acquisition import Channel, RecordingWriter, StreamDescription
-from millfrf.__main__ import run
+from millfrf.command_line import run
 from millfrf.mismatch import library
 from millfrf.mismatch.physics.protocol import answer_name
-from millfrf.report.diagnoses.answers import next_test, where
+from millfrf.reports.diagnoses.answers import next_test, where
 from modal_fit import ModalModel, write_modal_model
 
 RATE, SECONDS, DELAY = 128.0, 40.0, 0.005

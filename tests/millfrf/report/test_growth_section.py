@@ -6,7 +6,7 @@ from typing import Any, cast
 import pytest
 
 from millfrf.mismatch import StructureDiagnosis
-from millfrf.report.diagnoses.structure_page import growth_section
+from millfrf.reports.diagnoses.structure_page import growth_section
 
 
 def told(amplitude: list[float | None], recordings: int = 3, **more: Any) -> Any:

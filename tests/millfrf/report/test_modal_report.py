@@ -10,7 +10,7 @@ from types import ModuleType
 import pytest
 
 from estimation import write_frf
-from millfrf.__main__ import run
+from millfrf.command_line import run
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "modal_report.py"
 

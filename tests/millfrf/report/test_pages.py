@@ -13,8 +13,8 @@ import pytest
 from millfrf.core import InputError
 from millfrf.core.terminal import Table
 from millfrf.figures import GalleryEntry, SmallSvg, gallery_page, house_style, new_figure, save_figure
-from millfrf.report.results_page import FigureFiles, ResultsPage, page_text, write_results_page
-from millfrf.report.section import Fold, Picture, Section, picture_of
+from millfrf.reports.results_page import FigureFiles, ResultsPage, page_text, write_results_page
+from millfrf.reports.section import Fold, Picture, Section, picture_of
 
 FREQUENCIES = np.linspace(1.0, 50.0, 200)
 

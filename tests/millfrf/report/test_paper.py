@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from millfrf.__main__ import BAD_INPUT, run
+from millfrf.command_line import BAD_INPUT, run
 from millfrf.core.terminal import Table
 from millfrf.figures import house_style, new_figure
-from millfrf.report.paper import write_results_pdf
-from millfrf.report.results_page import ResultsPage
-from millfrf.report.section import Section, picture_of
+from millfrf.reports.paper import write_results_pdf
+from millfrf.reports.results_page import ResultsPage
+from millfrf.reports.section import Section, picture_of
 
 
 def _written(folder: Path, rows: int) -> Path:

@@ -4,8 +4,8 @@ from math import pi
 
 import numpy as np
 
-from millfrf.report.results_page import of_numbers
-from millfrf.report.sections.stability import advice_table, lobes_table
+from millfrf.reports.results_page import of_numbers
+from millfrf.reports.sections.stability import advice_table, lobes_table
 from millfrf.stability import StabilityLobes
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from simulated_taps import Bench, Hits, plate, write_taps
 
-from millfrf.steps.tap import tap_recordings
-from millfrf.steps.tap_points import TapOptions
+from millfrf.steps.tap import tap
 from modal_fit import fit_polyreference
 
 PLACES = ("P1:+Z", "P2:+Z")
@@ -26,7 +25,7 @@ def test_dampings_lie_within_the_bars_of_the_fit(tmp_path: Path, damping: tuple[
             paths.append(tmp_path / f"t{seed}_{number}.h5")
             bench = Bench(rate=2560.0, seconds=2.2, noise=1e-3, seed=100 * seed + number)
             write_taps(paths[-1], structure, Hits((0.6,), at=f"P{number % 3 + 1}:+Z"), PLACES, bench)
-        frf = tap_recordings(paths, TapOptions()).merged.frf
+        frf = tap(*paths).frf
         assert (frf.exponential_time_constant is not None) == windowed
         band = (0.6 * structure.frequencies.min(), 1.2 * structure.frequencies.max())
         model = fit_polyreference(frf, band).model

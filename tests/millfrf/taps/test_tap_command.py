@@ -12,10 +12,9 @@ from simulated_taps import Bench, Hits, Structure, at_resonances, plate, write_t
 
 from acquisition import Recording, RecordingWriter, StreamDescription
 from estimation import Frf, read_frf, write_frf
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import InputError
-from millfrf.steps.estimate import estimate_recordings
-from millfrf.steps.test_spectra import EstimateOptions
+from millfrf.steps.estimate import estimate
 
 TIMES = (0.6, 2.1, 3.6)
 QUICK = Bench(rate=2560.0, seconds=5.2, noise=1e-4)
@@ -185,7 +184,7 @@ def test_what_estimate_refuses_was_wrong_many_times_over(folder: Path, structure
     """The case that was found: one tap at the beginning of a segment under a Hann window."""
     path = write_taps(folder / "one.h5", structure, Hits((0.05,)), SENSORS, replace(QUICK, seconds=2.0))
     with pytest.raises(InputError, match="1 tap of a hammer"):
-        estimate_recordings([path], EstimateOptions(segment=2.0))
+        estimate(path, segment=2.0)
     with Recording(path) as recording:
         samples = recording.stream().read()
     lines = np.fft.rfft(samples * np.hanning(len(samples))[:, None], axis=0)
@@ -197,7 +196,7 @@ def test_what_estimate_refuses_was_wrong_many_times_over(folder: Path, structure
 
 def test_estimate_keeps_taps_at_the_beginning_of_segments_without_a_window(folder: Path, structure: Structure) -> None:
     path = write_taps(folder / "even.h5", structure, Hits((0.05, 1.55, 3.05)), SENSORS, replace(QUICK, seconds=4.5))
-    found = estimate_recordings([path], EstimateOptions(segment=1.5, overlap=0.0, window="boxcar"))
+    found = estimate(path, segment=1.5, overlap=0.0, window="boxcar")
     inside = (found.frf.frequencies > 20) & (found.frf.frequencies < 500)
     frf = replace(
         found.frf,

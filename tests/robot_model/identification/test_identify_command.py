@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from millfrf.__main__ import BAD_INPUT, DONE, FAILED, run
+from millfrf.command_line import BAD_INPUT, DONE, FAILED, run
 from millfrf.robot_model import assumptions, in_posture, modes_at, read_deflections, read_robot, read_spatial_robot
 from modal_fit import frequency_and_damping_errors
 
@@ -240,8 +240,8 @@ def test_bad_options_are_one_line(robot: Path, tmp_path: Path, capsys: pytest.Ca
     table, out = write_table(tmp_path / "d.csv", 2, 0.0), str(tmp_path / "f.toml")
     for arguments, message in (
         (["chen_2026", str(table), "--out", out, "--error", "10"], "planar"),
-        ([str(robot), str(table), "--out", out, "--error", "0"], "--error 0: give micrometres"),
-        ([str(robot), str(table), "--out", out, "--error", "10", "--prior", "1"], "--prior 1: give a factor above 1"),
+        ([str(robot), str(table), "--out", out, "--error", "0"], "--error 0 um: give a number above 0 um"),
+        ([str(robot), str(table), "--out", out, "--error", "10", "--prior", "1"], "--prior 1: give a number above 1"),
         ([str(robot), str(tmp_path / "none.csv"), "--out", out, "--error", "10"], "no file"),
         ([str(robot), str(table), "--out", str(robot), "--error", "10"], "is the input itself"),
     ):

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import FileFormatError, InputError
 from millfrf.robot_model import Frame, Mechanism, in_posture, modes_at, read_spatial_robot, structure_at, tip_compliance
 from millfrf.robot_model.finite_elements.statics import gravity_hessian, with_gravity

@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import InputError
 from millfrf.robot_model import (
     Frame,
@@ -144,4 +144,4 @@ def test_runout_on_the_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(asked) == BAD_INPUT
     assert "give --speed too" in capsys.readouterr().err
     assert run([*asked[:-2], "--overhang", "50000", "--speed", "2500"]) == BAD_INPUT
-    assert "give millimetres" in capsys.readouterr().err
+    assert "--overhang 50000 mm: give a number at most 1000 mm" in capsys.readouterr().err

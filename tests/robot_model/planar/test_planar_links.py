@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimation import Frf
-from millfrf.__main__ import DONE, run
+from millfrf.command_line import DONE, run
 from millfrf.core import TIP
 from millfrf.cutting import read_cutting_process
 from millfrf.robot_model import exact_receptance, in_posture, read_planar_robot, rigid_matrices

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from estimation import read_frf
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.cutting import read_cutting_process
 from millfrf.robot_model import modal_model_at, read_spatial_robot, with_joint_factor
 from millfrf.stability import certified_lobes, read_lobes

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from millfrf.__main__ import DONE, run
+from millfrf.command_line import DONE, run
 from millfrf.robot_model import CompensatedPath, ToolPath
 from millfrf.steps.robot.pictures import compensation_figure
 

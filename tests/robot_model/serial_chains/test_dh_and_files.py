@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.robot_model import SpatialCase, has_spherical_wrist, modes_at, numbered_robot_text, read_robot
 
 ROWS = [(0.1, 90, 0.4, 0), (0.56, 0, 0, 90), (0.035, 90, 0, 0), (0, -90, 0.515, 0), (0, 90, 0, 0), (0, 0, 0.08, 0)]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import InputError
 from millfrf.robot_model import in_posture, read_robot
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from millfrf.__main__ import DONE, run
+from millfrf.command_line import DONE, run
 from millfrf.core import InputError
 from millfrf.robot_model import SpatialCase, nearest_solution, reach, read_robot, tool_postures
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from estimation import read_frf
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.core import apart
 from millfrf.robot_model import in_posture, named_posture, read_robot
 

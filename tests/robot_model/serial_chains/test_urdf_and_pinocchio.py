@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.robot_model import SpatialCase, modes_at, read_robot, read_urdf, structure_at
 from millfrf.robot_model.finite_elements.structure import coordinate_basis, mass_matrix
 from millfrf.stability import read_lobes

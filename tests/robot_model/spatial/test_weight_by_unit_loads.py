@@ -18,7 +18,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from millfrf.__main__ import DONE, run
+from millfrf.command_line import DONE, run
 from millfrf.core import apart
 
 Real = NDArray[np.float64]

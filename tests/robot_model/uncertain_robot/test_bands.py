@@ -9,7 +9,7 @@ import pytest
 from millfrf.robot_model import SpatialCase, in_posture, modes_at, numbered_robot_text, read_robot
 from millfrf.robot_model.full_update.changed_structure import free_parameters
 from millfrf.robot_model.uncertain_robot.bands import RobotUncertainty, drawn_robots
-from millfrf.steps.robot.common import frequency_errors
+from millfrf.steps.robot.uncertainty import frequency_errors
 
 OPEN = ("joint joint_6 damping", "joint joint_6 stiffness")
 

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from millfrf.__main__ import run
 from millfrf.campaign import on_dask as worker_checks
 from millfrf.campaign.campaign_run import RunOptions, run_campaign
 from millfrf.campaign.tasks import Task, in_order
+from millfrf.command_line import run
 from millfrf.core import InputError
 
 
@@ -52,7 +52,7 @@ MISTAKES: dict[str, tuple[Callable[[Path], Any], tuple[str, str], str]] = {
     "an empty band": (nothing, ("[13.0, 30.0]", "[30.0, 13.0]"), "band_hz [30, 13] is empty"),
     "no pattern": (nothing, ("(?P<pose>", "(?P<pose"), "is no regular expression"),
     "no such robot": (nothing, ('title = "Two poses"', 'robot = "my.toml"'), "no robot file my.toml in"),
-    "no such method": (nothing, ('"zero-order"', '"best"'), "[lobes] method 'best' is unknown; use one of certified"),
+    "no such method": (nothing, ('"zero-order"', '"best"'), "lobes.method must be 'certified', 'zero-order'"),
     "learning without a robot": (nothing, ("[report]", "[learn]"), "[learn] needs a robot; add robot ="),
     "a table without its file": (
         lambda folder: (folder / "t.csv").write_text("file,pose\nrecordings/P9.h5,P9\n"),

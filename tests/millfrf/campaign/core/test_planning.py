@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from millfrf.__main__ import run
 from millfrf.campaign.campaign_tables import EstimateTable
 from millfrf.campaign.labels import Labels, joined_labels, labels_of_setup, read_label_table
 from millfrf.campaign.opened import longest_chain
@@ -16,6 +15,7 @@ from millfrf.campaign.recordings import FileLook, FoundRecording, without_copies
 from millfrf.campaign.run_folder import PROGRAM, only_run
 from millfrf.campaign.running import DONE, REFUSED, Ended, left_to_run
 from millfrf.campaign.tasks import RecordingSet, Task, grouped, in_order, keys_of
+from millfrf.command_line import run
 from millfrf.core import InputError
 
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from estimation import read_frf
-from millfrf.__main__ import run
 from millfrf.campaign.campaign_run import RunOptions, RunSummary, run_campaign
 from millfrf.campaign.jobs import JOB_OF
 from millfrf.campaign.work import Work
+from millfrf.command_line import run
 
 
 def serial(campaign: Path, **options: bool) -> RunSummary:

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from millfrf.cutting import MillingProcess
-from millfrf.mismatch import library
 from millfrf.mismatch.cut.force import Belief
 from millfrf.mismatch.cut.hypothesis import CutHypothesis, MeasuredCut
+from millfrf.mismatch.cut.library import cut_library
 from millfrf.mismatch.cut.recordings import CutRecording
 from millfrf.mismatch.cut.spectra import force_spectra
 from millfrf.mismatch.cut.spindle_law import SpindleLaw
@@ -34,7 +34,7 @@ def stated(deviations: Real | None = None, laws: int = 1, **numbers: list[float]
     """The cutting file's numbers, or others of the causes that are named."""
     acting = tuple(
         (cause, np.array(numbers[name]) if name in numbers else cause.stated(PROCESS))
-        for name, cause in library().items()
+        for name, cause in cut_library().items()
     )
     law = SpindleLaw(SECONDS / 2, 0.4, 84.0)
     return CutHypothesis(np.zeros(6) if deviations is None else deviations, acting, (law,) * laws)

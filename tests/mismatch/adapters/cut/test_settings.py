@@ -4,7 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 
-from millfrf.mismatch import library
+from millfrf.mismatch.cut.library import cut_library
 from millfrf.mismatch.cut.settings import CUT, CutSettings
 from millfrf.mismatch.inference.diagnosis import Findings, Remainder, verdict_of
 from millfrf.mismatch.inference.paired_tests import students_test
@@ -14,7 +14,7 @@ def test_the_thresholds_are_those_of_the_documentation() -> None:
     assert (CUT.evidence.least, CUT.evidence.as_good, CUT.evidence.clear) == (20.0, 6.0, 4.0)
     assert (CUT.proof.gain, CUT.proof.significance) == (10.0, 0.01)
     assert CUT.proof.test is students_test
-    assert CUT.search.most_causes >= len(library())
+    assert CUT.search.most_causes >= len(cut_library())
     own = {one.name for one in fields(CutSettings)} - {one.name for one in fields(CutSettings.__mro__[1])}
     assert {name: getattr(CUT, name) for name in own} == {
         "coefficient_error": 0.15,

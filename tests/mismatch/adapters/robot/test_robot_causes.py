@@ -10,7 +10,7 @@ from milled_robots import NAME, POSTURES, RATE, ROBOT, heavy_elbow, in_postures,
 
 from acquisition import Channel, RecordingWriter, StreamDescription
 from estimation import BandRecording
-from millfrf.__main__ import BAD_INPUT, DONE, run
+from millfrf.command_line import BAD_INPUT, DONE, run
 from millfrf.mismatch import RobotDiagnosis, diagnose_robot, number_of, standard_error_of
 from millfrf.mismatch.robot.receptance import posed
 from millfrf.robot_model import SpatialRobot, modes_at, with_joint_factor, with_payload

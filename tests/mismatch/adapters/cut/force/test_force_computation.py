@@ -6,9 +6,10 @@ from dataclasses import replace
 import numpy as np
 
 from millfrf.cutting import MillingProcess, damping_matrices, edge_matrices
-from millfrf.cutting.tooth_force import rigid_force
-from millfrf.mismatch import CutPhysics, library
+from millfrf.cutting.tooth import rigid_force
+from millfrf.mismatch import CutPhysics
 from millfrf.mismatch.cut.force import computed_force, view_of
+from millfrf.mismatch.cut.library import cut_library
 from millfrf.mismatch.cut.recordings import CutRecording
 from millfrf.mismatch.cut.spindle_law import SpindleLaw
 from millfrf.mismatch.cut.tip_motion import TipMotion
@@ -25,7 +26,7 @@ def _recording(motion: TipMotion | None = None) -> CutRecording:
 
 
 def _acting(process: MillingProcess, **numbers: float) -> list[tuple[CutPhysics, np.ndarray]]:
-    causes = library()
+    causes = cut_library()
     stated = {name: cause.stated(process) for name, cause in causes.items()}
     return [(cause, np.array([numbers[name]]) if name in numbers else stated[name]) for name, cause in causes.items()]
 

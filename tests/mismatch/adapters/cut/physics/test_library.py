@@ -39,7 +39,7 @@ def test_a_new_cause_is_one_entry_of_the_library(monkeypatch: pytest.MonkeyPatch
     defined: dict[str, Any] = {}
     exec(TOY, defined)
     monkeypatch.setattr(physics_folder, "CAUSES", (*physics_folder.CAUSES, defined["PHYSICS"]))
-    toy = physics_folder.library()["toy_drag"]
+    toy = physics_folder.cut_library()["toy_drag"]
     recording = CutRecording("r", 20000.0, np.zeros((20000, 3)), (0, 1, 2), None, LAW, 0.1)
     view = view_of(recording, CUTTER, LAW, 1)
     added = computed_force(CUTTER, 1e-3, view, [(toy, np.array([5e3]))]) - computed_force(CUTTER, 1e-3, view, ())

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from millfrf.cutting import MillingProcess
-from millfrf.mismatch import library
 from millfrf.mismatch.cut.force import view_of
+from millfrf.mismatch.cut.library import cut_library
 from millfrf.mismatch.cut.recordings import CutRecording
 from millfrf.mismatch.cut.spindle_law import SpindleLaw
 
-RUNOUT = library()["runout"]
+RUNOUT = cut_library()["runout"]
 LAW = SpindleLaw(0.5, 0.2, 90.0)
 RECORDING = CutRecording("r", 5000.0, np.zeros((5000, 3)), (0, 1, 2), None, LAW, 0.1)
 

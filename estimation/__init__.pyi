@@ -1,0 +1,206 @@
+from .band_recordings.band_recording import (
+    BandRecording,
+    band_of_channels,
+    band_recording,
+    before_force_high_pass,
+    read_band_recording,
+    require_room_at_rate,
+    require_room_for_band,
+)
+from .band_recordings.channel_matching import (
+    DERIVATIVE_ORDERS,
+    MatchedChannel,
+    before_high_pass,
+    channel_at,
+    channels_in_words,
+    channels_of,
+    derivative_orders,
+    high_pass_corners,
+    kinematic_factor,
+    names_at,
+    refuse_shared,
+)
+from .band_recordings.resampling import Resampler, needed_ratio, require_room, resampled, whole_ratio, widest_band
+from .band_recordings.spectrum_lines import WindowedSpectrum, padded_force, windowed_spectrum
+from .estimators import h1, h1_side_by_side, h2, hv, instrumental_variable
+from .frf.frf_files import is_uff_number, read_frf, uff_node_numbers, write_frf, write_frf_uff
+from .frf.frf_matrix import Frf, FrfCovariance
+from .frf.quantities import FRF_ORDERS, correct_high_pass, family_of, known_band, quantities_of_unit, to_receptance
+from .frf.reciprocity import ReciprocityPair, reciprocity_pairs, shared_points
+from .geometry.geometry_files import GeometryTable, import_geometry, is_geometry_table, read_geometry, write_geometry
+from .geometry.geometry_model import Geometry
+from .hammer.decay import Decay, answer_decay, window_for
+from .hammer.merging import MergedTaps, merge_taps
+from .hammer.segments import (
+    TapSettings,
+    choose_segments,
+    exponential_window,
+    force_window,
+    placed,
+    screened,
+    window_correlation,
+)
+from .hammer.tap_spectra import TapSums, tap_sums
+from .hammer.taps import FoundTaps, TapTest, find_taps, found_taps, require_room_for_taps
+from .importing.entries import ImportedFrf
+from .importing.frf_mapping import FrfMapping, is_frf_mapping, load_frf_mapping
+from .importing.import_frf import import_frf, looks_like_frf
+from .importing.uff_frfs import read_frf_uff
+from .local_polynomials import local_half_width, local_polynomial
+from .recording_spectra import (
+    AveragingSettings,
+    check_equal_rates,
+    only_inputs,
+    spectra_in_band,
+    spectra_of_test,
+    spectra_of_tests,
+)
+from .repeats.cut_periods import SteadyPeriods, steady_periods
+from .repeats.distortion import Distortion, Homogeneity, distortion, homogeneity
+from .repeats.linear_approximation import LinearApproximation, excited_lines, linear_approximation
+from .repeats.noise import MeasuredNoise
+from .repeats.noise_between_periods import measured_noise, noise_of_periods
+from .repeats.period_search import find_repeats, repeat_of
+from .spectra.coherence_functions import (
+    RANK_TOLERANCE,
+    InputIndependence,
+    bands_text,
+    input_coherence,
+    input_independence,
+)
+from .spectra.cross_spectra import CrossSpectra, SpectralSettings, join_parts, settings_for, sum_tests
+from .spectra.welch import (
+    EXCITING,
+    RESPONDING,
+    SpectralAccumulator,
+    choose_channels,
+    count_segments,
+    cross_spectra,
+    spectra_for_judging,
+)
+from .sweep_plan import SweepDemand, SweepPlan, plan_sweeps
+
+__all__ = [
+    "DERIVATIVE_ORDERS",
+    "EXCITING",
+    "FRF_ORDERS",
+    "RANK_TOLERANCE",
+    "RESPONDING",
+    "AveragingSettings",
+    "BandRecording",
+    "CrossSpectra",
+    "Decay",
+    "Distortion",
+    "FoundTaps",
+    "Frf",
+    "FrfCovariance",
+    "FrfMapping",
+    "Geometry",
+    "GeometryTable",
+    "Homogeneity",
+    "ImportedFrf",
+    "InputIndependence",
+    "LinearApproximation",
+    "MatchedChannel",
+    "MeasuredNoise",
+    "MergedTaps",
+    "ReciprocityPair",
+    "Resampler",
+    "SpectralAccumulator",
+    "SpectralSettings",
+    "SteadyPeriods",
+    "SweepDemand",
+    "SweepPlan",
+    "TapSettings",
+    "TapSums",
+    "TapTest",
+    "WindowedSpectrum",
+    "answer_decay",
+    "band_of_channels",
+    "band_recording",
+    "bands_text",
+    "before_force_high_pass",
+    "before_high_pass",
+    "channel_at",
+    "channels_in_words",
+    "channels_of",
+    "check_equal_rates",
+    "choose_channels",
+    "choose_segments",
+    "correct_high_pass",
+    "count_segments",
+    "cross_spectra",
+    "derivative_orders",
+    "distortion",
+    "excited_lines",
+    "exponential_window",
+    "family_of",
+    "find_repeats",
+    "find_taps",
+    "force_window",
+    "found_taps",
+    "h1",
+    "h1_side_by_side",
+    "h2",
+    "high_pass_corners",
+    "homogeneity",
+    "hv",
+    "import_frf",
+    "import_geometry",
+    "input_coherence",
+    "input_independence",
+    "instrumental_variable",
+    "is_frf_mapping",
+    "is_geometry_table",
+    "is_uff_number",
+    "join_parts",
+    "kinematic_factor",
+    "known_band",
+    "linear_approximation",
+    "load_frf_mapping",
+    "local_half_width",
+    "local_polynomial",
+    "looks_like_frf",
+    "measured_noise",
+    "merge_taps",
+    "names_at",
+    "needed_ratio",
+    "noise_of_periods",
+    "only_inputs",
+    "padded_force",
+    "placed",
+    "plan_sweeps",
+    "quantities_of_unit",
+    "read_band_recording",
+    "read_frf",
+    "read_frf_uff",
+    "read_geometry",
+    "reciprocity_pairs",
+    "refuse_shared",
+    "repeat_of",
+    "require_room",
+    "require_room_at_rate",
+    "require_room_for_band",
+    "require_room_for_taps",
+    "resampled",
+    "screened",
+    "settings_for",
+    "shared_points",
+    "spectra_for_judging",
+    "spectra_in_band",
+    "spectra_of_test",
+    "spectra_of_tests",
+    "steady_periods",
+    "sum_tests",
+    "tap_sums",
+    "to_receptance",
+    "uff_node_numbers",
+    "whole_ratio",
+    "widest_band",
+    "window_correlation",
+    "window_for",
+    "windowed_spectrum",
+    "write_frf",
+    "write_frf_uff",
+    "write_geometry",
+]

@@ -1,0 +1,383 @@
+"""A diagnosis in sentences: where, what, how sure, what else it could be, which test would tell."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+
+from millfrf.core import DegreeOfFreedom
+from millfrf.core.provenance import versions
+from millfrf.mismatch import AcceptedCause, StructureDiagnosis, form_of, joint_in_words, rig_of, tip_axes
+
+from ..tables import odds_in_words
+
+
+def left_in_words(diagnosis: StructureDiagnosis) -> str:
+    """Why a partial answer is not whole: what the named laws leave of the held-out recording.
+
+    Where the improved model holds a free form, its error is not that of the named laws; both are said.
+
+    Parameters
+    ----------
+    diagnosis
+        A diagnosis that is partly explained.
+    """
+    free = diagnosis.content.get("free_form")
+    if free:
+        compared, freed = (100 * free["held_out"][key] for key in ("compared", "free_form"))
+        return (
+            f"the named law leaves {compared:.3g} % of the held-out response, more than a whole explanation may "
+            f"leave; a free form of it leaves {freed:.3g} %"
+        )
+    return (
+        f"{100 * diagnosis.improvement.after:.3g} % of the held-out response is still not predicted, and "
+        f"{100 * diagnosis.leftover:.0f} % of that moves with the signal, more than a whole explanation may leave"
+    )
+
+
+def made_when(*, dated: bool = True) -> str:
+    """Program and, where it is wanted, time of writing.
+
+    Parameters
+    ----------
+    dated
+        Whether the time is told; without, equal input gives equal pages.
+    """
+    program = f"millfrf {versions()['millfrf']}"
+    return f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by {program}" if dated else f"Made by {program}"
+
+
+@dataclass(frozen=True)
+class NextTest:
+    """A meaning and a test, each one or two sentences, the meaning without a full stop."""
+
+    meaning: str
+    test: str
+
+
+@cache
+def _table() -> dict[str, dict[str, str]]:
+    return tomllib.loads(files("millfrf.reports.diagnoses").joinpath("next_tests.toml").read_text(encoding="utf-8"))
+
+
+def next_test(name: str) -> NextTest:
+    """Entry of a physics or a verdict; a general one for names that the table does not hold.
+
+    Examples
+    --------
+    >>> next_test("backlash").meaning
+    'one joint has play: it is soft inside a gap'
+    """
+    table = _table()
+    return NextTest(**table.get(name, table["other"]))
+
+
+NOWHERE = "No band, channel, time or level has more residual than noise would leave."
+"""What is said where no place stands out of a noise that an answer rests on."""
+
+NOWHERE_UNSURE = (
+    "No band, channel, time or level has more residual than the noise of the fit, which may hold what is unexplained: "
+    "where that sits cannot be told."
+)
+"""What is said instead where something stayed unexplained."""
+
+NOT_WHOLE = ("partly explained", "unexplained")
+"""Verdicts that leave something unexplained."""
+
+
+def words(name: str) -> str:
+    """Name of a physics as it is said.
+
+    Examples
+    --------
+    >>> words("coulomb_friction")
+    'Coulomb friction'
+    """
+    return name.replace("_", " ").replace("coulomb", "Coulomb").replace("ac coupling", "AC coupling")
+
+
+def first_word(name: str) -> str:
+    """The same at the beginning of a sentence.
+
+    Examples
+    --------
+    >>> first_word("ac_coupling"), first_word("missing_mode")
+    ('AC coupling', 'Missing mode')
+    """
+    said = words(name)
+    return said[:1].upper() + said[1:]
+
+
+def number(value: float, error: float | None = None) -> str:
+    """A value with its standard error.
+
+    Examples
+    --------
+    >>> number(0.00024987, 0.0000012), number(3.0)
+    ('0.0002499 ± 1.2e-06', '3')
+    """
+    if error is None or not np.isfinite(error) or error <= 0:
+        return f"{value:.4g}"
+    digits = int(np.clip(np.floor(np.log10(max(abs(value), error))) - np.floor(np.log10(error)) + 2, 2, 9))
+    return f"{value:.{digits}g} ± {error:.2g}"
+
+
+def verdict_sentence(diagnosis: StructureDiagnosis) -> str:
+    """The whole result in one sentence."""
+    gain = diagnosis.improvement
+    found = " and ".join(f"{named(cause)} ({next_test(cause.name).meaning})" for cause in diagnosis.physics)
+    left = f"{100 * gain.after:.3g} % of the response on the held-out recording"
+    if diagnosis.verdict == "none":
+        return f"Nothing is missing: {next_test('none').meaning}."
+    if diagnosis.verdict == "unexplained":
+        form = "a force of free form says how it behaves (below)" if diagnosis.content.get("free_form") else ""
+        known = f"no law is named for it{f', but {form}' if form else ''}"
+        return f"Unexplained: {next_test('unexplained').meaning}; {known}. The model leaves {left}."
+    several = len(diagnosis.physics) > 1
+    fall = (
+        f"; with {'them' if several else 'it'}, the error on the held-out recording falls from "
+        f"{100 * gain.before:.3g} % to {100 * gain.after:.3g} %, noise being {100 * gain.noise_floor:.3g} %"
+    )
+    fall = fall if gain.after < gain.before else ""
+    if diagnosis.verdict == "partly explained":
+        if diagnosis.content.get("free_form"):
+            return f"Only partly explained: the model leaves out {found}{fall}. But {left_in_words(diagnosis)}."
+        return (
+            f"Only partly explained: the model leaves out {found}{fall}. {'They help' if several else 'It helps'}, but "
+            f"{left} is still not predicted, more than a whole explanation may leave: something else is missing too, "
+            f"or {'these are' if several else 'this is'} not quite what is there."
+        )
+    return f"The model leaves out {found}{fall}."
+
+
+def named(cause: AcceptedCause) -> str:
+    """Name of a cause; of a tone with its frequency.
+
+    Examples
+    --------
+    >>> named(AcceptedCause("unmeasured_excitation", {}, {"frequency_hz": 23.456}, {"frequency_hz": 0.01}, 80.0))
+    'unmeasured excitation at 23.456 ± 0.01 Hz'
+    """
+    if cause.name != "unmeasured_excitation":
+        return words(cause.name)
+    shown = number(cause.parameters["frequency_hz"], cause.standard_errors.get("frequency_hz"))
+    return f"{words(cause.name)} at {shown} Hz"
+
+
+def answers(diagnosis: StructureDiagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Question and sentences, in the order in which an engineer asks."""
+    return (
+        ("Where?", where(diagnosis)),
+        ("What?", what(diagnosis)),
+        ("How sure?", how_sure(diagnosis)),
+        ("What else?", what_else(diagnosis)),
+        ("Which test tells?", which_test(diagnosis)),
+    )
+
+
+def where(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
+    """Place of each cause, then what the maps located."""
+    said = [f"{named(cause)[:1].upper()}{named(cause)[1:]}: {place(diagnosis, cause)}." for cause in diagnosis.physics]
+    said.append(f"Model and recordings are {diagnosis.details.band.sentence}.")
+    located = diagnosis.located
+    bands = located.get("frequency_bands", [])
+    if not bands:
+        return (*said, NOWHERE_UNSURE if diagnosis.verdict in NOT_WHOLE else NOWHERE)
+    large = [band for band in bands if band["share"] >= 0.005] or bands[:1]
+    shown = "; ".join(
+        f"{band['low_hz']:.3g} to {band['high_hz']:.3g} Hz ({100 * band['share']:.0f} %, strongest in the "
+        f"narrow band around {band['peak_hz']:.3g} Hz)"
+        for band in large[:3]
+    )
+    channels = ", ".join(
+        f"{row['channel']} {100 * row['share']:.0f} %"
+        for row in sorted(located["channels"], key=lambda row: -row["share"])
+        if row["significant"]
+    )
+    said.append(f"Residual above noise lies at {shown}" + (f"; in {channels}." if channels else "."))
+    said += _times(diagnosis) + _orders(located)
+    return tuple(said)
+
+
+def place(diagnosis: StructureDiagnosis, cause: AcceptedCause) -> str:
+    """Location of a cause in words."""
+    location = cause.location
+    if "direction" in location:
+        model = diagnosis.details.final.hypothesis.model
+        _, columns, axes = tip_axes(model)
+        node = DegreeOfFreedom.parse(model.excitations[int(abs(columns[:, 0]).argmax())]).node
+        at = f"at {node} that acts " if "participation" not in location else ""
+        return f"in a joint {at}{joint_in_words(location, axes)}"
+    if "participation" in location:
+        return f"in a joint {joint_in_words(location)}"
+    if "channel" in location:
+        return f"in the {location.get('role', 'response')} channel {location['channel']}"
+    if "form" in location:
+        return str(location["form"])
+    if "channels" in location:
+        return f"in {', '.join(location['channels'])}"
+    if "modes" in location:
+        return "modes " + ", ".join(str(mode) for mode in location["modes"])
+    if "shape" in location:
+        return "shape " + ", ".join(f"{label} {value:.2f}" for label, value in location["shape"].items())
+    return "in the whole measuring chain or structure"
+
+
+def _times(diagnosis: StructureDiagnosis) -> list[str]:
+    """Said only where a recording is not affected as a whole."""
+    said = []
+    for one in diagnosis.details.recordings:
+        stretches = [row for row in diagnosis.located["times"] if row["recording"] == one.recording.name]
+        held = sum(row["end_s"] - row["start_s"] for row in stretches)
+        if stretches and held < 0.8 * (one.recording.duration - one.start / one.recording.rate):
+            spans = ", ".join(f"{row['start_s']:.3g} to {row['end_s']:.3g} s" for row in stretches[:6])
+            said.append(f"In {one.recording.name} it is seen at {spans}{' and later' if len(stretches) > 6 else ''}.")
+    return said
+
+
+def _orders(located: Mapping[str, Any]) -> list[str]:
+    orders = sorted({row["order"] for row in located["spindle_orders"]})
+    if orders:
+        return [f"It sits at the spindle's orders {', '.join(str(order) for order in orders)}."]
+    note = located["spindle_orders_note"]
+    return [f"Spindle orders: {note}."] if note else []
+
+
+def what(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
+    """Equation and source of each cause, and how the residual grows with the level."""
+    said = []
+    for cause in diagnosis.physics:
+        physics = form_of(cause.name, cause.parameters, rig_of(diagnosis.details.final.hypothesis.model))
+        equation = f": {physics.equation} ({physics.source})" if physics is not None else ""
+        said.append(f"{first_word(cause.name)}{equation}.")
+    free = diagnosis.content.get("free_form")
+    said += [free["sentence"]] if free else []
+    growth = diagnosis.located.get("growth", {})
+    found = growth.get("effect") or growth.get("residual")
+    if found and found["exponent"] is not None:
+        said.append(
+            f"It grows as the force to the power {number(found['exponent'], found['exponent_standard_error'])} "
+            "(a linear omission: 1, a cubic stiffness: 3, dry friction: 0)."
+        )
+    behaviour = diagnosis.details.behaviour
+    if behaviour is not None:
+        said.append(f"Without any law: {behaviour.sentence}")
+    return tuple(said) or ("Nothing beyond the refitted modal parameters.",)
+
+
+def how_sure(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
+    """Evidence, and what it is worth on data that was held out."""
+    said = [
+        f"{first_word(cause.name)}: odds {odds_in_words(cause.evidence)} against its absence (evidence "
+        f"{cause.evidence:.0f}; each 4.6 more make the odds ten times as large, and 20 is the least that is accepted)."
+        for cause in diagnosis.physics
+    ]
+    said.append(_errors(diagnosis))
+    said += offered_in_words(diagnosis)
+    said += [one["sentence"] for one in diagnosis.content.get("noise", ())]
+    said.append(f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal.")
+    return tuple(said)
+
+
+def offered_in_words(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
+    """What is to be known of the improved model before one predicts with it; empty: nothing."""
+    said = diagnosis.content.get("improved_model", {}).get("sentence")
+    return (said,) if said else ()
+
+
+def _errors(diagnosis: StructureDiagnosis) -> str:
+    """Errors on the recording held out, and the test that was made on them."""
+    gain = diagnosis.improvement
+    told = (
+        f"the error is {100 * gain.before:.3g} % of the response for the nominal model, {100 * gain.refitted:.3g} % "
+        f"refitted, {100 * gain.after:.3g} % for the final one; noise is {100 * gain.noise_floor:.3g} %."
+    )
+    if not diagnosis.details.tested:
+        return f"On {gain.held_out}, the only recording, {told} Nothing was held out, so nothing confirms this."
+    told = (
+        f"On {gain.where}, which the fit did not see, {told} Final over nominal: {gain.interval[0]:.3g} to "
+        f"{gain.interval[1]:.3g} (95 % interval)."
+    )
+    if not diagnosis.physics:
+        return told
+    than = "the refitted" if gain.against == "refitted" else "the nominal"
+    return f"{told} Chance that the final model is no better there than {than} one: p = {gain.p_value:.2g}."
+
+
+def rivals(diagnosis: StructureDiagnosis) -> list[tuple[str, float]]:
+    """Other causes that were fitted with their best evidence, best first."""
+    accepted = {cause.name for cause in diagnosis.physics}
+    best: dict[str, float] = {}
+    for one in diagnosis.candidates:
+        if one.stage == "fitted" and one.name not in accepted:
+            best[one.name] = max(best.get(one.name, -np.inf), one.evidence)
+    return sorted(best.items(), key=lambda item: -item[1])
+
+
+def what_else(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
+    """Causes that the data cannot separate, then the nearest ones that it can."""
+    said = []
+    if diagnosis.equivalents:
+        names = ", ".join(words(name) for name in diagnosis.equivalents)
+        said.append(f"The recordings cannot tell it from {names}.")
+    others = [rival for rival in rivals(diagnosis) if rival[0] not in diagnosis.equivalents and rival[1] > 0]
+    if diagnosis.physics and others:
+        name, evidence = others[0]
+        top = max(cause.evidence for cause in diagnosis.physics)
+        ending = f"less by {top - evidence:.0f}" if evidence < top else "but it was the weaker answer in its round"
+        said.append(f"The nearest rival that was fitted is {words(name)} with evidence {evidence:.0f}, {ending}.")
+    said += [
+        f"{first_word(one.name)} would fit with evidence {one.evidence:.0f}, but {one.location['impossible']}."
+        for one in diagnosis.candidates
+        if one.stage == "impossible"
+    ][:2]
+    if others and not diagnosis.physics:
+        said.append(f"Nearest, but not accepted: {words(others[0][0])} with evidence {others[0][1]:.0f}.")
+    for cause in diagnosis.physics[:1]:
+        physics = form_of(cause.name, cause.parameters, rig_of(diagnosis.details.final.hypothesis.model))
+        if physics is not None and physics.confusable_with:
+            names = ", ".join(words(name) for name in physics.confusable_with)
+            said.append(f"In general it is easily taken for {names}.")
+    return tuple(said) or ("No other cause of the library came near.",)
+
+
+def which_test(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
+    """The next test for each accepted cause, for its equivalents, or for the verdict."""
+    names = [cause.name for cause in diagnosis.physics] + list(diagnosis.equivalents)
+    if diagnosis.verdict != "explained":
+        names = [diagnosis.verdict, *names]
+    several = len(names) > 1
+    return tuple((f"{first_word(name)}: " if several else "") + next_test(name).test for name in dict.fromkeys(names))
+
+
+def warnings(diagnosis: StructureDiagnosis) -> tuple[str, ...]:
+    """List the warnings of a diagnosis."""
+    gain, said = diagnosis.improvement, [f"{doubt[:1].upper()}{doubt[1:]}." for doubt in diagnosis.doubts]
+    if not diagnosis.details.tested:
+        said.append("There is a single recording: nothing could be held out, and errors are those of the fit.")
+    elif len(diagnosis.details.recordings) < 2:
+        said.append(
+            "There is a single recording: its middle half was held out; how the residual grows with the level is not "
+            "known."
+        )
+    elif len(diagnosis.details.recordings) < 3:
+        said.append("There are two recordings only: how the residual grows with the level is known from two points.")
+    if diagnosis.physics and diagnosis.details.tested and gain.p_value > 0.01:
+        said.append(f"On the held-out recording the improvement is not significant (p = {gain.p_value:.2g}).")
+    if not diagnosis.physics and gain.refitted > max(gain.before, 1.5 * gain.noise_floor):
+        said.append(
+            "Refitted without the recording that was held out, the model predicts it worse than the nominal one does: "
+            "the other recordings alone do not determine its modes, so keep the nominal model."
+        )
+    if gain.after > 1.5 * gain.noise_floor:
+        said.append(
+            f"On the held-out recording the final model's error is {gain.after / gain.noise_floor:.2g} times the noise."
+        )
+    if "explained" in diagnosis.verdict and diagnosis.physics and diagnosis.leftover > 0.1:
+        said.append(f"{100 * diagnosis.leftover:.0f} % of what is left still moves with the signal.")
+    return tuple(said)

@@ -1,0 +1,177 @@
+"""Put the sections together and write the page."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+from estimation import read_geometry
+from millfrf.core.progress import progress
+from millfrf.core.provenance import sha256, versions
+from millfrf.gate import (
+    FileKind,
+    check_frf,
+    check_model,
+    check_model_reciprocity,
+    check_reciprocity,
+    doubts_of,
+    stored_doubts,
+)
+from modal_fit import ModalModel, read_modal_model
+
+from .collection import Collected, SourceFile, collect
+from .paper import write_results_pdf
+from .results_page import FigureFiles, ResultsPage, write_results_page
+from .section import Section
+from .sections.frfs import frf_section
+from .sections.measurement import (
+    channel_section,
+    file_section,
+    hammer_section,
+    reciprocity_section,
+    settings_section,
+    setup_section,
+)
+from .sections.results import comparison_section, input_section, mode_section
+from .sections.stability import chatter_in_brief, chatter_section, stability_findings
+
+
+@dataclass(frozen=True)
+class ReportOptions:
+    """Options of a report.
+
+    Parameters
+    ----------
+    title
+        Title of the page.
+    band : Hz
+        Frequency axis of its figures; None: chosen by the fit.
+    reference
+        Model file with known dynamics to draw beside the measured ones.
+    geometry
+        File of a geometry on which mode shapes are drawn: TOML, UFF (datasets 15, 2411, 82) or CSV; a TOML may stand
+        among the other files as well.
+    pdf
+        The same report as PDF; None: no such file.
+    figures
+        Folder and format in which each figure is written as a file too; None: no files.
+    """
+
+    title: str = "In-process FRF and modal fit"
+    band: tuple[float, float] | None = None
+    reference: str | os.PathLike[str] | None = None
+    figures: FigureFiles | None = None
+    geometry: str | os.PathLike[str] | None = None
+    pdf: str | os.PathLike[str] | None = None
+
+
+def write_report(
+    path: str | os.PathLike[str],
+    paths: Sequence[str | os.PathLike[str]],
+    options: ReportOptions | None = None,
+) -> list[str]:
+    """Write one HTML page, figures inside, that needs no other file and no network.
+
+    Returns
+    -------
+    list of str
+        Doubts about files that do not belong together; they stand on the page too.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be used; nothing is written.
+    """
+    chosen = options or ReportOptions()
+    collected = _with_geometry(collect(paths), chosen)
+    page, sections = report_page(collected, chosen)
+    write_results_page(path, page, sections, chosen.figures)
+    if chosen.pdf is not None:
+        with progress("PDF"):
+            write_results_pdf(chosen.pdf, page, [section for section in sections if not section.empty])
+    return list(collected.doubts)
+
+
+def report_page(collected: Collected, options: ReportOptions) -> tuple[ResultsPage, tuple[Section, ...]]:
+    """Head and sections of the report, before it becomes a page."""
+    reference = None if options.reference is None else read_modal_model(options.reference)
+    channels, concerns = channel_section(collected)
+    with progress("stability"):
+        stability = stability_findings(_with_reference(collected, options, reference))
+    sections = (
+        mode_section(collected),
+        comparison_section(collected),
+        stability.section,
+        chatter_section(collected),
+        frf_section(collected, options.band, reference),
+        reciprocity_section(collected),
+        input_section(collected, options.band),
+        settings_section(collected),
+        hammer_section(collected),
+        setup_section(collected),
+        channels,
+        file_section(collected),
+    )
+    page = ResultsPage(
+        "Modal-fitting report",
+        options.title,
+        f"Written {datetime.now(UTC):%Y-%m-%d %H:%M} UTC by millfrf {versions()['millfrf']}",
+        (*_in_brief(collected), *stability.brief, *chatter_in_brief(collected)),
+        tuple(_warnings(collected, [*stability.warnings, *concerns])),
+        verdict_title="In brief",
+        warnings_title="Before you trust the figures",
+        clear="No warning from estimation, fit or channel levels.",
+    )
+    return page, sections
+
+
+def _with_geometry(collected: Collected, options: ReportOptions) -> Collected:
+    """The geometry of the options before those among the files."""
+    if options.geometry is None:
+        return collected
+    geometry, path = read_geometry(options.geometry), Path(options.geometry)
+    file = SourceFile(path, FileKind.GEOMETRY, sha256(path), {})
+    geometries = ((file, geometry), *collected.geometries)
+    return replace(collected, files=(*collected.files, file), geometries=geometries)
+
+
+def _with_reference(collected: Collected, options: ReportOptions, reference: ModalModel | None) -> Collected:
+    """The reference among the models, so that lobes drawn from it are known."""
+    if reference is None or options.reference is None:
+        return collected
+    path = Path(options.reference)
+    file = SourceFile(path, FileKind.MODEL, sha256(path), {})
+    return replace(collected, models=(*collected.models, (file, reference)))
+
+
+def _in_brief(collected: Collected) -> list[str]:
+    """The modes in a sentence."""
+    sentences = []
+    for file, model in _leading_models(collected):
+        modes = ", ".join(
+            f"{frequency:.2f} Hz ({100 * zeta:.2f} %)"
+            for frequency, zeta in zip(model.natural_frequencies, model.damping_ratios, strict=True)
+        )
+        sentences.append(f"{file.path.name} has {len(model.poles)} modes: {modes}.")
+    return sentences
+
+
+def _leading_models(collected: Collected) -> list[tuple[SourceFile, ModalModel]]:
+    """The model that stands at the head: the last that lobes were made from, else the last given."""
+    drawn = [one for one in collected.models if any(lobes.made_from(one[0]) for lobes, _ in collected.lobes)]
+    return (drawn or list(collected.models))[-1:]
+
+
+def _warnings(collected: Collected, concerns: Sequence[str]) -> list[str]:
+    """Everything a reader should know before trusting the figures, each once."""
+    found = [
+        f"{file.path.name}: {warning}" for file in collected.files for warning in file.provenance.get("warnings", [])
+    ]
+    found += [f"{file.path.name}: {warning}" for file, lobes in collected.lobes for warning in lobes.warnings]
+    found += [doubt for file, frf in collected.frfs for doubt in doubts_of(check_frf, frf, file.path.name)]
+    found += [doubt for file, model in collected.models for doubt in doubts_of(check_model, model, file.path.name)]
+    found += [doubt for file, frf in collected.frfs for doubt in check_reciprocity(frf, file.path.name)]
+    found += [doubt for file, model in collected.models for doubt in check_model_reciprocity(model, file.path.name)]
+    found += [doubt for file, _ in collected.models for doubt in stored_doubts(file.path)]
+    return list(dict.fromkeys([*collected.doubts, *found, *concerns]))

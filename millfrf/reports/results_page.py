@@ -1,0 +1,251 @@
+"""HTML pages of results: verdict, warnings, contents, sections; figures as files."""
+
+import base64
+import hashlib
+import os
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from millfrf.core import InputError, writing_whole_file
+from millfrf.core.provenance import versions
+from millfrf.core.terminal import Table
+from millfrf.figures import browser_library, save_figure
+
+from .section import Picture, Section
+
+FORMATS = ("svg", "png", "pdf")
+
+
+@dataclass(frozen=True)
+class FigureFiles:
+    """Where the figures of a page go, and in which format.
+
+    Parameters
+    ----------
+    folder
+        Folder of the files; it is made where it is not there.
+    format
+        ``svg``, ``png`` (200 dpi) or ``pdf``.
+
+    Raises
+    ------
+    InputError
+        Another format, or a folder whose name is that of a file.
+    """
+
+    folder: Path
+    format: str = "svg"
+
+    def __post_init__(self) -> None:
+        if self.format not in FORMATS:
+            raise InputError(f"unknown format {self.format!r} of figures; use one of {', '.join(FORMATS)}")
+        if self.folder.exists() and not self.folder.is_dir():
+            raise InputError(f"cannot write figures to {self.folder}: it is a file; name a folder")
+        if not self.folder.parent.is_dir():
+            raise InputError(f"cannot write figures to {self.folder}: {self.folder.parent} is no folder; make it first")
+
+
+def asked_figures(folder: Path | None, format: str) -> FigureFiles | None:
+    """What was asked for on the command line; None where no folder was named.
+
+    Parameters
+    ----------
+    folder, format
+        As typed after ``--figures`` and ``--figure-format``.
+
+    Raises
+    ------
+    InputError
+        As :class:`FigureFiles`.
+    """
+    return None if folder is None else FigureFiles(folder, format)
+
+
+def pictures_of(sections: Sequence[Section]) -> Iterator[Picture]:
+    """All pictures in the order in which a page numbers them."""
+    for section in sections:
+        if not section.empty:
+            yield from section.pictures
+            for fold in section.folds:
+                yield from fold.pictures
+
+
+def write_figures(where: FigureFiles, sections: Sequence[Section]) -> list[Path]:
+    """Write each figure of a page as ``figure_03_stability_lobes.svg``, numbered as on the page.
+
+    Parameters
+    ----------
+    where
+        Folder and format.
+    sections
+        Sections of the page.
+
+    Returns
+    -------
+    list of Path
+        Paths of the files that were written, in the order of the figures.
+
+    Raises
+    ------
+    InputError
+        The folder cannot be written to.
+    """
+    where.folder.mkdir(exist_ok=True)
+    written = []
+    for number, picture in enumerate(pictures_of(sections), start=1):
+        path = where.folder / f"figure_{number:02d}_{_name(picture.alternative)}.{where.format}"
+        save_figure(picture.figure, path)
+        written.append(path)
+    return written
+
+
+def _name(words: str) -> str:
+    """Words as a file name: small letters and underscores, 40 of them at most."""
+    return re.sub(r"[^a-z0-9]+", "_", words.split(":")[0].lower())[:40].strip("_")
+
+
+_NUMBER = re.compile(r"[-+−±<>≤≥≈]?\s*\d[\d.,]*(e[-+]?\d+)?(%|\s.*)?$")
+_NONE = {"", "-", "–", "no limit", "not resolved", "none"}
+"""Cells that stand in place of a number."""
+
+
+def of_numbers(table: Table) -> list[bool]:
+    """Say of each column whether all its cells are numbers, maybe with more behind, or stand in place of one.
+
+    Examples
+    --------
+    >>> of_numbers(Table("", ("cause", "gain"), (("Coulomb friction", "+3.2"), ("gap", "-"))))
+    [False, True]
+    >>> of_numbers(Table("", ("entry", "value"), (("1:+Z / 2:+Z", "2.02e-06 m/N"),)))
+    [False, True]
+    """
+    return [_numbers([row[column] for row in table.rows]) for column in range(len(table.columns))]
+
+
+def _numbers(cells: list[str]) -> bool:
+    told = [cell for cell in cells if cell.strip() not in _NONE and not cell.startswith("none up to")]
+    return bool(cells) and all(_NUMBER.match(cell) for cell in told)
+
+
+@dataclass(frozen=True)
+class ResultsPage:
+    """What a page of results says before its sections.
+
+    Parameters
+    ----------
+    kind
+        Kind of the report, a few words above the title.
+    title
+        Title of the page.
+    subtitle
+        One line under the title. Without a time of writing, equal results give equal pages.
+    verdict
+        Sentences that a reader wants first.
+    warnings
+        Sentences to know before trusting the page.
+    answers
+        Questions, each with the sentences that answer it; they follow the verdict.
+    verdict_title, warnings_title
+        Headings of verdict and warnings.
+    clear
+        Sentence in place of warnings, where there is none; may be empty.
+    """
+
+    kind: str
+    title: str
+    subtitle: str
+    verdict: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+    answers: tuple[tuple[str, tuple[str, ...]], ...] = ()
+    verdict_title: str = "Verdict"
+    warnings_title: str = "Before you trust it"
+    clear: str = ""
+
+
+def page_text(page: ResultsPage, sections: Sequence[Section]) -> str:
+    """The page as text: figures, style and script inside, no address of another file.
+
+    The page forbids its browser to load anything (content security policy), and to run any script but its own.
+
+    Parameters
+    ----------
+    page
+        Title, verdict, answers and warnings.
+    sections
+        Sections of the page; empty ones are left out.
+    """
+    environment = Environment(
+        loader=PackageLoader("millfrf.reports", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+    )
+    environment.globals["of_numbers"] = of_numbers
+    environment.filters["in_script"] = _in_script
+    pictures = list(pictures_of(sections))
+    scripts = [_own("report.js")]
+    if any(picture.moving for picture in pictures):
+        scripts.append(_own("shapes.js"))
+    if any(picture.zoomed for picture in pictures):
+        scripts += [browser_library(), _own("plots.js")]
+    return environment.get_template("page.html.j2").render(
+        page=page,
+        style=_own("report.css"),
+        scripts=scripts,
+        policy=_policy(scripts),
+        sections=[section for section in sections if not section.empty],
+        versions=versions(),
+    )
+
+
+def write_results_page(
+    path: str | os.PathLike[str],
+    page: ResultsPage,
+    sections: Sequence[Section],
+    figures: FigureFiles | None = None,
+) -> list[Path]:
+    """Write one HTML page, figures inside, that needs no other file and no network.
+
+    Parameters
+    ----------
+    path
+        The page; an older one is replaced.
+    page
+        Title, verdict and warnings.
+    sections
+        Sections of the page; empty ones are left out.
+    figures
+        Folder and format in which each figure is written as a file too; None: no files.
+
+    Returns
+    -------
+    list of Path
+        Files of figures.
+    """
+    text = page_text(page, sections)
+    written = [] if figures is None else write_figures(figures, sections)
+    with writing_whole_file(path) as temporary:
+        Path(temporary).write_text(text, encoding="utf-8")
+    return written
+
+
+def _in_script(text: str) -> Markup:
+    """JSON that cannot end the element in which it stands."""
+    return Markup(text.replace("<", "\\u003c"))
+
+
+def _own(name: str) -> str:
+    return files("millfrf.reports").joinpath("templates", name).read_text(encoding="utf-8")
+
+
+def _policy(scripts: Sequence[str]) -> str:
+    """Content security policy: nothing is loaded, only these scripts run, styles and pictures stand in the page."""
+    hashes = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii") for script in scripts)
+    allowed = " ".join(f"'sha256-{one}'" for one in hashes)
+    return f"default-src 'none'; script-src {allowed}; style-src 'unsafe-inline'; img-src data:; base-uri 'none'"

@@ -1,0 +1,366 @@
+"""Sections on results: inputs, modes, shapes, comparison of models."""
+
+from collections.abc import Sequence
+from dataclasses import fields
+
+import numpy as np
+
+from estimation import AveragingSettings, Frf, Geometry, spectra_of_tests
+from millfrf.core.terminal import Table
+from millfrf.figures import (
+    assurance_figure,
+    compass_figure,
+    indicator_figure,
+    input_figure,
+    mode_figure,
+    moving_shapes,
+    shapes_figure,
+    stabilisation_figure,
+    zoomed_chart,
+    zoomed_indicators,
+)
+from modal_fit import (
+    ComplexModeIndicator,
+    ModalModel,
+    ModePair,
+    ModeShapes,
+    chart_from_json,
+    compare_modes,
+    complex_mode_indicator,
+    multivariate_mode_indicator,
+)
+
+from ..collection import Collected, SourceFile
+from ..section import Fold, Picture, Section, picture_of
+from ..tables import error_table, mode_table, shape_table, shapes_of, with_error
+from .frfs import Band, axis_of, band_of, shown_frf
+
+
+def comparison_section(collected: Collected) -> Section:
+    """Each further model against the first of the same degrees of freedom, mode by mode."""
+    tables, sentences = [], []
+    fitted = [pair for pair in collected.models if pair[0].provenance.get("step") == "fit"]
+    for number, (file, model) in enumerate(fitted):
+        alike = [pair for pair in fitted[:number] if _same_axes(pair[1], model)]
+        if not alike:
+            continue
+        base_file, base = alike[0]
+        pairs = compare_modes(base, model)
+        tables.append(_table(base_file, base, file, model, pairs))
+        sentences.append(_summary(base_file, base, file, pairs))
+    return Section("Models compared", tuple(sentences), tuple(tables))
+
+
+def _same_axes(first: ModalModel, second: ModalModel) -> bool:
+    return (first.responses, first.excitations, first.unit) == (second.responses, second.excitations, second.unit)
+
+
+def _table(
+    base_file: SourceFile, base: ModalModel, file: SourceFile, model: ModalModel, pairs: tuple[ModePair, ...]
+) -> Table:
+    rows = []
+    for pair in pairs:
+        zeta = base.damping_ratios[pair.first]
+        rows.append(
+            (
+                str(pair.first + 1),
+                f"{base.natural_frequencies[pair.first]:.3f}",
+                with_error(pair.frequency_change, 2 * pair.frequency_error, sign=True),
+                f"{100 * zeta:.3f}",
+                with_error(100 * pair.damping_change, 200 * pair.damping_error, sign=True),
+                f"{pair.right_likeness:.3f} / {pair.left_likeness:.3f}",
+                "moved" if pair.moved else "",
+            )
+        )
+    columns = ("mode", "fn (Hz)", "change (Hz)", "zeta (%)", "change (%)", "MAC right / left", "")
+    title = f"{base_file.path.name}, and what changed in {file.path.name} (± 2 standard errors)"
+    return Table(title, columns, tuple(rows))
+
+
+def _summary(base_file: SourceFile, base: ModalModel, file: SourceFile, pairs: tuple[ModePair, ...]) -> str:
+    moved = [pair for pair in pairs if pair.moved]
+    text = f"{file.path.name} against {base_file.path.name}: {len(pairs)} modes in common"
+    alone = len(base.poles) - len(pairs)
+    text += f", {alone} without a partner" if alone else ""
+    if np.isnan([pair.frequency_error for pair in pairs]).any():
+        return text + "; a model has no error bars, so that no change can be judged."
+    if not moved:
+        return text + "; none moved by more than three standard errors of the change."
+    names = ", ".join(f"{base.natural_frequencies[pair.first]:.2f} Hz" for pair in moved[:8])
+    more = f" and {len(moved) - 8} more" if len(moved) > 8 else ""
+    largest = max(pair.significance for pair in moved)
+    return text + (
+        f"; moved by more than three standard errors: {names}{more} (at most {largest:.0f} standard errors). "
+        "Where both come from the same recordings this is a bias of one method; where amplitudes differ, the "
+        "structure is not linear."
+    )
+
+
+PROMINENT = 2.0
+"""Factor over its valleys from which a peak is told."""
+
+
+def has_lines(frf: Frf, band: Band) -> bool:
+    """Say whether enough lines lie in the band for a curve."""
+    inside = frf.valid & (frf.frequencies > 0) & (frf.frequencies >= band[0]) & (frf.frequencies <= band[1])
+    return int(inside.sum()) > 2
+
+
+def indicator_part(name: str, frf: Frf, model: ModalModel, band: Band) -> tuple[Picture, tuple[str, ...]]:
+    """Make the picture of both indicators in the band of a fit, and a sentence on peaks without a mode.
+
+    Parameters
+    ----------
+    name
+        Name of the model's file.
+    frf
+        FRF to which the model was fitted.
+    model
+        Modal model whose modes are marked.
+    band : Hz
+        Lowest and highest frequency of the fit.
+    """
+    indicator, multivariate = complex_mode_indicator(frf, band), multivariate_mode_indicator(frf, band)
+    single = len(multivariate.references) == 1
+    caption = (
+        f"{name}: mode indicators of the FRF. (a) Complex mode indicator (CMIF), the singular values of the FRF "
+        "matrix: a mode is a peak of the first curve; two close modes are peaks of two curves at one frequency. (b) "
+        + ("Mode indicator (MIF)" if single else "Multivariate mode indicator (MIF)")
+        + ", the share of the motion in phase with the forces: 0 at a real mode that stands alone."
+    )
+    zoomed = zoomed_indicators(indicator, multivariate, model)
+    words = f"Mode indicators of {name} over frequency"
+    picture = picture_of(indicator_figure(indicator, multivariate, model), caption, words, zoomed=zoomed)
+    return picture, _unexplained(name, indicator, model)
+
+
+def _unexplained(name: str, indicator: ComplexModeIndicator, model: ModalModel) -> tuple[str, ...]:
+    """Peaks of the first curve further from every mode than its bandwidth and two lines."""
+    step = float(np.median(np.diff(indicator.frequencies)))
+    reach = 2 * np.maximum(2 * model.damping_ratios * model.natural_frequencies, step)
+    alone = [
+        f"{peak.frequency:.2f} Hz"
+        for peak in indicator.peaks(PROMINENT)
+        if peak.curve == 1 and (np.abs(model.natural_frequencies - peak.frequency) > reach).all()
+    ]
+    if not alone:
+        return ()
+    one = len(alone) == 1
+    return (
+        f"{name}: the CMIF has {'a peak' if one else 'peaks'} without a mode at {', '.join(alone)}: a mode that was "
+        "left out, a frequency of the surroundings, or noise.",
+    )
+
+
+FEW = 6
+"""Degrees of freedom up to which right and left vectors are drawn with a name at each component."""
+
+MOST = 40
+"""Modes that are drawn."""
+
+ALIKE = 0.9
+"""MAC from which two modes are told as alike."""
+
+
+def shape_part(
+    name: str, model: ModalModel, geometries: Sequence[tuple[str, Geometry]] = ()
+) -> tuple[tuple[Table, ...], tuple[Picture, ...], tuple[str, ...]]:
+    """Give tables, pictures and sentences on the shapes of a model, empty where it has none.
+
+    Parameters
+    ----------
+    name
+        Name of the model's file.
+    model
+        Modal model with at least two degrees of freedom on one side.
+    geometries
+        Name of the file, and places of the points, of each geometry; the first that knows a point is drawn.
+    """
+    shapes, table = shapes_of(model), shape_table(model, f"{name}: mode shapes")
+    if shapes is None or table is None:
+        return (), (), ()
+    pictures = []
+    if 1 < len(model.poles) <= MOST:
+        pictures.append(_assurance(name, model, shapes))
+    if max(len(model.responses), len(model.excitations)) <= FEW:
+        pictures.append(_right_and_left(name, model))
+    elif len(model.poles) <= MOST:
+        pictures.append(_compasses(name, model, shapes))
+    moving, missing = _moving(name, model, shapes, geometries)
+    return (table,), (*moving, *pictures), (*_alike(name, model, shapes), *missing)
+
+
+def _moving(
+    name: str, model: ModalModel, shapes: ModeShapes, geometries: Sequence[tuple[str, Geometry]]
+) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
+    """Shapes on the first geometry that knows a point of the model, and a sentence on what does not move."""
+    for file, geometry in geometries:
+        moving = moving_shapes(geometry, model, shapes)
+        if moving is None:
+            continue
+        nodes = list(dict.fromkeys(dof.split(":")[0] for dof in shapes.dofs))
+        unknown = [node for node in nodes if node not in geometry.nodes]
+        still = len(geometry.nodes) - int(moving.measured.sum())
+        told = [f"{still} of its {len(geometry.nodes)} nodes were not measured and do not move"] if still else []
+        told += [f"{', '.join(unknown[:5])} stand in no geometry and are not drawn"] if unknown else []
+        caption = (
+            f"{name}: mode shapes ({shapes.side} vectors) on {file}. Grey: at rest; blue: displaced, dots where it was "
+            "measured. Only measured directions move."
+        )
+        words = f"Mode shapes of {name} on the geometry of {file}"
+        picture = picture_of(shapes_figure(moving), caption, words, moving=moving)
+        return (picture,), tuple(f"{name} on {file}: {one}." for one in told)
+    if not geometries:
+        return (), ()
+    return (), (f"{name}: no geometry has one of its points; its shapes are not drawn in place.",)
+
+
+def _assurance(name: str, model: ModalModel, shapes: ModeShapes) -> Picture:
+    caption = (
+        f"{name}: (a) auto-MAC of the {shapes.side} vectors in %: dark off the diagonal means two modes that the "
+        f"{len(shapes.dofs)} points cannot tell apart; (b) modal phase collinearity, 1 for a real mode; (c) mean phase "
+        "deviation, 0 for a real mode."
+    )
+    return picture_of(assurance_figure(model, shapes), caption, "Auto-MAC matrix, MPC and MPD")
+
+
+def _compasses(name: str, model: ModalModel, shapes: ModeShapes) -> Picture:
+    caption = (
+        f"{name}: the {len(shapes.dofs)} components of each {shapes.side} vector in the complex plane, turned to their "
+        "best straight line; circle: largest component. Components on the horizontal line are a real mode; "
+        "a single one off it is a doubtful point."
+    )
+    return picture_of(compass_figure(model, shapes), caption, "Modal vectors in the complex plane")
+
+
+def _right_and_left(name: str, model: ModalModel) -> Picture:
+    caption = (
+        f"{name}: modal vectors in the complex plane, each scaled to its largest component. Right "
+        "and left vectors agree where the structure is reciprocal; components on one line are a real mode."
+    )
+    return picture_of(mode_figure(model), caption, "Modal vectors")
+
+
+def _alike(name: str, model: ModalModel, shapes: ModeShapes) -> tuple[str, ...]:
+    if len(shapes.dofs) <= FEW:  # few points cannot tell most modes apart; the table shows it
+        return ()
+    f = model.natural_frequencies
+    return tuple(
+        f"{name}: modes {i + 1} and {j + 1} at {f[i]:.2f} and {f[j]:.2f} Hz have like shapes (MAC "
+        f"{shapes.assurance[i, j]:.2f}): one mode found twice, or points that cannot tell them apart."
+        for i, j in shapes.alike(ALIKE)
+    )
+
+
+def dropped_part(file: SourceFile) -> tuple[Fold, ...]:
+    """A fold with one row a group of poles; none where the model's file names none."""
+    stored = file.provenance.get("dropped") if file.provenance.get("step") == "fit" else None
+    if not stored:
+        return ()
+    rows = tuple(
+        (f"{one['frequency_hz']:.2f}", f"{100 * one['damping_ratio']:.2f}", str(one["reason"]))
+        for one in sorted(stored, key=_frequency)
+    )
+    title = f"{file.path.name}: {len(rows)} groups of poles that were not taken for modes, and why"
+    return (Fold(title, tables=(Table(title, ("frequency (Hz)", "damping ratio (%)", "why"), rows),)),)
+
+
+def _frequency(one: dict[str, float]) -> float:
+    return one["frequency_hz"]
+
+
+def input_section(collected: Collected, band: Band | None) -> Section:
+    """Independence of the inputs of each FRF whose recordings are among the files."""
+    pictures = []
+    for file, frf in collected.frfs:
+        recordings = collected.recordings_of(file)
+        if file.provenance.get("step") != "estimate":
+            continue
+        if not recordings or len(recordings) != len(file.provenance["sources"]) or len(frf.excitations) < 2:
+            continue
+        tests = spectra_of_tests([recording.path for recording in recordings], _averaging(file))
+        found = collected.model_of(file, frf)
+        axis = band or axis_of(frf, band_of(found[0]) if found else None)
+        caption = (
+            f"{file.path.name}: (a) power spectra of the inputs; (b) singular values of their spectral matrix, all "
+            f"{len(tests)} tests stacked{', and the smallest of each test alone' if len(tests) > 1 else ''}; where the "
+            "smallest vanishes the inputs are dependent; (c) coherence between each two inputs."
+        )
+        pictures.append(picture_of(input_figure(tests, axis), caption, "Independence of the inputs"))
+    return Section("Excitation", pictures=tuple(pictures))
+
+
+def _averaging(file: SourceFile) -> AveragingSettings:
+    """How the spectra behind an FRF were averaged, its channels by name."""
+    made = file.provenance
+    names = {field.name for field in fields(AveragingSettings)}
+    stored = {name: value for name, value in made["options"].items() if name in names}
+    stored["band"] = tuple(stored["band"]) if stored["band"] else None
+    stored["excitations"] = tuple(made["excitation_channels"])
+    stored["responses"] = tuple(made["response_channels"])
+    return AveragingSettings(**stored)
+
+
+def mode_section(collected: Collected) -> Section:
+    """Modes of each model, quality of the fit, stabilisation, vectors."""
+    tables, pictures, sentences = [], [], []
+    folds: list[Fold] = []
+    for file, model in collected.models:
+        tables.append(mode_table(model, f"{file.path.name}"))
+        by_source = error_table(model, f"{file.path.name}: standard errors by source")
+        tables += [] if by_source is None else [by_source]
+        sentences += _quality(file)
+        if file.provenance.get("step") == "fit":
+            pictures.append(_stabilisation(collected, file, model))
+            shown, peaks = _indicators(collected, file, model)
+            pictures += shown
+            sentences += peaks
+        shape_tables, shape_pictures, shape_sentences = shape_part(
+            file.path.name, model, [(known.path.name, geometry) for known, geometry in collected.geometries]
+        )
+        tables += shape_tables
+        pictures += shape_pictures
+        sentences += shape_sentences
+        folds += dropped_part(file)
+    return Section("Modal model", tuple(sentences), tuple(tables), tuple(pictures), tuple(folds))
+
+
+def _quality(file: SourceFile) -> list[str]:
+    made = file.provenance
+    if made.get("step") != "fit":
+        return []
+    text = (
+        f"{file.path.name}: {made['method']} up to order {made['max_order']}, {made['band_hz'][0]:g} to "
+        f"{made['band_hz'][1]:g} Hz"
+    )
+    if made.get("picked_poles") is not None:
+        text += f"; {made['status']} ({made['picked_poles']['file']})"
+    if made.get("relative_error") is not None:
+        error = 100 * np.asarray(made["relative_error"])
+        text += f"; misfit between {error.min():.2g} and {error.max():.2g} % of each FRF's rms"
+    chi = made.get("reduced_chi_square")
+    return [text + ("." if chi is None else f"; misfit over noise (reduced chi-square) {chi:.2f}.")]
+
+
+def _indicators(
+    collected: Collected, file: SourceFile, model: ModalModel
+) -> tuple[tuple[Picture, ...], tuple[str, ...]]:
+    """Mode indicators of the FRF that a model was fitted to, where that is among the files."""
+    frf, band = collected.frf_of(file), band_of(file)
+    if frf is None or band is None or not has_lines(frf, band):
+        return (), ()
+    picture, peaks = indicator_part(file.path.name, frf, model, band)
+    return (picture,), peaks
+
+
+def _stabilisation(collected: Collected, file: SourceFile, model: ModalModel) -> Picture:
+    frf = collected.frf_of(file)
+    shown = None if frf is None else shown_frf(frf, model)
+    chart = chart_from_json(file.provenance["stabilisation"])
+    caption = (
+        f"{file.path.name}: stabilisation chart; (a) poles over model order above the summed FRF, (b) damping of the "
+        "poles that are stable in frequency and damping. Vertical lines and diamonds: modes of the fitted model."
+    )
+    zoomed = zoomed_chart(chart, shown, model)
+    words = f"Stabilisation chart of {file.path.name}: poles over model order and damping"
+    return picture_of(stabilisation_figure(chart, shown, model), caption, words, zoomed=zoomed)

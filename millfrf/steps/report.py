@@ -1,0 +1,71 @@
+"""Step ``report``: one self-contained HTML page of whatever files are given."""
+
+from pathlib import Path
+from typing import Annotated
+
+from millfrf.core.steps import Band, File, Reads, Writes, step
+from millfrf.core.terminal import say_written, warn
+from millfrf.reports.page import ReportOptions, write_report
+from millfrf.reports.results_page import FigureFiles
+
+from .given import FigureFormat, Figures
+
+
+@step
+def report(
+    *files: Annotated[File, Reads("FILES...")],
+    out: Annotated[File, Writes(suffixes=(".html", ".htm"), needed=True)],
+    title: str = "In-process FRF and modal fit",
+    band: Band | None = None,
+    reference: Annotated[File | None, Reads("MODEL.json")] = None,
+    geometry: Annotated[File | None, Reads()] = None,
+    pdf: Annotated[File | None, Writes(suffixes=(".pdf",))] = None,
+    figures: Figures = None,
+    figure_format: FigureFormat = "svg",
+) -> tuple[str, ...]:
+    """The modal-fitting report of a test: set-up, settings, modes, figures, lobes, versions.
+
+    Parameters
+    ----------
+    files
+        Recordings, FRFs, models, lobes, verdicts on cuts, cutting file.
+    out
+        HTML page to write.
+    title
+        Title of the report.
+    band : Hz
+        Lowest and highest frequency of the figures; without it chosen by the fit.
+    reference
+        Model of known dynamics to draw with the fit.
+    geometry
+        Places of the points, for mode shapes: .toml, .uff or .csv.
+    pdf
+        The same report as PDF.
+    figures
+        Folder for each figure of the report as a file.
+    figure_format
+        Format of these files.
+
+    Returns
+    -------
+    tuple of str
+        Doubts about files that do not belong together; they stand on the page too.
+
+    Raises
+    ------
+    InputError
+        A file that cannot be used; nothing is written.
+
+    Examples
+    --------
+    ::
+
+        $ millfrf report rec1.h5 frf.h5 housing.json lobes.csv --out report.html
+    """
+    drawn = None if figures is None else FigureFiles(Path(figures), figure_format)
+    doubts = write_report(out, files, ReportOptions(title, band, reference, drawn, geometry, pdf))
+    warn(doubts)
+    say_written(
+        [path for path in (out, pdf) if path is not None], "" if figures is None else f"the figures in {figures}"
+    )
+    return tuple(doubts)

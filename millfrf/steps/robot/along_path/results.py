@@ -1,0 +1,222 @@
+"""Table, picture and sentences of an optimised path."""
+
+import csv
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from millfrf.core import warning_lines
+from millfrf.figures import COLOURS, LINE_STYLES, SHADE, house_style, new_figure, panel_letter, save_figure
+from millfrf.robot_model import CutPath, Mechanism, typed_values
+
+from ..common import cell_text
+from .optimum import PathOptimum
+from .search import Wanted
+from .state import PathState
+
+
+def draw_path(
+    path: Path, cut: CutPath, before: PathState, after: PathState, max_depth: float, planned: float | None
+) -> None:
+    """Write :func:`path_figure` as ``.png``, ``.pdf`` or ``.svg``."""
+    save_figure(path_figure(cut, before, after, max_depth, planned), path)
+
+
+@house_style()
+def path_figure(cut: CutPath, before: PathState, after: PathState, max_depth: float, planned: float | None) -> Figure:
+    """Draw depth limits, deviation, margins and angles over the way along the path.
+
+    Parameters
+    ----------
+    cut
+        The path, for the way.
+    before, after
+        Postures without turning, and those chosen.
+    max_depth : m
+        Largest depth that was searched: limits at it lie beyond.
+    planned : m
+        Depth of the planned cut, or None.
+    """
+    way = 1e3 * cut.lengths
+    figure = new_figure(165.0)
+    panels = figure.subplots(4, 1, sharex=True, height_ratios=(1.6, 1.2, 1.0, 1.0))
+    _depths(panels[0], way, before, after, max_depth, planned)
+    for state, look, name in ((before, 0, "redundancy at zero"), (after, 1, "chosen")):
+        style = {"color": COLOURS[look], "linestyle": LINE_STYLES[1 - look]}
+        panels[1].plot(way, 1e3 * state.sizes, **style, label=name)
+        panels[2].plot(way, np.degrees(state.margin), **style)
+    panels[1].set_ylabel("Deviation (mm)")
+    panels[1].set_ylim(bottom=0)
+    panels[2].set_ylabel("Distance to joint\nlimit (degrees)")
+    panels[2].set_ylim(bottom=0)
+    panels[3].plot(way, np.degrees(after.tool), color=COLOURS[1], label="about the tool")
+    if np.ptp(after.table) > 0 or after.table.any():
+        panels[3].plot(way, np.degrees(after.table), color=COLOURS[2], linestyle=LINE_STYLES[2], label="rotary table")
+        panels[3].legend(loc="best")
+    panels[3].set_ylabel("Turn (degrees)")
+    panels[3].set_xlabel("Way along the path (mm)")
+    panels[3].set_xlim(way.min(), way.max())
+    for number, axes in enumerate(panels):
+        panel_letter(axes, number)
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=3)
+    return figure
+
+
+def _depths(
+    axes: Axes, way: np.ndarray, before: PathState, after: PathState, max_depth: float, planned: float | None
+) -> None:
+    limits = [1e3 * state.values.known_depth(max_depth) for state in (before, after)]
+    limits[0] = np.where(before.reached, limits[0], np.nan)
+    highest = float(max(np.nanmax(limit, initial=0.0) for limit in limits))
+    top = 1.15 * min(1e3 * max_depth, highest) or 1.0
+    limited = limits[1] < 1e3 * max_depth
+    axes.fill_between(way, limits[1], top, where=limited, color=SHADE, label="unstable in the chosen postures")
+    axes.plot(way, limits[0], color=COLOURS[0], linestyle=LINE_STYLES[1], label="limit, redundancy at zero")
+    axes.plot(way, limits[1], color=COLOURS[1], label="limit, chosen postures")
+    unsure = np.array([word != "verified" for word in after.values.status])
+    if unsure.any():
+        axes.plot(way[unsure], limits[1][unsure], "x", color=COLOURS[2], markersize=4, label="not verified")
+    if planned is not None:
+        axes.axhline(1e3 * planned, color=COLOURS[2], linestyle=LINE_STYLES[2], label=f"planned, {1e3 * planned:g} mm")
+    if not limited.all():
+        axes.axhline(1e3 * max_depth, color=COLOURS[3], linestyle=LINE_STYLES[3], label="searched up to here")
+    axes.set_ylabel("Depth of cut (mm)")
+    axes.set_ylim(0, top)
+
+
+PLACE = ("point", "x_m", "y_m", "z_m", "i", "j", "k")
+CUT = (
+    "depth_limit_m",
+    "status",
+    "bifurcation",
+    "chatter_frequency_hz",
+    "lowest_frequency_hz",
+    "deviation_along_m",
+    "deviation_across_m",
+    "deviation_axial_m",
+)
+POSTURE = ("limit_margin_deg", "smallest_singular_value", "jacobian_condition", "tool_turn_deg", "table_turn_deg")
+
+
+def columns(n_joints: int) -> tuple[str, ...]:
+    """Names of the columns: the chosen postures, then the same with ``before_`` for the path as it was given."""
+    joints = tuple(f"q{i + 1}" for i in range(n_joints))
+    return (*PLACE, *joints, *CUT, *POSTURE, *(f"before_{name}" for name in (*joints, *CUT, *POSTURE[:3])))
+
+
+def write_path_table(
+    path: str | os.PathLike[str],
+    mechanism: Mechanism,
+    before: PathState,
+    after: PathState,
+    max_depth: float,
+    warnings: Sequence[str],
+) -> None:
+    """Write the table as CSV; warnings stand above the headings.
+
+    ``i j k`` points from the tip to the spindle. Joint values are in degrees, prismatic ones in metres. A depth limit
+    above the largest depth searched is written as that depth with the status it has and the bifurcation ``none``; an
+    empty cell is a point that is not reached, or a limit that is not known.
+    """
+    n_joints = int(mechanism.active.sum())
+    with open(path, "w", newline="", encoding="utf-8") as stream:  # noqa: PTH123
+        stream.writelines(warning_lines(warnings))
+        writer = csv.writer(stream)
+        writer.writerow(columns(n_joints))
+        for k in range(len(after.q)):
+            place = [k + 1, *after.positions[k], *-after.attitudes[k][:, 2]]
+            now = [*_joints(mechanism, after, k), *_cut(after, k, max_depth), *_posture(after, k)]
+            then = [*_joints(mechanism, before, k), *_cut(before, k, max_depth), *_posture(before, k)[:3]]
+            writer.writerow([cell_text(value) for value in (*place, *now, *then)])
+
+
+def _joints(mechanism: Mechanism, state: PathState, k: int) -> list[float]:
+    return [float(value) for value in typed_values(mechanism, state.q[k][mechanism.active])]
+
+
+def _cut(state: PathState, k: int, max_depth: float) -> list[object]:
+    values = state.values
+    depth = float(np.minimum(values.depth[k], max_depth))
+    return [depth, values.status[k], values.kind[k], values.frequency[k], values.lowest[k], *state.deviation[k]]
+
+
+def _posture(state: PathState, k: int) -> list[float]:
+    angles = np.degrees([state.tool[k], state.table[k]])
+    return [float(np.degrees(state.margin[k])), float(state.smallest[k]), float(state.condition[k]), *angles]
+
+
+def summary(optimum: PathOptimum, wanted: Wanted, max_depth: float, planned: float | None) -> list[str]:
+    """Depth, deviation and motion before and after, one line each."""
+    lines = []
+    for name, state in (("redundancy at zero", optimum.before), ("chosen postures", optimum.after)):
+        lines.append(f"{name}: {_state(state, max_depth)}")
+    steps = np.degrees(np.abs(np.diff(optimum.after.q, axis=0)).max(initial=0.0))
+    margin = np.degrees(optimum.after.margin.min())
+    lines.append(
+        f"largest joint step {steps:.1f} deg; nearest joint limit {margin:.1f} deg away, "
+        f"smallest singular value {optimum.after.smallest.min():.3f}"
+    )
+    lines.append(f"{optimum.evaluated[1]} postures certified; {'; '.join(optimum.rounds)}")
+    if wanted.objective == "both":
+        lines += [
+            f"front: {1e3 * point.depth:.3g} mm deep with {1e3 * point.deviation:.3g} mm of deviation"
+            for point in optimum.front
+        ]
+        lines.append(
+            f"chosen on it: smallest {wanted.balance:g} x lost depth + {1 - wanted.balance:g} x deviation, both scaled"
+        )
+    if planned is not None:
+        proven = optimum.after.values.known_depth(max_depth)
+        stable = int((proven >= planned).sum())
+        lines.append(f"the planned {1e3 * planned:g} mm is below the limit at {stable} of {len(proven)} points")
+    return lines
+
+
+def _state(state: PathState, max_depth: float) -> str:
+    here = state.reached
+    if not here.any():
+        return "no point is reached"
+    depth = state.values.known_depth(max_depth)[here]
+    beyond = "at least " if depth.min() >= max_depth else ""
+    missed = f"; {int((~here).sum())} of {len(here)} points not reached" if not here.all() else ""
+    return (
+        f"depth limit {beyond}{1e3 * depth.min():.3g} mm at the worst point, {1e3 * depth.mean():.3g} mm on average; "
+        f"deviation up to {1e3 * np.nanmax(state.sizes):.3g} mm{missed}"
+    )
+
+
+def doubts(optimum: PathOptimum, path: CutPath) -> list[str]:
+    """Warnings about limits, modes that were left out, and plunging."""
+    lines = []
+    words = optimum.after.values.status
+    unsure = [k + 1 for k, word in enumerate(words) if word != "verified"]
+    if unsure:
+        lines.append(f"at {len(unsure)} of {len(words)} points the limit is not verified ({_few(unsure)}): see status")
+    plunged = [int(k) + 1 for k in np.flatnonzero(path.plunges)]
+    if plunged:
+        lines.append(
+            f"at points {_few(plunged)} the tool moves along its own axis: depth limits there are those of a cut that "
+            "feeds as at the nearest other point, not of plunging"
+        )
+    kept = optimum.kept
+    if np.isfinite(kept.highest_frequency) and kept.highest_frequency < kept.reference:
+        lines.append(
+            f"modes above {kept.highest_frequency:.0f} Hz are left as their static flexibility; with modes "
+            f"{_up_to(kept.reference)} the limits at {kept.checked} postures change by at most "
+            f"{100 * kept.change:.2g} %"
+        )
+    return lines
+
+
+def _few(points: Sequence[int]) -> str:
+    shown = ", ".join(str(point) for point in points[:5])
+    return shown if len(points) <= 5 else f"{shown} and {len(points) - 5} more"
+
+
+def _up_to(frequency: float) -> str:
+    return f"up to {frequency:.0f} Hz" if np.isfinite(frequency) else "of all frequencies"

@@ -1,0 +1,78 @@
+from .amplitude import AmplitudeDependence, amplitude_dependence
+from .calibration import TipCalibration, calibrate_to_tip
+from .indicators import (
+    ComplexModeIndicator,
+    MultivariateModeIndicator,
+    complex_mode_indicator,
+    multivariate_mode_indicator,
+)
+from .models.modal_model import ModalModel, ModeErrors
+from .models.model_file import read_modal_model, write_modal_model
+from .models.out_of_band import Residuals
+from .models.synthesis import (
+    ModePair,
+    Synthesis,
+    compare_modes,
+    derived_covariance,
+    frequency_and_damping_errors,
+    pack_parameters,
+    synthesis,
+    unpack_parameters,
+)
+from .pole_picking import (
+    CandidateGroup,
+    PolesFile,
+    candidate_groups,
+    fit_picked_poles,
+    read_picked_poles,
+    read_pole_groups,
+    write_pole_candidates,
+)
+from .polyreference import ModalFit, fit_polyreference
+from .shapes import ModeShapes, mode_reciprocity, mode_shapes
+from .stabilisation import StabilisationChart, chart_from_json, chart_to_json
+from .subspace import SubspaceFit, fit_subspace
+from .uff_reading import import_modes_uff, write_modes_uff
+
+__all__ = [
+    "AmplitudeDependence",
+    "CandidateGroup",
+    "ComplexModeIndicator",
+    "ModalFit",
+    "ModalModel",
+    "ModeErrors",
+    "ModePair",
+    "ModeShapes",
+    "MultivariateModeIndicator",
+    "PolesFile",
+    "Residuals",
+    "StabilisationChart",
+    "SubspaceFit",
+    "Synthesis",
+    "TipCalibration",
+    "amplitude_dependence",
+    "calibrate_to_tip",
+    "candidate_groups",
+    "chart_from_json",
+    "chart_to_json",
+    "compare_modes",
+    "complex_mode_indicator",
+    "derived_covariance",
+    "fit_picked_poles",
+    "fit_polyreference",
+    "fit_subspace",
+    "frequency_and_damping_errors",
+    "import_modes_uff",
+    "mode_reciprocity",
+    "mode_shapes",
+    "multivariate_mode_indicator",
+    "pack_parameters",
+    "read_modal_model",
+    "read_picked_poles",
+    "read_pole_groups",
+    "synthesis",
+    "unpack_parameters",
+    "write_modal_model",
+    "write_modes_uff",
+    "write_pole_candidates",
+]
